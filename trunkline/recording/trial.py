@@ -1,0 +1,167 @@
+"""A filtered trial: every tracked segment and tendon on one uniform clock, in the base frame.
+
+This is what the identification stages read. Frames and units: positions in metres in the base frame (origin at
+the arm's mount, arm along -z when straight), quaternions (w, x, y, z), time in seconds from the trial's first frame.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+EXPERIMENTS = ("static_tilt", "release", "curl")
+SPLITS = ("identify", "validate")
+
+
+@dataclass
+class Trial:
+    """One experiment of T frames, S segments and K tendons.
+
+    name: unique within the session.
+    experiment: one of `EXPERIMENTS`. split: one of `SPLITS`.
+    level: nominal level, degrees of tilt for static_tilt, mm of pull for curl, None where there is none.
+    gravity: (3,) m/s² in the base frame, measured from the base body.
+    time: (T,) s, uniform. A static tilt is averaged over time and has T = 1.
+    positions: (T, S, 3) m. quaternions: (T, S, 4) wxyz, hemisphere-continuous, or None where the log has none.
+    measured: (T, S) False where a sample was bridged over a gap too long to trust.
+    commands, tendon_positions: (T, K) m of pull from the straight arm's path length, on the same clock.
+    start: s, the detected release, or the beginning of the curl cycle; 0 for a static tilt.
+    """
+
+    name: str
+    experiment: str
+    split: str
+    level: float | None
+    gravity: np.ndarray
+    time: np.ndarray
+    segments: tuple[str, ...]
+    positions: np.ndarray
+    quaternions: np.ndarray | None
+    measured: np.ndarray
+    tendons: tuple[str, ...]
+    commands: np.ndarray
+    tendon_positions: np.ndarray
+    start: float
+
+
+def write_trials(folder: Path, trials: list[Trial]) -> None:
+    """Write trials.parquet (a row a trial), poses.parquet (a row a frame and segment) and commands.parquet
+    (a row a frame and tendon) into `folder`, in the order of `trials`."""
+    rows = [
+        {
+            "trial": trial.name,
+            "experiment": trial.experiment,
+            "split": trial.split,
+            "level": trial.level,
+            "gravity": list(map(float, trial.gravity)),
+            "start": float(trial.start),
+            "frames": len(trial.time),
+            "segments": list(trial.segments),
+            "tendons": list(trial.tendons),
+            "orientations": trial.quaternions is not None,
+        }
+        for trial in trials
+    ]
+    schema = pa.schema(
+        {
+            "trial": pa.string(),
+            "experiment": pa.string(),
+            "split": pa.string(),
+            "level": pa.float64(),
+            "gravity": pa.list_(pa.float64()),
+            "start": pa.float64(),
+            "frames": pa.int64(),
+            "segments": pa.list_(pa.string()),
+            "tendons": pa.list_(pa.string()),
+            "orientations": pa.bool_(),
+        }
+    )
+    pq.write_table(pa.Table.from_pylist(rows, schema), Path(folder) / "trials.parquet")
+    poses = [
+        pose_table(t.name, t.time, t.segments, t.positions, t.quaternions).append_column(
+            "measured", pa.array(t.measured.ravel())
+        )
+        for t in trials
+    ]
+    pq.write_table(pa.concat_tables(poses), Path(folder) / "poses.parquet")
+    commands = [
+        long_table(t.name, t.time, "tendon", t.tendons, {"command": t.commands, "position": t.tendon_positions})
+        for t in trials
+    ]
+    pq.write_table(pa.concat_tables(commands), Path(folder) / "commands.parquet")
+
+
+def read_trials(folder: Path) -> list[Trial]:
+    """The trials that `write_trials` wrote into `folder`, in the same order."""
+    rows = pq.read_table(Path(folder) / "trials.parquet").to_pylist()
+    poses = columns_of(pq.read_table(Path(folder) / "poses.parquet"))
+    commands = columns_of(pq.read_table(Path(folder) / "commands.parquet"))
+    trials, pose_row, command_row = [], 0, 0
+    for row in rows:
+        shape = (row["frames"], len(row["segments"]))
+        pose = {key: column[pose_row : pose_row + shape[0] * shape[1]] for key, column in poses.items()}
+        pose_row += shape[0] * shape[1]
+        command_shape = (row["frames"], len(row["tendons"]))
+        count = command_shape[0] * command_shape[1]
+        command = {key: column[command_row : command_row + count] for key, column in commands.items()}
+        command_row += count
+        trials.append(
+            Trial(
+                name=row["trial"],
+                experiment=row["experiment"],
+                split=row["split"],
+                level=row["level"],
+                gravity=np.array(row["gravity"]),
+                time=pose["time"].reshape(shape)[:, 0].copy(),
+                segments=tuple(row["segments"]),
+                positions=stack(pose, ("x", "y", "z"), shape),
+                quaternions=stack(pose, ("qw", "qx", "qy", "qz"), shape) if row["orientations"] else None,
+                measured=pose["measured"].reshape(shape),
+                tendons=tuple(row["tendons"]),
+                commands=command["command"].reshape(command_shape),
+                tendon_positions=command["position"].reshape(command_shape),
+                start=row["start"],
+            )
+        )
+    return trials
+
+
+def pose_table(
+    trial: str, time: np.ndarray, segments: tuple[str, ...], positions: np.ndarray, quaternions: np.ndarray | None
+) -> pa.Table:
+    """Rows (trial, time, segment, x, y, z, qw, qx, qy, qz), frame by frame; quaternions NaN where there are none."""
+    if quaternions is None:
+        quaternions = np.full((*positions.shape[:2], 4), np.nan)
+    columns = {axis: positions[..., i] for i, axis in enumerate("xyz")}
+    columns |= {f"q{axis}": quaternions[..., i] for i, axis in enumerate("wxyz")}
+    return long_table(trial, time, "segment", segments, columns)
+
+
+def long_table(
+    trial: str, time: np.ndarray, label: str, names: tuple[str, ...], columns: dict[str, np.ndarray]
+) -> pa.Table:
+    """(T, N) arrays as T·N rows with the columns trial, time, `label` and those of `columns`."""
+    frames, count = len(time), len(names)
+    keys = pa.DictionaryArray.from_arrays(np.zeros(frames * count, np.int32), pa.array([trial]))
+    labels = pa.DictionaryArray.from_arrays(
+        np.tile(np.arange(count, dtype=np.int32), frames), pa.array(list(names), pa.string())
+    )
+    data = {"trial": keys.cast(pa.string()), "time": np.repeat(time, count), label: labels.cast(pa.string())}
+    data |= {key: np.asarray(values, dtype=float).ravel() for key, values in columns.items()}
+    return pa.table(data)
+
+
+def columns_of(table: pa.Table) -> dict[str, np.ndarray]:
+    """The numeric columns of a table, as numpy arrays."""
+    return {
+        field.name: table[field.name].to_numpy()
+        for field in table.schema
+        if pa.types.is_floating(field.type) or pa.types.is_boolean(field.type)
+    }
+
+
+def stack(columns: dict[str, np.ndarray], names: tuple[str, ...], shape: tuple[int, int]) -> np.ndarray:
+    """Columns side by side: (*shape, len(names))."""
+    return np.stack([columns[name].reshape(shape) for name in names], axis=-1)
