@@ -1,0 +1,1 @@
+"""The arm: geometry and material in, MuJoCo model out."""

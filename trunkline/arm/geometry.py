@@ -1,0 +1,35 @@
+"""The shape of a tendon-driven chain of units, whatever curve it was cut from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass
+class ChainGeometry:
+    """A straight chain of units, base first, hanging along -z.
+
+    Attributes:
+        lengths: length of each unit along the arm, m. Shape (n,).
+        widths: outer diameter of each unit at its proximal end, m. Shape (n,).
+        joint_range: largest bend of each joint in each direction, rad. Shape (n,).
+        ratio: scale from a unit to the next, α; 1 for a constant diameter.
+    """
+
+    lengths: np.ndarray
+    widths: np.ndarray
+    joint_range: np.ndarray
+    ratio: float
+
+    @property
+    def units(self) -> int:
+        return len(self.lengths)
+
+    @property
+    def length(self) -> float:
+        return float(self.lengths.sum())
+
+    @property
+    def scaling(self) -> np.ndarray:
+        """α^(i-1) of every unit, the first being 1. Shape (n,)."""
+        return self.ratio ** np.arange(self.units)

@@ -1,0 +1,150 @@
+"""Geometry and unit properties to a MuJoCo model: a pseudo-rigid chain, two hinges a joint, pulling tendons.
+
+Names: bodies `base`, `unit_01`…; hinges `unit_01_x`, `unit_01_y`; sites `unit_01_center` (the tracked frame),
+`unit_01_tendon_1`…, `base_center`, `tip`; tendons `tendon_1`…; actuators `tendon_1_position`….
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from trunkline.arm.geometry import ChainGeometry
+from trunkline.arm.material import UnitProperties
+from trunkline.frames import STANDARD_GRAVITY
+
+TENDON_RGBA = (0.15, 0.15, 0.15, 1)
+UNIT_RGBA = (0.93, 0.55, 0.2, 1)
+
+
+@dataclass
+class Tendons:
+    """Tendons through one hole a unit, evenly spread around the arm, tendon 1 over +x.
+
+    Attributes:
+        count: number of tendons.
+        radius_ratio: distance of the holes from the axis over the unit's outer radius.
+        friction: friction loss of each tendon, N.
+        kp: position gain, N/m. kv: velocity gain, N s/m.
+        max_force: largest pull F, N; a tendon cannot push.
+        time_constant: of the first-order filter on the commanded length, s.
+    """
+
+    count: int
+    radius_ratio: float
+    friction: float
+    kp: float
+    kv: float
+    max_force: float
+    time_constant: float
+
+
+@dataclass
+class Solver:
+    """Numbers of the simulation that are not the arm's.
+
+    Attributes:
+        timestep: s.
+        armature: added to each hinge, kg m²; the units at the tip are too light for the step without it.
+        limit_solref, limit_solimp, friction_solref, friction_solimp: MuJoCo's constraint parameters of joint
+            limits and of tendon friction, fixed because they are part of what "friction" means.
+    """
+
+    timestep: float
+    armature: float
+    limit_solref: list[float]
+    limit_solimp: list[float]
+    friction_solref: list[float]
+    friction_solimp: list[float]
+
+
+def unit_name(index: int) -> str:
+    """Name of unit `index`, counted from 0 at the base: `unit_01` is the first."""
+    return f"unit_{index + 1:02d}"
+
+
+def build_spec(chain: ChainGeometry, properties: UnitProperties, tendons: Tendons, solver: Solver) -> mujoco.MjSpec:
+    """The arm hanging straight down from its mount, in SI units. Compile it with `.compile()`."""
+    spec = mujoco.MjSpec()
+    spec.modelname = "arm"
+    spec.compiler.degree = False
+    spec.compiler.autolimits = False
+    spec.option.timestep = solver.timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.gravity = [0, 0, -STANDARD_GRAVITY]
+    cables = [_add_cable(spec, index, tendons, solver) for index in range(tendons.count)]
+
+    body = spec.worldbody.add_body(name="base")
+    body.explicitinertial, body.mass, body.inertia = True, 1.0, [1e-3] * 3  # fixed: never felt
+    _add_geom(body, "base", chain.widths[0] / 2, 0.005, (0, 0, 0.005))
+    body.add_site(name="base_center")
+    _add_holes(body, "base", tendons.radius_ratio * chain.widths[0] / 2, 0.0, cables)
+    for index in range(chain.units):
+        body = _add_unit(body, index, chain, properties, solver)
+        center = -chain.lengths[index] / 2
+        _add_holes(body, unit_name(index), tendons.radius_ratio * chain.widths[index] / 2, center, cables)
+    body.add_site(name="tip", pos=[0, 0, -chain.lengths[-1]])
+    return spec
+
+
+def _add_unit(parent, index: int, chain: ChainGeometry, properties: UnitProperties, solver: Solver):
+    name, length = unit_name(index), chain.lengths[index]
+    body = parent.add_body(name=name, pos=[0, 0, -chain.lengths[index - 1] if index else 0.0])
+    body.explicitinertial = True
+    body.mass = properties.masses[index]
+    body.ipos = [0, 0, -length / 2]
+    body.inertia = [properties.transverse_inertia[index]] * 2 + [properties.axial_inertia[index]]
+    for axis, direction in (("x", (1, 0, 0)), ("y", (0, 1, 0))):
+        body.add_joint(
+            name=f"{name}_{axis}",
+            type=mujoco.mjtJoint.mjJNT_HINGE,
+            axis=direction,
+            limited=True,
+            range=[-chain.joint_range[index], chain.joint_range[index]],
+            stiffness=[properties.stiffness[index], 0, 0],
+            damping=[properties.damping[index], 0, 0],
+            armature=solver.armature,
+            solref_limit=solver.limit_solref,
+            solimp_limit=solver.limit_solimp,
+        )
+    rim_gap = chain.widths[index] / 2 * chain.joint_range[index]
+    _add_geom(body, name, chain.widths[index] / 2, (length - 0.5 * rim_gap) / 2, (0, 0, -length / 2))
+    body.add_site(name=f"{name}_center", pos=[0, 0, -length / 2])
+    return body
+
+
+def _add_geom(body, name: str, radius: float, half_height: float, position) -> None:
+    body.add_geom(
+        name=f"{name}_geom",
+        type=mujoco.mjtGeom.mjGEOM_CYLINDER,
+        size=[radius, half_height, 0],
+        pos=position,
+        contype=0,
+        conaffinity=0,
+        mass=0,
+        rgba=UNIT_RGBA,
+    )
+
+
+def _add_cable(spec: mujoco.MjSpec, index: int, tendons: Tendons, solver: Solver):
+    name = f"tendon_{index + 1}"
+    cable = spec.add_tendon(
+        name=name,
+        frictionloss=tendons.friction,
+        solref_friction=solver.friction_solref,
+        solimp_friction=solver.friction_solimp,
+        width=0.0008,
+        rgba=TENDON_RGBA,
+    )
+    actuator = spec.add_actuator(name=f"{name}_position", target=name, trntype=mujoco.mjtTrn.mjTRN_TENDON)
+    actuator.set_to_position(kp=tendons.kp, kv=tendons.kv, timeconst=tendons.time_constant)
+    actuator.forcelimited, actuator.forcerange = True, [-tendons.max_force, 0]
+    return cable
+
+
+def _add_holes(body, name: str, radius: float, height: float, cables: list) -> None:
+    for index, cable in enumerate(cables):
+        angle = 2 * np.pi * index / len(cables)
+        site = f"{name}_tendon_{index + 1}"
+        body.add_site(name=site, pos=[radius * np.cos(angle), radius * np.sin(angle), height], size=[0.0015] * 3)
+        cable.wrap_site(site)

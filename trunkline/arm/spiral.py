@@ -1,0 +1,52 @@
+"""The logarithmic spiral ρ = a e^{bθ} of SpiRobs (Wang et al. 2024), unrolled into a chain of similar units."""
+
+import numpy as np
+from scipy.optimize import brentq
+
+from trunkline.arm.geometry import ChainGeometry
+from trunkline.errors import InputError
+
+GROWTH_BRACKET = (1e-3, 10.0)  # b of any arm that one could print: 1e-3 is nearly a circle
+
+
+def _length(growth: float, base_width: float, tip_width: float) -> float:
+    """Length of the unrolled spiral, L(b) = √(1+b²)/b · (W-w)/2 · (e^{2πb}+1)/(e^{2πb}-1), m."""
+    coth = 1 / np.tanh(np.pi * growth)
+    return np.sqrt(1 + growth**2) / growth * (base_width - tip_width) / 2 * coth
+
+
+def growth_rate(length: float, base_width: float, tip_width: float) -> float:
+    """The spiral's b for an arm of this length and these widths (m).
+
+    Raises:
+        InputError: if no logarithmic spiral has these dimensions.
+    """
+    shortest, longest = (_length(b, base_width, tip_width) for b in GROWTH_BRACKET[::-1])
+    if not shortest < length < longest:
+        raise InputError(
+            f"arm.length: found {length} m, expected between {shortest:.4g} and {longest:.4g} m for widths {base_width} to {tip_width} m"
+        )
+    return brentq(lambda b: _length(b, base_width, tip_width) - length, *GROWTH_BRACKET, xtol=1e-14)
+
+
+def spiral_chain(length: float, base_width: float, tip_width: float, units: int) -> ChainGeometry:
+    """Cut the spiral into `units` similar units that close on each other when fully bent.
+
+    Δθ = ln(W/w)/(b n) is the angle that a unit takes of the spiral, and so the joint range; α = e^{-bΔθ}.
+
+    Args:
+        length, base_width, tip_width: L, W, w in m, W > w.
+    """
+    if not base_width > tip_width:
+        raise InputError(f"arm.tip_width: found {tip_width} m, expected less than arm.base_width, {base_width} m")
+    growth = growth_rate(length, base_width, tip_width)
+    unit_angle = np.log(base_width / tip_width) / (growth * units)
+    ratio = float(np.exp(-growth * unit_angle))
+    scaling = ratio ** np.arange(units)
+    first_length = length * (1 - ratio) / (1 - ratio**units)
+    return ChainGeometry(
+        lengths=first_length * scaling,
+        widths=base_width * scaling,
+        joint_range=np.full(units, unit_angle),
+        ratio=ratio,
+    )
