@@ -1,0 +1,76 @@
+"""What every stage does around its one library call: load, report, write whole or not at all."""
+
+import json
+import math
+import os
+import resource
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TypeVar
+
+from trunkline.config import load_config
+from trunkline.errors import InputError
+
+Config = TypeVar("Config")
+
+
+def run_stage(name: str, schema: type[Config], main: Callable[[Config], None]) -> None:
+    """Call ``main`` with the stage's configuration; a user's mistake ends in one line and exit code 1."""
+    started = time.monotonic()
+    try:
+        main(load_config(schema, name))
+    except InputError as error:
+        sys.stdout.flush()
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(1)
+    peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # Linux counts in KiB
+    print(f"{name}: done in {time.monotonic() - started:.1f} s, peak memory {peak_mib:.0f} MiB")
+
+
+@contextmanager
+def output_folder(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary folder beside ``path``; it replaces ``path`` on success and vanishes on failure."""
+    path = Path(path)
+    partial, old = path.with_name(f".{path.name}.partial"), path.with_name(f".{path.name}.old")
+    for leftover in (partial, old):
+        shutil.rmtree(leftover, ignore_errors=True)
+    partial.mkdir(parents=True)
+    try:
+        yield partial
+    except BaseException:
+        shutil.rmtree(partial, ignore_errors=True)
+        raise
+    if path.exists():
+        os.rename(path, old)
+    os.rename(partial, path)
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def write_json(path: str | Path, data: object) -> None:
+    """Write JSON that is the same for the same results: sorted keys, floats to 9 significant digits.
+
+    NumPy scalars and arrays become numbers and lists.
+
+    Raises:
+        ValueError: naming the key, if a number is not finite.
+    """
+    text = json.dumps(_plain(data, ""), indent=2, sort_keys=True, allow_nan=False)
+    Path(path).write_text(text + "\n", encoding="utf-8")
+
+
+def _plain(value: object, key: str) -> object:
+    if hasattr(value, "tolist"):  # NumPy scalars and arrays
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(k): _plain(v, f"{key}.{k}" if key else str(k)) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(v, f"{key}[{i}]") for i, v in enumerate(value)]
+    if isinstance(value, float):
+        if not math.isfinite(value):
+            raise ValueError(f"{key}: found {value}, expected a finite number")
+        return float(f"{value:.9g}")
+    return value
