@@ -2,8 +2,8 @@
 
 ``conf/<stage>/config.yaml`` and its groups hold structure, variants and untuned values; ``params.yaml``
 holds, per stage, the values people tune. A key is set in one place only: it is absent from conf, or ``???``,
-if it is tuned in params.yaml. A group (a subfolder of ``conf/<stage>`` in the defaults list of its config.yaml)
-is chosen in params.yaml by its name: ``arm: spiral``.
+if it is tuned in params.yaml. A group (a subfolder of ``conf/<stage>``, named in its config.yaml's defaults
+list) is chosen in params.yaml by its name: ``arm: spiral``.
 """
 
 import difflib
@@ -87,8 +87,8 @@ def _choices(folder: Path, section: dict[str, Any], stage: str) -> dict[str, str
             options, found = group_options(folder)[group], section.get(group, default)
             if found not in options:
                 state = "missing" if found == "???" else f"found {found!r}"
-                raise InputError(f"params.yaml: {stage}.{group}: {state}, expected one of {', '.join(options)}"
-                                 f"{_nearest(str(found), options)}")
+                expected = ", ".join(options) + _nearest(str(found), options)
+                raise InputError(f"params.yaml: {stage}.{group}: {state}, expected one of {expected}")
             chosen[group] = found
     return chosen
 
