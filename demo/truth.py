@@ -1,0 +1,31 @@
+"""What the plant did in one trial, exact and in the world frame: the instruments see it, identification never does."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass
+class Truth:
+    """One trial of T instants, S segments, K tendons and Tc commands. The world is z-up, in metres.
+
+    time: (T,) s, uniform at 480 Hz or more, from 0.
+    base_position (3,), base_quaternion (4,) wxyz: pose of the base in the world, constant in a trial.
+    positions (T, S, 3), quaternions (T, S, 4) wxyz: the segments in the world.
+    command_time (Tc,) s, commands (Tc, K): m of pull, as sent. tendon_positions (T, K): m of pull, as wound.
+    """
+
+    name: str
+    experiment: str
+    level: float | None
+    split: str
+    time: np.ndarray
+    base_position: np.ndarray
+    base_quaternion: np.ndarray
+    segments: tuple[str, ...]
+    positions: np.ndarray
+    quaternions: np.ndarray
+    tendons: tuple[str, ...]
+    command_time: np.ndarray
+    commands: np.ndarray
+    tendon_positions: np.ndarray
