@@ -1,7 +1,7 @@
 """ROS 2 messages (CDR) decoded in batches: messages of one layout become one message of columns.
 
-Where a number lies in a CDR message depends only on the lengths and strings before it, so messages that agree in
-those bytes share a layout. It is worked out once, and the numbers of all of them are then read by slicing.
+Where a number lies in a CDR message depends only on the lengths and strings before it, so messages that
+agree in those bytes share a layout. It is worked out once, and their numbers are then read by slicing.
 """
 
 import re
@@ -16,7 +16,9 @@ NUMBERS = {
     "bool": "?",
     "byte": "u1",
     "char": "u1",
-    **{f"{kind}{bits}": f"{kind[0]}{bits // 8}" for kind in ("int", "uint", "float") for bits in (8, 16, 32, 64)},
+    **{f"{kind}{bits}": f"{kind[0]}{bits // 8}" for kind in ("int", "uint") for bits in (8, 16, 32, 64)},
+    "float32": "f4",
+    "float64": "f8",
 }
 HEADER = 4  # bytes of encapsulation; alignment counts from behind them
 
@@ -25,7 +27,7 @@ Definitions = dict[str, list["MessageField"]]
 
 @dataclass(frozen=True)
 class MessageField:
-    """kind: a number type, "string" or a message type. count: None for one, 0 for a sequence, n for an array."""
+    """kind: a number type, "string" or a message type. count: None for one, 0 a sequence, n an array."""
 
     name: str
     kind: str
@@ -50,11 +52,11 @@ class Layout:
 
 
 def parse_definition(schema: str, text: str) -> Definitions:
-    """Message type ("package/Name") to fields, from a `ros2msg` schema: definitions separated by lines of "="."""
+    """Message type ("package/Name") to fields, from a `ros2msg` schema: definitions between lines of "="."""
     definitions: Definitions = {}
     name = short_name(schema)
-    definitions["builtin_interfaces/Time"] = [MessageField("sec", "int32", None), MessageField("nanosec", "uint32", None)]
-    definitions["builtin_interfaces/Duration"] = definitions["builtin_interfaces/Time"]
+    time = [MessageField("sec", "int32", None), MessageField("nanosec", "uint32", None)]
+    definitions["builtin_interfaces/Time"] = definitions["builtin_interfaces/Duration"] = time
     for part in re.split(r"^={3,}\s*$", text, flags=re.MULTILINE):
         fields = []
         for line in part.splitlines():
@@ -68,7 +70,7 @@ def parse_definition(schema: str, text: str) -> Definitions:
 
 
 def short_name(schema: str) -> str:
-    """"package/msg/Name" as "package/Name"."""
+    """ "package/msg/Name" as "package/Name"."""
     return schema.replace("/msg/", "/")
 
 
@@ -83,11 +85,14 @@ def _parse_field(line: str, package: str) -> MessageField:
     return MessageField(name, short_name(kind), size)
 
 
-def decode(messages: list[bytes], schema: str, definitions: Definitions) -> Iterator[tuple[np.ndarray, SimpleNamespace]]:
+def decode(
+    messages: list[bytes], schema: str, definitions: Definitions
+) -> Iterator[tuple[np.ndarray, SimpleNamespace]]:
     """Messages of one schema, a batch a layout: (indices (n,), message).
 
-    Such a message has the fields of its schema. A number is an array (n,), a sequence of numbers (n, count); strings
-    and the lengths of sequences are the same within the batch. A message that does not fit its schema is left out.
+    Such a message has the fields of its schema. A number is an array (n,), a sequence of numbers (n, count);
+    strings and the lengths of sequences are the same within the batch. A message that does not fit its schema
+    is left out.
     """
     sizes = np.array([len(message) for message in messages])
     for size in np.unique(sizes):

@@ -1,7 +1,7 @@
-"""The one registry of message schemas: schema name to the function that reads poses or joints from a message.
+"""The one registry of message schemas: schema name to the function that reads poses or joints from it.
 
-A function here takes one decoded message, or a batch of one layout (see `cdr.decode`): numbers have shape () or
-(n,), so write along the last axes. Adding a schema is one such function under `@poses(...)` or `@joints(...)`.
+A function here takes one decoded message, or a batch of one layout (see `cdr.decode`): numbers have shape ()
+or (n,), so write along the last axes. Adding a schema is one such function under `@poses` or `@joints`.
 """
 
 from collections.abc import Callable
@@ -11,8 +11,10 @@ import numpy as np
 
 
 class Poses(NamedTuple):
-    """time: (...) ns. names: S. positions: (..., S, 3) in the log's unit. orientations: (..., S, 4) wxyz or None.
-    frame: (...) frame number, or None where the schema has none."""
+    """time: (...) ns. names: S. positions: (..., S, 3) in the log's unit.
+
+    orientations: (..., S, 4) wxyz, or None. frame: (...) frame number, or None where the schema has none.
+    """
 
     time: np.ndarray
     names: list[str]

@@ -1,7 +1,7 @@
 """A filtered trial: every tracked segment and tendon on one uniform clock, in the base frame.
 
-This is what the identification stages read. Frames and units: positions in metres in the base frame (origin at
-the arm's mount, arm along -z when straight), quaternions (w, x, y, z), time in seconds from the trial's first frame.
+This is what the identification stages read. Positions in metres in the base frame (origin at the arm's mount,
+arm along -z when straight), quaternions (w, x, y, z), time in seconds from the trial's first frame.
 """
 
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Trial:
     level: nominal level, degrees of tilt for static_tilt, mm of pull for curl, None where there is none.
     gravity: (3,) m/s² in the base frame, measured from the base body.
     time: (T,) s, uniform. A static tilt is averaged over time and has T = 1.
-    positions: (T, S, 3) m. quaternions: (T, S, 4) wxyz, hemisphere-continuous, or None where the log has none.
+    positions: (T, S, 3) m. quaternions: (T, S, 4) wxyz, hemisphere-continuous; None where the log has none.
     measured: (T, S) False where a sample was bridged over a gap too long to trust.
     commands, tendon_positions: (T, K) m of pull from the straight arm's path length, on the same clock.
     start: s, the detected release, or the beginning of the curl cycle; 0 for a static tilt.
@@ -87,7 +87,9 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
     ]
     pq.write_table(pa.concat_tables(poses), Path(folder) / "poses.parquet")
     commands = [
-        long_table(t.name, t.time, "tendon", t.tendons, {"command": t.commands, "position": t.tendon_positions})
+        long_table(
+            t.name, t.time, "tendon", t.tendons, {"command": t.commands, "position": t.tendon_positions}
+        )
         for t in trials
     ]
     pq.write_table(pa.concat_tables(commands), Path(folder) / "commands.parquet")
@@ -129,9 +131,13 @@ def read_trials(folder: Path) -> list[Trial]:
 
 
 def pose_table(
-    trial: str, time: np.ndarray, segments: tuple[str, ...], positions: np.ndarray, quaternions: np.ndarray | None
+    trial: str,
+    time: np.ndarray,
+    segments: tuple[str, ...],
+    positions: np.ndarray,
+    quaternions: np.ndarray | None,
 ) -> pa.Table:
-    """Rows (trial, time, segment, x, y, z, qw, qx, qy, qz), frame by frame; quaternions NaN where there are none."""
+    """Rows (trial, time, segment, x, y, z, qw, qx, qy, qz), frame by frame; quaternions NaN if None."""
     if quaternions is None:
         quaternions = np.full((*positions.shape[:2], 4), np.nan)
     columns = {axis: positions[..., i] for i, axis in enumerate("xyz")}

@@ -1,0 +1,220 @@
+"""An MCAP log as raw messages per topic; of a damaged one, what can be trusted.
+
+The file is read once from front to back, and every checksum that it carries is checked: each chunk's, and the
+data section's. An intact log gives what `mcap.reader.make_reader` gives. From a damaged one come the intact
+chunks and the readable beginning of a last chunk that was cut off; what is lost is counted and said.
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+
+import lz4.frame
+import numpy as np
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, DataEnd, Schema, Statistics
+
+from trunkline.errors import InputError
+
+MAGIC = b"\x89MCAP0\r\n"
+RECORD_HEADER = struct.Struct("<BQ")
+MESSAGE_HEADER = struct.Struct("<HIQQ")
+CHUNK_HEADER = struct.Struct("<QQQI")
+
+
+@dataclass
+class Topic:
+    """Messages of one topic in log-time order. log_times: (N,) ns."""
+
+    name: str
+    schema: str
+    definition: str
+    encoding: str
+    messages: list[bytes]
+    log_times: np.ndarray
+
+
+@dataclass
+class Log:
+    """topics by name; `damage`: one sentence for each thing that was lost, empty for an intact log."""
+
+    path: Path
+    topics: dict[str, Topic]
+    damage: list[str] = field(default_factory=list)
+
+
+@dataclass
+class _Contents:
+    """What was read so far: messages are (channel id, log time in ns, data)."""
+
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    messages: list[tuple[int, int, bytes]] = field(default_factory=list)
+    expected: int | None = None  # messages, by the log's own statistics
+
+
+def read_log(path: Path) -> Log:
+    """Read a log, salvaging what can be trusted.
+
+    Raises:
+        InputError: the file is missing, is no MCAP file, or nothing in it can be trusted.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror.lower()}, expected an MCAP log") from error
+    if not data.startswith(MAGIC):
+        raise InputError(f"{path}: found no MCAP file ({len(data)} bytes), expected an MCAP log")
+    contents, damage = _Contents(), []
+    end = _read_all(data, contents, damage, path)
+    if end is not None:
+        damage.append(f"cut off at byte {len(data)}" + _read_cut_chunk(data[end:], contents))
+    if damage and contents.expected is not None:
+        damage.append(f"{contents.expected - len(contents.messages)} of {contents.expected} messages lost")
+    return Log(Path(path), _by_topic(contents), damage)
+
+
+def _read_all(data: bytes, contents: _Contents, damage: list[str], path: Path) -> int | None:
+    """Read record by record up to the footer; without one, the byte behind the last whole record."""
+    end, unchunked = len(MAGIC), False
+    for position, opcode, body in _records(data, len(MAGIC)):
+        end = position + RECORD_HEADER.size + len(body)
+        try:
+            if opcode == Opcode.FOOTER:
+                return None
+            if opcode == Opcode.CHUNK:
+                _read_records(_chunk_data(body), contents)
+            elif opcode == Opcode.DATA_END:
+                crc = DataEnd.read(_stream(body)).data_section_crc
+                if crc and crc != zlib.crc32(data[:position]) and not damage:
+                    damage.append("the data section's checksum is wrong though every chunk's is right")
+                    if unchunked:
+                        raise InputError(
+                            f"{path}: wrong checksum over messages outside chunks, none can be trusted"
+                        )
+            elif opcode == Opcode.STATISTICS:
+                contents.expected = Statistics.read(_stream(body)).message_count
+            else:
+                unchunked |= opcode == Opcode.MESSAGE
+                _read_record(opcode, body, contents)
+        except InputError:
+            raise
+        except Exception as error:  # a damaged record fails in any way; it is dropped, and that is said
+            name = f"{_record_name(opcode)} of {len(body)} bytes{_chunk_span(opcode, body)}"
+            damage.append(f"{name} dropped: {_reason(error)}")
+    return end
+
+
+def _records(data: bytes, position: int) -> Iterator[tuple[int, int, bytes]]:
+    """(offset, opcode, body) of each record that is wholly there."""
+    while position + RECORD_HEADER.size <= len(data):
+        opcode, length = RECORD_HEADER.unpack_from(data, position)
+        start = position + RECORD_HEADER.size
+        if start + length > len(data):
+            return
+        yield position, opcode, data[start : start + length]
+        position = start + length
+
+
+def _read_records(data: bytes, contents: _Contents) -> None:
+    for _, opcode, body in _records(data, 0):
+        _read_record(opcode, body, contents)
+
+
+def _read_record(opcode: int, body: bytes, contents: _Contents) -> None:
+    if opcode == Opcode.MESSAGE:
+        channel, _, log_time, _ = MESSAGE_HEADER.unpack_from(body)
+        contents.messages.append((channel, log_time, body[MESSAGE_HEADER.size :]))
+    elif opcode == Opcode.SCHEMA:
+        schema = Schema.read(_stream(body))
+        contents.schemas[schema.id] = schema
+    elif opcode == Opcode.CHANNEL:
+        channel = Channel.read(_stream(body))
+        contents.channels[channel.id] = channel
+
+
+def _chunk_data(body: bytes) -> bytes:
+    """The records in a chunk, checked. Raises ValueError where they are not what was written."""
+    chunk = Chunk.read(_stream(body))
+    if chunk.compression == "zstd":
+        data = zstandard.ZstdDecompressor().decompressobj().decompress(chunk.data)
+    elif chunk.compression == "lz4":
+        data = lz4.frame.decompress(chunk.data)
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise ValueError(f"unknown compression {chunk.compression!r}")
+    if len(data) != chunk.uncompressed_size:
+        raise ValueError(f"{len(data)} bytes, expected {chunk.uncompressed_size}")
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError("wrong checksum")
+    return data
+
+
+def _read_cut_chunk(rest: bytes, contents: _Contents) -> str:
+    """Read the beginning of a last chunk that was cut off; a remark on what came of it, if there is such a chunk."""
+    if rest[:1] != bytes([Opcode.CHUNK]):
+        return ""
+    before, body = len(contents.messages), rest[RECORD_HEADER.size :]
+    try:
+        (name_length,) = struct.unpack_from("<I", body, CHUNK_HEADER.size)
+        start = CHUNK_HEADER.size + 4 + name_length
+        compression, data = body[start - name_length : start], body[start + 8 :]
+        if compression == b"zstd":
+            data = zstandard.ZstdDecompressor().decompressobj().decompress(data)
+        elif compression == b"lz4":
+            data = lz4.frame.LZ4FrameDecompressor().decompress(data)
+        _read_records(data, contents)
+    except Exception:  # what a cut does to a compressed stream is not specified
+        pass
+    return f", {len(contents.messages) - before} messages of the chunk that was cut are readable"
+
+
+def _by_topic(contents: _Contents) -> dict[str, Topic]:
+    by_channel: dict[int, list[tuple[int, bytes]]] = {}
+    for channel, log_time, data in contents.messages:
+        by_channel.setdefault(channel, []).append((log_time, data))
+    topics = {}
+    for channel_id, rows in by_channel.items():
+        channel = contents.channels.get(channel_id)
+        if channel is None:
+            continue
+        schema = contents.schemas.get(channel.schema_id)
+        times = np.array([time for time, _ in rows], np.int64)
+        order = np.argsort(times, kind="stable")
+        topics[channel.topic] = Topic(
+            channel.topic,
+            schema.name if schema else "",
+            schema.data.decode(errors="replace") if schema else "",
+            channel.message_encoding,
+            [rows[i][1] for i in order],
+            times[order],
+        )
+    return topics
+
+
+def _stream(body: bytes) -> ReadDataStream:
+    return ReadDataStream(BytesIO(body))
+
+
+def _record_name(opcode: int) -> str:
+    try:
+        return Opcode(opcode).name.lower().replace("_", " ")
+    except ValueError:
+        return f"record of kind {opcode}"
+
+
+def _chunk_span(opcode: int, body: bytes) -> str:
+    if opcode != Opcode.CHUNK or len(body) < CHUNK_HEADER.size:
+        return ""
+    start, end, _, _ = CHUNK_HEADER.unpack_from(body)
+    return f" ({abs(end - start) / 1e9:.2f} s)"
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
