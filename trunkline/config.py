@@ -8,6 +8,7 @@ list) is chosen in params.yaml by its name: ``arm: spiral``.
 
 import difflib
 import json
+import runpy
 from pathlib import Path
 from typing import Any, TypeVar, dataclass_transform
 
@@ -47,50 +48,99 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
     Raises:
         InputError: one line that names file and key, what was found and what was expected.
     """
-    root = Path(root)
-    section = read_section(root / "params.yaml", stage)
-    settings = compose_settings(root / "conf" / stage, section, stage)
-    return _validate(schema, settings, stage, section)
-
-
-def read_section(path: Path, stage: str) -> dict[str, Any]:
-    """The section ``stage`` of the params file at ``path``, as plain values (``1e-6`` is a number here)."""
-    params = _load(path)
-    if stage not in params:
-        raise InputError(f"{path.name}: no section {stage!r}{_nearest(stage, [str(k) for k in params])}")
-    section = {} if params[stage] is None else OmegaConf.to_container(params[stage], resolve=False)
-    if not isinstance(section, dict):
-        raise InputError(f"{path.name}: {stage}: found {section!r}, expected a section of `key: value` lines")
-    return section
-
-
-def compose_settings(folder: Path, section: dict[str, Any], stage: str) -> dict[str, Any]:
-    """Hydra's composition of ``folder`` with the groups that ``section`` names, then its values."""
-    if not (folder / "config.yaml").is_file():
-        raise InputError(f"{folder / 'config.yaml'}: no such file, expected the settings of stage {stage!r}")
-    chosen = _choices(folder, section, stage)
+    params, folder = Path(root) / "params.yaml", Path(root) / "conf" / stage
+    section = _read_section(params, stage)
+    composed = compose_settings(folder, section, f"{params}: {stage}")
+    # JSON mode: strict about numbers and strings, yet lists may fill tuples and mappings dataclasses.
+    adapter = TypeAdapter(schema)
     try:
-        with initialize_config_dir(config_dir=str(folder.resolve()), job_name=stage, version_base="1.3"):
+        return adapter.validate_json(json.dumps(composed), strict=True)
+    except ValidationError as error:
+        problems = sorted(error.errors(), key=lambda problem: problem["type"] != UNKNOWN_KEY)
+        first, more = problems[0], len(problems) - 1
+        tuned = first["type"] == "missing" or (first["loc"] and first["loc"][0] in section)
+        where = f"{params if tuned else folder}: {'.'.join(str(part) for part in (stage, *first['loc']))}"
+        text = f"{where}: {_describe(first, adapter)}" + (f" (and {more} more)" if more else "")
+        raise InputError(text) from error
+
+
+def check_settings(root: str | Path = ".") -> list[str]:
+    """Validate the settings of every stage under ``root / "stages"``, and return their names.
+
+    Raises:
+        InputError: for the first bad value in any section, or a section that belongs to no stage.
+    """
+    files = sorted((Path(root) / "stages").glob("*.py"))
+    stages = [file.stem for file in files]
+    for section in _load(Path(root) / "params.yaml") if files else ():
+        if section not in stages:
+            raise InputError(f"{Path(root) / 'params.yaml'}: {section}: no such stage{_nearest(section, stages)}")
+    for file in files:
+        load_config(runpy.run_path(str(file), run_name=file.stem)["Config"], file.stem, root)
+    return stages
+
+
+def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[str, Any]:
+    """Hydra's composition of ``folder`` with the groups that ``section`` names, then its values.
+
+    ``where`` begins the message of an InputError about ``section``.
+    """
+    if not (folder / "config.yaml").is_file():
+        raise InputError(f"{folder / 'config.yaml'}: no such file, expected the stage's settings")
+    chosen = _choices(folder, section, where)
+    try:
+        with initialize_config_dir(config_dir=str(folder.resolve()), job_name=folder.name, version_base="1.3"):
             config = compose("config", overrides=[f"{group}={option}" for group, option in chosen.items()])
         OmegaConf.set_struct(config, False)
         values = {key: value for key, value in section.items() if key not in chosen}
         return _without_missing(OmegaConf.to_container(OmegaConf.merge(config, values), resolve=True))
     except (HydraException, OmegaConfBaseException, YAMLError) as error:
-        raise InputError(f"conf/{stage}: {error}") from error
+        raise InputError(f"{folder}: {error}") from error
 
 
-def _choices(folder: Path, section: dict[str, Any], stage: str) -> dict[str, str]:
+def group_options(folder: Path) -> dict[str, list[str]]:
+    """Config groups in ``folder``: name of the group to the names of its options."""
+    return {
+        group.name: sorted(option.stem for option in group.glob("*.yaml"))
+        for group in sorted(folder.iterdir())
+        if group.is_dir()
+    }
+
+
+def _read_section(path: Path, stage: str) -> dict[str, Any]:
+    params = _load(path)
+    if stage not in params:
+        raise InputError(f"{path}: no section {stage!r}{_nearest(stage, [str(key) for key in params])}")
+    section = {} if params[stage] is None else OmegaConf.to_container(params, resolve=False)[stage]
+    if not isinstance(section, dict):
+        raise InputError(f"{path}: {stage}: found {section!r}, expected a section of `key: value` lines")
+    return section
+
+
+def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str]:
     """The option that ``section`` names for each group of the defaults list in ``folder / config.yaml``."""
     chosen = {}
     for entry in _load(folder / "config.yaml").get("defaults", []):
-        for group, default in OmegaConf.to_container(entry).items() if isinstance(entry, DictConfig) else ():
-            options, found = group_options(folder)[group], section.get(group, default)
+        for group, default in entry.items() if isinstance(entry, DictConfig) else ():
+            options, found = group_options(folder).get(group, []), section.get(group, default)
             if found not in options:
-                state = "missing" if found == "???" else f"found {found!r}"
+                state = "missing" if found in ("???", None) else f"found {found!r}"
                 expected = ", ".join(options) + _nearest(str(found), options)
-                raise InputError(f"params.yaml: {stage}.{group}: {state}, expected one of {expected}")
+                raise InputError(f"{where}.{group}: {state}, expected one of {expected}")
             chosen[group] = found
     return chosen
+
+
+def _load(path: Path) -> DictConfig:
+    try:
+        config = OmegaConf.load(path)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (YAMLError, OmegaConfBaseException, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path}: not readable as YAML: {error}") from error
+    if not isinstance(config, DictConfig):
+        raise InputError(f"{path}: found a list, expected `key: value` lines")
+    return config
 
 
 def _without_missing(value: Any) -> Any:
@@ -100,56 +150,15 @@ def _without_missing(value: Any) -> Any:
     return value
 
 
-def group_options(folder: Path) -> dict[str, list[str]]:
-    """Config groups in ``folder``: name of the group to the names of its options."""
-    return {
-        group.name: sorted(option.stem for option in group.glob("*.yaml"))
-        for group in sorted(folder.iterdir()) if group.is_dir() and any(group.glob("*.yaml"))
-    }
-
-
-def _load(path: Path) -> DictConfig:
-    try:
-        config = OmegaConf.load(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (YAMLError, OmegaConfBaseException, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path.name}: not readable as YAML: {error}") from error
-    if not isinstance(config, DictConfig):
-        raise InputError(f"{path.name}: found a list, expected `key: value` lines")
-    return config
-
-
-def _validate(schema: type[Schema], settings: dict[str, Any], stage: str, section: dict[str, Any]) -> Schema:
-    # JSON mode: strict about numbers and strings, yet lists may fill tuples and mappings dataclasses.
-    adapter = TypeAdapter(schema)
-    try:
-        return adapter.validate_json(json.dumps(settings), strict=True)
-    except ValidationError as error:
-        problems = sorted(error.errors(), key=lambda e: e["type"] != UNKNOWN_KEY)
-        valid = _field_names(adapter.json_schema())
-        lines = [_describe(p, stage, section, valid) for p in problems]
-        raise InputError(lines[0] + (f" (and {len(lines) - 1} more)" if len(lines) > 1 else "")) from error
-
-
-def _describe(problem: Any, stage: str, section: dict[str, Any], valid: list[str]) -> str:
-    location = ".".join(str(part) for part in (stage, *problem["loc"]))
-    top = problem["loc"][0] if problem["loc"] else None
-    where = "params.yaml" if top in section or problem["type"] == "missing" else f"conf/{stage}"
+def _describe(problem: Any, adapter: TypeAdapter) -> str:
     if problem["type"] == UNKNOWN_KEY:
-        name = str(problem["loc"][-1])
-        return f"{where}: {location}: unknown key{_nearest(name, valid)}"
+        schema = adapter.json_schema()
+        blocks = [schema, *schema.get("$defs", {}).values()]
+        return "unknown key" + _nearest(str(problem["loc"][-1]), [n for b in blocks for n in b.get("properties", {})])
     if problem["type"] == "missing":
-        return f"{where}: {location}: missing, expected a value"
+        return "missing, expected a value"
     expected = problem["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
-    if problem["type"] == "value_error":
-        return f"{where}: {location}: {expected}"
-    return f"{where}: {location}: found {problem['input']!r}, expected {expected}"
-
-
-def _field_names(json_schema: dict[str, Any]) -> list[str]:
-    blocks = [json_schema, *json_schema.get("$defs", {}).values()]
-    return sorted({name for block in blocks for name in block.get("properties", {})})
+    return expected if problem["type"] == "value_error" else f"found {problem['input']!r}, expected {expected}"
 
 
 def _nearest(found: str, valid: list[str]) -> str:

@@ -12,17 +12,24 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from trunkline.config import load_config
+from trunkline.config import check_settings, load_config
 from trunkline.errors import InputError
 
 Config = TypeVar("Config")
 
 
-def run_stage(name: str, schema: type[Config], main: Callable[[Config], None]) -> None:
-    """Call ``main`` with the stage's configuration; a user's mistake ends in one line and exit code 1."""
+def run_stage(
+    name: str, schema: type[Config], main: Callable[[Config], None], root: str | Path = "."
+) -> None:
+    """Call ``main`` with the stage's settings; a user's mistake ends in one line and exit code 1.
+
+    ``root`` holds the stage's ``params.yaml`` and ``conf/``. The settings of all stages are checked first, so
+    that a typo in the last section does not come to light after an hour's work.
+    """
     started = time.monotonic()
     try:
-        main(load_config(schema, name))
+        check_settings()
+        main(load_config(schema, name, root))
     except InputError as error:
         sys.stdout.flush()
         print(f"error: {error}", file=sys.stderr)
