@@ -1,0 +1,138 @@
+"""A session: a folder of MCAP logs and the session.yaml that says what they are."""
+
+import difflib
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from omegaconf import OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+from yaml import YAMLError
+
+from trunkline.errors import InputError
+
+Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+
+
+class Entry(BaseModel):
+    """A block of session.yaml; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class Frame(Entry):
+    """The motion-capture frame: which way is up in it, and the unit of its positions."""
+
+    up: Vector
+    unit: Literal["m", "mm"] = "m"
+
+    @model_validator(mode="after")
+    def _direction(self):
+        if np.linalg.norm(self.up) < 1e-6:
+            raise ValueError("up: found the zero vector, expected the direction against gravity")
+        return self
+
+    def up_direction(self) -> np.ndarray:
+        """(3,), a unit vector."""
+        return np.array(self.up) / np.linalg.norm(self.up)
+
+
+class FixedBase(Entry):
+    """Where no body marks the mount: its pose in the motion-capture frame. By default its z axis is up."""
+
+    position: Vector
+    quaternion: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
+
+
+class Topics(Entry):
+    """Topic names; what is left out is found by its schema."""
+
+    poses: str | None = None
+    commands: str | None = None
+    tendon_positions: str | None = None
+
+
+class TrialEntry(Entry):
+    """window: s from the log's first pose. level: degrees of tilt, or mm of pull."""
+
+    name: str = ""
+    file: str
+    window: tuple[FiniteFloat, FiniteFloat] | None = None
+    experiment: Literal["static_tilt", "release", "curl"]
+    level: FiniteFloat | None = None
+    split: Literal["identify", "validate"]
+
+    @model_validator(mode="after")
+    def _complete(self):
+        if self.window is not None and not self.window[0] < self.window[1]:
+            raise ValueError(f"window: found {list(self.window)}, expected [start, end] with start < end")
+        if self.level is None and self.experiment != "release":
+            raise ValueError(f"level: missing, expected the nominal level of a {self.experiment}")
+        self.name = self.name or Path(self.file).stem
+        return self
+
+
+class Session(Entry):
+    """base: the body that marks the mount, or its fixed pose. segments: name in the log to name in the model.
+
+    clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate that
+    the stamps show.
+    """
+
+    frame: Frame
+    base: str | FixedBase
+    segments: dict[str, str] | None = Field(default=None, min_length=1)
+    topics: Topics = Topics()
+    clock: Literal["stamp", "log", "frame"] = "stamp"
+    trials: list[TrialEntry] = Field(min_length=1)
+
+
+def read_session(folder: Path) -> Session:
+    """Read and check `folder`/session.yaml.
+
+    Raises:
+        InputError: naming the file and key, what was found and what was expected.
+    """
+    folder = Path(folder)
+    path = folder / "session.yaml"
+    logs = sorted(log.name for log in folder.glob("*.mcap")) if folder.is_dir() else None
+    if logs is None:
+        raise InputError(f"{folder}: no such folder, expected a session of MCAP logs and a session.yaml")
+    if not path.is_file():
+        raise InputError(f"{folder}: found {len(logs)} logs and no session.yaml, expected both")
+    try:
+        content = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
+    except (YAMLError, OmegaConfBaseException, UnicodeDecodeError, OSError) as error:
+        raise InputError(f"{path}: not readable as YAML: {' '.join(str(error).split())}") from error
+    try:
+        session = Session.model_validate(content)
+    except ValidationError as error:
+        raise InputError(f"{path}: {_describe(error)}") from error
+    for index, trial in enumerate(session.trials):
+        if trial.file not in logs:
+            close = difflib.get_close_matches(trial.file, logs, n=1) or logs[:1]
+            expected = f"one of the folder's {len(logs)} logs" + (f", such as {close[0]}" if close else "")
+            raise InputError(f"{path}: trials.{index}.file: found {trial.file!r}, expected {expected}")
+    names = [trial.name for trial in session.trials]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
+    return session
+
+
+def _describe(error: ValidationError) -> str:
+    """The first problem in one line, and how many more there are."""
+    problems = error.errors()
+    # a union reports each of its branches; the deepest says what is wrong within the branch that was meant
+    problem = max(problems, key=lambda p: (p["type"] == "extra_forbidden", -problems.index(p)))
+    key = ".".join(str(part) for part in problem["loc"]) or "the file"
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    if problem["type"] == "missing":
+        return f"{key}: missing, expected a value{more}"
+    if problem["type"] == "extra_forbidden":
+        return f"{key}: unknown key{more}"
+    if problem["type"] == "value_error":
+        return f"{key}: {problem['msg'].removeprefix('Value error, ')}{more}"
+    expected = problem["msg"].removeprefix("Input should be ")
+    return f"{key}: found {problem['input']!r}, expected {expected}{more}"
