@@ -70,11 +70,11 @@ def check_settings(root: str | Path = ".") -> list[str]:
     Raises:
         InputError: for the first bad value in any section, or a section that belongs to no stage.
     """
-    files = sorted((Path(root) / "stages").glob("*.py"))
+    params, files = Path(root) / "params.yaml", sorted((Path(root) / "stages").glob("*.py"))
     stages = [file.stem for file in files]
-    for section in _load(Path(root) / "params.yaml") if files else ():
+    for section in _load(params):
         if section not in stages:
-            raise InputError(f"{Path(root) / 'params.yaml'}: {section}: no such stage{_nearest(section, stages)}")
+            raise InputError(f"{params}: {section}: no such stage{_nearest(section, stages)}")
     for file in files:
         load_config(runpy.run_path(str(file), run_name=file.stem)["Config"], file.stem, root)
     return stages
@@ -89,7 +89,7 @@ def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[
         raise InputError(f"{folder / 'config.yaml'}: no such file, expected the stage's settings")
     chosen = _choices(folder, section, where)
     try:
-        with initialize_config_dir(config_dir=str(folder.resolve()), job_name=folder.name, version_base="1.3"):
+        with initialize_config_dir(version_base="1.3", config_dir=str(folder.resolve())):
             config = compose("config", overrides=[f"{group}={option}" for group, option in chosen.items()])
         OmegaConf.set_struct(config, False)
         values = {key: value for key, value in section.items() if key not in chosen}
@@ -120,8 +120,9 @@ def _read_section(path: Path, stage: str) -> dict[str, Any]:
 def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str]:
     """The option that ``section`` names for each group of the defaults list in ``folder / config.yaml``."""
     chosen = {}
-    for entry in _load(folder / "config.yaml").get("defaults", []):
-        for group, default in entry.items() if isinstance(entry, DictConfig) else ():
+    defaults = OmegaConf.to_container(_load(folder / "config.yaml")).get("defaults", [])
+    for entry in defaults:
+        for group, default in entry.items() if isinstance(entry, dict) else ():
             options, found = group_options(folder).get(group, []), section.get(group, default)
             if found not in options:
                 state = "missing" if found in ("???", None) else f"found {found!r}"
@@ -153,12 +154,15 @@ def _without_missing(value: Any) -> Any:
 def _describe(problem: Any, adapter: TypeAdapter) -> str:
     if problem["type"] == UNKNOWN_KEY:
         schema = adapter.json_schema()
-        blocks = [schema, *schema.get("$defs", {}).values()]
-        return "unknown key" + _nearest(str(problem["loc"][-1]), [n for b in blocks for n in b.get("properties", {})])
+        classes = [schema, *schema.get("$defs", {}).values()]
+        valid = [name for cls in classes for name in cls.get("properties", {})]
+        return "unknown key" + _nearest(str(problem["loc"][-1]), valid)
     if problem["type"] == "missing":
         return "missing, expected a value"
     expected = problem["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
-    return expected if problem["type"] == "value_error" else f"found {problem['input']!r}, expected {expected}"
+    if problem["type"] == "value_error":  # a rule between fields, in the schema's own words
+        return expected
+    return f"found {problem['input']!r}, expected {expected}"
 
 
 def _nearest(found: str, valid: list[str]) -> str:

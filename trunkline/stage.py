@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
-from trunkline.config import check_settings, load_config
+from trunkline.config import load_config
 from trunkline.errors import InputError
 
 Config = TypeVar("Config")
@@ -23,12 +23,10 @@ def run_stage(
 ) -> None:
     """Call ``main`` with the stage's settings; a user's mistake ends in one line and exit code 1.
 
-    ``root`` holds the stage's ``params.yaml`` and ``conf/``. The settings of all stages are checked first, so
-    that a typo in the last section does not come to light after an hour's work.
+    ``root`` holds the stage's ``params.yaml`` and ``conf/``.
     """
     started = time.monotonic()
     try:
-        check_settings()
         main(load_config(schema, name, root))
     except InputError as error:
         sys.stdout.flush()
