@@ -1,0 +1,67 @@
+"""Exact sampling of the Panda's poses whose end effector points straight down.
+
+Draw q1 to q4 freely. With u = R04^T (0, 0, -1), the direction in which the end effector shall point seen from
+frame 4, the wrist has two solutions (s = +1 and -1):
+
+    q6 = acos(-u_y)  or  2 pi - acos(-u_y),    q5 = atan2(-s u_z, s u_x),
+
+and q7 is free. Every sample points down exactly; only the limits of q5 and q6 (and collisions) reject any.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import qmc
+
+from trunkline.reachability.collision import CHUNK, clearance
+from trunkline.reachability.panda import Q_MAX, Q_MIN, joint_frames, within_limits
+
+# Borders of the workspace lie where the arm is stretched in its plane or a joint stands at its limit: a
+# share of the draws goes there, or thin tips of the workspace would stay empty.
+BORDER_SHARE = 0.25
+BORDER_VALUES = ((1, Q_MIN[1]), (1, Q_MAX[1]), (2, 0.0), (3, Q_MIN[3]), (3, Q_MAX[3]))  # joint index, rad
+
+
+def sample_downward(count: int, seed: int, mount_offset: float = 0.0, avoid_collisions: bool = True) -> NDArray:
+    """At least ``count`` joint vectors (M, 7), in rad, within limits, with the end effector straight down.
+
+    Args:
+        count: how many to find.
+        seed: of the scrambled Sobol sequence; the same seed gives the same samples.
+        mount_offset: from the flange to the mount, in m; matters for collisions only.
+        avoid_collisions: leave out poses in which the arm touches itself.
+    """
+    sequence = qmc.Sobol(6, seed=seed)
+    found, total = [], 0
+    while total < count:
+        poses = _solve(sequence.random(CHUNK))
+        if avoid_collisions:
+            poses = poses[clearance(poses, mount_offset) > 0.0]
+        found.append(poses)
+        total += len(poses)
+    return np.concatenate(found)
+
+
+def _solve(draws: NDArray) -> NDArray:
+    """Poses from uniform ``draws`` (N, 6): four joints, q7, and which border to sit on, if any."""
+    free = [0, 1, 2, 3, 6]
+    q = np.empty((len(draws), 7))
+    q[:, free] = Q_MIN[free] + draws[:, :5] * (Q_MAX - Q_MIN)[free]
+    border = (draws[:, 5] / BORDER_SHARE * len(BORDER_VALUES)).astype(int)
+    for index, (joint, value) in enumerate(BORDER_VALUES):
+        q[border == index, joint] = value
+    q5, q6 = wrist_downward(q[:, :4])
+    branches = []
+    for s in (0, 1):
+        branch = q.copy()
+        branch[:, 4], branch[:, 5] = q5[s], q6[s]
+        branches.append(branch)
+    poses = np.concatenate(branches)
+    return poses[within_limits(poses)]
+
+
+def wrist_downward(q: NDArray) -> tuple[NDArray, NDArray]:
+    """Both solutions (q5, q6), each (2, N) in rad, that point the end effector down, given q1..q4 (N, 4)."""
+    frame = joint_frames(q)[-1]
+    ux, uy, uz = -frame.x[2], -frame.y[2], -frame.z[2]
+    q6 = np.arccos(np.clip(-uy, -1.0, 1.0))
+    return np.stack([np.arctan2(-uz, ux), np.arctan2(uz, -ux)]), np.stack([q6, 2 * np.pi - q6])

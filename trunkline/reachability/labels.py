@@ -1,0 +1,81 @@
+"""Independent labels for the rigid map: can inverse kinematics bring the mount to a point, straight down?
+
+The map comes from forward kinematics of exact samples; the labels come from a damped least-squares solver
+that knows nothing of them. Points in doubt (the map says yes, the solver no) are tried with more starts before
+they count as errors of the map.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunkline.reachability.inverse import solve
+from trunkline.reachability.panda import DH_A, DH_D, FLANGE
+
+
+class Agreement(NamedTuple):
+    """How a map agrees with labels: shares of all points, of reachable ones, of unreachable ones, and counts."""
+
+    accuracy: float
+    tpr: float
+    fpr: float
+    reachable: int
+    unreachable: int
+
+
+def draw_points(lower: NDArray, upper: NDArray, count: int, seed: int) -> NDArray:
+    """``count`` points (count, 3), uniform in a box, in m."""
+    return np.random.default_rng(seed).uniform(lower, upper, size=(count, 3))
+
+
+def beyond_links(points: NDArray, mount_offset: float) -> NDArray:
+    """Points (N,) that no joint angles can reach, by the triangle inequality alone.
+
+    Pointing down, the wrist is ``FLANGE + mount_offset`` above the mount and a_7 beside it, and no further from the
+    shoulder than both link lengths.
+    """
+    upper_arm, forearm = np.hypot(DH_D[2], DH_A[3]), np.hypot(DH_D[4], DH_A[4])
+    beside = np.maximum(np.hypot(points[:, 0], points[:, 1]) - DH_A[6], 0.0)
+    above = points[:, 2] + FLANGE + mount_offset - DH_D[0]
+    return np.hypot(beside, above) > upper_arm + forearm
+
+
+def label(
+    points: NDArray,
+    claimed: NDArray,
+    *,
+    seed: int,
+    starts: int,
+    starts_in_doubt: int,
+    mount_offset: float,
+    avoid_collisions: bool,
+) -> NDArray:
+    """Whether the solver reaches each of ``points`` (N, 3) with the end effector straight down. Shape (N,).
+
+    Args:
+        points: in m.
+        claimed: what the map says, (N,); the solver spends ``starts_in_doubt`` more starts where it alone says yes.
+        seed: of the random starts.
+        starts: most starts for every point.
+        starts_in_doubt: most further starts for points in doubt.
+        mount_offset: from the flange to the mount, in m.
+        avoid_collisions: whether solutions in which the arm touches itself count.
+    """
+    reached = np.zeros(len(points), dtype=bool)
+    todo = np.flatnonzero(~beyond_links(points, mount_offset))
+    for round_seed, round_starts in ((seed, starts), (seed + 1, starts_in_doubt)):
+        result = solve(points[todo], seed=round_seed, starts=round_starts, mount_offset=mount_offset,
+                       avoid_collisions=avoid_collisions)
+        reached[todo] = result.success
+        todo = np.flatnonzero(claimed & ~reached)
+    return reached
+
+
+def agreement(claimed: NDArray, reachable: NDArray) -> Agreement:
+    """Accuracy, true and false positive rates of ``claimed`` (N,) against labels ``reachable`` (N,)."""
+    yes, no = int(reachable.sum()), int((~reachable).sum())
+    if not yes or not no:
+        raise ValueError(f"labels: found {yes} reachable and {no} unreachable points, expected some of both")
+    return Agreement(float((claimed == reachable).mean()), float(claimed[reachable].mean()),
+                     float(claimed[~reachable].mean()), yes, no)

@@ -1,0 +1,92 @@
+"""Closed surfaces of signed distance fields: marching cubes, then a simplifier that keeps them manifold."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import manifold3d
+import numpy as np
+import trimesh
+from numpy.typing import NDArray
+from skimage.measure import marching_cubes
+
+from trunkline.reachability.grid import Lattice
+
+# Lattice points at exactly the level make marching cubes emit degenerate triangles and open edges.
+LEVEL = 1e-3  # voxels outside zero
+FIRST_TOLERANCE = 0.1  # voxels
+TOLERANCE_GROWTH = 1.3
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A closed triangle mesh: ``vertices`` (V, 3) in m, ``faces`` (F, 3), outward by the right-hand rule.
+
+    ``tolerance`` (m) bounds how far simplification moved the surface.
+    """
+
+    vertices: NDArray
+    faces: NDArray
+    tolerance: float
+
+    @property
+    def mesh(self) -> trimesh.Trimesh:
+        return trimesh.Trimesh(self.vertices, self.faces, process=False)
+
+    def is_closed(self) -> bool:
+        """Watertight, consistently wound, outward: every edge has two faces and the volume is positive."""
+        mesh = self.mesh
+        return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
+
+
+def surface(field: NDArray, lattice: Lattice, most_triangles: int) -> Surface:
+    """Closed mesh of the zero level of ``field`` on a 3-D ``lattice``, with at most ``most_triangles``.
+
+    Raises:
+        ValueError: if nothing is inside, or no tolerance brings the mesh below ``most_triangles``.
+    """
+    if not (field < 0).any():
+        raise ValueError("nothing to mesh: no lattice point is inside the surface")
+    # The border counts as outside, so that a set that leaves the lattice is closed there.
+    padded = np.pad(np.asarray(field, dtype=np.float32), 1, constant_values=lattice.spacing)
+    level = LEVEL * lattice.spacing
+    vertices, faces, _, _ = marching_cubes(padded, level, spacing=(lattice.spacing,) * 3)
+    vertices = vertices + (lattice.origin - lattice.spacing)
+    solid = manifold3d.Manifold(manifold3d.Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
+    tolerance = FIRST_TOLERANCE * lattice.spacing
+    simple = solid.simplify(tolerance)
+    while simple.num_tri() > most_triangles and tolerance < 10 * lattice.spacing:
+        tolerance *= TOLERANCE_GROWTH
+        simple = solid.simplify(tolerance)
+    if not 0 < simple.num_tri() <= most_triangles:
+        raise ValueError(f"mesh: {simple.num_tri()} triangles at a tolerance of {tolerance:.3g} m, "
+                         f"expected 1 to {most_triangles}; use a larger voxel")
+    mesh = simple.to_mesh()
+    return Surface(np.asarray(mesh.vert_properties[:, :3], float), np.asarray(mesh.tri_verts, int), tolerance)
+
+
+def contains(shape: Surface, points: NDArray) -> NDArray:
+    """Whether each of ``points`` (N, 3) lies inside, by counting how often the line up from it leaves the mesh."""
+    corners = shape.vertices[shape.faces]
+    a, b, c = (corners[:, i, :2] for i in range(3))
+    area = _cross(b - a, c - a)
+    corners, a, b, c, area = (part[area != 0] for part in (corners, a, b, c, area))  # upright faces are never crossed
+    inside = np.empty(len(points), dtype=bool)
+    for start in range(0, len(points), 256):
+        here = points[start:start + 256, None, :]
+        weights = np.stack([_cross(c - b, here[..., :2] - b), _cross(a - c, here[..., :2] - c),
+                            _cross(b - a, here[..., :2] - a)], axis=-1) / area[:, None]
+        height = (weights * corners[:, :, 2]).sum(axis=-1)
+        crossed = (weights >= 0).all(axis=-1) & (height > here[..., 2])
+        inside[start:start + 256] = crossed.sum(axis=1) % 2 == 1
+    return inside
+
+
+def _cross(u: NDArray, v: NDArray) -> NDArray:
+    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+
+
+def write_obj(path: str | Path, shape: Surface, title: str) -> None:
+    """Write a Wavefront OBJ in m, to a micrometre; ``title`` goes into its first line."""
+    lines = [f"# {title}; m", *(f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in shape.vertices),
+             *(f"f {a} {b} {c}" for a, b, c in shape.faces + 1)]
+    Path(path).write_text("\n".join(lines) + "\n", encoding="ascii")

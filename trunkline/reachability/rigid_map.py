@@ -1,0 +1,111 @@
+"""The rigid arm's map: where its mount can be with the end effector straight down.
+
+Joint 1 turns everything about the base's z axis, so the set is known from a profile in (r, z) and, in each
+cell of it, the azimuths phi0 that the arm reaches with q1 = 0. These come in pairs +-phi0 (limits and links
+are mirror images), and q1 covers +-Q1 around each. With the largest and the smallest |phi0| of a cell, a and b,
+the azimuth psi = |phi| is reached exactly if b - Q1 <= psi <= Q1 + a. A million poses on a plane leave few gaps.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from trunkline.reachability.grid import Lattice, close_gaps, drop_specks, redistance
+from trunkline.reachability.panda import Q_MAX, forward
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The reachable set in cylinder coordinates, on a 2-D lattice of (r, z).
+
+    ``distance`` (R, Z) is the signed distance in m in the plane; ``widest`` and ``narrowest`` (R, Z) are the
+    largest and smallest azimuth |phi0| in rad reached there with q1 = 0.
+    """
+
+    lattice: Lattice
+    distance: NDArray
+    widest: NDArray
+    narrowest: NDArray
+
+    def field(self, points: NDArray) -> NDArray:
+        """Negative inside the reachable set; near its surface a distance in m. ``points`` (N, 3), result (N,)."""
+        r = np.hypot(points[:, 0], points[:, 1])
+        azimuth = np.abs(np.arctan2(points[:, 1], points[:, 0]))
+        plane = np.column_stack([r, points[:, 2]])
+        too_far_round = azimuth - Q_MAX[0] - self.lattice.sample(self.widest, plane)
+        too_near_front = self.lattice.sample(self.narrowest, plane) - Q_MAX[0] - azimuth
+        return np.maximum(self.lattice.sample(self.distance, plane), r * np.maximum(too_far_round, too_near_front))
+
+
+def profile(q: NDArray, mount_offset: float, spacing: float, closing: float, smallest: int) -> Profile:
+    """Profile of the set that downward poses ``q`` (N, 7) sample.
+
+    Args:
+        q: from ``sample_downward``, in rad.
+        mount_offset: from the flange to the mount, in m.
+        spacing: of the (r, z) lattice, in m.
+        closing: radius in m of the gaps between samples that are filled.
+        smallest: islands and holes of fewer cells than this vanish.
+    """
+    radius, height, azimuth = _cylinder(q, mount_offset)
+    plane = np.column_stack([radius, height])
+    # Cells of r < 0 mirror those of r > 0, so that the axis is no border.
+    right = Lattice.around([0.0, height.min()], [radius.max(), height.max()], spacing, closing + 3 * spacing)
+    first = round(-right.origin[0] / spacing)
+    cells = right.occupancy(plane)[first:]
+    cells = np.concatenate([cells[:0:-1], cells])
+    cells = drop_specks(close_gaps(cells, closing / spacing), smallest)
+    # A cell counts as soon as the set touches it: its border lies half a cell too far out on average.
+    distance = _cell_distance(cells, spacing)[len(cells) // 2:] + 0.5 * spacing
+    lattice = Lattice(np.array([0.0, right.origin[1]]), spacing, distance.shape)
+    window = 2 * int(np.ceil(closing / spacing)) + 1
+    widest = _per_cell(np.maximum, lattice, plane, azimuth, -np.inf, window)
+    narrowest = _per_cell(np.minimum, lattice, plane, azimuth, np.inf, window)
+    return Profile(lattice, distance, widest, narrowest)
+
+
+def rigid_field(shape: Profile, spacing: float, smoothing: float) -> tuple[NDArray, Lattice]:
+    """Signed distance field (float64) of the set on a 3-D lattice.
+
+    Args:
+        shape: from ``profile``.
+        spacing: of the lattice, in m.
+        smoothing: standard deviation of a Gaussian over the field, in lattice steps.
+    """
+    inside = shape.distance < 0
+    r, z = shape.lattice.axes()
+    reach, low, high = r[inside.any(axis=1)][-1], z[inside.any(axis=0)][0], z[inside.any(axis=0)][-1]
+    lattice = Lattice.around([-reach, -reach, low], [reach, reach, high], spacing, 4 * spacing)
+    points = np.stack(np.meshgrid(*lattice.axes(), indexing="ij"), axis=-1).reshape(-1, 3)
+    field = redistance(shape.field(points).reshape(lattice.shape), spacing)
+    return ndimage.gaussian_filter(field, smoothing) if smoothing else field, lattice
+
+
+def _cylinder(q: NDArray, mount_offset: float) -> tuple[NDArray, NDArray, NDArray]:
+    """Radius (m), height (m) and |phi0| (rad), each (N,), of the mount."""
+    chunks = []
+    for start in range(0, len(q), 1 << 15):
+        part = q[start:start + (1 << 15)]
+        position, _ = forward(part, mount_offset)
+        azimuth = np.arctan2(position[:, 1], position[:, 0]) - part[:, 0]
+        azimuth = np.abs((azimuth + np.pi) % (2 * np.pi) - np.pi)
+        chunks.append(np.column_stack([np.hypot(position[:, 0], position[:, 1]), position[:, 2], azimuth]))
+    return tuple(np.concatenate(chunks).T)
+
+
+def _cell_distance(cells: NDArray, spacing: float) -> NDArray:
+    outside = ndimage.distance_transform_edt(~cells)
+    inside = ndimage.distance_transform_edt(cells)
+    return spacing * np.where(cells, 0.5 - inside, outside - 0.5)
+
+
+def _per_cell(choose, lattice: Lattice, plane: NDArray, values: NDArray, empty: float, window: int) -> NDArray:
+    """``choose`` (np.maximum or np.minimum) of ``values`` within ``window`` cells, nearest where there are none."""
+    result = np.full(lattice.shape, empty)
+    choose.at(result, tuple(lattice.nearest(plane).T), values)
+    around = ndimage.maximum_filter if choose is np.maximum else ndimage.minimum_filter
+    result = around(result, size=window)
+    nearest = ndimage.distance_transform_edt(np.isinf(result), return_distances=False, return_indices=True)
+    return result[tuple(nearest)]
