@@ -1,0 +1,102 @@
+"""A small made-up session: a flexible pendulum of four segments, tilted, released and curled, in a few seconds."""
+
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from demo.instruments import InstrumentSettings, Measurement, measure
+from demo.recorder import write_log, write_session
+from demo.truth import Truth
+
+SEGMENTS = ("unit_02", "unit_04", "unit_06", "unit_08")
+TENDONS = ("tendon_1", "tendon_2", "tendon_3")
+RELEASE, CURL_BEGIN = 0.4, 0.3  # s
+RATE = 480.0  # Hz
+
+
+def bent_truth(
+    name: str,
+    experiment: str,
+    level: float | None,
+    split: str,
+    tilt_deg: float,
+    bend: np.ndarray,
+    pulls: np.ndarray,
+) -> Truth:
+    """An arm of 0.4 m whose every part bends by `bend` (T,) rad in all, as a circle in the base's x-z plane."""
+    time = np.arange(len(bend)) / RATE
+    along = np.linspace(0.1, 0.4, len(SEGMENTS))  # m from the mount
+    angle = bend[:, None] * along / 0.4
+    curvature = np.where(np.abs(bend) < 1e-6, 1e-6, bend)[:, None] / 0.4
+    local = np.stack([(1 - np.cos(angle)) / curvature, 0 * angle, -np.sin(angle) / curvature], axis=-1)
+    local = np.where(
+        np.abs(bend[:, None, None]) < 1e-6, np.stack([0 * along, 0 * along, -along], axis=-1), local
+    )
+    # gravity in the base frame is g (sin tilt, 0, -cos tilt), and (0, 0, -g) in the world
+    base = Rotation.from_euler("z", 40, degrees=True) * Rotation.from_euler("y", tilt_deg, degrees=True)
+    turns = base * Rotation.from_rotvec(np.stack([0 * angle, -angle, 0 * angle], axis=-1).reshape(-1, 3))
+    position = np.array([0.2, -0.1, 1.5])
+    return Truth(
+        name,
+        experiment,
+        level,
+        split,
+        time,
+        position,
+        base.as_quat(scalar_first=True),
+        SEGMENTS,
+        base.apply(local.reshape(-1, 3)).reshape(local.shape) + position,
+        turns.as_quat(scalar_first=True).reshape(*angle.shape, 4),
+        TENDONS if pulls.any() else (),
+        time[::5],
+        pulls[::5] if pulls.any() else np.empty((len(time[::5]), 0)),
+        pulls if pulls.any() else np.empty((len(time), 0)),
+    )
+
+
+def static_truth(tilt_deg: float, split: str = "identify") -> Truth:
+    """At rest for 1 s, sagging by a third of the tilt."""
+    bend = np.full(int(1.0 * RATE), np.deg2rad(tilt_deg) / 3)
+    return bent_truth(
+        f"tilt_{tilt_deg:02.0f}", "static_tilt", tilt_deg, split, tilt_deg, bend, np.zeros((len(bend), 3))
+    )
+
+
+def release_truth(split: str = "identify") -> Truth:
+    """Held bent by 1.5 rad until `RELEASE`, then ringing down at 1.5 Hz."""
+    time = np.arange(int(2.5 * RATE)) / RATE
+    since = np.clip(time - RELEASE, 0, None)
+    omega, decay = 2 * np.pi * 1.5, 1.2
+    bend = 1.5 * np.exp(-decay * since) * (np.cos(omega * since) + decay / omega * np.sin(omega * since))
+    return bent_truth("release_a", "release", None, split, 0.0, bend, np.zeros((len(bend), 3)))
+
+
+def curl_truth(level_mm: float = 40.0, split: str = "validate") -> Truth:
+    """Tendon 1 pulled by `level_mm` from `CURL_BEGIN` and let out again; the bend follows the pull at once."""
+    time = np.arange(int(2.5 * RATE)) / RATE
+    phase = np.clip((time - CURL_BEGIN) / 1.8, 0, 1)
+    pull = 1e-3 * level_mm * 0.5 * (1 - np.cos(2 * np.pi * phase))
+    pulls = np.stack([pull, -pull / 2, -pull / 2], axis=1)
+    return bent_truth(f"curl_{level_mm:.0f}", "curl", level_mm, split, 0.0, pull / 0.03, pulls)
+
+
+def all_truths() -> list[Truth]:
+    """Two tilts, a release and a curl."""
+    return [static_truth(0.0), static_truth(60.0, "validate"), release_truth(), curl_truth()]
+
+
+def record(
+    folder: Path, truths: list[Truth], settings: InstrumentSettings, seed: int = 0
+) -> list[Measurement]:
+    """Measure and log `truths` into `folder`, which becomes a session."""
+    folder.mkdir(parents=True, exist_ok=True)
+    seeds = np.random.SeedSequence(seed).spawn(len(truths))
+    measurements = [
+        measure(truth, settings, np.random.default_rng(child), index * settings.pause_s)
+        for index, (truth, child) in enumerate(zip(truths, seeds, strict=True))
+    ]
+    for measurement in measurements:
+        write_log(folder / f"{measurement.name}.mcap", measurement)
+    write_session(folder, measurements, settings)
+    return measurements
