@@ -1,0 +1,75 @@
+"""``python -m trunkline.pipeline.lock``: does dvc.lock belong to this code, params.yaml and metrics?
+
+Works in a fresh clone, without data or cache. DVC compares commands, parameters and every file that is there;
+files that only the cache holds are compared through the lock: what a stage read must be what another wrote.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+from dvc.repo import Repo
+
+
+def mismatches(root: Path) -> list[str]:
+    """One line per way in which the lock files disagree with the working tree or with themselves."""
+    with Repo(str(root)) as repo:
+        return [*_unlocked(repo), *_changed(repo), *_inconsistent(repo)]
+
+
+def _unlocked(repo: Repo) -> list[str]:
+    """Stages that never ran, or that gained a dependency or an output since."""
+    return [
+        f"{stage.addressing}: {entry} is not in the lock file"
+        for stage in repo.index.stages
+        for entry in (*stage.deps, *stage.outs)
+        if not entry.hash_info
+    ]
+
+
+def _changed(repo: Repo) -> list[str]:
+    """What ``dvc status`` reports, but for files that a clone without the cache cannot have."""
+    command = ["git", "ls-files", "-z"]
+    listed = subprocess.run(command, cwd=repo.root_dir, capture_output=True, text=True, check=True).stdout
+    expected = {Path(file) for file in listed.split("\0") if file}
+    expected |= {folder for file in expected for folder in file.parents}
+    expected |= {_path(out) for out in repo.index.outs if not out.use_cache}
+    found = []
+    for stage in repo.index.stages:
+        for change in stage.status().get(stage.addressing, []):
+            if isinstance(change, str):  # "changed command"
+                found.append(f"{stage.addressing}: {change}")
+                continue
+            found += [
+                f"{stage.addressing}: {kind}: {name}: {state}"
+                for kind, states in change.items()
+                for name, state in states.items()
+                if state != "deleted" or Path(name) in expected
+            ]
+    return found
+
+
+def _inconsistent(repo: Repo) -> list[str]:
+    written = {_path(out): out for out in repo.index.outs}
+    return [
+        f"{stage.addressing}: read another {dep} than {out.stage.addressing} wrote"
+        for stage in repo.index.stages
+        for dep in stage.deps
+        if (out := written.get(_path(dep))) and dep.hash_info and dep.hash_info != out.hash_info
+    ]
+
+
+def _path(entry) -> Path:
+    return Path(entry.fs_path).relative_to(entry.repo.root_dir)
+
+
+def main(root: Path = Path(".")) -> int:
+    problems = mismatches(root)
+    for problem in problems:
+        print(f"lock: FAIL {problem}")
+    print(f"lock: {len(problems)} problems")
+    return 1 if problems else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
