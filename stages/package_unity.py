@@ -1,0 +1,127 @@
+"""Pack the twin for Unity: calibrated MJCF, IK network, reachability maps and a manifest, in one tarball."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pandas as pd
+from pydantic import Field, PositiveFloat
+
+from trunkline.bundle.package import read_tarball, write_tarball
+from trunkline.bundle.plots import roundtrip_figure
+from trunkline.bundle.roundtrip import curl, deviation, simulate
+from trunkline.bundle.twin import MANIFEST, MODEL, Label, Sources, Trajectory, assemble, compare
+from trunkline.config import settings
+from trunkline.errors import InputError
+from trunkline.plots import save_figure
+from trunkline.stage import output_folder, run_stage, write_json
+
+ARTIFACTS = Path("artifacts")
+MEASURED = ["ingest", "filter", "build_mjcf", "identify_stiffness", "identify_damping", "identify_control"]
+MEASURED += ["fk_dataset", "train_ik", "reachability"]
+
+
+@settings
+class Roundtrip:
+    duration: PositiveFloat
+    pull: PositiveFloat
+    tilts_deg: list[float] = Field(min_length=1)
+    joint_speed: PositiveFloat
+
+
+@settings
+class Config:
+    name: str = Field(pattern=r"^[a-z0-9-]+(\.[a-z0-9-]+){2,}$")
+    version: str = Field(pattern=r"^\d+\.\d+\.\d+$")
+    display_name: str
+    description: str
+    unity: str = Field(pattern=r"^\d+\.\d+$")
+    roundtrip: Roundtrip
+
+
+def main(config: Config) -> None:
+    trajectory = Trajectory(
+        duration=config.roundtrip.duration,
+        pull=config.roundtrip.pull,
+        tilts=np.radians(config.roundtrip.tilts_deg).tolist(),
+        joint_speed=config.roundtrip.joint_speed,
+    )
+    label = Label(
+        config.name,
+        config.version,
+        config.display_name,
+        config.description,
+        config.unity,
+        trunkline=tomllib.loads(_existing("pyproject.toml").read_text())["project"]["version"],
+    )
+    sources = read_sources(config.version)
+    files, violations = assemble(label, sources, trajectory)
+    for violation in violations:
+        print(f"package_unity: broken rule: {violation}")
+
+    with output_folder(ARTIFACTS / "package_unity") as out:
+        tarball = out / f"{config.name}-{config.version}.tgz"
+        write_tarball(tarball, files)
+        packed = read_tarball(tarball)
+        (out / "manifest.json").write_bytes(packed[MANIFEST])
+        calibrated = mujoco.MjModel.from_xml_string(sources.mjcf)
+        bundled = mujoco.MjModel.from_xml_string(packed[MODEL].decode())
+        write_json(
+            out / "metrics.json",
+            {
+                "rule_violations": len(violations),
+                "roundtrip_max_deviation_mm": compare(calibrated, bundled, trajectory)[0],
+                "files": len(packed),
+                "bytes": tarball.stat().st_size,
+            },
+        )
+        write_roundtrip(out, calibrated, bundled, trajectory)
+
+
+def read_sources(version: str) -> Sources:
+    """What the earlier stages wrote; a missing file is a user's mistake."""
+    reachability = ARTIFACTS / "reachability"
+    meshes = sorted(p for p in reachability.glob("*") if p.suffix in (".obj", ".stl"))
+    if not meshes:
+        raise InputError(
+            f"{reachability}: found no mesh, expected .obj or .stl files (run the reachability stage)"
+        )
+    return Sources(
+        mjcf=_existing(ARTIFACTS / "identify_control/arm.xml").read_text(),
+        network=_existing(ARTIFACTS / "train_ik/ik.onnx"),
+        meshes=meshes,
+        grids=_existing(reachability / "grids.npz"),
+        metrics={s: json.loads(_existing(ARTIFACTS / s / "metrics.json").read_text()) for s in MEASURED},
+        texts={
+            "README.md": _existing("docs/unity.md").read_bytes(),
+            "LICENSE.md": _existing("LICENSE").read_bytes(),
+            "CHANGELOG.md": f"# Changelog\n\n## [{version}]\n\nSee `Runtime/manifest.json`.\n".encode(),
+        },
+    )
+
+
+def write_roundtrip(
+    out: Path, calibrated: mujoco.MjModel, bundled: mujoco.MjModel, trajectory: Trajectory
+) -> None:
+    """The curl at the last gravity angle in both models, as a table and as a picture."""
+    controls = curl(calibrated, trajectory.duration, trajectory.pull)
+    before, after = (simulate(model, controls, trajectory.tilts[-1])[0] for model in (calibrated, bundled))
+    gap_mm = 1e3 * deviation(before, after)
+    time = calibrated.opt.timestep * np.arange(1, len(controls) + 1)
+    columns = {"time": time, "deviation_mm": gap_mm}
+    for axis, name in enumerate("xyz"):
+        columns |= {f"calibrated_{name}": before[:, -1, axis], f"bundled_{name}": after[:, -1, axis]}
+    pd.DataFrame(columns)[::10].to_csv(out / "roundtrip.csv", index=False, float_format="%.6g")
+    save_figure(roundtrip_figure(time, before[:, -1], after[:, -1], gap_mm), out / "roundtrip.png")
+
+
+def _existing(path: str | Path) -> Path:
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file, expected what an earlier stage writes (run `dvc repro`)")
+    return Path(path)
+
+
+if __name__ == "__main__":
+    run_stage("package_unity", Config, main)

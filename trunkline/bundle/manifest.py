@@ -1,0 +1,141 @@
+"""manifest.json of the Unity package: all that an app must know and that the files do not say themselves."""
+
+import hashlib
+from typing import Literal
+
+import mujoco
+from pydantic import BaseModel, ConfigDict, Field
+
+from trunkline.bundle.linearize import Linearization
+from trunkline.bundle.unity_frame import unity_position
+
+
+class _Block(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+
+class Versions(_Block):
+    package: str
+    trunkline: str
+    mujoco: str
+    unity: str = Field(description="the oldest editor that it is meant for")
+
+
+class Units(_Block):
+    length: Literal["m"] = "m"
+    angle: Literal["rad"] = "rad"
+    time: Literal["s"] = "s"
+    mass: Literal["kg"] = "kg"
+    force: Literal["N"] = "N"
+
+
+class Frames(_Block):
+    base: str = "right-handed; origin at the arm's mount, the straight arm along -z, tendon 1 over +x"
+    unity: str = "left-handed, y up"
+    position: str = "base (x, y, z) -> Unity (x, z, y)"
+    quaternion: str = "base (w, x, y, z) -> Unity (x: x, y: z, z: y, w: -w)"
+    gravity_angle: str = (
+        "angle between the straight arm and gravity, the mount tilting about base +y; "
+        "gravity in the base frame is g (sin, 0, -cos)"
+    )
+    meshes: str = "OBJ vertices are base (-x, z, y); Unity negates x on import, which leaves (x, z, y)"
+
+
+class Names(_Block):
+    bodies: list[str]
+    joints: list[str]
+    tendons: list[str]
+    actuators: list[str]
+    sites: list[str]
+
+
+class Model(_Block):
+    file: str
+    time_step: float = Field(gt=0, description="s; set it as Unity's Fixed Timestep")
+    gravity: list[float] = Field(min_length=3, max_length=3, description="m/s², base frame, mount upright")
+    gravity_unity: list[float] = Field(min_length=3, max_length=3, description="m/s², for Physics.gravity")
+    integrator: str
+    names: Names
+    rest_lengths: dict[str, float] = Field(description="path length of each tendon, arm straight, m")
+    control: str = "each actuator's control is the path length of its tendon in m; it pulls and never pushes"
+    changes: list[Linearization] = Field(
+        description="what the importer cannot read, and what stands in for it"
+    )
+    changes_max_deviation_mm: float = Field(
+        ge=0, description="with those changes, against the calibrated model"
+    )
+    import_max_deviation_mm: float = Field(
+        ge=0, description="what the importer keeps, in 32-bit floats, against the calibrated model"
+    )
+
+
+class Network(_Block):
+    file: str
+    opset: int
+    input: str
+    input_order: list[str]
+    input_meaning: str = (
+        "gravity angle, rad; tip position, m, and orientation in the base frame (not Unity's)"
+    )
+    output: str
+    output_order: list[str] = Field(description="path length of each tendon, m: the actuators' controls")
+    operators: list[str]
+
+
+class Grid(_Block):
+    file: str
+    frame: str
+    shape: list[int] = Field(min_length=3, max_length=3, description="points along Unity's x, y, z")
+    origin: list[float] = Field(min_length=3, max_length=3, description="first point, Unity's axes, m")
+    spacing: list[float] = Field(min_length=3, max_length=3, description="between points, Unity's axes, m")
+    format: str = "raw little-endian float16, x fastest, then y, then z (Unity Texture3D, RHalf)"
+    meaning: str = "signed distance to the surface of the reachable set, m, negative inside"
+
+
+class Mesh(_Block):
+    file: str
+    frame: str
+    triangles: int = Field(gt=0)
+
+
+class Manifest(_Block):
+    name: str
+    versions: Versions
+    units: Units = Units()
+    frames: Frames = Frames()
+    model: Model
+    network: Network
+    meshes: dict[str, Mesh]
+    grids: dict[str, Grid]
+    metrics: dict[str, dict] = Field(description="metrics.json of every stage before this one")
+    sha256: dict[str, str] = Field(description="of every other file in the package, by its path in it")
+
+
+def names_of(model: mujoco.MjModel) -> Names:
+    """Names by kind, in the order of MuJoCo's indices; the world body is left out."""
+    return Names(
+        bodies=[model.body(i).name for i in range(1, model.nbody)],
+        joints=[model.joint(i).name for i in range(model.njnt)],
+        tendons=[model.tendon(i).name for i in range(model.ntendon)],
+        actuators=[model.actuator(i).name for i in range(model.nu)],
+        sites=[model.site(i).name for i in range(model.nsite)],
+    )
+
+
+def describe_model(model: mujoco.MjModel, file: str, **measured) -> Model:
+    """The model's block; `measured` are its changes and deviations."""
+    return Model(
+        file=file,
+        time_step=model.opt.timestep,
+        gravity=model.opt.gravity.tolist(),
+        gravity_unity=unity_position(model.opt.gravity).tolist(),
+        integrator=mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_").lower(),
+        names=names_of(model),
+        rest_lengths={model.tendon(i).name: float(model.tendon_length0[i]) for i in range(model.ntendon)},
+        **measured,
+    )
+
+
+def hashes(files: dict[str, bytes]) -> dict[str, str]:
+    """SHA-256 of each file, in hexadecimal digits."""
+    return {path: hashlib.sha256(data).hexdigest() for path, data in sorted(files.items())}

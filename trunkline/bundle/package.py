@@ -1,0 +1,76 @@
+"""A Unity package (UPM) as one tarball that is the same bytes for the same files.
+
+Unity ignores files of a tarball package that come without a `.meta`, since it cannot write one there; so each
+file and folder gets one, with an identifier made from its path that stays the same from version to version.
+"""
+
+import gzip
+import hashlib
+import io
+import json
+import tarfile
+from pathlib import Path
+
+from trunkline.errors import InputError
+
+ROOT = "package/"  # folder that npm's and Unity's tarballs hold everything in
+
+
+def package_json(name: str, version: str, display_name: str, unity: str, description: str) -> bytes:
+    """The manifest that Unity's package manager reads."""
+    fields = {
+        "name": name,
+        "version": version,
+        "displayName": display_name,
+        "unity": unity,
+        "description": description,
+        "keywords": ["mujoco", "soft robot", "digital twin"],
+        "hideInEditor": False,
+    }
+    return (json.dumps(fields, indent=2) + "\n").encode()
+
+
+def with_metas(name: str, files: dict[str, bytes]) -> dict[str, bytes]:
+    """The files of a package and a `.meta` beside each of them and of their folders.
+
+    Args:
+        name: the package's name, part of the identifiers. files: contents by path in the package.
+    """
+    folders = {str(folder) for path in files for folder in Path(path).parents if str(folder) != "."}
+    metas = {f"{path}.meta": _meta(name, path, is_folder=False) for path in files}
+    metas |= {f"{folder}.meta": _meta(name, folder, is_folder=True) for folder in folders}
+    return dict(sorted((files | metas).items()))
+
+
+def _meta(name: str, path: str, is_folder: bool) -> bytes:
+    guid = hashlib.sha256(f"{name}/{path}".encode()).hexdigest()[:32]
+    folder = "folderAsset: yes\nDefaultImporter:\n  externalObjects: {}\n" if is_folder else ""
+    return f"fileFormatVersion: 2\nguid: {guid}\n{folder}".encode()
+
+
+def write_tarball(path: Path, files: dict[str, bytes]) -> None:
+    """Write `files` to a .tgz: sorted, without times, owners or file name in it."""
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.USTAR_FORMAT) as archive:
+        for name, data in sorted(files.items()):
+            entry = tarfile.TarInfo(ROOT + name)
+            entry.size, entry.mode = len(data), 0o644
+            archive.addfile(entry, io.BytesIO(data))
+    path.write_bytes(gzip.compress(buffer.getvalue(), compresslevel=9, mtime=0))
+
+
+def read_tarball(path: Path) -> dict[str, bytes]:
+    """Contents by path in the package.
+
+    Raises:
+        InputError: if it is not a package.
+    """
+    try:
+        with tarfile.open(path, "r:gz") as archive:
+            return {
+                entry.name.removeprefix(ROOT): archive.extractfile(entry).read()
+                for entry in archive.getmembers()
+                if entry.isfile()
+            }
+    except (tarfile.TarError, EOFError, OSError) as error:
+        raise InputError(f"{path}: found {error}, expected a package's .tgz") from error

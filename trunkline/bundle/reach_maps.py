@@ -1,0 +1,69 @@
+"""The reachability stage's meshes and grids, in the form that Unity reads."""
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+
+from trunkline.bundle.manifest import Grid, Mesh
+from trunkline.bundle.unity_frame import unity_obj, unity_position, unity_volume
+from trunkline.errors import InputError
+
+FOLDER = "Runtime/Reachability"
+
+
+def frame_of(name: str) -> str:
+    """The frame of a map by its name: soft maps are the arm's own, the others hang on the rigid arm."""
+    return "base of the soft arm" if name.startswith("soft") else "base of the rigid arm"
+
+
+def convert_meshes(paths: list[Path]) -> tuple[dict[str, bytes], dict[str, Mesh]]:
+    """Meshes (OBJ or STL) as OBJ files for Unity.
+
+    Returns:
+        Contents by path in the package, and the manifest's blocks by name of the map.
+    """
+    files, blocks = {}, {}
+    for path in paths:
+        mesh = trimesh.load_mesh(path)
+        if len(mesh.faces) == 0:
+            raise InputError(f"{path}: found no triangles, expected a closed mesh")
+        file = f"{FOLDER}/{path.stem}.obj"
+        files[file] = unity_obj(mesh.vertices, mesh.faces)
+        blocks[path.stem] = Mesh(file=file, frame=frame_of(path.stem), triangles=len(mesh.faces))
+    return files, blocks
+
+
+def convert_grids(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str, bytes], dict[str, Grid]]:
+    """Signed distance grids as raw volumes for Unity.
+
+    Args:
+        arrays: every array of three dimensions is a map (x, y, z) by its name; `<name>_origin` (3,) and
+            `<name>_spacing` in m place it, or `origin` and `spacing` if maps share a lattice.
+        source: the file they are from, for messages.
+    """
+    files, blocks = {}, {}
+    for name, values in sorted(arrays.items()):
+        if values.ndim != 3:
+            continue
+        origin, spacing = (_lattice(arrays, name, key, source) for key in ("origin", "spacing"))
+        file = f"{FOLDER}/{name}.bytes"
+        files[file] = unity_volume(values)
+        blocks[name] = Grid(
+            file=file,
+            frame=frame_of(name),
+            shape=unity_position(values.shape).tolist(),
+            origin=unity_position(origin).tolist(),
+            spacing=unity_position(spacing).tolist(),
+        )
+    if not blocks:
+        raise InputError(f"{source}: found no grid of three dimensions, expected one for each map")
+    return files, blocks
+
+
+def _lattice(arrays: dict[str, np.ndarray], name: str, key: str, source: str) -> np.ndarray:
+    group = name.split("_")[0]
+    for candidate in (f"{name}_{key}", f"{group}_{key}", key):
+        if candidate in arrays:
+            return np.broadcast_to(arrays[candidate].astype(float), 3)
+    raise InputError(f"{source}: {name}: found no {key}, expected {name}_{key}, {group}_{key} or {key}")

@@ -1,0 +1,126 @@
+"""The twin, whole: the calibrated model and all that was made from it, as the files of a Unity package."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from trunkline.bundle.linearize import linearize_joints
+from trunkline.bundle.manifest import Manifest, Versions, describe_model, hashes
+from trunkline.bundle.network import describe_network
+from trunkline.bundle.package import package_json, with_metas
+from trunkline.bundle.reach_maps import convert_grids, convert_meshes
+from trunkline.bundle.roundtrip import curl, deviation, simulate
+from trunkline.bundle.unity_importer import as_imported
+from trunkline.bundle.unity_rules import Violation, lint_mjcf
+
+MODEL = "Runtime/Model/arm.xml"
+NETWORK = "Runtime/Network/ik.onnx"
+MANIFEST = "Runtime/manifest.json"
+
+
+@dataclass
+class Label:
+    """How the package calls itself; `unity` is the oldest editor that it is for."""
+
+    name: str
+    version: str
+    display_name: str
+    description: str
+    unity: str
+    trunkline: str
+
+
+@dataclass
+class Trajectory:
+    """The movement on which models are compared.
+
+    Attributes:
+        duration: s. pull: largest pull of tendon 1, m. tilts: gravity angles, rad.
+        joint_speed: up to which polynomial damping is made linear, rad/s.
+    """
+
+    duration: float
+    pull: float
+    tilts: list[float]
+    joint_speed: float
+
+
+@dataclass
+class Sources:
+    """What the earlier stages made: the calibrated MJCF, files to read, metrics by stage, texts by name."""
+
+    mjcf: str
+    network: Path
+    meshes: list[Path]
+    grids: Path
+    metrics: dict[str, dict]
+    texts: dict[str, bytes]
+
+
+def assemble(
+    label: Label, sources: Sources, trajectory: Trajectory
+) -> tuple[dict[str, bytes], list[Violation]]:
+    """All files of the package by path, and the rules that it breaks."""
+    calibrated = mujoco.MjModel.from_xml_string(sources.mjcf)
+    spec = mujoco.MjSpec.from_string(sources.mjcf)
+    changes = linearize_joints(spec, trajectory.joint_speed)
+    spec.compile()
+    mjcf = spec.to_xml()
+    violations = lint_mjcf(mjcf)
+
+    bundled = mujoco.MjModel.from_xml_string(mjcf)
+    imported = mujoco.MjModel.from_xml_string(as_imported(mjcf))
+    import_deviation_mm, complaints = compare(calibrated, imported, trajectory)
+    if complaints:  # MjScene.CheckForPhysicsException
+        violations.append(
+            Violation("simulation", "warning", f"{complaints} while it curls; Unity stops at one")
+        )
+    tendons = [bundled.tendon(i).name for i in bundled.actuator_trnid[:, 0]]
+    network = sources.network.read_bytes()
+    network_block, found = describe_network(network, NETWORK, tendons, str(sources.network))
+    meshes, mesh_blocks = convert_meshes(sources.meshes)
+    with np.load(sources.grids) as arrays:
+        grids, grid_blocks = convert_grids(dict(arrays), str(sources.grids))
+
+    files = sources.texts | {
+        "package.json": package_json(
+            label.name, label.version, label.display_name, label.unity, label.description
+        ),
+        MODEL: mjcf.encode(),
+        NETWORK: network,
+    }
+    files = with_metas(label.name, files | meshes | grids | {MANIFEST: b""})
+    manifest = Manifest(
+        name=label.name,
+        versions=Versions(
+            package=label.version, trunkline=label.trunkline, mujoco=mujoco.__version__, unity=label.unity
+        ),
+        model=describe_model(
+            bundled,
+            MODEL,
+            changes=changes,
+            changes_max_deviation_mm=compare(calibrated, bundled, trajectory)[0] if changes else 0.0,
+            import_max_deviation_mm=import_deviation_mm,
+        ),
+        network=network_block,
+        meshes=mesh_blocks,
+        grids=grid_blocks,
+        metrics=sources.metrics,
+        sha256=hashes({path: data for path, data in files.items() if path != MANIFEST}),
+    )
+    files[MANIFEST] = (manifest.model_dump_json(indent=2) + "\n").encode()
+    return files, violations + found
+
+
+def compare(first: mujoco.MjModel, second: mujoco.MjModel, trajectory: Trajectory) -> tuple[float, int]:
+    """Largest distance of any body between two models on the trajectory, over all its gravity angles, in mm,
+    and how many warnings MuJoCo counted while it simulated the second."""
+    controls = curl(first, trajectory.duration, trajectory.pull)
+    largest, warnings = 0.0, 0
+    for tilt in trajectory.tilts:
+        expected, _ = simulate(first, controls, tilt)
+        found, count = simulate(second, controls, tilt)
+        largest, warnings = max(largest, float(deviation(expected, found).max())), warnings + count
+    return round(1e3 * largest, 6), warnings
