@@ -159,7 +159,9 @@ def _lay_out(data: bytes, schema: str, definitions: Definitions) -> Layout:
                 if position > len(data):
                     raise ValueError("numbers beyond the message's end")
             else:
-                tree[part.name] = one(part.kind) if count is None else [one(part.kind) for _ in range(count)]
+                tree[part.name] = (
+                    one(part.kind) if count is None else [one(part.kind) for _ in range(count)]
+                )
         if not definitions[kind]:
             position += 1  # an empty message takes one byte
         return tree

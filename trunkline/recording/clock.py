@@ -10,7 +10,7 @@ SHAPE_MODES = 5  # principal motions of the arm that explain the tendons, with t
 
 @dataclass
 class FrameFit:
-    """Stamp ≈ start + frame / rate. start: ns, rate: Hz. jitter, worst: s, robust deviation and largest one."""
+    """Stamp ≈ start + frame / rate. start: s, rate: Hz. jitter, worst: s, robust and largest deviation."""
 
     start: float
     rate: float
@@ -46,10 +46,10 @@ def fit_frames(stamps: np.ndarray, frames: np.ndarray) -> FrameFit:
 def estimate_offset(
     time: np.ndarray, positions: np.ndarray, motor_time: np.ndarray, pulls: np.ndarray, limit: float
 ) -> OffsetFit | None:
-    """The offset between the clocks at which the arm's shape explains the tendons best; None if they rest.
+    """The offset between the clocks at which the shape explains the tendons best; None if they rest.
 
-    A taut tendon's length is a function of the arm's shape, whatever the dynamics. It is fitted as a quadratic in
-    the principal motions of the segments, for every offset within ±limit; the best fit wins.
+    A taut tendon's length is a function of the arm's shape, whatever the dynamics. It is fitted as a
+    quadratic in the principal motions of the segments, for every offset within ±limit; the best fit wins.
 
     Args:
         time (T,) s, positions (T, S, 3) m with NaN: the segments in any fixed frame.
@@ -77,7 +77,7 @@ def estimate_offset(
 
 
 def agree_on_offset(fits: list[OffsetFit]) -> tuple[float, float]:
-    """One offset for a session and its spread, s: median and robust deviation over the trials that are certain.
+    """One offset for a session and its spread, s: median and robust deviation over the certain trials.
 
     (0, inf) where there is no such trial.
     """
@@ -89,7 +89,7 @@ def agree_on_offset(fits: list[OffsetFit]) -> tuple[float, float]:
 
 
 def fill_gaps(time: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Columns (T, C) with NaN replaced by linear interpolation, and held at the ends; all-NaN columns become 0."""
+    """Columns (T, C) with NaN replaced by linear interpolation, held at the ends; all-NaN columns are 0."""
     filled = np.zeros_like(columns)
     for index, column in enumerate(columns.T):
         good = np.isfinite(column)

@@ -75,7 +75,9 @@ def read_log(path: Path) -> Log:
     if end is not None:
         damage.append(f"cut off at byte {len(data)}" + _read_cut_chunk(data[end:], contents))
     if damage and contents.expected is not None:
-        damage.append(f"{contents.expected - len(contents.messages)} of {contents.expected} messages lost")
+        damage.append(
+            f"{contents.expected - len(contents.messages)} of {contents.expected} messages lost"
+        )
     return Log(Path(path), _by_topic(contents), damage)
 
 
@@ -157,7 +159,7 @@ def _chunk_data(body: bytes) -> bytes:
 
 
 def _read_cut_chunk(rest: bytes, contents: _Contents) -> str:
-    """Read the beginning of a last chunk that was cut off; a remark on what came of it, if there is such a chunk."""
+    """Read the beginning of a last chunk that was cut off; a remark on what came of it."""
     if rest[:1] != bytes([Opcode.CHUNK]):
         return ""
     before, body = len(contents.messages), rest[RECORD_HEADER.size :]

@@ -75,7 +75,9 @@ def joint_state(message) -> Joints:
 
 def stamp(header) -> np.ndarray:
     """std_msgs/Header to ns since the epoch, (...)."""
-    return np.asarray(header.stamp.sec, np.int64) * 1_000_000_000 + np.asarray(header.stamp.nanosec, np.int64)
+    return np.asarray(header.stamp.sec, np.int64) * 1_000_000_000 + np.asarray(
+        header.stamp.nanosec, np.int64
+    )
 
 
 def vectors(message, points: list) -> np.ndarray:
@@ -91,4 +93,6 @@ def quaternions(message, rotations: list) -> np.ndarray:
 def _stack(message, items: list, axes: str) -> np.ndarray:
     if not items:
         return np.empty((*np.shape(message.header.stamp.sec), 0, len(axes)))
-    return np.stack([np.stack([getattr(item, axis) for axis in axes], axis=-1) for item in items], axis=-2)
+    return np.stack(
+        [np.stack([getattr(item, axis) for axis in axes], axis=-1) for item in items], axis=-2
+    )

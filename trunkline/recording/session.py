@@ -74,10 +74,10 @@ class TrialEntry(Entry):
 
 
 class Session(Entry):
-    """base: the body that marks the mount, or its fixed pose. segments: name in the log to name in the model.
+    """base: the body that marks the mount, or its pose. segments: name in the log to name in the model.
 
-    clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate that
-    the stamps show.
+    clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
+    that the stamps show.
     """
 
     frame: Frame
@@ -112,12 +112,16 @@ def read_session(folder: Path) -> Session:
     for index, trial in enumerate(session.trials):
         if trial.file not in logs:
             close = difflib.get_close_matches(trial.file, logs, n=1) or logs[:1]
-            expected = f"one of the folder's {len(logs)} logs" + (f", such as {close[0]}" if close else "")
+            expected = f"one of the folder's {len(logs)} logs" + (
+                f", such as {close[0]}" if close else ""
+            )
             raise InputError(f"{path}: trials.{index}.file: found {trial.file!r}, expected {expected}")
     names = [trial.name for trial in session.trials]
     for index, name in enumerate(names):
         if name in names[:index]:
-            raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
+            raise InputError(
+                f"{path}: trials.{index}.name: found {name!r} again, expected each name once"
+            )
     return session
 
 

@@ -11,16 +11,17 @@ from trunkline.recording.messages import JOINTS, POSES
 
 @dataclass
 class PoseStream:
-    """T messages, B bodies. stamps, log_times: (T,) ns, by the header and by the recorder; frames (T,) or None.
+    """T messages, B bodies. stamps, log_times: (T,) ns, of the header and the recorder. frames: (T,) or None.
 
-    positions: (T, B, 3) in the log's unit, NaN where a body is not in a message. quaternions: (T, B, 4) wxyz, or
-    None. undecodable: messages that do not fit their schema.
+    present: (T, B) whether a body is in a message. positions: (T, B, 3) in the log's unit, quaternions:
+    (T, B, 4) wxyz or None; NaN where absent. undecodable: messages that do not fit their schema.
     """
 
     stamps: np.ndarray
     log_times: np.ndarray
     frames: np.ndarray | None
     names: tuple[str, ...]
+    present: np.ndarray
     positions: np.ndarray
     quaternions: np.ndarray | None
     undecodable: int
@@ -43,12 +44,14 @@ def pose_stream(topic: Topic) -> PoseStream:
     names = _union(batches)
     positions = np.full((len(topic.messages), len(names), 3), np.nan)
     quaternions = np.full((len(topic.messages), len(names), 4), np.nan)
+    present = np.zeros(positions.shape[:2], bool)
     stamps = np.zeros(len(topic.messages), np.int64)
     frames = np.zeros(len(topic.messages), np.int64)
     oriented, numbered = False, True
     for rows, poses in batches:
         columns = [names.index(name) for name in poses.names]
         stamps[rows] = poses.time
+        present[np.ix_(rows, columns)] = True
         positions[np.ix_(rows, columns)] = poses.positions
         if poses.orientations is not None:
             quaternions[np.ix_(rows, columns)] = poses.orientations
@@ -61,6 +64,7 @@ def pose_stream(topic: Topic) -> PoseStream:
         topic.log_times[kept],
         frames[kept] if numbered else None,
         names,
+        present[kept],
         positions[kept],
         quaternions[kept] if oriented else None,
         len(topic.messages) - int(kept.sum()),
@@ -83,7 +87,9 @@ def joint_stream(topic: Topic) -> JointStream:
 def _read(topic: Topic, reader) -> tuple[list, np.ndarray]:
     """(rows, what `reader` makes of them) for each batch, and which messages (N,) could be read."""
     definitions = parse_definition(topic.schema, topic.definition)
-    batches = [(rows, reader(message)) for rows, message in decode(topic.messages, topic.schema, definitions)]
+    batches = [
+        (rows, reader(message)) for rows, message in decode(topic.messages, topic.schema, definitions)
+    ]
     kept = np.zeros(len(topic.messages), bool)
     for rows, _ in batches:
         kept[rows] = True

@@ -1,4 +1,4 @@
-"""A take: one trial as it was recorded, checked but not filtered, in the motion-capture frame and on its own clocks."""
+"""A take: one trial as recorded, checked but not filtered, in the motion-capture frame, on its own clocks."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +17,8 @@ class Take:
     """T frames, S segments, K tendons; the motors have Tc commands and Tm measured positions.
 
     up: (3,) unit vector against gravity. time: (T,) s from the first frame.
-    positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None, base_positions (T, 3), base_quaternions (T, 4): in
-    the motion-capture frame, NaN where there is no good sample.
+    positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None, base_positions (T, 3), base_quaternions (T, 4):
+    in the motion-capture frame, NaN where there is no good sample.
     command_time (Tc,), tendon_time (Tm,): s on the motors' clock, which reads time - clock_offset.
     commands (Tc, K), tendon_positions (Tm, K): m of pull.
     """

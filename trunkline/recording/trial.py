@@ -154,7 +154,11 @@ def long_table(
     labels = pa.DictionaryArray.from_arrays(
         np.tile(np.arange(count, dtype=np.int32), frames), pa.array(list(names), pa.string())
     )
-    data = {"trial": keys.cast(pa.string()), "time": np.repeat(time, count), label: labels.cast(pa.string())}
+    data = {
+        "trial": keys.cast(pa.string()),
+        "time": np.repeat(time, count),
+        label: labels.cast(pa.string()),
+    }
     data |= {key: np.asarray(values, dtype=float).ravel() for key, values in columns.items()}
     return pa.table(data)
 

@@ -1,0 +1,75 @@
+"""Filter every trial: gaps, outliers, noise; one clock, the base frame, and when each trial begins."""
+
+from pathlib import Path
+
+import numpy as np
+from pydantic import Field, PositiveFloat, PositiveInt
+
+from trunkline.config import settings
+from trunkline.plots import save_figure
+from trunkline.progress import progress
+from trunkline.recording.filtering import Filter, filter_take, summary
+from trunkline.recording.plots import filter_figure
+from trunkline.recording.take import read_takes
+from trunkline.recording.trial import write_trials
+from trunkline.stage import output_folder, run_stage, write_json
+
+INGEST, PROCESSED, ARTIFACTS = (
+    Path("data/processed/ingest"),
+    Path("data/processed/filter"),
+    Path("artifacts/filter"),
+)
+
+
+@settings
+class Outliers:
+    window: PositiveInt
+    deviations: PositiveFloat
+    position_floor_mm: PositiveFloat
+    angle_floor_deg: PositiveFloat
+
+
+@settings
+class Config:
+    rate: PositiveFloat
+    cutoff: PositiveFloat
+    order: int = Field(ge=1, le=10)
+    longest_bridge: float = Field(ge=0)
+    outliers: Outliers
+
+    def __post_init__(self):
+        if self.cutoff >= self.rate / 2:
+            raise ValueError(
+                f"cutoff: found {self.cutoff} Hz, expected less than half the rate of {self.rate} Hz"
+            )
+
+
+def main(config: Config) -> None:
+    hampel = config.outliers
+    chosen = Filter(
+        config.rate,
+        config.cutoff,
+        config.order,
+        config.longest_bridge,
+        hampel.window,
+        hampel.deviations,
+        hampel.position_floor_mm * 1e-3,
+        np.deg2rad(hampel.angle_floor_deg),
+    )
+    takes = read_takes(INGEST)
+    trials, findings = [], []
+    with progress(len(takes), "filter", "trials") as bar:
+        for take in takes:
+            trial, found = filter_take(take, chosen)
+            trials.append(trial)
+            findings.append(found)
+            bar.update(1, trial=take.name)
+    with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
+        write_trials(processed, trials)
+        write_json(artifacts / "metrics.json", summary(trials, findings))
+        shown = max(range(len(trials)), key=lambda i: np.ptp(trials[i].positions, axis=0).sum())
+        save_figure(filter_figure(takes[shown], trials[shown]), artifacts / "filter.png")
+
+
+if __name__ == "__main__":
+    run_stage("filter", Config, main)

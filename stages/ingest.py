@@ -1,0 +1,63 @@
+"""Read the session's MCAP logs: trials as Parquet, and a report on the quality of the data."""
+
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, PositiveFloat
+
+from trunkline.config import settings
+from trunkline.errors import InputError
+from trunkline.plots import save_figure
+from trunkline.progress import progress
+from trunkline.recording.intake import Limits, align_clocks, take_in
+from trunkline.recording.plots import quality_figure
+from trunkline.recording.quality import judge, report, summary
+from trunkline.recording.session import read_session
+from trunkline.recording.take import write_takes
+from trunkline.stage import output_folder, run_stage, write_json
+
+RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Path("artifacts/ingest")
+
+
+@settings
+class Config:
+    session: str = Field(min_length=1)
+    refused_trials: Literal["stop", "leave_out"]
+    min_duration: PositiveFloat
+    min_coverage: float = Field(gt=0, le=1)
+    max_disorder: PositiveFloat
+    max_clock_offset: PositiveFloat
+
+
+def main(config: Config) -> None:
+    folder = RAW / config.session
+    session = read_session(folder)
+    limits = Limits(
+        config.min_duration, config.min_coverage, config.max_disorder, config.max_clock_offset
+    )
+    takes, findings, refused = [], [], {}
+    with progress(len(session.trials), "ingest", "trials") as bar:
+        for trial, take, found in take_in(folder, session, limits):
+            if isinstance(take, InputError):
+                if config.refused_trials == "stop":
+                    raise take
+                refused[trial.name] = str(take)
+            else:
+                takes.append(take)
+                findings.append(found)
+            bar.update(1, trial=trial.name)
+    if not takes:
+        raise InputError(
+            f"{folder}: all {len(refused)} trials refused, the first: {next(iter(refused.values()))}"
+        )
+    offset, spread = align_clocks(takes, [found.offset for found in findings])
+    qualities = [judge(take, found) for take, found in zip(takes, findings, strict=True)]
+    with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
+        write_takes(processed, takes)
+        write_json(artifacts / "quality.json", report(qualities, refused, offset, spread))
+        write_json(artifacts / "metrics.json", summary(qualities, refused, offset, spread))
+        save_figure(quality_figure(qualities, refused, offset, spread), artifacts / "quality.png")
+
+
+if __name__ == "__main__":
+    run_stage("ingest", Config, main)

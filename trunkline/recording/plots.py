@@ -1,0 +1,137 @@
+"""Pictures of the data: the quality page of a session, and what the filter did to it."""
+
+import textwrap
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+
+from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE
+from trunkline.recording.base_frame import average_base, to_base_frame
+from trunkline.recording.quality import Quality
+from trunkline.recording.take import Take
+from trunkline.recording.trial import Trial
+
+BIN = 1 / 30  # s, of the coverage picture
+UNSEEN, PARTLY, SEEN = INITIAL, VALIDATE, "#d7e3ea"
+COLORS = {"static_tilt": MEASURED, "release": IDENTIFIED, "curl": VALIDATE}
+
+
+def quality_figure(
+    qualities: list[Quality], refused: dict[str, str], offset: float, spread: float
+) -> Figure:
+    """The quality page: coverage per segment over time, gaps, noise, rates, clock fit, repairs and refusals."""
+    figure = plt.figure(figsize=(14, 13))
+    left, right = figure.subfigures(1, 2, width_ratios=(3, 2))
+    _coverage(left.subplots(), qualities)
+    gaps, noise, jitter, clock, words = right.subplots(5, 1, height_ratios=(1, 1, 1, 1, 1.4))
+
+    lengths = 1e3 * np.concatenate([quality.gaps for quality in qualities])
+    if len(lengths):
+        gaps.hist(lengths, bins=40, color=IDENTIFIED)
+    gaps.set(
+        title=f"Gaps: {len(lengths)}",
+        xlabel="length (ms)",
+        ylabel="count",
+        yscale="log" if len(lengths) else "linear",
+    )
+
+    segments = qualities[0].take.segments
+    noise.boxplot(
+        [[1e3 * quality.position_noise[i] for quality in qualities] for i in range(len(segments))],
+        tick_labels=[segment.removeprefix("unit_") for segment in segments],
+        showfliers=False,
+    )
+    noise.set(title="Noise per segment", xlabel="segment", ylabel="position (mm)", ylim=(0, None))
+
+    numbers = np.arange(len(qualities))
+    colors = [COLORS[quality.take.experiment] for quality in qualities]
+    jitters = [np.nan if q.findings.frames is None else 1e3 * q.findings.frames.jitter for q in qualities]
+    jitter.bar(numbers, jitters, color=colors)
+    rates = [1 / quality.interval for quality in qualities]
+    title = f"Frame stamps: {np.median(rates):.1f} Hz, {sum(q.dropped for q in qualities)} frames dropped"
+    jitter.set(title=title, xlabel="trial", ylabel="jitter (ms)")
+
+    fits = [(i, q.findings.offset) for i, q in enumerate(qualities) if q.findings.offset is not None]
+    clock.axhline(1e3 * offset, color=MEASURED, lw=1)
+    clock.scatter(
+        [i for i, _ in fits], [1e3 * fit.offset for _, fit in fits], c=[colors[i] for i, _ in fits], s=18
+    )
+    found = f"{1e3 * offset:.1f} ± {1e3 * spread:.1f} ms" if np.isfinite(spread) else "no trial tells"
+    clock.set(title=f"Cameras' clock − motors' clock: {found}", xlabel="trial", ylabel="offset (ms)")
+
+    words.axis("off")
+    lines = [f"refused {name}: {reason}" for name, reason in refused.items()]
+    lines += [f"{q.take.name}: {repair}" for q in qualities for repair in q.findings.repairs]
+    wrapped = [part for line in lines for part in textwrap.wrap(line, 78)] or ["nothing"]
+    more = [f"… and {len(wrapped) - 14} lines more in quality.json"] if len(wrapped) > 14 else []
+    words.set_title("Repaired and refused")
+    words.text(0, 1, "\n".join(wrapped[:14] + more), va="top", fontsize=8, transform=words.transAxes)
+    return figure
+
+
+def _coverage(axes, qualities: list[Quality]) -> None:
+    """A band a trial, in it a row a segment: what was seen when."""
+    bins = int(max(quality.take.time[-1] for quality in qualities) / BIN) + 1
+    bands, ticks, row = [], [], 0
+    for quality in qualities:
+        take = quality.take
+        place = (take.time / BIN).astype(int)
+        frames = np.bincount(place, minlength=bins)
+        band = np.full((len(take.segments) + 2, bins), np.nan)
+        for index in range(len(take.segments)):
+            good = np.isfinite(take.positions[:, index, 0])
+            share = np.bincount(place, weights=good, minlength=bins) / np.maximum(frames, 1)
+            level = np.where(share == 0, 0, np.where(share < 1, 1, 2)).astype(float)
+            level[place[-1] + 1 :] = np.nan
+            band[index] = level
+        bands.append(band)
+        ticks.append(row + len(take.segments) / 2)
+        row += len(band)
+    extent = (0, bins * BIN, row, 0)
+    colors = ListedColormap([UNSEEN, PARTLY, SEEN])
+    axes.imshow(
+        np.vstack(bands),
+        aspect="auto",
+        extent=extent,
+        cmap=colors,
+        vmin=0,
+        vmax=2,
+        interpolation="nearest",
+    )
+    axes.set_yticks(ticks, [quality.take.name for quality in qualities], fontsize=7)
+    axes.set(xlabel="time (s)")
+    axes.set_title("Coverage: each trial's segments from base (top) to tip; dark where unseen")
+    axes.grid(False)
+
+
+def filter_figure(take: Take, trial: Trial) -> Figure:
+    """One moving trial before and after the filter, at the segment that moves most."""
+    base = average_base(take.base_positions, take.base_quaternions)
+    moved, _ = to_base_frame(base, take.positions, None)
+    figure, axes = plt.subplots(2, 1, figsize=(9, 6), sharex=True)
+    last = int(np.argmax(np.ptp(trial.positions, axis=0).sum(axis=1)))
+    for axis, color in zip(range(3), (MEASURED, IDENTIFIED, VALIDATE), strict=True):
+        axes[0].plot(take.time, 1e3 * moved[:, last, axis], ".", ms=2, color=color, alpha=0.5)
+        axes[0].plot(trial.time, 1e3 * trial.positions[:, last, axis], color=color, label="xyz"[axis])
+        rest = moved[:, last, axis] - np.interp(take.time, trial.time, trial.positions[:, last, axis])
+        axes[1].plot(take.time, 1e3 * rest, ".", ms=2, color=color)
+    for panel in axes:
+        panel.axvline(trial.start, color=INITIAL, lw=1)
+        for begin, end in _stretches(~trial.measured[:, last]):
+            panel.axvspan(trial.time[begin], trial.time[end], color=INITIAL, alpha=0.15, lw=0)
+    axes[0].set(
+        title=f"{trial.name}, {trial.segments[last]}: measured and filtered", ylabel="position (mm)"
+    )
+    axes[0].legend(ncols=3)
+    axes[1].set(
+        xlabel="time (s), line: detected start, shaded: not measured", ylabel="removed (mm)", ylim=(-2, 2)
+    )
+    return figure
+
+
+def _stretches(flags: np.ndarray) -> list[tuple[int, int]]:
+    """First and last index of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(begin), int(end) - 1) for begin, end in zip(edges[::2], edges[1::2], strict=True)]

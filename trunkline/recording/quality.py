@@ -1,0 +1,112 @@
+"""How good a session's data are: what was seen, how noisy it is, what was repaired and what refused."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trunkline.recording.intake import Findings
+from trunkline.recording.smoothing import noise_level
+from trunkline.recording.take import Take
+
+
+@dataclass
+class Quality:
+    """The quality of one take.
+
+    interval: s, median time between frames. dropped: frames missing between others.
+    coverage: (S,) share of frames in which a segment has a good sample. gaps: s, of each stretch without.
+    position_noise: (S,) m, angle_noise: (S,) rad or None: per axis, standard deviation.
+    """
+
+    take: Take
+    findings: Findings
+    interval: float
+    dropped: int
+    coverage: np.ndarray
+    gaps: np.ndarray
+    position_noise: np.ndarray
+    angle_noise: np.ndarray | None
+
+
+def judge(take: Take, findings: Findings) -> Quality:
+    """Measure the quality of a take."""
+    steps = np.diff(take.time)
+    interval = float(np.median(steps))
+    seen = np.isfinite(take.positions[..., 0])
+    gaps = [np.diff(take.time[good]) for good in seen.T]
+    shape = (len(take.time), len(take.segments), -1)
+    position_noise = noise_level(take.positions.reshape(len(take.time), -1)).reshape(shape[1:])
+    angle_noise = None
+    if take.quaternions is not None:
+        component = noise_level(take.quaternions.reshape(len(take.time), -1)).reshape(shape[1:])
+        # half an angle is in the vector part; what three axes bring is spread over four components
+        angle_noise = 2 * np.sqrt(np.sum(component**2, axis=1) / 3)
+    return Quality(
+        take,
+        findings,
+        interval,
+        int(np.sum(np.round(steps / interval) - 1)),
+        seen.mean(axis=0),
+        np.concatenate([gap[gap > 1.5 * interval] for gap in gaps]),
+        np.sqrt(np.mean(position_noise**2, axis=1)),
+        angle_noise,
+    )
+
+
+def report(qualities: list[Quality], refused: dict[str, str], offset: float, spread: float) -> dict:
+    """The quality report, per trial and for the session; None where there is nothing to measure."""
+    return {
+        "trials": {quality.take.name: _trial(quality) for quality in qualities},
+        "refused": refused,
+        "clock": {
+            "offset_s": offset,
+            "spread_s": spread if np.isfinite(spread) else None,
+            "trials": sum(quality.findings.offset is not None for quality in qualities),
+        },
+    }
+
+
+def summary(qualities: list[Quality], refused: dict[str, str], offset: float, spread: float) -> dict:
+    """The session in a few numbers, for metrics.json."""
+    angles = [quality.angle_noise for quality in qualities if quality.angle_noise is not None]
+    gaps = np.concatenate([quality.gaps for quality in qualities])
+    return {
+        "trials": len(qualities),
+        "refused": len(refused),
+        "repairs": sum(len(quality.findings.repairs) for quality in qualities),
+        "poses": sum(len(quality.take.time) * (len(quality.take.segments) + 1) for quality in qualities),
+        "coverage": float(np.mean([quality.coverage.mean() for quality in qualities])),
+        "dropped_frames": sum(quality.dropped for quality in qualities),
+        "gaps": len(gaps),
+        "longest_gap_ms": 1e3 * float(gaps.max(initial=0)),
+        "rate_hz": float(1 / np.median([quality.interval for quality in qualities])),
+        "position_noise_mm": 1e3 * float(np.median([quality.position_noise for quality in qualities])),
+        "orientation_noise_deg": float(np.degrees(np.median(angles))) if angles else None,
+        "clock_offset_ms": 1e3 * offset,
+        "clock_spread_ms": 1e3 * spread if np.isfinite(spread) else None,
+    }
+
+
+def _trial(quality: Quality) -> dict:
+    take, findings = quality.take, quality.findings
+    return {
+        "experiment": take.experiment,
+        "frames": len(take.time),
+        "duration_s": float(take.time[-1]),
+        "rate_hz": 1 / quality.interval,
+        "dropped_frames": quality.dropped,
+        "stamp_jitter_ms": None if findings.frames is None else 1e3 * findings.frames.jitter,
+        "coverage": dict(zip(take.segments, quality.coverage.tolist(), strict=True)),
+        "gaps": len(quality.gaps),
+        "longest_gap_ms": 1e3 * float(quality.gaps.max(initial=0)),
+        "position_noise_mm": 1e3 * float(np.median(quality.position_noise)),
+        "orientation_noise_deg": (
+            None if quality.angle_noise is None else float(np.degrees(np.median(quality.angle_noise)))
+        ),
+        "clock": (
+            None
+            if findings.offset is None
+            else {"offset_s": findings.offset.offset, "unexplained": findings.offset.ratio}
+        ),
+        "repairs": findings.repairs,
+    }
