@@ -35,10 +35,11 @@ $(STAMP): requirements.txt
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || apt-get install -y python3-venv || \
 	  { echo "error: Python has no venv module; install Debian's python3-venv" >&2; exit 1; }
 	$(PYTHON) -m venv --clear .venv
-	.venv/bin/python -m pip install --quiet --disable-pip-version-check -r requirements.txt
-	.venv/bin/python -c 'import pathlib, sysconfig; \
+	@echo "installing the packages of requirements.txt into .venv (some minutes, once)"
+	@.venv/bin/python -m pip install -qq --no-compile --disable-pip-version-check -r requirements.txt
+	@.venv/bin/python -c 'import pathlib, sysconfig; \
 	  pathlib.Path(sysconfig.get_path("purelib"), "trunkline.pth").write_text(str(pathlib.Path.cwd()) + "\n")'
-	cp requirements.txt $(STAMP)
+	@cp requirements.txt $(STAMP)
 
 clean:               ## remove the virtual environment
 	rm -rf .venv

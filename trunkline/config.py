@@ -15,7 +15,7 @@ from typing import Any, TypeVar, dataclass_transform
 from hydra import compose, initialize_config_dir
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
+from omegaconf.errors import InterpolationToMissingValueError, OmegaConfBaseException
 from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
 from pydantic.dataclasses import dataclass
 from yaml import YAMLError
@@ -56,7 +56,7 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
     try:
         return adapter.validate_json(json.dumps(composed), strict=True)
     except ValidationError as error:
-        problems = sorted(error.errors(), key=lambda problem: problem["type"] != UNKNOWN_KEY)
+        problems = sorted(error.errors(), key=_rank)
         first, more = problems[0], len(problems) - 1
         tuned = first["type"] == "missing" or (first["loc"] and first["loc"][0] in section)
         where = f"{params if tuned else folder}: {'.'.join(str(part) for part in (stage, *first['loc']))}"
@@ -93,7 +93,7 @@ def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[
             config = compose("config", overrides=[f"{group}={option}" for group, option in chosen.items()])
         OmegaConf.set_struct(config, False)
         values = {key: value for key, value in section.items() if key not in chosen}
-        return _without_missing(OmegaConf.to_container(OmegaConf.merge(config, values), resolve=True))
+        return _plain(OmegaConf.merge(config, values))
     except (HydraException, OmegaConfBaseException, YAMLError) as error:
         raise InputError(f"{folder}: {error}") from error
 
@@ -144,11 +144,23 @@ def _load(path: Path) -> DictConfig:
     return config
 
 
+def _plain(config: DictConfig) -> dict[str, Any]:
+    """``config`` as plain values, without its ``???`` entries, so that validation reports them as missing."""
+    try:
+        return _without_missing(OmegaConf.to_container(config, resolve=True))
+    except InterpolationToMissingValueError:  # then the missing value is the mistake, and validation names it
+        return _without_missing(OmegaConf.to_container(config, resolve=False))
+
+
 def _without_missing(value: Any) -> Any:
-    """``value`` without its ``???`` entries, so that validation reports them as missing."""
     if isinstance(value, dict):
         return {key: _without_missing(item) for key, item in value.items() if item != "???"}
     return value
+
+
+def _rank(problem: Any) -> int:
+    """Unknown keys first, for they explain missing ones, and those explain the rest."""
+    return {UNKNOWN_KEY: 0, "missing": 1}.get(problem["type"], 2)
 
 
 def _describe(problem: Any, adapter: TypeAdapter) -> str:

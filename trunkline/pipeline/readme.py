@@ -1,0 +1,128 @@
+"""``python -m trunkline.pipeline.readme``: regenerate the README's graph, table of results and picture.
+
+Generated blocks stand between ``<!-- name -->`` and ``<!-- /name -->``.
+"""
+
+import json
+import re
+import shutil
+import sys
+from pathlib import Path
+
+import networkx
+from dvc.repo import Repo
+
+from trunkline.pipeline.gate import Limit, lookup, read_limits
+
+PICTURE = Path("artifacts/identify_control/comparison.png")  # copied to docs/: Git holds no artifacts
+
+# stage: [(what it is, dotted key in metrics.json, unit)]
+RESULTS = {
+    "identify_stiffness": [
+        ("Static shapes, held-out tilts: E_internal", "identified.validate.e_internal_mm", "mm"),
+        ("… mean position error", "identified.validate.e_position_mm", "mm"),
+    ],
+    "identify_damping": [
+        ("Held-out releases: E_internal", "identified.validate.e_internal_mm", "mm"),
+        ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
+        ("… mean position error", "identified.validate.e_position_mm", "mm"),
+    ],
+    "identify_control": [
+        ("Held-out releases and curls: E_internal", "identified.validate.e_internal_mm", "mm"),
+        ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
+        ("… mean position error", "identified.validate.e_position_mm", "mm"),
+        ("… E_internal of the CAD model", "cad.validate.e_internal_mm", "mm"),
+    ],
+    "fk_dataset": [
+        ("Equilibria in the data set", "samples", ""),
+        ("FK against MuJoCo settled to rest: median", "mujoco_deviation_mm.median", "mm"),
+        ("… largest", "mujoco_deviation_mm.max", "mm"),
+    ],
+    "train_ik": [
+        ("Tip error of the IK network after FK: median", "position_error_mm.median", "mm"),
+        ("… 95th percentile", "position_error_mm.p95", "mm"),
+    ],
+    "reachability": [
+        ("Rigid map: accuracy against independent IK", "rigid.accuracy", ""),
+        ("Soft maps: smallest overlap at angles left out", "soft.heldout_iou_min", ""),
+    ],
+    "package_unity": [
+        ("Rules of the Unity importer broken", "rule_violations", ""),
+        ("Bundled model against the calibrated one: largest deviation", "roundtrip_max_deviation_mm", "mm"),
+    ],
+}
+
+
+def pipeline_graph(root: Path) -> str:
+    """The stages of dvc.yaml as a mermaid flowchart; edges that follow from others are left out."""
+    with Repo(str(root)) as repo:
+        stages = {stage.addressing: stage for stage in repo.index.stages}
+        graph = networkx.DiGraph()
+        graph.add_nodes_from(stages)
+        graph.add_edges_from((above.addressing, stage.addressing) for stage, above in repo.index.graph.edges)
+    reduced = networkx.transitive_reduction(graph)
+    order = list(networkx.lexicographical_topological_sort(reduced, key=list(stages).index))
+    names = {address: address.removesuffix(".yaml").rpartition(":")[2] for address in order}
+    lines = ["```mermaid", "flowchart TD"]
+    lines += [f'    {names[a]}["<b>{names[a]}</b><br/>{stages[a].desc}"]' for a in order]
+    lines += [f"    {names[a]} --> {names[b]}" for a in order for b in order if reduced.has_edge(a, b)]
+    return "\n".join([*lines, "```"])
+
+
+def results_table(root: Path) -> str:
+    """The metrics in the working tree as a Markdown table, beside the gate's bounds."""
+    limits = read_limits(root / "tests" / "limits.yaml")
+    lines = ["| measure | found | bound |", "|---|---:|---:|"]
+    for stage, rows in RESULTS.items():
+        path = root / "artifacts" / stage / "metrics.json"
+        metrics = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+        for what, key, unit in rows:
+            found = f"{_number(lookup(metrics, key))} {unit}".strip()
+            lines.append(f"| {what} | {found} | {_bound(limits.get(stage, {}).get(key))} |")
+    return "\n".join(lines)
+
+
+def _bound(limit: Limit | None) -> str:
+    if limit is None:
+        return ""
+    if limit.equals is not None:
+        return f"{limit.equals}"
+    return f"≤ {_number(limit.max)}" if limit.max is not None else f"≥ {_number(limit.min)}"
+
+
+def _number(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{value:,}" if isinstance(value, int) else f"{value:.3g}"
+
+
+def with_blocks(text: str, blocks: dict[str, str]) -> str:
+    """``text`` with the content of each named block replaced.
+
+    Raises:
+        ValueError: if ``text`` has no such block.
+    """
+    for name, content in blocks.items():
+        block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
+        if not block.search(text):
+            raise ValueError(f"README.md: expected a block `<!-- {name} -->` … `<!-- /{name} -->`")
+        text = block.sub(lambda match, content=content: f"{match[1]}{content}\n{match[2]}", text)
+    return text
+
+
+def generate(root: Path) -> str:
+    """README.md with its generated blocks as they should be."""
+    text = (root / "README.md").read_text(encoding="utf-8")
+    return with_blocks(text, {"pipeline": pipeline_graph(root), "results": results_table(root)})
+
+
+def main(root: Path = Path(".")) -> int:
+    (root / "README.md").write_text(generate(root), encoding="utf-8")
+    if (root / PICTURE).is_file():
+        (root / "docs").mkdir(exist_ok=True)
+        shutil.copyfile(root / PICTURE, root / "docs" / PICTURE.name)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
