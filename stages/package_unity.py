@@ -13,6 +13,7 @@ from trunkline.bundle.package import read_tarball, write_tarball
 from trunkline.bundle.plots import roundtrip_figure
 from trunkline.bundle.roundtrip import curl, deviation, simulate
 from trunkline.bundle.twin import MANIFEST, MODEL, Label, Sources, Trajectory, assemble, compare
+from trunkline.bundle.unity_importer import as_imported
 from trunkline.config import settings
 from trunkline.errors import InputError
 from trunkline.plots import save_figure
@@ -77,7 +78,7 @@ def main(config: Config) -> None:
                 "bytes": tarball.stat().st_size,
             },
         )
-        write_roundtrip(out, calibrated, bundled, trajectory)
+        write_roundtrip(out, calibrated, packed[MODEL].decode(), trajectory)
 
 
 def read_sources(version: str) -> Sources:
@@ -102,19 +103,25 @@ def read_sources(version: str) -> Sources:
     )
 
 
-def write_roundtrip(
-    out: Path, calibrated: mujoco.MjModel, bundled: mujoco.MjModel, trajectory: Trajectory
-) -> None:
-    """The curl at the last gravity angle in both models, as a table and as a picture."""
+def write_roundtrip(out: Path, calibrated: mujoco.MjModel, mjcf: str, trajectory: Trajectory) -> None:
+    """The curl at the last gravity angle: calibrated model, packed model, and what Unity keeps of it."""
+    models = {
+        "calibrated": calibrated,
+        "from the package": mujoco.MjModel.from_xml_string(mjcf),
+        "as the importer keeps it": mujoco.MjModel.from_xml_string(as_imported(mjcf)),
+    }
     controls = curl(calibrated, trajectory.duration, trajectory.pull)
-    before, after = (simulate(model, controls, trajectory.tilts[-1])[0] for model in (calibrated, bundled))
-    gap_mm = 1e3 * deviation(before, after)
+    paths = {label: simulate(model, controls, trajectory.tilts[-1])[0] for label, model in models.items()}
+    tips = {label: path[:, -1] for label, path in paths.items()}
+    expected, *others = paths.items()
+    gaps_mm = {label: 1e3 * deviation(expected[1], path) for label, path in others}
     time = calibrated.opt.timestep * np.arange(1, len(controls) + 1)
-    columns = {"time": time, "deviation_mm": gap_mm}
-    for axis, name in enumerate("xyz"):
-        columns |= {f"calibrated_{name}": before[:, -1, axis], f"bundled_{name}": after[:, -1, axis]}
+    columns = {"time": time} | {f"{label}, gap in mm": gap for label, gap in gaps_mm.items()}
+    columns |= {
+        f"{label}, {name} in m": tips[label][:, axis] for label in tips for axis, name in enumerate("xyz")
+    }
     pd.DataFrame(columns)[::10].to_csv(out / "roundtrip.csv", index=False, float_format="%.6g")
-    save_figure(roundtrip_figure(time, before[:, -1], after[:, -1], gap_mm), out / "roundtrip.png")
+    save_figure(roundtrip_figure(time, tips, gaps_mm), out / "roundtrip.png")
 
 
 def _existing(path: str | Path) -> Path:

@@ -28,7 +28,7 @@ def describe_network(
     if widths != [[len(INPUTS)], [len(tendons)]]:
         raise InputError(
             f"{source}: found inputs of width {widths[0]} and outputs of width {widths[1]}, expected one"
-            f" input of {len(INPUTS)} ({', '.join(INPUTS)}), one output of {len(tendons)} ({', '.join(tendons)})"
+            f" input ({', '.join(INPUTS)}) and one output ({', '.join(tendons)})"
         )
     opset = max(entry.version for entry in model.opset_import)
     block = Network(

@@ -4,28 +4,31 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from trunkline.plots import IDENTIFIED, MEASURED
+from trunkline.plots import IDENTIFIED, INITIAL, MEASURED
 
 
-def roundtrip_figure(
-    time: np.ndarray, calibrated: np.ndarray, bundled: np.ndarray, gap_mm: np.ndarray
-) -> Figure:
-    """The tip in the calibrated and in the packed model, and the largest distance of any body between them.
+def roundtrip_figure(time: np.ndarray, tips: dict[str, np.ndarray], gaps_mm: dict[str, np.ndarray]) -> Figure:
+    """The tip in several models, and how far any body is from where the first model has it.
 
     Args:
-        time: s, shape (steps,). calibrated, bundled: tip positions, m, shape (steps, 3).
-        gap_mm: shape (steps,).
+        time: s, shape (steps,).
+        tips: by model, the calibrated one first: positions in m, shape (steps, 3).
+        gaps_mm: by each other model, shape (steps,).
     """
-    figure, (above, below) = plt.subplots(2, 1, figsize=(7, 4.5), sharex=True, height_ratios=(3, 1))
+    figure, (above, below) = plt.subplots(2, 1, figsize=(7, 4.8), sharex=True, height_ratios=(3, 2))
+    looks = [
+        dict(color=MEASURED, lw=4, alpha=0.3),
+        dict(color=IDENTIFIED, ls="--"),
+        dict(color=INITIAL, ls=":"),
+    ]
     for axis, name in ((0, "x"), (2, "z")):
-        above.plot(
-            time, 1e3 * calibrated[:, axis], color=MEASURED, lw=3, alpha=0.35, label=f"calibrated, {name}"
-        )
-        above.plot(
-            time, 1e3 * bundled[:, axis], color=IDENTIFIED, lw=1.2, ls="--", label=f"from the package, {name}"
-        )
-    above.set(title="The packed model moves as the calibrated one does", ylabel="tip unit (mm)")
-    above.legend(ncols=2)
-    below.plot(time, gap_mm, color=IDENTIFIED)
-    below.set(xlabel="time (s)", ylabel="largest gap (mm)")
+        for (label, tip), look in zip(tips.items(), looks, strict=True):
+            above.plot(time, 1e3 * tip[:, axis], label=label if axis == 0 else None, **look)
+        start = next(iter(tips.values()))[0, axis]
+        above.annotate(name, (0, 1e3 * start), xytext=(-12, -4), textcoords="offset points")
+    above.set(title="The packed model moves as the calibrated one does", ylabel="last unit (mm)")
+    above.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, -0.2))
+    for (label, gap), look in zip(gaps_mm.items(), looks[1:], strict=True):
+        below.plot(time, 1e3 * gap, label=label, **look)
+    below.set(xlabel="time (s)", ylabel="largest gap (µm)")
     return figure
