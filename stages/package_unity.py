@@ -107,19 +107,16 @@ def write_roundtrip(out: Path, calibrated: mujoco.MjModel, mjcf: str, trajectory
     """The curl at the last gravity angle: calibrated model, packed model, and what Unity keeps of it."""
     models = {
         "calibrated": calibrated,
-        "from the package": mujoco.MjModel.from_xml_string(mjcf),
-        "as the importer keeps it": mujoco.MjModel.from_xml_string(as_imported(mjcf)),
+        "packed": mujoco.MjModel.from_xml_string(mjcf),
+        "imported": mujoco.MjModel.from_xml_string(as_imported(mjcf)),
     }
     controls = curl(calibrated, trajectory.duration, trajectory.pull)
-    paths = {label: simulate(model, controls, trajectory.tilts[-1])[0] for label, model in models.items()}
-    tips = {label: path[:, -1] for label, path in paths.items()}
-    expected, *others = paths.items()
-    gaps_mm = {label: 1e3 * deviation(expected[1], path) for label, path in others}
+    paths = {name: simulate(model, controls, trajectory.tilts[-1])[0] for name, model in models.items()}
+    tips = {name: path[:, -1] for name, path in paths.items()}
+    gaps_mm = {name: 1e3 * deviation(paths["calibrated"], paths[name]) for name in ("packed", "imported")}
     time = calibrated.opt.timestep * np.arange(1, len(controls) + 1)
-    columns = {"time": time} | {f"{label}, gap in mm": gap for label, gap in gaps_mm.items()}
-    columns |= {
-        f"{label}, {name} in m": tips[label][:, axis] for label in tips for axis, name in enumerate("xyz")
-    }
+    columns = {"time": time} | {f"{name}_gap_mm": gap for name, gap in gaps_mm.items()}
+    columns |= {f"{name}_{axis}": tip[:, "xyz".index(axis)] for name, tip in tips.items() for axis in "xyz"}
     pd.DataFrame(columns)[::10].to_csv(out / "roundtrip.csv", index=False, float_format="%.6g")
     save_figure(roundtrip_figure(time, tips, gaps_mm), out / "roundtrip.png")
 
