@@ -29,7 +29,6 @@ class Roundtrip:
     duration: PositiveFloat
     pull: PositiveFloat
     tilts_deg: list[float] = Field(min_length=1)
-    joint_speed: PositiveFloat
 
 
 @settings
@@ -47,7 +46,6 @@ def main(config: Config) -> None:
         duration=config.roundtrip.duration,
         pull=config.roundtrip.pull,
         tilts=np.radians(config.roundtrip.tilts_deg).tolist(),
-        joint_speed=config.roundtrip.joint_speed,
     )
     label = Label(
         config.name,
@@ -111,9 +109,9 @@ def write_roundtrip(out: Path, calibrated: mujoco.MjModel, mjcf: str, trajectory
         "imported": mujoco.MjModel.from_xml_string(as_imported(mjcf)),
     }
     controls = curl(calibrated, trajectory.duration, trajectory.pull)
-    paths = {name: simulate(model, controls, trajectory.tilts[-1])[0] for name, model in models.items()}
-    tips = {name: path[:, -1] for name, path in paths.items()}
-    gaps_mm = {name: 1e3 * deviation(paths["calibrated"], paths[name]) for name in ("packed", "imported")}
+    motions = {name: simulate(model, controls, trajectory.tilts[-1]) for name, model in models.items()}
+    tips = {name: motion.positions[:, -1] for name, motion in motions.items()}
+    gaps_mm = {name: 1e3 * deviation(motions["calibrated"], motions[name]) for name in ("packed", "imported")}
     time = calibrated.opt.timestep * np.arange(1, len(controls) + 1)
     columns = {"time": time} | {f"{name}_gap_mm": gap for name, gap in gaps_mm.items()}
     columns |= {f"{name}_{axis}": tip[:, "xyz".index(axis)] for name, tip in tips.items() for axis in "xyz"}

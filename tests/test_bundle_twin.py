@@ -25,7 +25,7 @@ from trunkline.errors import InputError
 
 ROOT = Path(__file__).parents[1]
 LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0", trunkline="0.1.0")
-TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts=[0.0, 1.0], joint_speed=5.0)
+TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts=[0.0, 1.0])
 
 
 def network(inputs: int = 8, opset: int = 15) -> bytes:
@@ -87,7 +87,7 @@ def test_the_model_from_the_finished_package_moves_as_the_calibrated_one(files, 
 
 def test_the_curl_bends_the_arm_towards_the_pulled_tendon():
     model = mujoco.MjModel.from_xml_string(small_mjcf())
-    positions, _ = simulate(model, curl(model, TRAJECTORY.duration, TRAJECTORY.pull), tilt=0.0)
+    positions = simulate(model, curl(model, TRAJECTORY.duration, TRAJECTORY.pull), tilt=0.0).positions
     assert positions[:, -1, 0].max() > 0.05  # m, tendon 1 is over +x
 
 

@@ -1,7 +1,7 @@
 """The closest model without polynomial springs and dampers, which Unity's importer cannot read.
 
-MuJoCo's joint torque is -(a q + b q² + c q³) and -(a v + b v|v| + c v³). The line that is nearest in
-the mean square over a symmetric range: over ±R, k = a + 3/5 c R²; over ±V, d = a + 3/4 b V + 3/5 c V².
+MuJoCo's joint torque is -(a q + b q² + c q³) for a spring and -(a v + b v|v| + c v³) for a damper. The line
+that replaces it is nearest in the mean square over the angles and speeds of a given movement, Σ τ q / Σ q².
 """
 
 from dataclasses import dataclass
@@ -27,23 +27,20 @@ class Linearization:
     written: float
 
 
-def linearize_joints(spec: mujoco.MjSpec, speed: float) -> list[Linearization]:
-    """Replace polynomial joint springs and dampers in place.
+def linearize_joints(spec: mujoco.MjSpec, angles: np.ndarray, speeds: np.ndarray) -> list[Linearization]:
+    """Replace polynomial springs and dampers of hinges, in place.
 
     Args:
-        spec: the model; an unlimited joint's range counts as ±π.
-        speed: V, the joint speed in rad/s up to which damping matters.
+        spec: a model of hinges only.
+        angles, speeds: of every joint while it moves, rad and rad/s. Shape (steps, njnt).
     """
     changes = []
-    for joint in spec.joints:
-        reach = float(np.abs(joint.range).max()) or np.pi
-        stiffness, damping = np.array(joint.stiffness), np.array(joint.damping)
-        if stiffness[1:].any():
-            line = stiffness[0] + 3 / 5 * stiffness[2] * reach**2
-            changes.append(Linearization(joint.name, "stiffness", tuple(stiffness.tolist()), float(line)))
-            joint.stiffness = [line, 0, 0]
-        if damping[1:].any():
-            line = damping[0] + 3 / 4 * damping[1] * speed + 3 / 5 * damping[2] * speed**2
-            changes.append(Linearization(joint.name, "damping", tuple(damping.tolist()), float(line)))
-            joint.damping = [line, 0, 0]
+    for joint, q, v in zip(spec.joints, angles.T, speeds.T, strict=True):
+        for attribute, x, even in (("stiffness", q, q**2), ("damping", v, v * np.abs(v))):
+            a, b, c = getattr(joint, attribute)
+            if b == 0 and c == 0:
+                continue
+            slope = float((a * x + b * even + c * x**3) @ x / (x @ x)) if x.any() else float(a)
+            changes.append(Linearization(joint.name, attribute, (a, b, c), slope))
+            setattr(joint, attribute, [slope, 0, 0])
     return changes

@@ -1,10 +1,28 @@
 """Whether two models move alike: the same curl, under gravity from several directions."""
 
+from dataclasses import dataclass
+
 import mujoco
 import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
+
+
+@dataclass
+class Motion:
+    """What a model did.
+
+    Attributes:
+        positions: of all bodies in the base frame, m. Shape (steps, nbody, 3).
+        angles, speeds: qpos and qvel, rad and rad/s. Shapes (steps, nq), (steps, nv).
+        warnings: how many MuJoCo counted; Unity stops the scene at one.
+    """
+
+    positions: np.ndarray
+    angles: np.ndarray
+    speeds: np.ndarray
+    warnings: int = 0
 
 
 def curl(model: mujoco.MjModel, duration: float, pull: float) -> np.ndarray:
@@ -21,28 +39,28 @@ def curl(model: mujoco.MjModel, duration: float, pull: float) -> np.ndarray:
     return rest - pull * np.sin(np.pi * phase)[:, None] ** 2 * direction
 
 
-def simulate(model: mujoco.MjModel, controls: np.ndarray, tilt: float) -> tuple[np.ndarray, int]:
-    """Positions of all bodies in the base frame, and how many warnings MuJoCo counted (Unity throws on one).
+def simulate(model: mujoco.MjModel, controls: np.ndarray, tilt: float) -> Motion:
+    """Step a model from rest in its straight shape.
 
     Args:
         controls: shape (steps, nu). tilt: gravity angle, rad.
-
-    Returns:
-        Positions in m, shape (steps, nbody, 3), and the count.
     """
     data = mujoco.MjData(model)
     gravity = model.opt.gravity.copy()
     model.opt.gravity = gravity_in_base(tilt)
     data.act[:] = controls[0, model.actuator_actadr >= 0]  # the motors' filters start at rest
-    positions = np.empty((len(controls), model.nbody, 3))
+    motion = Motion(
+        *(np.empty((len(controls), *shape)) for shape in ((model.nbody, 3), (model.nq,), (model.nv,)))
+    )
     for step, control in enumerate(controls):
         data.ctrl[:] = control
         mujoco.mj_step(model, data)
-        positions[step] = data.xpos
+        motion.positions[step], motion.angles[step], motion.speeds[step] = data.xpos, data.qpos, data.qvel
     model.opt.gravity = gravity
-    return positions, int(sum(warning.number for warning in data.warning))
+    motion.warnings = int(sum(warning.number for warning in data.warning))
+    return motion
 
 
-def deviation(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def deviation(first: Motion, second: Motion) -> np.ndarray:
     """Largest distance between corresponding bodies at each step, m. Shape (steps,)."""
-    return np.linalg.norm(first - second, axis=-1).max(axis=-1)
+    return np.linalg.norm(first.positions - second.positions, axis=-1).max(axis=-1)

@@ -38,13 +38,11 @@ class Trajectory:
 
     Attributes:
         duration: s. pull: largest pull of tendon 1, m. tilts: gravity angles, rad.
-        joint_speed: up to which polynomial damping is made linear, rad/s.
     """
 
     duration: float
     pull: float
     tilts: list[float]
-    joint_speed: float
 
 
 @dataclass
@@ -65,7 +63,7 @@ def assemble(
     """All files of the package by path, and the rules that it breaks."""
     calibrated = mujoco.MjModel.from_xml_string(sources.mjcf)
     spec = mujoco.MjSpec.from_string(sources.mjcf)
-    changes = linearize_joints(spec, trajectory.joint_speed)
+    changes = linearize_joints(spec, *movement(calibrated, trajectory))
     spec.compile()
     mjcf = spec.to_xml()
     violations = lint_mjcf(mjcf)
@@ -114,13 +112,19 @@ def assemble(
     return files, violations + found
 
 
+def movement(model: mujoco.MjModel, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    """Joint angles and speeds of a model on the trajectory, all gravity angles one after the other."""
+    controls = curl(model, trajectory.duration, trajectory.pull)
+    motions = [simulate(model, controls, tilt) for tilt in trajectory.tilts]
+    return np.concatenate([m.angles for m in motions]), np.concatenate([m.speeds for m in motions])
+
+
 def compare(first: mujoco.MjModel, second: mujoco.MjModel, trajectory: Trajectory) -> tuple[float, int]:
     """Largest distance of any body between two models on the trajectory, over all its gravity angles, in mm,
     and how many warnings MuJoCo counted while it simulated the second."""
     controls = curl(first, trajectory.duration, trajectory.pull)
     largest, warnings = 0.0, 0
     for tilt in trajectory.tilts:
-        expected, _ = simulate(first, controls, tilt)
-        found, count = simulate(second, controls, tilt)
-        largest, warnings = max(largest, float(deviation(expected, found).max())), warnings + count
+        expected, found = (simulate(model, controls, tilt) for model in (first, second))
+        largest, warnings = max(largest, float(deviation(expected, found).max())), warnings + found.warnings
     return round(1e3 * largest, 6), warnings
