@@ -35,13 +35,13 @@ def _changed(repo: Repo) -> list[str]:
     expected |= {folder for file in expected for folder in file.parents}
     expected |= {_path(out) for out in repo.index.outs if not out.use_cache}
     found = []
-    for stage in repo.index.stages:
-        for change in stage.status().get(stage.addressing, []):
+    for stage, changes in repo.status().items():
+        for change in changes:
             if isinstance(change, str):  # "changed command"
-                found.append(f"{stage.addressing}: {change}")
+                found.append(f"{stage}: {change}")
                 continue
             found += [
-                f"{stage.addressing}: {kind}: {name}: {state}"
+                f"{stage}: {kind}: {name}: {state}"
                 for kind, states in change.items()
                 for name, state in states.items()
                 if state != "deleted" or Path(name) in expected
