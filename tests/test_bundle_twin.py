@@ -1,6 +1,7 @@
 """The package, whole: reproducible, complete, described truly, and moving as the calibrated model does."""
 
 import hashlib
+import io
 import json
 import re
 import shutil
@@ -127,6 +128,13 @@ def test_the_manifest_is_valid_and_true(files, sources):
     assert set(manifest.meshes) == {"rigid", "soft_030"}
     with pytest.raises(ValueError, match="extra"):
         Manifest.model_validate(json.loads(files[MANIFEST]) | {"surprise": 1})
+
+
+def test_meshes_stay_closed_and_outwards(files):
+    for mesh in Manifest.model_validate_json(files[MANIFEST]).meshes.values():
+        loaded = trimesh.load_mesh(io.BytesIO(files[mesh.file]), file_type="obj")
+        assert loaded.is_watertight
+        assert (len(loaded.faces), loaded.volume > 0) == (mesh.triangles, True)
 
 
 def test_a_grid_is_found_again_at_its_place(files):
