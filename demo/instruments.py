@@ -82,7 +82,9 @@ def rotation_mocap_world(settings: InstrumentSettings) -> Rotation:
     length = np.linalg.norm(axis)
     angle = np.arctan2(length, up[2])
     axis = axis / length if length > 0 else np.array([1.0, 0, 0])
-    return Rotation.from_rotvec(angle * axis) * Rotation.from_euler("z", settings.heading_deg, degrees=True)
+    return Rotation.from_rotvec(angle * axis) * Rotation.from_euler(
+        "z", settings.heading_deg, degrees=True
+    )
 
 
 def measure(
@@ -191,4 +193,6 @@ def _logged(
 ) -> np.ndarray:
     """ns: when messages sent at `time` reach the recorder, in the order in which they were sent."""
     delay = rng.exponential(settings.delivery_ms * 1e-3, size=len(time))
-    return np.maximum.accumulate(_nanoseconds(epoch, time + delay)) if len(time) else np.empty(0, np.int64)
+    return (
+        np.maximum.accumulate(_nanoseconds(epoch, time + delay)) if len(time) else np.empty(0, np.int64)
+    )

@@ -8,7 +8,7 @@ from mcap_ros2.writer import Writer
 from demo.instruments import BASE, InstrumentSettings, Measurement
 
 POSES, COMMANDS, TENDON_POSITIONS = "/rigid_bodies", "/tendon_commands", "/tendon_states"
-CHUNK_SIZE = 256 * 1024  # bytes; what a crash of the recorder costs
+CHUNK_SIZE = 64 * 1024  # bytes; what a crash of the recorder costs
 
 SEPARATOR = "=" * 80 + "\n"
 HEADER = f"""{SEPARATOR}MSG: std_msgs/Header
@@ -116,7 +116,9 @@ def _rigid_bodies(stamp: int, frame: int, bodies, positions: np.ndarray, quatern
                     "orientation": dict(zip("wxyz", quaternion.tolist(), strict=True)),
                 },
             }
-            for name, position, quaternion, seen in zip(bodies, positions, quaternions, visible, strict=True)
+            for name, position, quaternion, seen in zip(
+                bodies, positions, quaternions, visible, strict=True
+            )
             if seen
         ],
     }

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveFloat
 
 from trunkline.config import settings
 from trunkline.plots import save_figure
@@ -23,7 +23,6 @@ INGEST, PROCESSED, ARTIFACTS = (
 
 @settings
 class Outliers:
-    window: PositiveInt
     deviations: PositiveFloat
     position_floor_mm: PositiveFloat
     angle_floor_deg: PositiveFloat
@@ -45,16 +44,15 @@ class Config:
 
 
 def main(config: Config) -> None:
-    hampel = config.outliers
+    outliers = config.outliers
     chosen = Filter(
         config.rate,
         config.cutoff,
         config.order,
         config.longest_bridge,
-        hampel.window,
-        hampel.deviations,
-        hampel.position_floor_mm * 1e-3,
-        np.deg2rad(hampel.angle_floor_deg),
+        outliers.deviations,
+        outliers.position_floor_mm * 1e-3,
+        np.deg2rad(outliers.angle_floor_deg),
     )
     takes = read_takes(INGEST)
     trials, findings = [], []

@@ -19,14 +19,13 @@ class Filter:
     """rate: Hz of the uniform clock. cutoff: Hz, order: of the Butterworth low-pass.
 
     longest_bridge: s, longer gaps are filled and marked as not measured.
-    window: samples, deviations, position_floor (m), angle_floor (rad): Hampel's test for outliers.
+    deviations, position_floor (m), angle_floor (rad): see `smoothing.outliers`.
     """
 
     rate: float
     cutoff: float
     order: int
     longest_bridge: float
-    window: int
     deviations: float
     position_floor: float
     angle_floor: float
@@ -34,7 +33,7 @@ class Filter:
 
 @dataclass
 class Findings:
-    """samples: of all segments on the uniform clock. gap_share, filled_share: of them, not trusted and filled in.
+    """samples: of all segments on the uniform clock. gap_share, filled_share: not trusted, filled in.
     outliers: samples dropped.
 
     position_noise (m), angle_noise (rad): root mean square of what the filter took away, per axis.
@@ -81,7 +80,7 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
         time, samples = take.time[good], samples[good]
         if width == 7:
             samples[:, 3:] = make_continuous(samples[:, 3:])
-        inliers = ~_outliers(samples, settings)
+        inliers = ~_outliers(time, samples, settings)
         dropped += int(np.sum(~inliers))
         time, samples = time[inliers], samples[inliers]
         if len(time) < 2 * settings.order:
@@ -193,11 +192,11 @@ def average_static(trial: Trial) -> Trial:
     )
 
 
-def _outliers(samples: np.ndarray, settings: Filter) -> np.ndarray:
+def _outliers(time: np.ndarray, samples: np.ndarray, settings: Filter) -> np.ndarray:
     """Rows of (T, 3 or 7) whose position or orientation is off."""
-    bad = outliers(samples[:, :3], settings.window, settings.deviations, settings.position_floor)
+    bad = outliers(time, samples[:, :3], settings.deviations, settings.position_floor)
     if samples.shape[1] == 7:  # a chord between unit quaternions is half the angle
-        bad |= outliers(samples[:, 3:], settings.window, settings.deviations, settings.angle_floor / 2)
+        bad |= outliers(time, samples[:, 3:], settings.deviations, settings.angle_floor / 2)
     return bad
 
 

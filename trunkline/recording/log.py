@@ -74,10 +74,9 @@ def read_log(path: Path) -> Log:
     end = _read_all(data, contents, damage, path)
     if end is not None:
         damage.append(f"cut off at byte {len(data)}" + _read_cut_chunk(data[end:], contents))
-    if damage and contents.expected is not None:
-        damage.append(
-            f"{contents.expected - len(contents.messages)} of {contents.expected} messages lost"
-        )
+    if contents.expected is not None and contents.expected != len(contents.messages):
+        lost = contents.expected - len(contents.messages)
+        damage.append(f"{lost} of {contents.expected} messages lost")
     return Log(Path(path), _by_topic(contents), damage)
 
 
@@ -93,11 +92,13 @@ def _read_all(data: bytes, contents: _Contents, damage: list[str], path: Path) -
                 _read_records(_chunk_data(body), contents)
             elif opcode == Opcode.DATA_END:
                 crc = DataEnd.read(_stream(body)).data_section_crc
-                if crc and crc != zlib.crc32(data[:position]) and not damage:
-                    damage.append("the data section's checksum is wrong though every chunk's is right")
+                if crc and crc != zlib.crc32(data[:position]):
                     if unchunked:
-                        raise InputError(
-                            f"{path}: wrong checksum over messages outside chunks, none can be trusted"
+                        found = "wrong checksum over messages outside chunks"
+                        raise InputError(f"{path}: {found}, none can be trusted")
+                    if not damage:
+                        damage.append(
+                            "the data section's checksum is wrong though every chunk's is right"
                         )
             elif opcode == Opcode.STATISTICS:
                 contents.expected = Statistics.read(_stream(body)).message_count

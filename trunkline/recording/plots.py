@@ -6,6 +6,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE
 from trunkline.recording.base_frame import average_base, to_base_frame
@@ -21,7 +22,7 @@ COLORS = {"static_tilt": MEASURED, "release": IDENTIFIED, "curl": VALIDATE}
 def quality_figure(
     qualities: list[Quality], refused: dict[str, str], offset: float, spread: float
 ) -> Figure:
-    """The quality page: coverage per segment over time, gaps, noise, rates, clock fit, repairs and refusals."""
+    """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals."""
     figure = plt.figure(figsize=(14, 13))
     left, right = figure.subfigures(1, 2, width_ratios=(3, 2))
     _coverage(left.subplots(), qualities)
@@ -68,6 +69,10 @@ def quality_figure(
     more = [f"… and {len(wrapped) - 14} lines more in quality.json"] if len(wrapped) > 14 else []
     words.set_title("Repaired and refused")
     words.text(0, 1, "\n".join(wrapped[:14] + more), va="top", fontsize=8, transform=words.transAxes)
+    for panel in (jitter, clock):
+        panel.set_xlim(-1, len(qualities))
+        panel.xaxis.get_major_locator().set_params(integer=True)
+    jitter.legend(handles=[Patch(color=color, label=name) for name, color in COLORS.items()], ncols=3)
     return figure
 
 
@@ -102,7 +107,7 @@ def _coverage(axes, qualities: list[Quality]) -> None:
     )
     axes.set_yticks(ticks, [quality.take.name for quality in qualities], fontsize=7)
     axes.set(xlabel="time (s)")
-    axes.set_title("Coverage: each trial's segments from base (top) to tip; dark where unseen")
+    axes.set_title("Coverage: each trial's segments, base on top; red where unseen, yellow where in part")
     axes.grid(False)
 
 

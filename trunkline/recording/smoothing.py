@@ -2,20 +2,45 @@
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.ndimage import median_filter
 from scipy.signal import butter, sosfiltfilt
 
+ROUNDS = 5  # of removing outliers; what bad rows hide shows once they are gone
 
-def outliers(columns: np.ndarray, window: int, deviations: float, floor: float) -> np.ndarray:
-    """Hampel's test: which rows of (T, C) are far from the running median. Shape (T,); no NaN allowed.
+
+def outliers(time: np.ndarray, columns: np.ndarray, deviations: float, floor: float) -> np.ndarray:
+    """Which rows of (T, C) disagree with their neighbours, however one looks at them: (T,). No NaN allowed.
+
+    A row is predicted along a line from the two before it, the two behind it and the ones at its sides; the best
+    counts. So fast motion passes, and a good row beside a bad one. Three bad rows that agree with each other are
+    no noise but a segment taken for another, and pass.
 
     Args:
-        window: samples, odd. deviations: allowed distance in robust standard deviations of the window.
-        floor: an absolute distance that is always allowed, so that fast motion passes.
+        time: (T,) s, increasing.
+        deviations: allowed disagreement, in medians of it.
+        floor: always allowed; at an acceleration a, a good row may disagree by a (Δt)² / 2.
     """
-    distance = np.linalg.norm(columns - median_filter(columns, (window, 1), mode="nearest"), axis=1)
-    spread = 1.4826 * median_filter(distance, window, mode="nearest")
-    return distance > np.maximum(deviations * spread, floor)
+    kept = np.arange(len(time))
+    for _ in range(ROUNDS):
+        disagreement = _disagreement(time[kept], columns[kept])
+        good = disagreement <= max(deviations * np.median(disagreement), floor)
+        if good.all():
+            break
+        kept = kept[good]
+    bad = np.ones(len(time), bool)
+    bad[kept] = False
+    return bad
+
+
+def _disagreement(time: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Distance of each row to the nearest of its three predictions; 0 where there is none."""
+    nearest = np.full(len(time), np.inf)
+    for first, second in ((-2, -1), (1, 2), (-1, 1)):
+        rows = np.arange(max(0, -first), len(time) - max(0, second))
+        before, after = rows + first, rows + second
+        share = ((time[rows] - time[before]) / (time[after] - time[before]))[:, None]
+        predicted = columns[before] + share * (columns[after] - columns[before])
+        nearest[rows] = np.minimum(nearest[rows], np.linalg.norm(columns[rows] - predicted, axis=1))
+    return np.where(np.isfinite(nearest), nearest, 0.0)
 
 
 def resample(time: np.ndarray, columns: np.ndarray, grid: np.ndarray) -> np.ndarray:

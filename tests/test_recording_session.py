@@ -1,0 +1,105 @@
+"""session.yaml: every mistake in one line that names file, key, what was found and what was expected."""
+
+import numpy as np
+import pytest
+from omegaconf import OmegaConf
+
+from trunkline.errors import InputError
+from trunkline.recording.session import FixedBase, read_session
+
+GOOD = {
+    "frame": {"up": [0, 2, 0]},
+    "base": "base",
+    "trials": [
+        {"file": "tilt.mcap", "experiment": "static_tilt", "level": 30, "split": "identify"},
+        {"file": "swing.mcap", "experiment": "release", "split": "validate", "window": [1, 2.5]},
+    ],
+}
+
+
+def session(folder, content=GOOD, logs=("tilt.mcap", "swing.mcap")):
+    folder.mkdir(exist_ok=True)
+    for log in logs:
+        (folder / log).touch()
+    text = content if isinstance(content, str) else OmegaConf.to_yaml(content)
+    (folder / "session.yaml").write_text(text)
+    return folder
+
+
+def changed(*path, value):
+    content = OmegaConf.to_container(OmegaConf.create(GOOD))
+    place = content
+    for key in path[:-1]:
+        place = place[key]
+    place[path[-1]] = value
+    return content
+
+
+def test_good_session(tmp_path):
+    read = read_session(session(tmp_path))
+    assert [trial.name for trial in read.trials] == ["tilt", "swing"]
+    np.testing.assert_allclose(read.frame.up_direction(), [0, 1, 0])
+    assert read.clock == "stamp"
+    fixed = read_session(session(tmp_path, changed("base", value={"position": [0.1, 0, 0.1]})))
+    assert isinstance(fixed.base, FixedBase)
+
+
+@pytest.mark.parametrize(
+    ("path", "value", "message"),
+    [
+        (
+            ("trials", 0, "file"),
+            "tilt_.mcap",
+            r"trials.0.file: found 'tilt_.mcap', expected .*such as tilt.mcap",
+        ),
+        (
+            ("trials", 0, "experiment"),
+            "tilt",
+            r"trials.0.experiment: found 'tilt', expected 'static_tilt'",
+        ),
+        (
+            ("trials", 0, "split"),
+            "test",
+            r"trials.0.split: found 'test', expected 'identify' or 'validate'",
+        ),
+        (
+            ("trials", 0, "level"),
+            None,
+            r"trials.0: level: missing, expected the nominal level of a static_tilt",
+        ),
+        (("trials", 0, "level"), float("nan"), r"trials.0.level: found nan, expected a finite number"),
+        (
+            ("trials", 1, "window"),
+            [2, 1],
+            r"trials.1: window: found \[2.0, 1.0\], expected \[start, end\]",
+        ),
+        (("trials", 1, "name"), "tilt", r"trials.1.name: found 'tilt' again, expected each name once"),
+        (("trials", 1, "leevl"), 3, r"trials.1.leevl: unknown key"),
+        (("trials",), [], r"trials: found \[\], expected"),
+        (("frame", "up"), [0, 0, 0], r"frame: up: found the zero vector"),
+        (("frame", "up"), [0, 1], r"frame.up.2: missing"),
+        (("frame", "unit"), "cm", r"frame.unit: found 'cm', expected 'm' or 'mm'"),
+        (("clock",), "utc", r"clock: found 'utc', expected 'stamp', 'log' or 'frame'"),
+        (("base",), {"position": [0, 0], "quaternion": [1, 0, 0, 0]}, r"base"),
+    ],
+)
+def test_mistakes(tmp_path, path, value, message):
+    with pytest.raises(InputError, match=r"session\.yaml: " + message) as error:
+        read_session(session(tmp_path, changed(*path, value=value)))
+    assert "\n" not in str(error.value)
+
+
+def test_missing_keys_and_files(tmp_path):
+    with pytest.raises(InputError, match="nowhere: no such folder"):
+        read_session(tmp_path / "nowhere")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match="empty: found 0 logs and no session.yaml"):
+        read_session(tmp_path / "empty")
+    with pytest.raises(InputError, match="expected one of the folder's 0 logs"):
+        read_session(session(tmp_path / "nologs", logs=()))
+    with pytest.raises(InputError, match=r"session.yaml: frame: missing.*\(and 1 more\)"):
+        read_session(session(tmp_path / "bare", {"base": "base"}))
+    with pytest.raises(InputError, match="session.yaml: not readable as YAML"):
+        read_session(session(tmp_path / "broken", "trials: [\n"))
+    with pytest.raises(InputError, match=r"session.yaml: the file: found \[1, 2\]"):
+        read_session(session(tmp_path / "list", "[1, 2]"))
