@@ -10,6 +10,8 @@ from pathlib import Path
 
 from dvc.repo import Repo
 
+ABSENT = ("deleted", "not in cache")  # DVC's words for a file that a clone without the cache lacks
+
 
 def mismatches(root: Path) -> list[str]:
     """One line per way in which the lock files disagree with the working tree or with themselves."""
@@ -20,7 +22,7 @@ def mismatches(root: Path) -> list[str]:
 def _unlocked(repo: Repo) -> list[str]:
     """Stages that never ran, or that gained a dependency or an output since."""
     return [
-        f"{stage.addressing}: {entry} is not in the lock file"
+        f"{stage.name}: {_path(entry)} is not in the lock file"
         for stage in repo.index.stages
         for entry in (*stage.deps, *stage.outs)
         if not entry.hash_info
@@ -35,7 +37,8 @@ def _changed(repo: Repo) -> list[str]:
     expected |= {folder for file in expected for folder in file.parents}
     expected |= {_path(out) for out in repo.index.outs if not out.use_cache}
     found = []
-    for stage, changes in repo.status().items():
+    for address, changes in repo.status().items():
+        stage = address.rpartition(":")[2]
         for change in changes:
             if isinstance(change, str):  # "changed command"
                 found.append(f"{stage}: {change}")
@@ -44,7 +47,7 @@ def _changed(repo: Repo) -> list[str]:
                 f"{stage}: {kind}: {name}: {state}"
                 for kind, states in change.items()
                 for name, state in states.items()
-                if state != "deleted" or Path(name) in expected
+                if state not in ABSENT or Path(name) in expected
             ]
     return found
 
@@ -52,7 +55,7 @@ def _changed(repo: Repo) -> list[str]:
 def _inconsistent(repo: Repo) -> list[str]:
     written = {_path(out): out for out in repo.index.outs}
     return [
-        f"{stage.addressing}: read another {dep} than {out.stage.addressing} wrote"
+        f"{stage.name}: read another {_path(dep)} than {out.stage.name} wrote"
         for stage in repo.index.stages
         for dep in stage.deps
         if (out := written.get(_path(dep))) and dep.hash_info and dep.hash_info != out.hash_info
