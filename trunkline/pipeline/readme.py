@@ -87,13 +87,16 @@ def _bound(limit: Limit | None) -> str:
         return ""
     if limit.equals is not None:
         return f"{limit.equals}"
-    return f"≤ {_number(limit.max)}" if limit.max is not None else f"≥ {_number(limit.min)}"
+    words = [f"≤ {_number(limit.max)}" if limit.max is not None else f"≥ {_number(limit.min)}"]
+    if limit.below is not None:
+        words.append(f"{limit.below.factor:g}× below {limit.below.key.partition('.')[0].upper()}")
+    return ", ".join(words)
 
 
 def _number(value: float | None) -> str:
     if value is None:
         return "–"
-    return f"{value:,}" if isinstance(value, int) else f"{value:.3g}"
+    return f"{int(value):,}" if value == int(value) else f"{value:.3g}"
 
 
 def with_blocks(text: str, blocks: dict[str, str]) -> str:
