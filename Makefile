@@ -13,9 +13,9 @@ demo: setup          ## run the whole pipeline, from recording the demo logs to 
 	dvc repro
 	@ls -lh artifacts/package_unity/*.tgz
 
-test: setup          ## lint and run every test
-	ruff check .
+test: setup          ## run every test, then lint
 	python -m pytest -n auto --dist worksteal
+	ruff check --output-format concise .
 
 gate: setup          ## compare the metrics with tests/limits.yaml
 	python -m trunkline.pipeline.gate
