@@ -1,0 +1,67 @@
+"""The soft arm's map at a gravity angle: where its tip can be, to a tolerance.
+
+An arm that only bends reaches a shell, not a solid: two parameters of three move the tip along the shell, the
+third hardly. The map is the set of points within ``tolerance`` of a sampled tip, so that it has an inside.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.spatial import cKDTree
+
+from trunkline.reachability.grid import Lattice, blend, drop_specks, overlap, redistance
+from trunkline.reachability.tips import TipInterpolator, TipSamples
+from trunkline.threads import thread_count
+
+
+@dataclass(frozen=True)
+class SoftShape:
+    """How tips become a set.
+
+    ``tolerance`` (m): how near a reachable tip a point must be. ``closing`` (m): radius up to which gaps in
+    the set are filled. ``smoothing``: standard deviation of a Gaussian over the field, in lattice steps.
+    ``smallest``: islands and cavities of fewer cells vanish.
+    """
+
+    tolerance: float
+    closing: float
+    smoothing: float
+    smallest: int
+
+
+def soft_lattice(samples: TipSamples, shape: SoftShape, spacing: float) -> Lattice:
+    """One lattice for the maps of all angles."""
+    tips = np.concatenate(samples.tips)
+    return Lattice.around(tips.min(axis=0), tips.max(axis=0), spacing, shape.tolerance + shape.closing + 2 * spacing)
+
+
+def soft_field(tips: NDArray, lattice: Lattice, shape: SoftShape) -> NDArray:
+    """Signed distance field of the points near ``tips`` (N, 3), in m. Shape ``lattice.shape``."""
+    points = np.stack(np.meshgrid(*lattice.axes(), indexing="ij"), axis=-1).reshape(-1, 3)
+    distance, _ = cKDTree(tips).query(points, workers=thread_count())
+    # Closing: grow by tolerance + closing, then shrink by closing.
+    grown = distance.reshape(lattice.shape) - (shape.tolerance + shape.closing)
+    field = redistance(grown, lattice.spacing) + shape.closing
+    cells = field < 0
+    kept = drop_specks(cells, shape.smallest)
+    field = np.where(kept == cells, field, np.where(kept, -0.5, 0.5) * lattice.spacing)
+    return ndimage.gaussian_filter(redistance(field, lattice.spacing), shape.smoothing)
+
+
+def soft_fields(samples: TipSamples, angles: NDArray, lattice: Lattice, shape: SoftShape) -> NDArray:
+    """Fields (len(angles), ...) at gravity ``angles`` (rad), sampled ones or between them."""
+    interpolator = TipInterpolator(samples, shape.tolerance / 2)
+    return np.stack([soft_field(interpolator.tips(a), lattice, shape) for a in angles]).astype(np.float32)
+
+
+def heldout_overlap(samples: TipSamples, index: int, step: float, lattice: Lattice, shape: SoftShape) -> float:
+    """Overlap (IoU) at angle ``index`` of its own field with the blend that is made without its samples.
+
+    The blend is the headset's: linear between two fields ``step`` (rad) apart, here at its worst, half-way.
+    """
+    angle = samples.angles[index]
+    beside = angle + step * np.array([-0.5, 0.5])
+    fields = soft_fields(samples.without(index), beside, lattice, shape)
+    return overlap(blend(fields, beside, angle), soft_field(samples.tips[index], lattice, shape))
