@@ -14,7 +14,7 @@ demo: setup          ## run the whole pipeline, from recording the demo logs to 
 	@ls -lh artifacts/package_unity/*.tgz
 
 test: setup          ## run every test, then lint
-	python -m pytest -n auto --dist worksteal
+	python -m pytest -n auto --dist loadgroup
 	ruff check --output-format concise .
 
 gate: setup          ## compare the metrics with tests/limits.yaml

@@ -25,6 +25,9 @@ STAGES = [
 INERT = {f"trunkline/{name}.py" for name in ("__init__", "config", "errors", "plots", "progress", "stage", "threads")}
 
 
+pytestmark = pytest.mark.xdist_group("pipeline")  # one worker, so that the stub pipeline runs once
+
+
 @pytest.fixture(scope="module")
 def repo():
     with Repo(str(ROOT)) as repo:
