@@ -22,7 +22,8 @@ STAGES = [
 ]  # fmt: skip
 
 # What surrounds every stage (load, show, refuse, write) and never changes a number: no reason to run again.
-INERT = {f"trunkline/{name}.py" for name in ("__init__", "config", "errors", "plots", "progress", "stage", "threads")}
+INERT = {f"trunkline/{name}.py" for name in ("config", "errors", "plots", "progress", "stage", "threads")}
+INERT |= {"trunkline/pipeline/settings.py"}
 
 
 pytestmark = pytest.mark.xdist_group("pipeline")  # one worker, so that the stub pipeline runs once

@@ -68,16 +68,17 @@ def check_settings(root: str | Path = ".") -> list[str]:
     """Validate the settings of every stage under ``root / "stages"``, and return their names.
 
     Raises:
-        InputError: for the first bad value in any section, or a section that belongs to no stage.
+        InputError: for the first bad value in any section, or a section of no stage in dvc.yaml.
     """
-    params, files = Path(root) / "params.yaml", sorted((Path(root) / "stages").glob("*.py"))
-    stages = [file.stem for file in files]
+    root = Path(root)
+    params, stages = root / "params.yaml", list(_load(root / "dvc.yaml").stages)
     for section in _load(params):
         if section not in stages:
             raise InputError(f"{params}: {section}: no such stage{_nearest(section, stages)}")
+    files = sorted((root / "stages").glob("*.py"))
     for file in files:
         load_config(runpy.run_path(str(file), run_name=file.stem)["Config"], file.stem, root)
-    return stages
+    return [file.stem for file in files]
 
 
 def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[str, Any]:

@@ -1,9 +1,35 @@
 """``python -m trunkline.pipeline.settings``: check every stage's settings before anything runs."""
 
+import hashlib
 import sys
+from pathlib import Path
 
 from trunkline.config import check_settings
 from trunkline.errors import InputError
+
+
+def check_once(root: Path = Path(".")) -> None:
+    """Check the settings of all stages, unless these very files passed before.
+
+    Every stage calls this first, so that a typo in the last section shows before the first stage works. To check
+    is to import every stage, which takes seconds; hence the note of what has passed, in DVC's temporary folder.
+    Outside of the project (no dvc.yaml) there is nothing to check.
+
+    Raises:
+        InputError: for the first mistake in any section.
+    """
+    if not (root / "dvc.yaml").is_file():
+        return
+    files = [root / "params.yaml", root / "dvc.yaml", *root.glob("conf/**/*.yaml"), *root.glob("stages/*.py")]
+    digest = hashlib.sha256()
+    for file in sorted(file for file in files if file.is_file()):
+        digest.update(str(file).encode() + b"\0" + file.read_bytes() + b"\0")
+    passed = root / ".dvc" / "tmp" / "settings.sha256"
+    if passed.is_file() and passed.read_text() == digest.hexdigest():
+        return
+    check_settings(root)
+    passed.parent.mkdir(parents=True, exist_ok=True)
+    passed.write_text(digest.hexdigest())
 
 
 def main() -> int:
