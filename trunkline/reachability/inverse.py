@@ -59,12 +59,11 @@ def solve(
     n = len(positions)
     best = InverseResult(np.tile((Q_MIN + Q_MAX) / 2, (n, 1)), np.full(n, np.inf), np.full(n, np.inf),
                          np.zeros(n, int), np.zeros(n, bool))
-    rng = np.random.default_rng(seed)
     left = np.arange(n)
-    for _ in range(starts):
+    for start in range(starts):
         if not left.size:
             break
-        first = rng.uniform(Q_MIN, Q_MAX, size=(n, 7))[left]
+        first = np.random.default_rng([seed, start]).uniform(Q_MIN, Q_MAX, size=(n, 7))[left]
         target = None if rotations is None else rotations[left]
         q, position_error, rotation_error = _descend(first, positions[left], target, mount_offset)
         success = (position_error <= POSITION_TOLERANCE) & (rotation_error <= ROTATION_TOLERANCE)

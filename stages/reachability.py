@@ -1,0 +1,137 @@
+"""Map the reach of the rigid arm, of the soft arm per gravity angle, and of both together."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from pydantic import Field, PositiveFloat, PositiveInt
+
+from trunkline.config import settings
+from trunkline.errors import InputError
+from trunkline.plots import save_figure
+from trunkline.reachability.maps import HybridSettings, LabelSettings, RigidSettings, build_maps, check_maps
+from trunkline.reachability.mesh import write_obj
+from trunkline.reachability.panda_mjcf import panda_spec
+from trunkline.reachability.plots import heldout_figure, maps_figure, slices_figure
+from trunkline.reachability.soft_map import SoftShape
+from trunkline.reachability.tips import TipSamples
+from trunkline.stage import output_folder, run_stage, write_json
+
+SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
+ARTIFACTS = Path("artifacts/reachability")
+TENSIONS = ["f1", "f2", "f3"]
+
+
+@settings
+class Rigid:
+    mount_offset: float = Field(ge=0, le=0.5)
+    self_collision: bool
+    poses: int = Field(ge=1000)
+    profile_voxel: PositiveFloat
+    voxel: PositiveFloat
+    closing: PositiveFloat
+    smoothing: float = Field(ge=0)
+    smallest: PositiveInt
+
+
+@settings
+class Labels:
+    count: int = Field(ge=100)
+    starts: PositiveInt
+    starts_in_doubt: PositiveInt
+    margin: PositiveFloat
+
+
+@settings
+class Soft:
+    tolerance: PositiveFloat
+    voxel: PositiveFloat
+    closing: PositiveFloat
+    smoothing: float = Field(ge=0)
+    smallest: PositiveInt
+    angle_step_deg: PositiveFloat
+
+
+@settings
+class Hybrid:
+    voxel: PositiveFloat
+    smoothing: float = Field(ge=0)
+
+
+@settings
+class Config:
+    most_triangles: int = Field(ge=100)
+    seed: int = Field(ge=0)
+    rigid: Rigid
+    labels: Labels
+    soft: Soft
+    hybrid: Hybrid
+
+
+def main(config: Config) -> None:
+    samples = read_samples(SAMPLES)
+    shape = SoftShape(config.soft.tolerance, config.soft.closing, config.soft.smoothing, config.soft.smallest)
+    step = np.radians(config.soft.angle_step_deg)
+    maps = build_maps(
+        samples,
+        RigidSettings(**vars(config.rigid)),
+        shape,
+        HybridSettings(**vars(config.hybrid)),
+        soft_voxel=config.soft.voxel,
+        step=step,
+        most_triangles=config.most_triangles,
+        seed=config.seed,
+    )
+    check = check_maps(maps, samples, LabelSettings(**vars(config.labels)), shape, step, config.seed)
+
+    with output_folder(ARTIFACTS) as folder:
+        np.savez_compressed(folder / "grids.npz", **maps.arrays())
+        (folder / "meshes").mkdir()
+        for name, mesh in maps.meshes().items():
+            write_obj(folder / "meshes" / f"{name}.obj", mesh, f"Reachable set: {name}")
+        (folder / "panda.xml").write_text(panda_spec(config.rigid.mount_offset).to_xml())
+        heldout = pd.DataFrame({"angle_deg": np.degrees(samples.angles[1:-1]).round(6), "iou": check.heldout})
+        heldout.to_csv(folder / "heldout.csv", index=False, float_format="%.6g")
+        save_figure(maps_figure(maps, samples), folder / "maps.png")
+        save_figure(slices_figure(maps, samples, check), folder / "slices.png")
+        save_figure(heldout_figure(heldout), folder / "heldout.png")
+        write_json(folder / "metrics.json", metrics(maps, check))
+
+
+def read_samples(path: Path) -> TipSamples:
+    """Tips and tensions by gravity angle, from the data set of forward kinematics."""
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected the samples of the fk_dataset stage (run `dvc repro`)")
+    columns = ["theta_g", "x", "y", "z", *TENSIONS]
+    try:
+        table = pd.read_parquet(path, columns=columns)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}, expected the columns {', '.join(columns)}") from error
+    groups = [group for _, group in table.groupby(table["theta_g"].round(9))]
+    if len(groups) < 3:
+        raise InputError(f"{path}: found {len(groups)} gravity angles, expected at least 3 to check blending")
+    return TipSamples(
+        angles=np.array([group["theta_g"].iloc[0] for group in groups]),
+        tips=[group[["x", "y", "z"]].to_numpy(float) for group in groups],
+        tensions=[group[TENSIONS].to_numpy(float) for group in groups],
+    )
+
+
+def metrics(maps, check) -> dict:
+    """What SPEC section 11 asks for, and how much it rests on."""
+    soft = [maps.soft.meshes[i] for i in range(len(maps.soft.meshes))]
+    return {
+        "rigid": check.rigid._asdict() | {
+            "watertight": maps.rigid.mesh.is_closed(), "triangles": len(maps.rigid.mesh.faces),
+        },
+        "soft": {
+            "heldout_iou_min": min(check.heldout),
+            "watertight": all(mesh.is_closed() for mesh in soft),
+            "triangles": max(len(mesh.faces) for mesh in soft),
+        },
+        "hybrid": {"watertight": maps.hybrid.mesh.is_closed(), "triangles": len(maps.hybrid.mesh.faces)},
+    }
+
+
+if __name__ == "__main__":
+    run_stage("reachability", Config, main)

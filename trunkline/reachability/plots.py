@@ -1,0 +1,169 @@
+"""Pictures of the maps: in space, in slices, and how well blending between gravity angles holds."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+from numpy.typing import NDArray
+
+from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE
+from trunkline.reachability.inverse import solve
+from trunkline.reachability.maps import Check, Maps
+from trunkline.reachability.mesh import Surface
+from trunkline.reachability.panda import FLANGE, joint_frames
+from trunkline.reachability.tips import TipSamples
+
+SUN = np.array([0.35, -0.75, 0.55])  # towards the light
+POSE = (0.45, 0.0, 0.55)  # m, where the drawn Panda holds the mount
+RIGID, SOFT, HYBRID = IDENTIFIED, INITIAL, VALIDATE
+SHOWN_DEG = (0.0, 60.0, 120.0)  # gravity angles of the paper's figure
+
+
+def maps_figure(maps: Maps, samples: TipSamples) -> Figure:
+    """The paper's figure: (a) rigid, (b) soft along gravity, (c) soft at three angles, (d) hybrid on the robot."""
+    figure = plt.figure(figsize=(12, 11))
+    arm = panda_line(maps.mount_offset, maps.self_collision)
+    length = float(np.linalg.norm(samples.tips[0], axis=1).max())
+    mount = np.array(POSE)
+
+    a = _space(figure, 221, "(a) Panda, end effector straight down")
+    _add_surface(a, maps.rigid.mesh, RIGID, 0.30)
+    _add_line(a, arm, MEASURED, 5)
+    _frame(a, [maps.rigid.mesh.vertices])
+
+    nearest = [int(np.abs(maps.soft.mesh_angles - np.radians(d)).argmin()) for d in SHOWN_DEG]
+    b = _space(figure, 222, f"(b) Soft arm, gravity at {np.degrees(maps.soft.mesh_angles[nearest[0]]):.0f}°")
+    _add_surface(b, maps.soft.meshes[nearest[0]], SOFT, 0.35)
+    _add_line(b, np.array([[0, 0, 0], [0, 0, -length]]), MEASURED, 4)
+    _frame(b, [maps.soft.meshes[nearest[0]].vertices, np.zeros((1, 3))])
+
+    c = _space(figure, 223, "(c) Soft arm, gravity at " + ", ".join(
+        f"{np.degrees(maps.soft.mesh_angles[i]):.0f}°" for i in sorted(set(nearest))))
+    c.view_init(elev=12, azim=-80)
+    for index, color in zip(sorted(set(nearest)), (SOFT, VALIDATE, IDENTIFIED), strict=False):
+        _add_surface(c, maps.soft.meshes[index], color, 0.40)
+        _add_gravity(c, maps.soft.mesh_angles[index], length, color)
+    _add_line(c, np.array([[0, 0, 0.06], [0, 0, 0]]), MEASURED, 6)
+    _frame(c, [maps.soft.meshes[i].vertices for i in nearest] + [np.zeros((1, 3))])
+
+    d = _space(figure, 224, "(d) Both: soft tip, soft arm hanging from the Panda")
+    _add_surface(d, maps.hybrid.mesh, HYBRID, 0.22)
+    soft = maps.soft.meshes[nearest[0]]
+    _add_surface(d, Surface(soft.vertices + mount, soft.faces, soft.tolerance), SOFT, 0.5)
+    _add_line(d, arm, MEASURED, 4)
+    _frame(d, [maps.hybrid.mesh.vertices])
+    return figure
+
+
+def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
+    """Slices through y = 0 with what they were checked against: labels, tips; and the hybrid around the rigid map."""
+    figure, (rigid, soft, hybrid) = plt.subplots(1, 3, figsize=(14, 5.4))
+    _fill_slice(rigid, maps.rigid, RIGID)
+    radius = np.hypot(check.points[:, 0], check.points[:, 1]) * np.where(check.points[:, 0] < 0, -1, 1)
+    for right, mark, size in ((True, ".", 3), (False, "x", 40)):
+        for reached, color in ((True, IDENTIFIED), (False, "#999999")):
+            rows = (check.reachable == reached) & ((check.claimed == check.reachable) == right)
+            name = ("reached" if reached else "not reached") + ("" if right else ", map wrong")
+            rigid.scatter(radius[rows], check.points[rows, 2], s=size, marker=mark, zorder=3,
+                          color=color if right else INITIAL, label=f"{name} ({rows.sum()})")
+    rigid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, fontsize=8, markerscale=1.5)
+    rigid.set(title=f"Rigid: accuracy {100 * check.rigid.accuracy:.2f} %", xlabel="±radius (m)", ylabel="z (m)")
+
+    angles = maps.soft.mesh_angles
+    colors = plt.get_cmap("viridis")(np.linspace(0, 0.9, len(angles)))
+    x, y, z = maps.soft.lattice.axes()
+    middle = int(np.abs(y).argmin())
+    for index, (angle, color) in enumerate(zip(angles, colors, strict=True)):
+        soft.contour(x, z, maps.soft.at(angle)[:, middle].T, levels=[0.0], colors=[color], linewidths=1.4)
+        tips = samples.tips[index]
+        near = np.abs(tips[:, 1]) < maps.soft.lattice.spacing / 2
+        soft.scatter(tips[near, 0], tips[near, 2], s=2, color=color, label=f"{np.degrees(angle):.0f}°")
+    soft.plot(0, 0, "k^", markersize=8)
+    soft.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4, fontsize=8, markerscale=4,
+                title="gravity angle; dots: tips")
+    soft.set(title="Soft: maps and tips", xlabel="x (m)", ylabel="z (m)")
+
+    _fill_slice(hybrid, maps.hybrid, HYBRID)
+    x, y, z = maps.rigid.lattice.axes()
+    rigid_slice = maps.rigid.field[:, int(np.abs(y).argmin())].T
+    hybrid.contour(x, z, rigid_slice, levels=[0.0], colors=[RIGID], linewidths=1.5)
+    hybrid.plot([], [], color=RIGID, label="mount (rigid map)")
+    hybrid.plot([], [], color=HYBRID, linewidth=6, alpha=0.6, label="soft tip (hybrid map)")
+    arm = panda_line(maps.mount_offset, maps.self_collision)
+    hybrid.plot(arm[:, 0], arm[:, 2], color=MEASURED, linewidth=3, label="Panda")
+    hybrid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, fontsize=8)
+    hybrid.set(title="Hybrid: both together", xlabel="x (m)", ylabel="z (m)")
+    for axes in (rigid, soft, hybrid):
+        axes.set_aspect("equal")
+    return figure
+
+
+def heldout_figure(heldout: pd.DataFrame) -> Figure:
+    """Overlap of blended and own map at each gravity angle left out; columns ``angle_deg``, ``iou``."""
+    figure, axes = plt.subplots(figsize=(6, 3.6))
+    names = [f"{angle:.0f}°" for angle in heldout["angle_deg"]]
+    bars = axes.bar(names, heldout["iou"], color=IDENTIFIED, width=0.6)
+    axes.bar_label(bars, fmt="%.3f", padding=2, fontsize=9)
+    axes.set(ylim=(0, 1.05), xlabel="gravity angle left out", ylabel="IoU",
+             title="Soft map blended from the other angles, against its own samples")
+    return figure
+
+
+def panda_line(mount_offset: float, avoid_collisions: bool) -> NDArray:
+    """Polyline (P, 3) in m along the links of a Panda that holds the mount at ``POSE``, pointing down."""
+    found = solve(np.array([POSE]), seed=1, starts=200, mount_offset=mount_offset, avoid_collisions=avoid_collisions)
+    frames = joint_frames(found.q)
+    shoulder, elbow, below_elbow, wrist, hand = (frames[i].p[:, 0] for i in (0, 3, 4, 5, 6))
+    forearm_offset = elbow - frames[3].x[:, 0] * 0.0825
+    upper_offset = frames[2].p[:, 0]
+    mount = hand + (FLANGE + mount_offset) * frames[6].z[:, 0]
+    del below_elbow
+    return np.array([[0, 0, 0], shoulder, upper_offset, elbow, forearm_offset, wrist, hand, mount])
+
+
+def _space(figure: Figure, position: int, title: str):
+    axes = figure.add_subplot(position, projection="3d", computed_zorder=False)
+    axes.set_title(title)
+    axes.view_init(elev=18, azim=-60)
+    axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.pane.set_facecolor("white")
+        axis.set_major_locator(plt.MaxNLocator(5))
+    return axes
+
+
+def _add_surface(axes, shape: Surface, color: str, alpha: float) -> None:
+    triangles = shape.vertices[shape.faces]
+    normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-15)
+    light = 0.55 + 0.45 * np.clip(normals @ (SUN / np.linalg.norm(SUN)), -1, 1)
+    shades = np.clip(np.array(to_rgb(color)) * (0.55 + 0.6 * light[:, None]), 0, 1)
+    faces = np.column_stack([shades, np.full(len(shades), alpha)])
+    axes.add_collection3d(Poly3DCollection(triangles, facecolors=faces, edgecolors="none", linewidths=0))
+
+
+def _add_line(axes, points: NDArray, color: str, width: float) -> None:
+    segments = np.stack([points[:-1], points[1:]], axis=1)
+    axes.add_collection3d(Line3DCollection(segments, colors=color, linewidths=width, capstyle="round", zorder=5))
+    axes.scatter(*points.T, color=color, s=3 * width, zorder=5, depthshade=False)
+
+
+def _add_gravity(axes, angle: float, length: float, color: str) -> None:
+    down = length * np.array([np.sin(angle), 0.0, -np.cos(angle)])
+    axes.quiver(0, 0, 0, *down, color=color, linewidth=2, arrow_length_ratio=0.08, zorder=6)
+
+
+def _frame(axes, vertices: list[NDArray]) -> None:
+    every = np.concatenate(vertices)
+    lower, upper = every.min(axis=0), every.max(axis=0)
+    axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
+    axes.set_box_aspect(upper - lower)
+
+
+def _fill_slice(axes, one, color: str) -> None:
+    x, y, z = one.lattice.axes()
+    values = one.field[:, int(np.abs(y).argmin())].T
+    axes.contourf(x, z, values, levels=[values.min() - 1, 0.0], colors=[color], alpha=0.25)
+    axes.contour(x, z, values, levels=[0.0], colors=[color], linewidths=1.5)
