@@ -37,55 +37,64 @@ def distances(positions: np.ndarray) -> np.ndarray:
     return np.linalg.norm(positions, axis=-1)
 
 
-def distance_loss(simulated: np.ndarray, real: np.ndarray, measured: np.ndarray, weights: LossWeights) -> np.ndarray:
-    """The paper's L_sum: relative Huber losses of distances and of their change from frame to frame.
+def distance_residuals(
+    simulated: np.ndarray, real: np.ndarray, measured: np.ndarray, weights: LossWeights
+) -> np.ndarray:
+    """Residuals r of the paper's loss L_sum, so that L_sum = ½ Σ r².
 
-    For one frame it is the static loss L, times w_pos.
+    L_sum is the mean over frames of w_pos L_pos,t + w_vel L_vel,t, where L_pos,t is the mean over the measured
+    segments of Huber((d_sim - d_real) / (|d_real| + ε)), L_vel,t the same of the change of d from frame to
+    frame, and L_vel of the first frame is 0. For one frame it is the static loss L, times w_pos.
 
     Args:
         simulated: (C, T, S, 3). real: (T, S, 3).
 
     Returns:
-        The mean over frames of w_pos L_pos,t + w_vel L_vel,t, where L_vel of the first frame is 0. Shape (C,).
+        Shape (C, R).
     """
-    d_sim, d_real = distances(simulated), distances(real)
-    position = huber((d_sim - d_real) / (np.abs(d_real) + weights.epsilon), weights.delta_position)
-    step_sim, step_real = np.diff(d_sim, axis=-2), np.diff(d_real, axis=-2)
-    velocity = huber((step_sim - step_real) / (np.abs(step_real) + weights.epsilon_velocity), weights.delta_velocity)
-    return _weigh(position, velocity, measured, weights)
+    return _residuals(distances(simulated)[..., None], distances(real)[..., None], distances(real), measured, weights)
 
 
-def position_loss(simulated: np.ndarray, real: np.ndarray, measured: np.ndarray, weights: LossWeights) -> np.ndarray:
-    """As `distance_loss`, with vectors in the base frame in place of distances from the base.
+def position_residuals(
+    simulated: np.ndarray, real: np.ndarray, measured: np.ndarray, weights: LossWeights
+) -> np.ndarray:
+    """As `distance_residuals`, with positions in the base frame in place of distances from the base.
 
-    Distances hardly change while an arm swings gently to and fro; positions do.
+    Distances hardly change while an arm swings gently to and fro; positions do. A Huber loss is then of the
+    length of a vector, relative to the segment's distance from the base, or to its step.
     """
-    offset = np.linalg.norm(simulated - real, axis=-1)
-    position = huber(offset / (distances(real) + weights.epsilon), weights.delta_position)
-    step_real = np.diff(real, axis=-3)
-    step_offset = np.linalg.norm(np.diff(simulated, axis=-3) - step_real, axis=-1)
-    relative = step_offset / (np.linalg.norm(step_real, axis=-1) + weights.epsilon_velocity)
-    return _weigh(position, huber(relative, weights.delta_velocity), measured, weights)
+    return _residuals(simulated, real, distances(real), measured, weights)
 
 
-LOSSES = {"distances": distance_loss, "positions": position_loss}
+RESIDUALS = {"distances": distance_residuals, "positions": position_residuals}
 
 
-def _weigh(position: np.ndarray, velocity: np.ndarray, measured: np.ndarray, weights: LossWeights) -> np.ndarray:
-    """Mean over the measured segments of each frame, then over the T frames (those with any segment)."""
-    loss = weights.weight_position * _frame_means(position, measured).mean(axis=-1)
-    if velocity.shape[-2]:
+def loss_of(residuals: np.ndarray) -> np.ndarray:
+    """½ Σ r² over the last axis."""
+    return 0.5 * np.einsum("...r,...r->...", residuals, residuals)
+
+
+def _residuals(simulated, real, scale, measured, weights: LossWeights) -> np.ndarray:
+    """Position and velocity terms of (C, T, S, K) against (T, S, K), K = 1 for distances, 3 for positions."""
+    offset = (simulated - real) / (scale + weights.epsilon)[..., None]
+    frames = measured.any(axis=-1).sum()
+    shares = measured / np.maximum(measured.sum(axis=-1, keepdims=True), 1) / frames
+    terms = [_whiten(offset, weights.delta_position, weights.weight_position * shares)]
+    if len(real) > 1 and weights.weight_velocity > 0:
+        step = np.diff(real, axis=0)
+        step_scale = np.linalg.norm(step, axis=-1, keepdims=True) + weights.epsilon_velocity
+        offset = (np.diff(simulated, axis=1) - step) / step_scale
         pairs = measured[1:] & measured[:-1]
-        total = _frame_means(velocity, pairs).sum(axis=-1)
-        loss = loss + weights.weight_velocity * total / position.shape[-2]
-    return loss
+        shares = pairs / np.maximum(pairs.sum(axis=-1, keepdims=True), 1) / frames
+        terms.append(_whiten(offset, weights.delta_velocity, weights.weight_velocity * shares))
+    return np.concatenate([term.reshape(len(simulated), -1) for term in terms], axis=1)
 
 
-def _frame_means(values: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    """Mean over the segments measured in each frame: (C, T, S) → (C, T'), frames with none left out."""
-    frames = measured.any(axis=-1)
-    values, measured = values[:, frames], measured[frames]
-    return (values * measured).sum(axis=-1) / measured.sum(axis=-1)
+def _whiten(offset: np.ndarray, delta: float, shares: np.ndarray) -> np.ndarray:
+    """Scale vectors (C, T, S, K) so that half their squared length is `shares` (T, S) times Huber of their length."""
+    length = np.linalg.norm(offset, axis=-1)
+    inside = np.where(length > delta, np.sqrt(2 * huber(length, delta)) / np.maximum(length, delta), 1.0)
+    return offset * (inside * np.sqrt(shares))[..., None]
 
 
 def internal_error(simulated: np.ndarray, real: np.ndarray, measured: np.ndarray) -> np.ndarray:

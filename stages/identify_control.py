@@ -1,0 +1,17 @@
+"""Identify the actuators' gains, force range and time constant from curls."""
+
+from pathlib import Path
+
+from trunkline.identification.run import run
+from trunkline.identification.settings import IdentificationSettings
+from trunkline.stage import run_stage
+
+Config = IdentificationSettings
+
+
+def main(config: Config) -> None:
+    run("identify_control", config, Path("artifacts/identify_damping/arm.xml"), report_cad=True)
+
+
+if __name__ == "__main__":
+    run_stage("identify_control", Config, main)

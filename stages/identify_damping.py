@@ -1,0 +1,17 @@
+"""Identify damping and tendon friction from releases."""
+
+from pathlib import Path
+
+from trunkline.identification.run import run
+from trunkline.identification.settings import IdentificationSettings
+from trunkline.stage import run_stage
+
+Config = IdentificationSettings
+
+
+def main(config: Config) -> None:
+    run("identify_damping", config, Path("artifacts/identify_stiffness/arm.xml"))
+
+
+if __name__ == "__main__":
+    run_stage("identify_damping", Config, main)

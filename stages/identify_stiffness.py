@@ -1,0 +1,17 @@
+"""Identify bending stiffness from static shapes under tilt."""
+
+from pathlib import Path
+
+from trunkline.identification.run import run
+from trunkline.identification.settings import IdentificationSettings
+from trunkline.stage import run_stage
+
+Config = IdentificationSettings
+
+
+def main(config: Config) -> None:
+    run("identify_stiffness", config, Path("artifacts/build_mjcf/arm.xml"))
+
+
+if __name__ == "__main__":
+    run_stage("identify_stiffness", Config, main)

@@ -1,0 +1,178 @@
+"""Figures of an identification stage, and the tables that `dvc plots` shows."""
+
+import matplotlib.pyplot as plt
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+from scipy.signal import butter, sosfiltfilt
+
+from trunkline.frames import tilt_of_gravity
+from trunkline.identification.evaluation import Replay
+from trunkline.identification.experiment import Experiment
+from trunkline.identification.identify import Identification
+from trunkline.identification.loss import distances
+from trunkline.plots import IDENTIFIED, INITIAL, MEASURED
+
+ERROR_CUTOFF = 6.0  # Hz, of the low-pass over error curves, as the paper filters its figure
+SHOWN_SEGMENTS = 5
+COLORS = {"initial": INITIAL, "identified": IDENTIFIED}
+
+
+def convergence_table(identification: Identification) -> pd.DataFrame:
+    """Columns phase, step, best, mean."""
+    return pd.DataFrame(
+        [
+            {"phase": phase, "step": step, "best": best, "mean": mean}
+            for phase, history in identification.convergence.items()
+            for step, (best, mean) in enumerate(zip(history.best, history.mean, strict=True))
+        ]
+    )
+
+
+def convergence_figure(identification: Identification) -> Figure:
+    """Best and mean loss of every phase."""
+    phases = identification.convergence
+    figure, axes = plt.subplots(1, len(phases), figsize=(3.4 * len(phases), 3.4), squeeze=False)
+    for axis, (phase, history) in zip(axes[0], phases.items(), strict=True):
+        axis.semilogy(history.best, color=IDENTIFIED, marker="o", markersize=3, label="best")
+        if history.mean != history.best:
+            axis.semilogy(history.mean, color="#999999", label="mean of the population")
+            axis.legend()
+        axis.set(title=phase.replace("_", " "), xlabel="generation" if history.mean != history.best else "iteration")
+    axes[0, 0].set_ylabel("loss")
+    return figure
+
+
+def error_curves(experiments: list[Experiment], replays: dict[str, Replay]) -> pd.DataFrame:
+    """Over time, mean over trials and segments: columns time_s, model, position_error_mm, velocity_error_mm_s.
+
+    The errors of the paper's figure, of distances from the base and of their rate of change, low-pass filtered.
+    """
+    frames = min(e.frames for e in experiments)
+    step = experiments[0].frame_step
+    low_pass = butter(2, ERROR_CUTOFF, fs=1 / step, output="sos")
+    tables = []
+    for model, replayed in replays.items():
+        error = np.stack(
+            [
+                (distances(p) - distances(e.positions))[:frames]
+                for p, e in zip(replayed.positions, experiments, strict=True)
+            ],
+            axis=1,
+        )
+        rate = np.gradient(error, step, axis=0)
+        tables.append(
+            pd.DataFrame(
+                {
+                    "time_s": np.arange(frames) * step,
+                    "model": model,
+                    "position_error_mm": sosfiltfilt(low_pass, np.abs(error).mean(axis=(1, 2))) * 1e3,
+                    "velocity_error_mm_s": sosfiltfilt(low_pass, np.abs(rate).mean(axis=(1, 2))) * 1e3,
+                }
+            )
+        )
+    return pd.concat(tables)
+
+
+def error_figure(curves: pd.DataFrame) -> Figure:
+    """Position and velocity error over time, initial and identified, as (d) and (e) of the paper's figure."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 3.4))
+    for model, rows in curves.groupby("model", sort=False):
+        axes[0].plot(rows.time_s, rows.position_error_mm, color=COLORS[model], label=model)
+        axes[1].plot(rows.time_s, rows.velocity_error_mm_s, color=COLORS[model], label=model)
+    axes[0].set(xlabel="time (s)", ylabel="error of distances (mm)", title="Position error, validate split", ylim=0)
+    axes[1].set(xlabel="time (s)", ylabel="error of their rate (mm/s)", title="Velocity error, validate split", ylim=0)
+    axes[0].legend()
+    return figure
+
+
+def distance_table(experiment: Experiment, index: int, replays: dict[str, Replay], segments) -> pd.DataFrame:
+    """Distances from the base of a few segments: columns time_s, segment, source, distance_mm."""
+    chosen = np.unique(np.linspace(0, len(segments) - 1, SHOWN_SEGMENTS).astype(int))
+    sources = {"measured": experiment.positions} | {m: r.positions[index] for m, r in replays.items()}
+    time = np.arange(experiment.frames) * experiment.frame_step
+    return pd.concat(
+        pd.DataFrame(
+            {"time_s": time, "segment": segments[s], "source": source, "distance_mm": distances(positions)[:, s] * 1e3}
+        )
+        for source, positions in sources.items()
+        for s in chosen
+    )
+
+
+def distance_figure(table: pd.DataFrame, trial: str) -> Figure:
+    """Measured against simulated distances of a few segments over time."""
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
+    for axis, model in zip(axes, COLORS, strict=True):
+        for source, style in (("measured", {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45}),
+                              (model, {"color": COLORS[model], "linewidth": 1.2})):
+            for number, (_, rows) in enumerate(table[table.source == source].groupby("segment", sort=False)):
+                axis.plot(rows.time_s, rows.distance_mm, label=source if number == 0 else None, **style)
+        axis.set(xlabel="time (s)", title=f"{trial}: {model} model")
+        axis.legend(loc="lower right")
+    axes[0].set_ylabel("distance from the base (mm)")
+    return figure
+
+
+def path_figure(experiment: Experiment, index: int, replays: dict[str, Replay]) -> Figure:
+    """The tip's coordinates over time: where distances are blind, this shows the swing."""
+    figure, axes = plt.subplots(3, 1, figsize=(8, 6), sharex=True)
+    time = np.arange(experiment.frames) * experiment.frame_step
+    for axis, name in zip(axes, "xyz", strict=True):
+        number = "xyz".index(name)
+        axis.plot(time, experiment.positions[:, -1, number] * 1e3, color=MEASURED, alpha=0.45, lw=2.5, label="measured")
+        for model, replayed in replays.items():
+            axis.plot(time, replayed.positions[index][:, -1, number] * 1e3, color=COLORS[model], lw=1.2, label=model)
+        axis.set_ylabel(f"{name} (mm)")
+    axes[0].set_title(f"Last tracked segment in the base frame, {experiment.name}")
+    axes[0].legend(ncols=3, loc="upper right")
+    axes[-1].set_xlabel("time (s)")
+    return figure
+
+
+def shape_table(experiments: list[Experiment], replays: dict[str, Replay], segments) -> pd.DataFrame:
+    """Static shapes in the plane of the tilt: columns trial, tilt_deg, source, segment, x_mm, z_mm."""
+    rows = []
+    for index, experiment in enumerate(experiments):
+        sources = {"measured": experiment.positions} | {m: r.positions[index] for m, r in replays.items()}
+        for source, positions in sources.items():
+            for segment, (x, _, z) in zip(segments, positions[0] * 1e3, strict=True):
+                rows.append((experiment.name, np.degrees(tilt_of_gravity(experiment.gravity)), source, segment, x, z))
+    return pd.DataFrame(rows, columns=["trial", "tilt_deg", "source", "segment", "x_mm", "z_mm"])
+
+
+def shape_figure(table: pd.DataFrame) -> Figure:
+    """Measured, initial and identified shape of each trial, side view in the base frame."""
+    figure, axis = plt.subplots(figsize=(6.5, 6))
+    for (_, source), rows in table.groupby(["trial", "source"], sort=False):
+        x, z = np.append(0, rows.x_mm), np.append(0, rows.z_mm)
+        if source == "measured":
+            axis.plot(x, z, "o", color=MEASURED, markersize=4, alpha=0.6)
+            axis.annotate(f"{rows.tilt_deg.iloc[0]:.0f}°", (x[-1], z[-1]), xytext=(6, 0), textcoords="offset points")
+        else:
+            axis.plot(x, z, color=COLORS[source], linewidth=1.6 if source == "identified" else 1.1)
+    for source, style in (("measured", "o"), ("initial", "-"), ("identified", "-")):
+        axis.plot([], [], style, color=COLORS.get(source, MEASURED), label=source)
+    axis.legend(loc="lower left")
+    axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Static shapes per tilt, validate split")
+    return figure
+
+
+def parameter_figure(identification: Identification, bounds, units: dict[str, str]) -> Figure:
+    """Each scalar with its 95 % interval within its range, and the per-joint factors."""
+    panels = 1 + bool(identification.factors)
+    figure, axes = plt.subplots(1, panels, figsize=(5.5 * panels, 3.2), squeeze=False)
+    for row, (name, value) in enumerate(identification.values.items()):
+        low, high = np.log(bounds[name].low), np.log(bounds[name].high)
+        place = (np.log(value) - low) / (high - low)
+        width = identification.certainty.half_width[row] / (high - low)
+        axes[0, 0].errorbar(place, row, xerr=width, fmt="o", color=IDENTIFIED, capsize=4)
+        axes[0, 0].annotate(f"{value:.4g} {units[name]}", (place, row), xytext=(0, 8),
+                            textcoords="offset points", ha="center", fontsize=9)
+    axes[0, 0].set(xlim=(0, 1), ylim=(-0.6, len(identification.values) - 0.2), xlabel="place in its range (log scale)",
+                   yticks=range(len(identification.values)), yticklabels=list(identification.values),
+                   title="Parameters, 95 % intervals")
+    for name, factors in identification.factors.items():
+        axes[0, 1].bar(np.arange(1, len(factors) + 1), (factors - 1) * 100, color=IDENTIFIED)
+        axes[0, 1].set(xlabel="unit, from the base", ylabel="%", title=f"Per-joint factors of {name}, minus 1")
+    return figure

@@ -1,0 +1,92 @@
+"""What is searched for: parameters with bounds, a model, experiments and a loss; candidates in, losses out."""
+
+from dataclasses import dataclass, field
+
+import mujoco
+import numpy as np
+
+from trunkline.arm.parameters import PARAMETERS, candidate_fields, unit_of_hinge
+from trunkline.identification.experiment import Experiment
+from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
+from trunkline.identification.population import Population
+
+DIVERGED_LOSS = 1e3  # far above any loss of a simulation that stays finite, and finite
+
+
+@dataclass
+class Bounds:
+    """Range of a parameter in its own unit; both ends positive: it is searched on a logarithmic scale."""
+
+    low: float
+    high: float
+
+
+@dataclass
+class Problem:
+    """Minimise the mean loss over `experiments` of a model whose parameters are free within bounds.
+
+    A candidate is a vector z: first the scalars of `parameters` (natural logarithm), then, if `per_joint` names
+    them, the factors of every unit. Counts evaluations (one candidate on all trials), divergences and steps.
+    """
+
+    model: mujoco.MjModel
+    experiments: list[Experiment]
+    segments: tuple[str, ...]
+    parameters: dict[str, Bounds]
+    loss: str
+    weights: LossWeights
+    step_factor: float = 1.0
+    per_joint: tuple[str, ...] = ()
+    fixed: dict[str, float] = field(default_factory=dict)
+    evaluations: int = 0
+    diverged: int = 0
+    steps: int = 0
+
+    def __post_init__(self):
+        self._population = Population(self.model, self.experiments, self.segments, self.step_factor)
+        self.units = int(unit_of_hinge(self.model).max()) + 1
+
+    def fields(self, vectors: np.ndarray) -> dict[str, np.ndarray]:
+        """Model fields of candidates (C, P)."""
+        scalars = len(self.parameters)
+        values = {name: np.exp(vectors[:, i]) for i, name in enumerate(self.parameters)}
+        values |= {name: np.full(len(vectors), value) for name, value in self.fixed.items()}
+        blocks = vectors[:, scalars:].reshape(len(vectors), len(self.per_joint), self.units)
+        return candidate_fields(
+            self.model, values, {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
+        )
+
+    def residuals(self, vectors: np.ndarray) -> list[np.ndarray]:
+        """Residuals per trial, weighted so that the sum of ½ r² over all of them is the loss. Each (C, R)."""
+        simulated = self._population.simulate(self.fields(vectors))
+        self.evaluations += len(vectors)
+        self.diverged += int(simulated.diverged.sum())
+        self.steps += simulated.steps
+        share = 1 / np.sqrt(len(self.experiments))
+        blocks = []
+        for positions, experiment in zip(simulated.positions, self.experiments, strict=True):
+            with np.errstate(invalid="ignore", over="ignore"):
+                block = share * RESIDUALS[self.loss](
+                    positions, experiment.positions, experiment.measured, self.weights
+                )
+            # a diverged candidate: every residual the same, and in sum the penalty
+            block[simulated.diverged] = np.sqrt(2 * DIVERGED_LOSS / len(self.experiments) / block.shape[1])
+            blocks.append(block)
+        return blocks
+
+    def losses(self, vectors: np.ndarray) -> np.ndarray:
+        """Loss of each candidate (C, P) → (C,)."""
+        return sum(loss_of(block) for block in self.residuals(vectors))
+
+    def bounds(self, per_joint_range: float) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest vector z."""
+        low = [np.log(b.low) for b in self.parameters.values()]
+        high = [np.log(b.high) for b in self.parameters.values()]
+        joints = len(self.per_joint) * self.units
+        return (
+            np.array(low + [1 - per_joint_range] * joints),
+            np.array(high + [1 + per_joint_range] * joints),
+        )
+
+    def unit(self, name: str) -> str:
+        return PARAMETERS[name].unit
