@@ -1,0 +1,15 @@
+"""Statics of the calibrated arm: compiled model, equilibria, samples of them, and the network that inverts them."""
+
+import hashlib
+import os
+from pathlib import Path
+
+import numba
+
+# numba renews a cached kernel when its own file changes, not when a kernel it calls does in another file;
+# so the cache is named after the text of all of them.
+_HERE = Path(__file__).parent
+_KERNELS = ("energy.py", "factor.py", "newton.py", "statics.py")
+_STAMP = hashlib.sha256(b"".join((_HERE / name).read_bytes() for name in _KERNELS)).hexdigest()[:12]
+if not os.environ.get("NUMBA_CACHE_DIR") and os.access(_HERE, os.W_OK):
+    numba.config.CACHE_DIR = str(_HERE / "__pycache__" / f"kernels-{_STAMP}")
