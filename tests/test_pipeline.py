@@ -191,9 +191,10 @@ def _set(name, old, new):
         (_set("params.yaml", "fk_dataset:", "fk_dataset:\n  added: 1"), "fk_dataset: changed deps: params.yaml"),
         (_set("conf/train_ik/config.yaml", "", "added: 1\n"), "train_ik: changed deps: conf/train_ik/config.yaml"),
         (_set("artifacts/train_ik/metrics.json", "digest", "edited"), "train_ik: changed outs: artifacts/train_ik"),
+        (_set("dvc.yaml", "- stages/filter.py", "- LICENSE\n      - stages/filter.py"), "filter: not in the lock file"),
         (_set("dvc.yaml", "-m stages.filter", "-m stages.filter --fast"), "filter: changed command"),
         (lambda clone: (clone / "artifacts/fk_dataset/metrics.json").unlink(), "fk_dataset: changed outs: artifacts"),
-        (lambda clone: (clone / "dvc.lock").unlink(), "filter: stages/filter.py is not in the lock file"),
+        (lambda clone: (clone / "dvc.lock").unlink(), "filter: never ran"),
     ],
 )
 def test_lock_that_belongs_to_something_else_is_refused(clone, change, problem):

@@ -21,12 +21,14 @@ def mismatches(root: Path) -> list[str]:
 
 def _unlocked(repo: Repo) -> list[str]:
     """Stages that never ran, or that gained a dependency or an output since."""
-    return [
-        f"{stage.name}: {_path(entry)} is not in the lock file"
-        for stage in repo.index.stages
-        for entry in (*stage.deps, *stage.outs)
-        if not entry.hash_info
-    ]
+    found = []
+    for stage in repo.index.stages:
+        entries = [*stage.deps, *stage.outs]
+        new = [str(_path(entry)) for entry in entries if not entry.hash_info]
+        if new:
+            what = "never ran" if len(new) == len(entries) else f"not in the lock file: {', '.join(new)}"
+            found.append(f"{stage.name}: {what}")
+    return found
 
 
 def _changed(repo: Repo) -> list[str]:

@@ -14,7 +14,7 @@ from dvc.repo import Repo
 
 from trunkline.pipeline.gate import Limit, lookup, read_limits
 
-PICTURE = Path("artifacts/identify_control/comparison.png")  # copied to docs/: Git holds no artifacts
+PICTURE = Path("artifacts/identify_control/distances.png")  # copied to docs/: Git holds no artifacts
 
 # stage: [(what it is, dotted key in metrics.json, unit)]
 RESULTS = {
