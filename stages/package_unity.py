@@ -82,11 +82,9 @@ def main(config: Config) -> None:
 def read_sources(version: str) -> Sources:
     """What the earlier stages wrote; a missing file is a user's mistake."""
     reachability = ARTIFACTS / "reachability"
-    meshes = sorted(p for p in reachability.glob("*") if p.suffix in (".obj", ".stl"))
+    meshes = sorted((reachability / "meshes").glob("*.obj"))
     if not meshes:
-        raise InputError(
-            f"{reachability}: found no mesh, expected .obj or .stl files (run the reachability stage)"
-        )
+        raise InputError(f"{reachability}/meshes: found no mesh, expected .obj files (run the reachability stage)")
     return Sources(
         mjcf=_existing(ARTIFACTS / "identify_control/arm.xml").read_text(),
         network=_existing(ARTIFACTS / "train_ik/ik.onnx"),

@@ -212,8 +212,10 @@ def project(tmp_path, sources) -> Path:
         (root / "artifacts" / stage / "metrics.json").write_text("{}")
     (root / "artifacts/identify_control/arm.xml").write_text(sources.mjcf)
     shutil.copy(sources.network, root / "artifacts/train_ik/ik.onnx")
-    for path in [*sources.meshes, sources.grids]:
-        shutil.copy(path, root / "artifacts/reachability")
+    (root / "artifacts/reachability/meshes").mkdir()
+    for path in sources.meshes:
+        shutil.copy(path, root / "artifacts/reachability/meshes")
+    shutil.copy(sources.grids, root / "artifacts/reachability")
     return root
 
 
