@@ -9,7 +9,15 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from trunkline.config import settings
 from trunkline.errors import InputError
 from trunkline.plots import save_figure
-from trunkline.reachability.maps import HybridSettings, LabelSettings, RigidSettings, build_maps, check_maps
+from trunkline.reachability.maps import (
+    Check,
+    HybridSettings,
+    LabelSettings,
+    Maps,
+    RigidSettings,
+    build_maps,
+    check_maps,
+)
 from trunkline.reachability.mesh import write_obj
 from trunkline.reachability.panda_mjcf import panda_spec
 from trunkline.reachability.plots import heldout_figure, maps_figure, slices_figure
@@ -56,6 +64,7 @@ class Soft:
 class Hybrid:
     voxel: PositiveFloat
     smoothing: float = Field(ge=0)
+    smallest: PositiveInt
 
 
 @settings
@@ -110,6 +119,8 @@ def read_samples(path: Path) -> TipSamples:
     groups = [group for _, group in table.groupby(table["theta_g"].round(9))]
     if len(groups) < 3:
         raise InputError(f"{path}: found {len(groups)} gravity angles, expected at least 3 to check blending")
+    if table["theta_g"].abs().min() > 1e-6:
+        raise InputError(f"{path}: found no gravity angle of 0, expected one: the hybrid map hangs straight down")
     return TipSamples(
         angles=np.array([group["theta_g"].iloc[0] for group in groups]),
         tips=[group[["x", "y", "z"]].to_numpy(float) for group in groups],
@@ -117,9 +128,9 @@ def read_samples(path: Path) -> TipSamples:
     )
 
 
-def metrics(maps, check) -> dict:
+def metrics(maps: Maps, check: Check) -> dict:
     """What SPEC section 11 asks for, and how much it rests on."""
-    soft = [maps.soft.meshes[i] for i in range(len(maps.soft.meshes))]
+    soft = maps.soft.meshes
     return {
         "rigid": check.rigid._asdict() | {
             "watertight": maps.rigid.mesh.is_closed(), "triangles": len(maps.rigid.mesh.faces),

@@ -68,7 +68,10 @@ def _point(frames: list[Frame], link: int, local: tuple[float, float, float]) ->
 
 
 def segment_distance(a_start: NDArray, a_end: NDArray, b_start: NDArray, b_end: NDArray) -> NDArray:
-    """Distance between segments a and b, ends (3, N) in m. Shape (N,). Ericson, Real-Time Collision Detection, 5.1.9."""
+    """Distance between segments a and b, ends (3, N) in m. Shape (N,).
+
+    Source: Ericson, Real-Time Collision Detection, section 5.1.9.
+    """
     u, v, w = a_end - a_start, b_end - b_start, a_start - b_start
     uu, vv, uv = _dot(u, u), _dot(v, v), _dot(u, v)
     uw, vw = _dot(u, w), _dot(v, w)

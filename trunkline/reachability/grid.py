@@ -66,6 +66,13 @@ def drop_specks(cells: NDArray, smallest: int) -> NDArray:
     return cells
 
 
+def without_specks(field: NDArray, spacing: float, smallest: int) -> NDArray:
+    """``field`` (m) after ``drop_specks`` on its inside, as a distance field again."""
+    cells = field < 0
+    kept = drop_specks(cells, smallest)
+    return redistance(np.where(kept == cells, field, np.where(kept, -0.5, 0.5) * spacing), spacing)
+
+
 def distance_from_cells(cells: NDArray, spacing: float) -> NDArray:
     """Signed distance in m to the border of occupied ``cells``, half-way between cell centres."""
     outside = ndimage.distance_transform_edt(~cells)

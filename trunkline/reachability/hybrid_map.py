@@ -3,50 +3,43 @@
 The soft arm then hangs at gravity angle 0 whatever the rigid arm does, and joint 7 turns it freely about the
 vertical (its range of 332 degrees is more than the 120 degrees between tendons). So the map is the Minkowski sum
 
-    H = R + S,    S = the soft map at angle 0, swept about z,
+    H = R + S,    S = the soft arm's tips at angle 0, swept about z,
 
-of the rigid map R. With R_t the set of points within t of R (distance below t), R_t + S is the set of points
-within t of H: sums at a few offsets t give the distance field of H near its surface, finer than the lattice.
+of the rigid map R. S is the tips themselves, not the soft map around them: its tolerance would swell H. With
+R_t the set of points within t of R (distance below t), R_t + S is the set of points within t of H: sums at a
+few offsets t give the distance field of H near its surface, finer than the lattice.
 """
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, ndimage
 
-from trunkline.reachability.grid import Lattice, redistance
+from trunkline.reachability.grid import Lattice, redistance, without_specks
 
-OFFSETS = np.array([1.0, 0.5, 0.0, -0.5, -1.0])  # lattice steps, from the widest set to the narrowest
-AZIMUTHS = 72  # directions of the sweep: 7 mm apart at a radius of 8 cm, less than a cell
-
-
-def sweep(field: NDArray, lattice: Lattice, points: NDArray) -> NDArray:
-    """Smallest value of ``field`` on the circle about the z axis through each of ``points`` (N, 3). Shape (N,)."""
-    radius = np.hypot(points[:, 0], points[:, 1])
-    result = np.full(len(points), np.inf)
-    for azimuth in 2 * np.pi * np.arange(AZIMUTHS) / AZIMUTHS:
-        turned = np.column_stack([radius * np.cos(azimuth), radius * np.sin(azimuth), points[:, 2]])
-        np.minimum(result, lattice.sample(field, turned), out=result)
-    return result
+# A tip counts for the nearest lattice point only if each coordinate is this near: with all tips, up to half a
+# step away, H would be 0.4 steps too large on average.
+NEAR = 0.2  # lattice steps
+OFFSETS = np.array([1.0, 0.5, 0.0, -0.5, -1.0])  # t in lattice steps, from the widest set to the narrowest
 
 
-def swept_cells(field: NDArray, lattice: Lattice, spacing: float) -> tuple[NDArray, Lattice]:
-    """Cells of the swept inside of ``field``, on a lattice of ``spacing`` through the origin."""
-    x, y, z = lattice.axes()
-    reach = float(np.hypot(np.abs(x).max(), np.abs(y).max()))
-    target = Lattice.around([-reach, -reach, z[0]], [reach, reach, z[-1]], spacing, 0.0)
-    # One value per radius and height: the circle is the same for every azimuth.
-    radii = np.arange(0.0, reach + 2 * spacing, spacing / 2)
-    plane = Lattice(np.array([0.0, target.origin[2]]), spacing / 2, (len(radii), 2 * target.shape[2]))
-    rr, zz = np.meshgrid(*plane.axes(), indexing="ij")
-    swept = sweep(field, lattice, np.column_stack([rr.ravel(), np.zeros(rr.size), zz.ravel()])).reshape(rr.shape)
-    gx, gy, gz = np.meshgrid(*target.axes(), indexing="ij")
-    values = plane.sample(swept, np.column_stack([np.hypot(gx, gy).ravel(), gz.ravel()]))
-    cells = values.reshape(target.shape) < 0
-    return _trim(cells, target)
+def swept_cells(tips: NDArray, spacing: float) -> tuple[NDArray, Lattice]:
+    """Cells of a lattice of ``spacing`` (m) through the origin that ``tips`` (N, 3) pass when turned about z."""
+    radius, height = np.hypot(tips[:, 0], tips[:, 1]), tips[:, 2]
+    reach = radius.max()
+    # Once per cell of the half-plane, a quarter of the spacing wide: tips that share one pass the same cells.
+    plane = Lattice.around([0.0, height.min()], [reach, height.max()], spacing / 4, spacing)
+    radius, height = (plane.origin + plane.spacing * np.argwhere(plane.occupancy(np.column_stack([radius, height])))).T
+    azimuths = np.linspace(0.0, 2 * np.pi, int(np.ceil(8 * np.pi * reach / spacing)) + 1)
+    circle = np.stack([np.outer(radius, np.cos(azimuths)), np.outer(radius, np.sin(azimuths)),
+                       np.broadcast_to(height[:, None], (len(height), len(azimuths)))], axis=-1)
+    lattice = Lattice.around([-reach, -reach, height.min()], [reach, reach, height.max()], spacing, 0.0)
+    passed = circle.reshape(-1, 3)
+    offset = (passed - lattice.origin) / spacing
+    return lattice.occupancy(passed[(np.abs(offset - np.rint(offset)) <= NEAR).all(axis=1)]), lattice
 
 
 def minkowski_field(
-    field: NDArray, lattice: Lattice, cells: NDArray, cells_lattice: Lattice, smoothing: float
+    field: NDArray, lattice: Lattice, cells: NDArray, cells_lattice: Lattice, smoothing: float, smallest: int
 ) -> tuple[NDArray, Lattice]:
     """Signed distance field of (inside of ``field``) + ``cells``, exact near its surface to the lattice of ``cells``.
 
@@ -54,6 +47,7 @@ def minkowski_field(
         field: signed distance in m on ``lattice``, at least 1.5 ``cells_lattice.spacing`` wide outside.
         cells: the set to add, on ``cells_lattice``, whose spacing and phase the result has.
         smoothing: standard deviation of a Gaussian over the field, in lattice steps.
+        smallest: islands and cavities of fewer cells vanish.
     """
     spacing = cells_lattice.spacing
     lower, upper = lattice.origin, lattice.origin + lattice.spacing * (np.array(lattice.shape) - 1)
@@ -72,13 +66,5 @@ def minkowski_field(
         result[pairs > 0.5] = spacing * (offset - 0.25)
     result[result < spacing * OFFSETS[-1]] = -2.0 * spacing
     total = Lattice(rigid.origin + cells_lattice.origin, spacing, shape)
-    field = redistance(result, spacing)
+    field = without_specks(redistance(result, spacing), spacing, smallest)
     return ndimage.gaussian_filter(field, smoothing) if smoothing else field, total
-
-
-def _trim(cells: NDArray, lattice: Lattice) -> tuple[NDArray, Lattice]:
-    """The smallest box of ``cells`` that holds them all, and its lattice."""
-    where = np.nonzero(cells)
-    first, last = np.array([w.min() for w in where]), np.array([w.max() for w in where])
-    box = cells[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))]
-    return box, Lattice(lattice.origin + lattice.spacing * first, lattice.spacing, box.shape)

@@ -93,7 +93,8 @@ def _descend(q: NDArray, positions: NDArray, rotations: NDArray | None, mount_of
         ])
         position_error[active] = np.sqrt((error[:3] ** 2).sum(axis=0))
         rotation_error[active] = np.sqrt((error[3:] ** 2).sum(axis=0))
-        going = (position_error[active] > 0.1 * POSITION_TOLERANCE) | (rotation_error[active] > 0.1 * ROTATION_TOLERANCE)
+        going = position_error[active] > 0.1 * POSITION_TOLERANCE
+        going |= rotation_error[active] > 0.1 * ROTATION_TOLERANCE
         if not going.any():
             break
         J = jacobian(frames, mount)[:, :joints, going].transpose(2, 0, 1)

@@ -45,6 +45,7 @@ class HybridSettings:
 
     voxel: float
     smoothing: float
+    smallest: int
 
 
 @dataclass(frozen=True)
@@ -131,9 +132,11 @@ def build_maps(
     """All maps: ``soft_voxel`` in m; ``step`` in rad between soft fields, at most."""
     rigid_map = build_rigid(rigid, most_triangles, seed)
     soft_maps = build_soft(samples, shape, soft_voxel, step, most_triangles)
-    hanging = soft_maps.at(0.0)
-    cells, cells_lattice = swept_cells(hanging, soft_maps.lattice, hybrid.voxel)
-    field, lattice = minkowski_field(rigid_map.field, rigid_map.lattice, cells, cells_lattice, hybrid.smoothing)
+    hanging = samples.tips[int(np.abs(samples.angles).argmin())]
+    cells, cells_lattice = swept_cells(hanging, hybrid.voxel)
+    field, lattice = minkowski_field(
+        rigid_map.field, rigid_map.lattice, cells, cells_lattice, hybrid.smoothing, hybrid.smallest
+    )
     hybrid_map = Map(field, lattice, surface(field, lattice, most_triangles))
     return Maps(rigid_map, soft_maps, hybrid_map, rigid.mount_offset, rigid.self_collision)
 

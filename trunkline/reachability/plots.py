@@ -12,12 +12,13 @@ from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE
 from trunkline.reachability.inverse import solve
 from trunkline.reachability.maps import Check, Maps
 from trunkline.reachability.mesh import Surface
-from trunkline.reachability.panda import FLANGE, joint_frames
+from trunkline.reachability.panda import DH_A, FLANGE, joint_frames
 from trunkline.reachability.tips import TipSamples
 
 SUN = np.array([0.35, -0.75, 0.55])  # towards the light
 POSE = (0.45, 0.0, 0.55)  # m, where the drawn Panda holds the mount
 RIGID, SOFT, HYBRID = IDENTIFIED, INITIAL, VALIDATE
+WIDEST_SHOWN = 1.0  # m, of the label points: those in the corners of their box say little
 SHOWN_DEG = (0.0, 60.0, 120.0)  # gravity angles of the paper's figure
 
 
@@ -42,6 +43,7 @@ def maps_figure(maps: Maps, samples: TipSamples) -> Figure:
     c = _space(figure, 223, "(c) Soft arm, gravity at " + ", ".join(
         f"{np.degrees(maps.soft.mesh_angles[i]):.0f}°" for i in sorted(set(nearest))))
     c.view_init(elev=12, azim=-80)
+    c.yaxis.set_major_locator(plt.MaxNLocator(2))
     for index, color in zip(sorted(set(nearest)), (SOFT, VALIDATE, IDENTIFIED), strict=False):
         _add_surface(c, maps.soft.meshes[index], color, 0.40)
         _add_gravity(c, maps.soft.mesh_angles[index], length, color)
@@ -68,7 +70,7 @@ def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
             name = ("reached" if reached else "not reached") + ("" if right else ", map wrong")
             rigid.scatter(radius[rows], check.points[rows, 2], s=size, marker=mark, zorder=3,
                           color=color if right else INITIAL, label=f"{name} ({rows.sum()})")
-    rigid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, fontsize=8, markerscale=1.5)
+    rigid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8, markerscale=1.5)
     rigid.set(title=f"Rigid: accuracy {100 * check.rigid.accuracy:.2f} %", xlabel="±radius (m)", ylabel="z (m)")
 
     angles = maps.soft.mesh_angles
@@ -81,7 +83,7 @@ def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
         near = np.abs(tips[:, 1]) < maps.soft.lattice.spacing / 2
         soft.scatter(tips[near, 0], tips[near, 2], s=2, color=color, label=f"{np.degrees(angle):.0f}°")
     soft.plot(0, 0, "k^", markersize=8)
-    soft.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=4, fontsize=8, markerscale=4,
+    soft.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=4, fontsize=8, markerscale=4,
                 title="gravity angle; dots: tips")
     soft.set(title="Soft: maps and tips", xlabel="x (m)", ylabel="z (m)")
 
@@ -93,10 +95,12 @@ def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
     hybrid.plot([], [], color=HYBRID, linewidth=6, alpha=0.6, label="soft tip (hybrid map)")
     arm = panda_line(maps.mount_offset, maps.self_collision)
     hybrid.plot(arm[:, 0], arm[:, 2], color=MEASURED, linewidth=3, label="Panda")
-    hybrid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=2, fontsize=8)
+    hybrid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8)
     hybrid.set(title="Hybrid: both together", xlabel="x (m)", ylabel="z (m)")
+    rigid.set_xlim(-WIDEST_SHOWN, WIDEST_SHOWN)
     for axes in (rigid, soft, hybrid):
         axes.set_aspect("equal")
+        axes.xaxis.set_major_locator(plt.MaxNLocator(5))
     return figure
 
 
@@ -115,12 +119,11 @@ def panda_line(mount_offset: float, avoid_collisions: bool) -> NDArray:
     """Polyline (P, 3) in m along the links of a Panda that holds the mount at ``POSE``, pointing down."""
     found = solve(np.array([POSE]), seed=1, starts=200, mount_offset=mount_offset, avoid_collisions=avoid_collisions)
     frames = joint_frames(found.q)
-    shoulder, elbow, below_elbow, wrist, hand = (frames[i].p[:, 0] for i in (0, 3, 4, 5, 6))
-    forearm_offset = elbow - frames[3].x[:, 0] * 0.0825
-    upper_offset = frames[2].p[:, 0]
+    shoulder, elbow, wrist, hand = (frames[i].p[:, 0] for i in (0, 3, 5, 6))
+    upper_end = frames[2].p[:, 0]
+    forearm_start = elbow + DH_A[4] * frames[3].x[:, 0]
     mount = hand + (FLANGE + mount_offset) * frames[6].z[:, 0]
-    del below_elbow
-    return np.array([[0, 0, 0], shoulder, upper_offset, elbow, forearm_offset, wrist, hand, mount])
+    return np.array([[0, 0, 0], shoulder, upper_end, elbow, forearm_start, wrist, hand, mount])
 
 
 def _space(figure: Figure, position: int, title: str):

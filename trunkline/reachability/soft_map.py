@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from trunkline.reachability.grid import Lattice, blend, drop_specks, overlap, redistance
+from trunkline.reachability.grid import Lattice, blend, overlap, redistance, without_specks
 from trunkline.reachability.tips import TipInterpolator, TipSamples
 from trunkline.threads import thread_count
 
@@ -44,10 +44,7 @@ def soft_field(tips: NDArray, lattice: Lattice, shape: SoftShape) -> NDArray:
     # Closing: grow by tolerance + closing, then shrink by closing.
     grown = distance.reshape(lattice.shape) - (shape.tolerance + shape.closing)
     field = redistance(grown, lattice.spacing) + shape.closing
-    cells = field < 0
-    kept = drop_specks(cells, shape.smallest)
-    field = np.where(kept == cells, field, np.where(kept, -0.5, 0.5) * lattice.spacing)
-    return ndimage.gaussian_filter(redistance(field, lattice.spacing), shape.smoothing)
+    return ndimage.gaussian_filter(without_specks(field, lattice.spacing, shape.smallest), shape.smoothing)
 
 
 def soft_fields(samples: TipSamples, angles: NDArray, lattice: Lattice, shape: SoftShape) -> NDArray:

@@ -1,0 +1,207 @@
+"""The rigid, soft and hybrid maps: against inverse kinematics, known shapes, and sums of balls."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from trunkline.reachability.downward import sample_downward
+from trunkline.reachability.grid import Lattice, overlap
+from trunkline.reachability.hybrid_map import minkowski_field, swept_cells
+from trunkline.reachability.labels import agreement, beyond_links, draw_points, label
+from trunkline.reachability.maps import RigidSettings, angle_name, build_rigid, build_soft
+from trunkline.reachability.mesh import contains
+from trunkline.reachability.panda import Q_MAX, forward
+from trunkline.reachability.rigid_map import profile
+from trunkline.reachability.soft_map import SoftShape, heldout_overlap, soft_field, soft_lattice
+from trunkline.reachability.tips import TipInterpolator, TipSamples
+
+OFFSET = 0.05  # m
+LENGTH = 0.5  # m, of the arm of constant curvature below
+SHAPE = SoftShape(tolerance=0.02, closing=0.02, smoothing=0.7, smallest=60)
+
+
+@pytest.fixture(scope="module")
+def poses():
+    return sample_downward(1 << 17, seed=0, mount_offset=OFFSET)
+
+
+@pytest.fixture(scope="module")
+def rigid():
+    settings = RigidSettings(mount_offset=OFFSET, self_collision=True, poses=1 << 17, profile_voxel=0.006,
+                             voxel=0.02, closing=0.018, smoothing=0.5, smallest=30)
+    return build_rigid(settings, 8000, seed=0)
+
+
+def curved_arm(angles_deg, count, seed=0):
+    """Tips of an arm of constant curvature under three tendons, swinging two thirds of the gravity angle."""
+    samples = TipSamples(np.radians(angles_deg), [], [])
+    rng = np.random.default_rng(seed)
+    directions = 2 * np.pi * np.arange(3) / 3
+    for angle in samples.angles:
+        tensions = rng.uniform(0, 4, size=(count, 3))
+        tensions[np.arange(count), rng.integers(0, 3, count)] = 0.0
+        bend = tensions @ np.column_stack([np.cos(directions), np.sin(directions)])
+        turn = np.maximum(np.linalg.norm(bend, axis=1), 1e-9)
+        side, down = LENGTH * (1 - np.cos(turn)) / turn, LENGTH * np.sin(turn) / turn
+        tips = np.column_stack([bend / turn[:, None] * side[:, None], -down])
+        swing = 2 / 3 * angle * down / LENGTH
+        x = np.cos(swing) * tips[:, 0] - np.sin(swing) * tips[:, 2]
+        z = np.sin(swing) * tips[:, 0] + np.cos(swing) * tips[:, 2]
+        samples.tips.append(np.column_stack([x, tips[:, 1], z]))
+        samples.tensions.append(tensions)
+    return samples
+
+
+def ball_field(radius, spacing, center=(0.0, 0.0, 0.0)):
+    center = np.array(center)
+    lattice = Lattice.around(center - radius, center + radius, spacing, 4 * spacing)
+    grid = np.stack(np.meshgrid(*lattice.axes(), indexing="ij"), axis=-1)
+    return np.linalg.norm(grid - center, axis=-1) - radius, lattice
+
+
+def test_rigid_map_agrees_with_inverse_kinematics(rigid):
+    points = draw_points([-0.9, -0.9, -0.5], [0.9, 0.9, 1.0], 400, seed=1)
+    claimed = contains(rigid.mesh, points)
+    reachable = label(points, claimed, seed=0, starts=40, starts_in_doubt=300, mount_offset=OFFSET,
+                      avoid_collisions=True)
+    result = agreement(claimed, reachable)
+    assert result.accuracy >= 0.98
+    assert result.fpr <= 0.02
+    assert result.reachable + result.unreachable == 400
+
+
+def test_rigid_mesh_is_closed_and_small(rigid):
+    assert rigid.mesh.is_closed()
+    assert len(rigid.mesh.faces) <= 8000
+
+
+def test_samples_lie_inside_the_rigid_map(rigid):
+    position, _ = forward(sample_downward(4000, seed=9, mount_offset=OFFSET), OFFSET)
+    depth = rigid.lattice.sample(rigid.field, position)
+    assert np.quantile(depth, 0.99) < 0.005
+    assert depth.max() < rigid.lattice.spacing
+
+
+def test_profile_knows_where_joint_1_ends():
+    """Poses of one elbow, in the arm's plane (phi0 = 0), are reached up to joint 1's limit and no further."""
+    near = np.random.default_rng(0).uniform(-0.05, 0.05, size=(2000, 2))
+    q = np.zeros((2000, 7))
+    q[:, [1, 3]] = [0.3, -1.5] + near
+    q[:, 5] = 0.3  # a profile looks at positions only
+    shape = profile(q, OFFSET, spacing=0.004, closing=0.012, smallest=1)
+    position, _ = forward(q.mean(axis=0)[None], OFFSET)
+    radius, height = np.hypot(*position[0, :2]), position[0, 2]
+    azimuths = np.array([0.0, Q_MAX[0] - 0.02, Q_MAX[0] + 0.02, np.pi])
+    points = np.column_stack([radius * np.cos(azimuths), radius * np.sin(azimuths), np.full(4, height)])
+    np.testing.assert_array_equal(shape.field(points) < 0, [True, True, False, False])
+    np.testing.assert_array_equal(shape.field(points * [1, -1, 1]) < 0, [True, True, False, False])
+
+
+def test_no_sample_is_beyond_the_links(poses):
+    position, _ = forward(poses, OFFSET)
+    assert not beyond_links(position, OFFSET).any()
+    assert beyond_links(np.array([[0.9, 0, 0.1]]), OFFSET).all()
+
+
+def test_labels_find_samples_and_refuse_the_impossible(poses):
+    position, _ = forward(poses[::4000], OFFSET)
+    impossible = np.array([[0.0, 0.0, 0.1], [0.0, 0.0, -0.2], [2.0, 0.0, 0.0]])
+    points = np.concatenate([position, impossible])
+    claimed = np.ones(len(points), bool)
+    reached = label(points, claimed, seed=0, starts=30, starts_in_doubt=100, mount_offset=OFFSET,
+                    avoid_collisions=True)
+    assert reached[:-3].mean() >= 0.95  # samples on the very border are hard to hit
+    assert not reached[-3:].any()
+
+
+def test_agreement_counts():
+    result = agreement(np.array([1, 1, 0, 0, 1], bool), np.array([1, 1, 1, 0, 0], bool))
+    assert result == (3 / 5, 2 / 3, 1 / 2, 3, 2)
+    with pytest.raises(ValueError, match="expected some of both"):
+        agreement(np.ones(2, bool), np.ones(2, bool))
+
+
+def test_tips_at_a_sampled_angle_are_the_samples():
+    samples = curved_arm([0, 20, 40, 60], 500)
+    assert TipInterpolator(samples, 0.01).tips(samples.angles[2]) is samples.tips[2]
+
+
+def test_tips_between_angles_are_where_the_arm_would_put_them():
+    """The tip of every tension vector, at an angle left out."""
+    samples = curved_arm([0, 20, 40, 60], 2000)
+    found = TipInterpolator(samples.without(1), 0.01).tips(samples.angles[1])
+    truth = curved_arm([20], 100_000, seed=5).tips[0]
+    gap, _ = cKDTree(truth).query(found)
+    assert len(found) > 3000
+    assert np.quantile(gap, 0.95) < 0.01  # neighbours in truth are some 4 mm apart
+
+
+def test_soft_field_of_one_tip_is_a_ball():
+    tips = np.array([[0.0, 0.0, -0.3]])
+    samples = TipSamples(np.zeros(1), [tips], [np.zeros((1, 3))])
+    shape = SoftShape(tolerance=0.05, closing=0.02, smoothing=0.3, smallest=1)
+    lattice = soft_lattice(samples, shape, 0.01)
+    field = soft_field(tips, lattice, shape)
+    grid = np.stack(np.meshgrid(*lattice.axes(), indexing="ij"), axis=-1)
+    true = np.linalg.norm(grid - tips[0], axis=-1) - 0.05
+    near = np.abs(true) < 0.02
+    assert np.abs(field - true)[near].max() < 0.005
+
+
+def test_soft_maps_are_closed_and_share_a_lattice():
+    samples = curved_arm([0, 30, 60], 2000)
+    maps = build_soft(samples, SHAPE, 0.015, np.radians(10), 8000)
+    np.testing.assert_allclose(np.degrees(maps.angles), [0, 10, 20, 30, 40, 50, 60], atol=1e-9)
+    assert maps.fields.shape == (7, *maps.lattice.shape)
+    assert len(maps.meshes) == 3
+    assert all(mesh.is_closed() and len(mesh.faces) <= 8000 for mesh in maps.meshes)
+    for tips, angle in zip(samples.tips, samples.angles, strict=True):
+        inside = maps.lattice.sample(maps.at(angle), tips) < 0
+        assert inside.mean() > 0.99  # but for tips that no other is near: specks
+
+
+def test_blend_overlaps_an_angle_left_out():
+    samples = curved_arm([0, 30, 60, 90, 120], 4000)
+    lattice = soft_lattice(samples, SHAPE, 0.015)
+    own = [soft_field(tips, lattice, SHAPE) for tips in samples.tips]
+    plain = overlap((own[1] + own[3]) / 2, own[2])  # what a headset would get from so coarse a set of angles
+    blended = heldout_overlap(samples, 2, np.radians(5), lattice, SHAPE)
+    assert blended > 0.85
+    assert blended > plain + 0.08
+
+
+def test_names_of_angles():
+    assert [angle_name(np.radians(a)) for a in (0, 60, 7.5, 120)] == ["soft_000", "soft_060", "soft_007p5", "soft_120"]
+
+
+def test_a_tip_beside_the_axis_sweeps_a_ring():
+    cells, lattice = swept_cells(np.array([[0.15, 0.0, -0.2]]), 0.01)
+    centers = lattice.origin + lattice.spacing * np.argwhere(cells)
+    np.testing.assert_allclose(centers[:, 2], -0.2, atol=1e-9)
+    assert np.abs(np.hypot(centers[:, 0], centers[:, 1]) - 0.15).max() < 0.01
+    azimuths = np.sort(np.arctan2(centers[:, 1], centers[:, 0]))
+    assert np.diff(azimuths).max() < 0.2
+
+
+def test_hybrid_of_a_point_and_a_ball_is_the_ball():
+    field, lattice = ball_field(0.2, 0.01)
+    one = Lattice(np.array([0.0, 0.0, -0.32]), 0.016, (1, 1, 1))
+    result, where = minkowski_field(field, lattice, np.ones((1, 1, 1), bool), one, smoothing=0.0, smallest=1)
+    grid = np.stack(np.meshgrid(*where.axes(), indexing="ij"), axis=-1)
+    true = np.linalg.norm(grid - [0, 0, -0.32], axis=-1) - 0.2
+    near = np.abs(true) < 0.03
+    assert np.abs(result - true)[near].max() < 0.016
+
+
+def test_hybrid_of_two_balls_is_the_ball_of_both_radii():
+    field, lattice = ball_field(0.2, 0.01)
+    rng = np.random.default_rng(0)
+    tips = rng.normal(size=(20_000, 3))
+    tips *= 0.12 * rng.uniform(0.9, 1.0, (20_000, 1)) / np.linalg.norm(tips, axis=1, keepdims=True)
+    cells, cells_lattice = swept_cells(tips - [0, 0, 0.2], 0.015)
+    result, where = minkowski_field(field, lattice, cells, cells_lattice, smoothing=0.7, smallest=1)
+    grid = np.stack(np.meshgrid(*where.axes(), indexing="ij"), axis=-1)
+    true = np.linalg.norm(grid - [0, 0, -0.2], axis=-1) - 0.32
+    error = (result - true)[np.abs(true) < 0.015]
+    assert np.abs(error).max() < 0.015
+    assert abs(error.mean()) < 0.004
