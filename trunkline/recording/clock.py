@@ -4,6 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trunkline.recording.smoothing import fill_gaps, low_pass, outliers
+from trunkline.recording.start import onset
+
+LAG = 0.2  # s, the most by which the arm's lag may put a fit of the whole motion off
 MIN_TRAVEL = 5e-3  # m; a tendon that moves less says nothing about time
 SHAPE_MODES = 5  # principal motions of the arm that explain the tendons, with their products
 
@@ -21,10 +25,11 @@ class FrameFit:
 @dataclass
 class OffsetFit:
     """time = motor time + offset, s. ratio: what remains unexplained of the tendons' motion there, over what
-    remains on average; near 0 is certain, near 1 is a guess."""
+    remains on average; near 0 is certain, near 1 is a guess. onset: the offset by the first motion, s, or None."""
 
     offset: float
     ratio: float
+    onset: float | None = None
 
 
 def fit_frames(stamps: np.ndarray, frames: np.ndarray) -> FrameFit:
@@ -76,26 +81,58 @@ def estimate_offset(
     return OffsetFit(float(offset), float(residuals[best] / residuals.mean()))
 
 
+def first_motion_offset(
+    time: np.ndarray, positions: np.ndarray, motor_time: np.ndarray, pulls: np.ndarray, rough: float
+) -> float | None:
+    """The offset at which the segments begin to move when the tendons do, s; None where nothing rests first.
+
+    Friction and elastic cables let the arm lag behind its motors, and a fit of the whole motion takes the lag for
+    an offset. Only the first motion, of the light tip, has next to none.
+
+    Args: as for `estimate_offset`, which gave `rough`, s.
+    """
+    pull = pulls[:, np.argmax(np.ptp(pulls, axis=0))]
+    travel = np.abs(pull - np.median(pull[: len(pull) // 20 + 1]))
+    rising = np.flatnonzero(travel > 0.15 * travel.max())[0]
+    risen = np.flatnonzero(travel > 0.6 * travel.max())[0]
+    if risen - rising < 3:  # a step
+        begin = motor_time[max(rising - 1, 0)]
+    else:
+        slope, start = np.polyfit(motor_time[rising:risen], travel[rising:risen], 1)
+        begin = -start / slope
+    grid, smooth = _smooth(time, positions)
+    resting = (grid > begin + rough - 3 * LAG) & (grid < begin + rough - LAG)
+    if resting.sum() < 20:
+        return None
+    moved = np.sqrt(np.mean(np.square(smooth - smooth[resting].mean(axis=0)), axis=1))
+    first = onset(grid, moved, resting)
+    return None if first is None or abs(first - begin - rough) > LAG else float(first - begin)
+
+
+def _smooth(time: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A uniform clock (G,) and on it the segments' coordinates (G, 3 S), without outliers, gaps and most noise."""
+    grid = np.arange(time[0], time[-1], np.median(np.diff(time)))
+    columns = []
+    for segment in np.moveaxis(positions, 1, 0):
+        good = np.isfinite(segment[:, 0])
+        good[good] &= ~outliers(time[good], segment[good], 8.0, 5e-3)
+        columns += [np.interp(grid, time[good], axis[good]) for axis in segment.T]
+    rate = 1 / (grid[1] - grid[0])
+    return grid, low_pass(np.stack(columns, axis=1), rate, min(20.0, rate / 5), 4)
+
+
 def agree_on_offset(fits: list[OffsetFit]) -> tuple[float, float]:
     """One offset for a session and its spread, s: median and robust deviation over the certain trials.
 
-    (0, inf) where there is no such trial.
+    First motions decide where there are any. (0, inf) where no trial tells.
     """
-    certain = np.array([fit.offset for fit in fits if fit.ratio < 0.3])
+    sure = [fit for fit in fits if fit.ratio < 0.3]
+    first = [fit.onset for fit in sure if fit.onset is not None]
+    certain = np.array(first or [fit.offset for fit in sure])
     if not len(certain):
         return 0.0, np.inf
     offset = float(np.median(certain))
     return offset, float(1.4826 * np.median(np.abs(certain - offset)))
-
-
-def fill_gaps(time: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Columns (T, C) with NaN replaced by linear interpolation, held at the ends; all-NaN columns are 0."""
-    filled = np.zeros_like(columns)
-    for index, column in enumerate(columns.T):
-        good = np.isfinite(column)
-        if good.any():
-            filled[:, index] = np.interp(time, time[good], column[good])
-    return filled
 
 
 def _shape_features(columns: np.ndarray) -> np.ndarray:

@@ -7,8 +7,7 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.frames import make_continuous, tilt_of_gravity
 from trunkline.recording.base_frame import average_base, gravity_from_up, to_base_frame
-from trunkline.recording.clock import fill_gaps
-from trunkline.recording.smoothing import bridged, low_pass, outliers, resample
+from trunkline.recording.smoothing import bridged, fill_gaps, low_pass, outliers, resample
 from trunkline.recording.start import cycle_time, release_time
 from trunkline.recording.take import Take
 from trunkline.recording.trial import Trial

@@ -10,7 +10,14 @@ from scipy.spatial.transform import Rotation
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
 from trunkline.recording.cdr import short_name
-from trunkline.recording.clock import FrameFit, OffsetFit, agree_on_offset, estimate_offset, fit_frames
+from trunkline.recording.clock import (
+    FrameFit,
+    OffsetFit,
+    agree_on_offset,
+    estimate_offset,
+    first_motion_offset,
+    fit_frames,
+)
 from trunkline.recording.log import Log, Topic, read_log
 from trunkline.recording.messages import JOINTS, POSES
 from trunkline.recording.session import FixedBase, Session, TrialEntry
@@ -223,6 +230,8 @@ def _take(
     wound = (take.tendon_time, take.tendon_positions)
     motion = wound if len(take.tendon_time) else (take.command_time, take.commands)
     findings.offset = estimate_offset(time, positions, *motion, limits.clock_offset)
+    if findings.offset is not None:
+        findings.offset.onset = first_motion_offset(time, positions, *motion, findings.offset.offset)
     return take
 
 

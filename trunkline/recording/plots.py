@@ -53,12 +53,19 @@ def quality_figure(
     rates = [1 / quality.interval for quality in qualities]
     title = f"Frame stamps: {np.median(rates):.1f} Hz, {sum(q.dropped for q in qualities)} frames dropped"
     jitter.set(title=title, xlabel="trial", ylabel="jitter (ms)")
+    jitter.margins(y=0.3)
 
-    fits = [(i, q.findings.offset) for i, q in enumerate(qualities) if q.findings.offset is not None]
     clock.axhline(1e3 * offset, color=MEASURED, lw=1)
-    clock.scatter(
-        [i for i, _ in fits], [1e3 * fit.offset for _, fit in fits], c=[colors[i] for i, _ in fits], s=18
-    )
+    fits = [(i, q.findings.offset) for i, q in enumerate(qualities) if q.findings.offset is not None]
+    for label, fill, value in (
+        ("by the whole motion", "none", lambda fit: fit.offset),
+        ("by the first motion", VALIDATE, lambda fit: np.nan if fit.onset is None else fit.onset),
+    ):
+        offsets = [1e3 * value(fit) for _, fit in fits]
+        clock.scatter(
+            [i for i, _ in fits], offsets, s=18, facecolor=fill, edgecolor=VALIDATE, label=label
+        )
+    clock.legend()
     found = f"{1e3 * offset:.1f} ± {1e3 * spread:.1f} ms" if np.isfinite(spread) else "no trial tells"
     clock.set(title=f"Cameras' clock − motors' clock: {found}", xlabel="trial", ylabel="offset (ms)")
 

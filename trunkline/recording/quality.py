@@ -106,7 +106,11 @@ def _trial(quality: Quality) -> dict:
         "clock": (
             None
             if findings.offset is None
-            else {"offset_s": findings.offset.offset, "unexplained": findings.offset.ratio}
+            else {
+                "whole_motion_s": findings.offset.offset,
+                "first_motion_s": findings.offset.onset,
+                "unexplained": findings.offset.ratio,
+            }
         ),
         "repairs": findings.repairs,
     }

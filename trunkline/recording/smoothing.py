@@ -78,3 +78,13 @@ def noise_level(columns: np.ndarray) -> np.ndarray:
     """Standard deviation of white noise on smooth columns (T, C), by their third differences: (C,)."""
     third = np.diff(columns, n=3, axis=0)
     return 1.4826 * np.nanmedian(np.abs(third), axis=0) / np.sqrt(20)  # 1² + 3² + 3² + 1²
+
+
+def fill_gaps(time: np.ndarray, columns: np.ndarray) -> np.ndarray:
+    """Columns (T, C) with NaN replaced by linear interpolation, held at the ends; all-NaN columns are 0."""
+    filled = np.zeros_like(columns)
+    for index, column in enumerate(columns.T):
+        good = np.isfinite(column)
+        if good.any():
+            filled[:, index] = np.interp(time, time[good], column[good])
+    return filled

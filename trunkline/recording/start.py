@@ -4,37 +4,48 @@ import numpy as np
 
 LIFTOFF = 0.2  # share of the top speed that only the released arm reaches
 QUIET = 0.03  # share of the top speed below which a hand may still move the arm
-FIT = (0.15, 1.0)  # share of the displacement soon after, where it grows as the square of time
+REST = 0.25  # s before the motion in which the noise is measured
+RISE = (2.0, 16.0)  # times the noise: where the displacement stands out, yet grows as the square of time
 
 
 def release_time(time: np.ndarray, positions: np.ndarray) -> float:
     """When the arm was let go, s; 0 if it is on its way from the first frame.
 
-    After the release the displacement grows as a (t - t0)² / 2, so its root is a straight line in time, and
-    where that crosses zero is t0: the line is fitted beyond what the low-pass rounds off. The upper quartile over the
-    segments stands for the arm, so that a few of them bridged over a gap do not matter.
-
     Args:
         time (T,) s, uniform. positions (T, S, 3) m, filtered, of an arm that is held, then swings.
     """
-    speed = _robust_length(np.gradient(positions, time, axis=0))
+    speed = robust_length(np.gradient(positions, time, axis=0))
     liftoff = int(np.argmax(speed > LIFTOFF * speed.max()))
     quiet = np.flatnonzero(speed[: liftoff + 1] < QUIET * speed.max())
     if not len(quiet):
         return 0.0
-    held = positions[max(0, quiet[-1] - 12) : quiet[-1] + 1].mean(axis=0)
-    end = liftoff + int(0.03 / (time[1] - time[0]))
-    moved = _robust_length(positions[quiet[-1] : end + 1] - held)
-    share = moved / moved.max()
-    used = (share >= FIT[0]) & (share <= FIT[1])
-    if used.sum() < 3:
-        return float(time[quiet[-1]])
-    slope, offset = np.polyfit(time[quiet[-1] : end + 1][used], np.sqrt(moved[used]), 1)
-    return float(np.clip(-offset / slope, time[max(0, quiet[-1] - 3)], time[liftoff]))
+    end = time[quiet[-1]]
+    resting = (time >= end - REST) & (time <= end)
+    begin = onset(time, robust_length(positions - positions[resting].mean(axis=0)), resting)
+    return float(end) if begin is None else begin
 
 
-def _robust_length(vectors: np.ndarray) -> np.ndarray:
-    """Upper quartile over the segments of the lengths of (T, S, 3). Shape (T,)."""
+def onset(time: np.ndarray, moved: np.ndarray, resting: np.ndarray) -> float | None:
+    """When the displacement `moved` (T,) m begins to grow, s, after the frames `resting` (T,); None if it does not.
+
+    Under a force that sets in at t0, as under one that grows while damping prevails, the displacement grows as
+    (t - t0)². Its root is a straight line in time, and where that crosses zero is t0.
+    """
+    noise = float(np.median(moved[resting]))
+    moved = np.sqrt(np.maximum(moved**2 - noise**2, 0))
+    low, high = (share * max(noise, 1e-5) for share in RISE)
+    risen = np.flatnonzero((moved > high) & (time > time[resting][-1]))
+    if not len(risen):
+        return None
+    last = max(int(risen[0]), 3)
+    still = np.flatnonzero(moved[:last] < low)
+    first = min(int(still[-1]) + 1 if len(still) else 0, last - 2)
+    slope, offset = np.polyfit(time[first : last + 1], np.sqrt(moved[first : last + 1]), 1)
+    return float(np.clip(-offset / slope, time[max(first - 6, 0)], time[last])) if slope > 0 else None
+
+
+def robust_length(vectors: np.ndarray) -> np.ndarray:
+    """Upper quartile over the segments of the lengths of (T, S, 3): a few hidden segments do not matter. (T,)."""
     return np.quantile(np.linalg.norm(vectors, axis=2), 0.75, axis=1)
 
 
