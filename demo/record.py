@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
-from pydantic.dataclasses import dataclass as checked
 
 from demo.instruments import InstrumentSettings, measure
 from demo.laboratory import Experiments, Motors, record
@@ -33,10 +32,10 @@ class Arm:
 class Config:
     seed: int
     arm: Arm
-    plant: checked(PlantSettings)
-    motors: checked(Motors)
-    experiments: checked(Experiments)
-    instruments: checked(InstrumentSettings)
+    plant: settings(PlantSettings)
+    motors: settings(Motors)
+    experiments: settings(Experiments)
+    instruments: settings(InstrumentSettings)
 
 
 def main(config: Config) -> None:

@@ -162,6 +162,18 @@ def test_unknown_keys_are_refused_at_every_level(stage, tmp_path):
             load_config(schema, stage, tmp_path)
 
 
+def test_the_stand_in_lab_refuses_unknown_keys_too(tmp_path):
+    schema = runpy.run_path(str(ROOT / "demo" / "record.py"), run_name="record")["Config"]
+    load_config(schema, "record", ROOT / "demo")
+    (tmp_path / "conf").symlink_to(ROOT / "demo" / "conf")
+    for path in [(), *_nested(schema)]:
+        params = OmegaConf.load(ROOT / "demo" / "params.yaml")
+        OmegaConf.update(params, ".".join(["record", *path, "tpyo"]), 1, force_add=True)
+        OmegaConf.save(params, tmp_path / "params.yaml")
+        with pytest.raises(InputError, match=".".join(["record", *path, "tpyo: unknown key"])):
+            load_config(schema, "record", tmp_path)
+
+
 def _schema(stage: str) -> type:
     return runpy.run_path(str(ROOT / "stages" / f"{stage}.py"), run_name=stage)["Config"]
 

@@ -14,6 +14,7 @@ from typing import TypeVar
 
 from trunkline.config import load_config
 from trunkline.errors import InputError
+from trunkline.pipeline.settings import check_once
 
 Config = TypeVar("Config")
 
@@ -27,6 +28,7 @@ def run_stage(
     """
     started = time.monotonic()
     try:
+        check_once()
         main(load_config(schema, name, root))
     except InputError as error:
         sys.stdout.flush()
