@@ -1,0 +1,116 @@
+"""Known parameters come back, from a plant that is the model."""
+
+import numpy as np
+import pytest
+
+from tests.matched_plant import curl, release, segments_of, small_model, tilt
+from trunkline.arm.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.certainty import certainty, weakest_in_words
+from trunkline.identification.experiment import prepare
+from trunkline.identification.identify import Coarse, Fine, identify
+from trunkline.identification.loss import LossWeights
+from trunkline.identification.problem import DIVERGED_LOSS, Bounds, Problem
+
+WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
+
+
+def identified(trials, model, parameters, per_joint=(), fine="none", coarse_frames=437):
+    experiments = [prepare(trial, model, 437) for trial in trials]
+    bounds = {name: Bounds(*span) for name, span in parameters.items()}
+    return identify(
+        "test", model, experiments, segments_of(model), bounds, per_joint, "positions", WEIGHTS,
+        Coarse(8, 6, 1e-3, 1.0, coarse_frames, 8), Fine(fine, 0.1, 8, 4, 6, 1e-6), seed=3,
+    )  # fmt: skip
+
+
+def changed(model, **values):
+    copy = model.__copy__()
+    set_fields(copy, candidate_fields(model, {k: np.array([v]) for k, v in values.items()}))
+    return copy
+
+
+def test_stiffness_comes_back_within_2_percent():
+    model = small_model()
+    truth = changed(model, stiffness=0.6 * PARAMETERS["stiffness"].read(model))
+    trials = [tilt(truth, 30), tilt(truth, 60), tilt(truth, 90), tilt(truth, 45, "validate")]
+    found = identified(trials, model, {"stiffness": (0.2, 20.0)})
+    assert found.values["stiffness"] == pytest.approx(PARAMETERS["stiffness"].read(truth), rel=0.02)
+    assert not found.at_bound
+
+
+def test_per_joint_factors_come_back():
+    model = small_model()
+    factors = np.array([0.93, 1.06, 1.0, 0.96, 1.05, 0.98])
+    truth = model.__copy__()
+    set_fields(truth, candidate_fields(model, {}, {"stiffness": factors[None]}))
+    trials = [tilt(truth, angle) for angle in (30, 60, 90)]
+    span = PARAMETERS["stiffness"].read(model)
+    found = identified(trials, model, {"stiffness": (0.99 * span, 1.01 * span)}, ("stiffness",), "least_squares")
+    stiffness = found.models["identified"].jnt_stiffness / model.jnt_stiffness
+    np.testing.assert_allclose(stiffness[::2][:3], factors[:3], atol=0.02)  # beyond, gravity bends too little
+
+
+def test_damping_and_tendon_friction_come_back():
+    model = small_model()
+    truth = changed(model, damping=2.5 * PARAMETERS["damping"].read(model), tendon_friction=0.6)
+    trials = [release(truth, 0.3, frames=100), release(truth, -0.25, frames=100)]
+    found = identified(trials, model, {"damping": (0.005, 1.0), "tendon_friction": (0.02, 3.0)})
+    assert found.values["damping"] == pytest.approx(PARAMETERS["damping"].read(truth), rel=0.05)
+    assert found.values["tendon_friction"] == pytest.approx(0.6, rel=0.2)
+
+
+def test_validate_trials_are_never_fitted():
+    model = small_model()
+    truth, other = (changed(model, stiffness=f * PARAMETERS["stiffness"].read(model)) for f in (0.7, 1.6))
+    trials = [tilt(truth, 60), tilt(truth, 90), tilt(other, 60, "validate"), tilt(other, 90, "validate")]
+    found = identified(trials, model, {"stiffness": (0.2, 20.0)})
+    assert found.values["stiffness"] == pytest.approx(PARAMETERS["stiffness"].read(truth), rel=0.02)
+
+
+def test_a_parameter_on_its_bound_is_named():
+    model = small_model()
+    trials = [tilt(model, 60), tilt(model, 90)]
+    true = PARAMETERS["stiffness"].read(model)
+    found = identified(trials, model, {"stiffness": (1.5 * true, 3 * true)})
+    assert found.at_bound == ["stiffness"]
+
+
+def test_control_parameters_move_the_loss_the_right_way():
+    model = small_model()
+    trials = [curl(model, 60, frames=110)]
+    experiments = [prepare(trial, model, 437) for trial in trials]
+    spans = {name: Bounds(1e-4, 1e6) for name in ("kp", "kv", "force_range", "time_constant")}
+    problem = Problem(model, experiments, segments_of(model), spans, "positions", WEIGHTS)
+    truth = np.log([PARAMETERS[name].read(model) for name in spans])
+    candidates = truth + np.concatenate([np.zeros((1, 4)), np.diag(np.log([0.5, 3, 0.01, 2]))])
+    losses = problem.losses(candidates)
+    assert (losses[1:] > 10 * losses[0]).all()
+
+
+def test_divergence_is_a_finite_penalty_and_counted():
+    model = small_model()
+    experiments = [prepare(release(model, 0.25, frames=30), model, 30)]
+    problem = Problem(model, experiments, segments_of(model), {"stiffness": Bounds(1, 1e7)}, "positions", WEIGHTS)
+    losses = problem.losses(np.log([[PARAMETERS["stiffness"].read(model)], [1e6]]))
+    assert losses[0] < 1e-3
+    assert losses[1] == pytest.approx(DIVERGED_LOSS)
+    assert problem.diverged == 1
+    assert problem.evaluations == 2
+
+
+def test_certainty_of_a_straight_line():
+    """Slope and intercept with independent clusters of one residual: the textbook's errors, nearly."""
+    rng = np.random.default_rng(0)
+    x = np.linspace(-1, 1, 400)
+    design = np.stack([x, np.ones_like(x)], axis=1)
+    residual = rng.normal(0, 0.5, len(x))
+    residual -= design @ np.linalg.lstsq(design, residual, rcond=None)[0]
+    found = certainty(list(residual[:, None]), list(design[:, None]))
+    expected = 0.5 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    np.testing.assert_allclose(found.standard_error, expected, rtol=0.12)
+    assert found.condition == pytest.approx(1, abs=0.01)
+
+
+def test_the_weakest_direction_is_named():
+    assert weakest_in_words(["a", "b", "c"], np.array([0.7, -0.7, 0.1])) == "a and b trade off"
+    assert weakest_in_words(["a", "b"], np.array([0.05, 0.99])) == "b is determined least"

@@ -1,0 +1,104 @@
+"""The start of a trial and its simulation, against plain MuJoCo."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.matched_plant import curl, release, segments_of, small_model, tilt
+from trunkline.arm.parameters import candidate_fields
+from trunkline.errors import InputError
+from trunkline.identification.experiment import prepare
+from trunkline.identification.loss import position_error
+from trunkline.identification.population import Population
+from trunkline.identification.pose_fit import fit_pose
+
+
+def seen_at(model, qpos, segments):
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    sites = [model.site(f"{s}_center").id for s in segments]
+    return data.site_xpos[sites], [data.site_xmat[s].reshape(3, 3) for s in sites]
+
+
+@pytest.mark.parametrize("with_orientations", [True, False])
+def test_pose_fit_finds_a_coil_of_more_than_a_turn(with_orientations):
+    model = small_model(units=16)
+    segments = tuple(f"unit_{i:02d}" for i in (*range(1, 9), 10, 12, 14, 16))
+    bend = np.linspace(0.2, 0.6, 16)
+    qpos = np.stack([0.4 * bend, bend], axis=1).ravel()  # 6.9 rad in all
+    positions, matrices = seen_at(model, qpos, segments)
+    quaternions = np.empty((len(segments), 4))
+    for quaternion, matrix in zip(quaternions, matrices, strict=True):
+        mujoco.mju_mat2Quat(quaternion, matrix.ravel())
+    fit = fit_pose(model, segments, positions, quaternions if with_orientations else None)
+    assert fit.converged
+    assert fit.residuals.max() < 1e-3
+    assert np.abs(seen_at(model, fit.qpos, ["unit_16"])[0] - seen_at(model, qpos, ["unit_16"])[0]).max() < 1e-3
+
+
+def test_pose_fit_leaves_out_what_was_not_seen():
+    model = small_model()
+    segments = segments_of(model)
+    qpos = np.tile([0.05, 0.2], 6)
+    positions, _ = seen_at(model, qpos, segments)
+    positions[2] = np.nan
+    fit = fit_pose(model, segments, positions)
+    seen = np.isfinite(positions[:, 0])
+    assert fit.residuals[seen].max() < 1e-3
+
+
+def test_a_population_of_the_truth_replays_the_truth():
+    model = small_model()
+    trials = [tilt(model, 60), release(model, 0.25, frames=60), curl(model, 40, frames=90)]
+    experiments = [prepare(trial, model, 437) for trial in trials]
+    fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * [1.0, 1.2]})
+    simulated = Population(model, experiments, segments_of(model)).simulate(fields)
+    for positions, experiment in zip(simulated.positions, experiments, strict=True):
+        truth, other = (position_error(p, experiment.positions, experiment.measured) for p in positions)
+        assert truth < 0.4e-3  # starts are fitted, and a static shape settles for a finite time
+        assert other > 3 * truth
+
+
+def test_simulation_does_not_depend_on_threads(monkeypatch):
+    model = small_model()
+    experiments = [prepare(release(model, 0.25, frames=20), model, 20)]
+    fields = candidate_fields(model, {"damping": np.array([0.01, 0.02, 0.05])})
+    results = []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("TRUNKLINE_THREADS", threads)
+        results.append(Population(model, experiments, segments_of(model)).simulate(fields).positions[0])
+    np.testing.assert_array_equal(*results)
+
+
+def test_a_population_of_another_size_and_a_second_call_are_as_the_first():
+    model = small_model()
+    experiments = [prepare(release(model, 0.25, frames=20), model, 20), prepare(tilt(model, 30), model, 1)]
+    population = Population(model, experiments, segments_of(model))
+    values = np.array([0.01, 0.02, 0.05])
+    first = population.simulate(candidate_fields(model, {"damping": values})).positions
+    single = population.simulate(candidate_fields(model, {"damping": values[1:2]})).positions
+    again = population.simulate(candidate_fields(model, {"damping": values})).positions
+    for a, b, c in zip(first, single, again, strict=True):
+        np.testing.assert_array_equal(a[1], b[0])
+        np.testing.assert_array_equal(a, c)
+
+
+def test_divergence_is_seen():
+    model = small_model()
+    experiments = [prepare(release(model, 0.25, frames=30), model, 30)]
+    fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * [1.0, 1e5]})
+    simulated = Population(model, experiments, segments_of(model)).simulate(fields)
+    assert simulated.diverged.tolist() == [False, True]
+
+
+def test_trials_of_another_arm_are_refused():
+    model = small_model()
+    trial = release(model, 0.2, frames=5)
+    trial.segments = (*trial.segments[:-1], "unit_99")
+    with pytest.raises(InputError, match="unit_99.*unit_01 to unit_06"):
+        prepare(trial, model, 5)
+    trial = curl(model, 20, frames=5)
+    trial.tendons = ("tendon_1", "tendon_2", "cable")
+    with pytest.raises(InputError, match="cable"):
+        prepare(trial, model, 5)
