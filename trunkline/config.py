@@ -59,7 +59,8 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
         problems = sorted(error.errors(), key=_rank)
         first, more = problems[0], len(problems) - 1
         tuned = first["type"] == "missing" or (first["loc"] and first["loc"][0] in section)
-        where = f"{params if tuned else folder}: {'.'.join(str(part) for part in (stage, *first['loc']))}"
+        key = ".".join(str(part) for part in (stage, *first["loc"]) if part != "[key]")  # pydantic's mark
+        where = f"{params if tuned else folder}: {key}"
         text = f"{where}: {_describe(first, adapter)}" + (f" (and {more} more)" if more else "")
         raise InputError(text) from error
 
