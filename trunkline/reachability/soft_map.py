@@ -40,9 +40,11 @@ def soft_lattice(samples: TipSamples, shape: SoftShape, spacing: float) -> Latti
 def soft_field(tips: NDArray, lattice: Lattice, shape: SoftShape) -> NDArray:
     """Signed distance field of the points near ``tips`` (N, 3), in m. Shape ``lattice.shape``."""
     points = np.stack(np.meshgrid(*lattice.axes(), indexing="ij"), axis=-1).reshape(-1, 3)
-    distance, _ = cKDTree(tips).query(points, workers=thread_count())
-    # Closing: grow by tolerance + closing, then shrink by closing.
-    grown = distance.reshape(lattice.shape) - (shape.tolerance + shape.closing)
+    # Closing: grow by tolerance + closing, then shrink by closing. Distances far outside are worked out after that.
+    radius = shape.tolerance + shape.closing
+    farthest = radius + 2 * lattice.spacing
+    distance, _ = cKDTree(tips).query(points, distance_upper_bound=farthest, workers=thread_count())
+    grown = np.minimum(distance, farthest).reshape(lattice.shape) - radius
     field = redistance(grown, lattice.spacing) + shape.closing
     return ndimage.gaussian_filter(without_specks(field, lattice.spacing, shape.smallest), shape.smoothing)
 
