@@ -1,0 +1,143 @@
+"""Samples of the reachable set: equilibria over gravity angles and tensions, uniform in the space of tips.
+
+Reachable means: at rest, with at least one tendon of every three slack. Pulling all of them at once bends nothing but
+presses the units together, and above a few newtons a straight arm buckles under it: then the same lengths have many
+equilibria, which one depends on history, and no function gives lengths from poses. With one tendon slack the
+equilibrium was found to be unique. So, per gravity angle, two neighbouring tendons pull, in any proportion, up to
+their largest force: tips form a surface, each point of which has one set of path lengths.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.frames import gravity_in_base
+from trunkline.kinematics.chain import Chain
+from trunkline.kinematics.statics import Equilibrium, equilibrium_paths
+
+COARSE_STEPS = 48  # of the first look at a path, to space the second one evenly along the tip's way
+COARSE_POWER = 3.0  # tension ~ (step / steps)^power there: the tip's soft units bend under the first newton
+
+
+@dataclass
+class Candidates:
+    """All samples at one gravity angle before thinning: N of them, dropped ones left out.
+
+    Attributes:
+        gravity: in the base frame, m/s². Shape (3,).
+        equilibrium: the N equilibria.
+        kind: "general", "dorsal" (tendon 1 alone) or "ventral" (tendons 2 and 3 alike). Shape (N,).
+        failed: samples dropped because Newton's method found no stable equilibrium.
+        snapped: samples dropped because the arm jumped on the way there.
+    """
+
+    gravity: np.ndarray
+    equilibrium: Equilibrium
+    kind: np.ndarray
+    failed: int
+    snapped: int
+
+
+def sample_angle(chain: Chain, tilt: float, directions: int, steps: int, rng: np.random.Generator) -> Candidates:
+    """Follow the arm along rays of growing tension, samples evenly spaced along the tip's way on each.
+
+    Args:
+        tilt: gravity angle θ_G, rad.
+        directions: rays, their bending moments evenly spread around the arm.
+        steps: samples on each ray, at random in equal shares of its length; four times as many on the planar rays.
+    """
+    gravity = gravity_in_base(tilt)
+    rays = pull_directions(chain, (np.arange(directions) + rng.random()) / directions * 2 * np.pi)
+    planar, kinds = planar_directions(chain)
+    parts = [_follow(chain, gravity, rays, steps, rng), _follow(chain, gravity, planar, 4 * steps, rng)]
+    kind = np.repeat(np.array(["general", *kinds]), [directions * steps] + [4 * steps] * len(planar))
+    whole = Equilibrium(
+        **{name: np.concatenate([values, vars(parts[1])[name]]) for name, values in vars(parts[0]).items()}
+    )
+    good = whole.converged & ~whole.snapped
+    failed = int(np.sum(~whole.converged))
+    return Candidates(gravity, whole[good], kind[good], failed, int(np.sum(~good)) - failed)
+
+
+def pull_directions(chain: Chain, angles: np.ndarray) -> np.ndarray:
+    """Tensions of two neighbouring tendons whose moment points at `angles` (rad) around the arm, the larger at its limit.
+
+    Returns:
+        Tensions in N. Shape (len(angles), K).
+
+    Raises:
+        InputError: if fewer than three tendons surround the arm.
+    """
+    holes = _first_holes(chain)
+    around = np.arctan2(holes[:, 1], holes[:, 0])
+    order = np.argsort(around)
+    gaps = np.diff(np.append(around[order], around[order[0]] + 2 * np.pi))
+    if chain.tendons < 3 or gaps.max() >= np.pi - 1e-6:
+        raise InputError(f"arm: found {chain.tendons} tendons, expected 3 or more all around: else the tip has no workspace")
+    tensions = np.zeros((len(angles), chain.tendons))
+    for row, angle in enumerate(angles):
+        place = np.searchsorted(around[order], np.arctan2(np.sin(angle), np.cos(angle))) - 1
+        pair = order[[place % len(order), (place + 1) % len(order)]]
+        moment = np.linalg.solve(holes[pair, :2].T, [np.cos(angle), np.sin(angle)])
+        tensions[row, pair] = np.maximum(moment, 0)
+    share = (tensions / chain.max_tension).max(axis=1, keepdims=True)
+    return tensions / share
+
+
+def planar_directions(chain: Chain) -> tuple[np.ndarray, list[str]]:
+    """The two planar pulls of the paper's grasps: one dorsal cable, the two ventral cables together."""
+    if chain.tendons != 3:
+        return np.zeros((0, chain.tendons)), []
+    force = chain.max_tension
+    return np.array([[force[0], 0, 0], [0, min(force[1:]), min(force[1:])]]), ["dorsal", "ventral"]
+
+
+def _first_holes(chain: Chain) -> np.ndarray:
+    """Where each tendon leaves the base, in the plane across the straight arm, as unit vectors. Shape (K, 3)."""
+    holes = chain.hole_in[0] + chain.offset[0]
+    across = holes - np.outer(holes @ chain.tip, chain.tip) / (chain.tip @ chain.tip)
+    return across / np.linalg.norm(across, axis=1, keepdims=True)
+
+
+def _follow(chain: Chain, gravity: np.ndarray, rays: np.ndarray, steps: int, rng: np.random.Generator) -> Equilibrium:
+    """`steps` equilibria on each ray, from no tension to the whole of it, evenly spaced along the tip's way."""
+    shares = np.linspace(0, 1, COARSE_STEPS) ** COARSE_POWER
+    coarse = equilibrium_paths(chain, rays[:, None, :] * shares[:, None], gravity)
+    tips = coarse.position.reshape(len(rays), COARSE_STEPS, 3)
+    way = np.linalg.norm(np.diff(tips, axis=1), axis=2).cumsum(axis=1)
+    way = np.concatenate([np.zeros((len(rays), 1)), way], axis=1)
+    places = (np.arange(steps) + rng.random((len(rays), steps))) / steps
+    fine = np.stack([np.interp(p * w[-1], w, shares) for p, w in zip(places, way, strict=True)])
+    return equilibrium_paths(chain, rays[:, None, :] * fine[..., None], gravity)
+
+
+def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Indices of at most `count` points, no two in one cell of a cubic lattice, the cells as small as that allows.
+
+    Args:
+        points: m. Shape (N, 3).
+    """
+    shuffled = rng.permutation(len(points))
+    low, high = 1e-5, float(np.ptp(points, axis=0).max()) + 1e-3
+    if len(points) <= count:
+        return np.sort(shuffled)
+    for _ in range(40):
+        edge = np.sqrt(low * high)
+        low, high = (edge, high) if len(_one_a_cell(points[shuffled], edge)) > count else (low, edge)
+    kept = shuffled[_one_a_cell(points[shuffled], low)]
+    return np.sort(kept[rng.permutation(len(kept))[:count]])
+
+
+def _one_a_cell(points: np.ndarray, edge: float) -> np.ndarray:
+    """Index of the first point in each occupied cell."""
+    cells = np.floor((points - points.min(axis=0)) / edge).astype(np.int64)
+    size = cells.max(axis=0) + 1
+    flat = (cells[:, 0] * size[1] + cells[:, 1]) * size[2] + cells[:, 2]
+    return np.unique(flat, return_index=True)[1]
+
+
+def crowding(points: np.ndarray, edge: float = 0.01) -> np.ndarray:
+    """Number of points in each occupied cell of `edge` m. Even samples of a surface give similar numbers."""
+    cells = np.floor(points / edge).astype(np.int64)
+    return np.unique(cells, axis=0, return_counts=True)[1]
