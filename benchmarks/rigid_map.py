@@ -43,7 +43,8 @@ def main() -> None:
     seconds = time.perf_counter() - started
     errors = result.position_error[result.success], result.rotation_error[result.success]
     print(f"batched: {100 * result.success.mean():.2f} % of {len(q)} poses solved, "
-          f"{1e6 * seconds / len(q):.0f} us each, worst {1e3 * errors[0].max():.4f} mm and {1e3 * errors[1].max():.4f} mrad")
+          f"{1e6 * seconds / len(q):.0f} us each, "
+          f"worst {1e3 * errors[0].max():.4f} mm and {1e3 * errors[1].max():.4f} mrad")
 
     times = [_timed(lambda i=i: solve(positions[i:i + 1], rotations[i:i + 1], seed=0, starts=STARTS,
                                       mount_offset=settings.mount_offset)) for i in range(arguments.single)]
