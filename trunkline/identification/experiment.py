@@ -55,7 +55,8 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int) -> Experiment:
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
     quaternions = None if trial.quaternions is None else trial.quaternions[first]
-    fit = fit_pose(model, trial.segments, positions[0], quaternions)
+    seen = np.where(measured[0][:, None], positions[0], np.nan)
+    fit = fit_pose(model, trial.segments, seen, quaternions)
     return Experiment(
         name=trial.name,
         kind=trial.experiment,

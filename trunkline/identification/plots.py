@@ -153,7 +153,7 @@ def shape_figure(table: pd.DataFrame) -> Figure:
             axis.plot(x, z, color=COLORS[source], linewidth=1.6 if source == "identified" else 1.1)
     for source, style in (("measured", "o"), ("initial", "-"), ("identified", "-")):
         axis.plot([], [], style, color=COLORS.get(source, MEASURED), label=source)
-    axis.legend(loc="lower left")
+    axis.legend(loc="upper right")
     axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Static shapes per tilt, validate split")
     return figure
 
