@@ -92,14 +92,15 @@ def first_motion_offset(
     Args: as for `estimate_offset`, which gave `rough`, s.
     """
     pull = pulls[:, np.argmax(np.ptp(pulls, axis=0))]
-    travel = np.abs(pull - np.median(pull[: len(pull) // 20 + 1]))
-    rising = np.flatnonzero(travel > 0.15 * travel.max())[0]
-    risen = np.flatnonzero(travel > 0.6 * travel.max())[0]
-    if risen - rising < 3:  # a step
-        begin = motor_time[max(rising - 1, 0)]
-    else:
-        slope, start = np.polyfit(motor_time[rising:risen], travel[rising:risen], 1)
-        begin = -start / slope
+    travel = np.abs(pull - pull[0])
+    rising = motor_time[np.argmax(travel > 0.15 * travel.max())]
+    resting = motor_time < motor_time[0] + 0.6 * (rising - motor_time[0])
+    if resting.sum() < 10:
+        return None
+    travel = np.abs(pull - np.median(pull[resting]))
+    begin = onset(motor_time, travel, resting, floor=travel.max() / 400, powers=(1, 2))
+    if begin is None:
+        return None
     grid, smooth = _smooth(time, positions)
     resting = (grid > begin + rough - 3 * LAG) & (grid < begin + rough - LAG)
     if resting.sum() < 20:

@@ -86,7 +86,7 @@ def _read_all(data: bytes, contents: _Contents, damage: list[str], path: Path) -
     for position, opcode, body in _records(data, len(MAGIC)):
         end = position + RECORD_HEADER.size + len(body)
         try:
-            if opcode == Opcode.FOOTER:
+            if opcode == Opcode.FOOTER and data[end:] == MAGIC:
                 return None
             if opcode == Opcode.CHUNK:
                 _read_records(_chunk_data(body), contents)

@@ -25,23 +25,39 @@ def release_time(time: np.ndarray, positions: np.ndarray) -> float:
     return float(end) if begin is None else begin
 
 
-def onset(time: np.ndarray, moved: np.ndarray, resting: np.ndarray) -> float | None:
+def onset(
+    time: np.ndarray,
+    moved: np.ndarray,
+    resting: np.ndarray,
+    floor: float = 1e-5,
+    powers: tuple[int, ...] = (2,),
+) -> float | None:
     """When the displacement `moved` (T,) m begins to grow, s, after the frames `resting` (T,); None if it does not.
 
     Under a force that sets in at t0, as under one that grows while damping prevails, the displacement grows as
     (t - t0)². Its root is a straight line in time, and where that crosses zero is t0.
+
+    Args:
+        floor: m, what the noise is taken for at least.
+        powers: of (t - t0) that come into question; the one that fits best counts.
     """
-    noise = float(np.median(moved[resting]))
+    noise = max(float(np.median(moved[resting])), floor)
     moved = np.sqrt(np.maximum(moved**2 - noise**2, 0))
-    low, high = (share * max(noise, 1e-5) for share in RISE)
+    low, high = (share * noise for share in RISE)
     risen = np.flatnonzero((moved > high) & (time > time[resting][-1]))
     if not len(risen):
         return None
     last = max(int(risen[0]), 3)
     still = np.flatnonzero(moved[:last] < low)
     first = min(int(still[-1]) + 1 if len(still) else 0, last - 2)
-    slope, offset = np.polyfit(time[first : last + 1], np.sqrt(moved[first : last + 1]), 1)
-    return float(np.clip(-offset / slope, time[max(first - 6, 0)], time[last])) if slope > 0 else None
+    t, y = time[first : last + 1], moved[first : last + 1]
+    best, begin = np.inf, None
+    for power in powers:
+        slope, offset = np.polyfit(t, y ** (1 / power), 1)
+        misfit = np.square(np.maximum(slope * t + offset, 0) ** power - y).sum()
+        if slope > 0 and misfit < best:
+            best, begin = misfit, float(np.clip(-offset / slope, time[max(first - 6, 0)], t[-1]))
+    return begin
 
 
 def robust_length(vectors: np.ndarray) -> np.ndarray:
