@@ -1,5 +1,6 @@
 """Map the reach of the rigid arm, of the soft arm per gravity angle, and of both together."""
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +28,6 @@ from trunkline.stage import output_folder, run_stage, write_json
 
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
 ARTIFACTS = Path("artifacts/reachability")
-TENSIONS = ["f1", "f2", "f3"]
 
 
 @settings
@@ -111,11 +111,11 @@ def read_samples(path: Path) -> TipSamples:
     """Tips and tensions by gravity angle, from the data set of forward kinematics."""
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the samples of the fk_dataset stage (run `dvc repro`)")
-    columns = ["theta_g", "x", "y", "z", *TENSIONS]
-    try:
-        table = pd.read_parquet(path, columns=columns)
-    except ValueError as error:
-        raise InputError(f"{path}: {error}, expected the columns {', '.join(columns)}") from error
+    table = pd.read_parquet(path)
+    tensions = sorted(name for name in table if re.fullmatch(r"f\d+", name))
+    missing = {"theta_g", "x", "y", "z"} - set(table)
+    if missing or not tensions:
+        raise InputError(f"{path}: found no column {', '.join(sorted(missing) or ['f1'])}, expected tips and tensions")
     groups = [group for _, group in table.groupby(table["theta_g"].round(9))]
     if len(groups) < 3:
         raise InputError(f"{path}: found {len(groups)} gravity angles, expected at least 3 to check blending")
@@ -124,7 +124,7 @@ def read_samples(path: Path) -> TipSamples:
     return TipSamples(
         angles=np.array([group["theta_g"].iloc[0] for group in groups]),
         tips=[group[["x", "y", "z"]].to_numpy(float) for group in groups],
-        tensions=[group[TENSIONS].to_numpy(float) for group in groups],
+        tensions=[group[tensions].to_numpy(float) for group in groups],
     )
 
 
