@@ -45,7 +45,8 @@ def sample_table(
     """About `count` samples at one gravity angle, thinned in the space of tips.
 
     Columns: theta_g (rad), x, y, z (m), qw, qx, qy, qz, l1… (m, path lengths), f1… (N, tensions), residual (N m),
-    iterations, set, and the derivatives by tension dx_df1… (m/N) and dl1_df1… (m/N).
+    iterations, set, and the derivatives by tension dx_df1… (tip, m/N), rx_df1… (turn of the tip as a rotation
+    vector in the base frame, rad/N) and dl1_df1… (path lengths, m/N).
     The planar sets are kept beside the thinned samples, thinned along their own curves.
 
     Args:
@@ -73,6 +74,7 @@ def _table(chain: Chain, tilt: float, candidates: Candidates, kept: np.ndarray) 
     columns |= {"residual": rest.residual, "iterations": rest.iterations, "set": candidates.kind[kept]}
     for t in range(chain.tendons):
         columns |= {f"d{axis}_df{t + 1}": slopes.tip_by_tension[:, k, t] for k, axis in enumerate(AXES)}
+        columns |= {f"r{axis}_df{t + 1}": slopes.turn_by_tension[:, k, t] for k, axis in enumerate(AXES)}
         columns |= {f"dl{s + 1}_df{t + 1}": slopes.length_by_tension[:, s, t] for s in range(chain.tendons)}
     return pd.DataFrame(columns)
 
@@ -90,6 +92,12 @@ def tension_columns(tendons: int) -> list[str]:
 def tip_by_tension(table: pd.DataFrame, tendons: int) -> np.ndarray:
     """∂(tip position)/∂(tensions), m/N. Shape (N, 3, K)."""
     names = [[f"d{axis}_df{t + 1}" for t in range(tendons)] for axis in AXES]
+    return np.stack([table[row].to_numpy() for row in names], axis=1)
+
+
+def turn_by_tension(table: pd.DataFrame, tendons: int) -> np.ndarray:
+    """∂(rotation vector of the tip)/∂(tensions), rad/N. Shape (N, 3, K)."""
+    names = [[f"r{axis}_df{t + 1}" for t in range(tendons)] for axis in AXES]
     return np.stack([table[row].to_numpy() for row in names], axis=1)
 
 

@@ -1,0 +1,56 @@
+"""What the network is worth: the tip error after forward kinematics of the lengths it predicts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trunkline.frames import gravity_in_base
+from trunkline.kinematics.chain import Chain
+from trunkline.kinematics.statics import forward
+
+
+@dataclass
+class TipErrors:
+    """N targets; NaN where the forward kinematics did not converge.
+
+    Attributes:
+        position: distance from the target, m. Shape (N,).
+        orientation: angle from the target, rad. Shape (N,).
+    """
+
+    position: np.ndarray
+    orientation: np.ndarray
+
+    def metrics(self, length: float) -> dict:
+        """Summary in mm and degrees; a target without an answer counts as missed.
+
+        Args:
+            length: of the arm, m.
+        """
+        missed = ~np.isfinite(self.position)
+        position = np.where(missed, length, self.position)
+        orientation = np.where(missed, np.pi, self.orientation)
+        return {
+            "position_error_mm": {
+                "median": np.median(position) * 1e3,
+                "p95": np.quantile(position, 0.95) * 1e3,
+                "max": position.max() * 1e3,
+            },
+            "within_1pct": np.mean(position <= 0.01 * length),
+            "orientation_error_deg": {
+                "median": np.degrees(np.median(orientation)),
+                "p95": np.degrees(np.quantile(orientation, 0.95)),
+            },
+            "targets": len(position),
+            "failed": int(missed.sum()),
+        }
+
+
+def tip_errors(chain: Chain, inputs: np.ndarray, lengths: np.ndarray) -> TipErrors:
+    """Errors of predicted lengths (N, K), m, for targets `inputs` (N, 8): θ_G, position, quaternion."""
+    found = forward(chain, lengths, gravity_in_base(inputs[:, 0]))
+    position = np.linalg.norm(found.position - inputs[:, 1:4], axis=1)
+    overlap = np.abs(np.einsum("ni,ni->n", found.quaternion, inputs[:, 4:]))
+    orientation = 2 * np.arccos(np.clip(overlap, 0, 1))
+    position[~found.converged], orientation[~found.converged] = np.nan, np.nan
+    return TipErrors(position, orientation)
