@@ -2,14 +2,12 @@
 
 from pathlib import Path
 
-import mujoco
 import numpy as np
 import pandas as pd
 from pydantic import Field
 
 from trunkline.config import settings
-from trunkline.errors import InputError
-from trunkline.kinematics.chain import read_chain
+from trunkline.kinematics.chain import load_model, read_chain
 from trunkline.kinematics.dataset import Density, friction_band, mujoco_deviation, sample_table, split
 from trunkline.kinematics.plots import density_figure, deviation_figure
 from trunkline.plots import save_figure
@@ -63,16 +61,6 @@ def main(config: Config) -> None:
         unevenness_table(densities).to_csv(folder / "density.csv", index=False, float_format="%.6g")
         deviation.to_csv(folder / "deviation.csv", index=False, float_format="%.6g")
         write_json(folder / "metrics.json", metrics(table, densities, deviation, band))
-
-
-def load_model(path: Path) -> mujoco.MjModel:
-    """Compile an MJCF file; InputError if there is none or MuJoCo refuses it."""
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, expected the calibrated model (run `dvc repro`)")
-    try:
-        return mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def unevenness_table(densities: list[Density]) -> pd.DataFrame:

@@ -61,7 +61,7 @@ def sample_angle(chain: Chain, tilt: float, directions: int, steps: int, rng: np
 
 
 def pull_directions(chain: Chain, angles: np.ndarray) -> np.ndarray:
-    """Tensions of two neighbouring tendons whose moment points at `angles` (rad) around the arm, the larger at its limit.
+    """Two neighbouring tendons' tensions whose moment points at `angles` (rad) around the arm, one at its limit.
 
     Returns:
         Tensions in N. Shape (len(angles), K).
@@ -74,7 +74,7 @@ def pull_directions(chain: Chain, angles: np.ndarray) -> np.ndarray:
     order = np.argsort(around)
     gaps = np.diff(np.append(around[order], around[order[0]] + 2 * np.pi))
     if chain.tendons < 3 or gaps.max() >= np.pi - 1e-6:
-        raise InputError(f"arm: found {chain.tendons} tendons, expected 3 or more all around: else the tip has no workspace")
+        raise InputError(f"arm: found {chain.tendons} tendons, expected 3 or more all around, to reach every way")
     tensions = np.zeros((len(angles), chain.tendons))
     for row, angle in enumerate(angles):
         place = np.searchsorted(around[order], np.arctan2(np.sin(angle), np.cos(angle))) - 1
