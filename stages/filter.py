@@ -22,19 +22,12 @@ INGEST, PROCESSED, ARTIFACTS = (
 
 
 @settings
-class Outliers:
-    deviations: PositiveFloat
-    position_floor_mm: PositiveFloat
-    angle_floor_deg: PositiveFloat
-
-
-@settings
 class Config:
     rate: PositiveFloat
     cutoff: PositiveFloat
     order: int = Field(ge=1, le=10)
     longest_bridge: float = Field(ge=0)
-    outliers: Outliers
+    outlier_deviations: PositiveFloat
 
     def __post_init__(self):
         if self.cutoff >= self.rate / 2:
@@ -44,15 +37,8 @@ class Config:
 
 
 def main(config: Config) -> None:
-    outliers = config.outliers
     chosen = Filter(
-        config.rate,
-        config.cutoff,
-        config.order,
-        config.longest_bridge,
-        outliers.deviations,
-        outliers.position_floor_mm * 1e-3,
-        np.deg2rad(outliers.angle_floor_deg),
+        config.rate, config.cutoff, config.order, config.longest_bridge, config.outlier_deviations
     )
     takes = read_takes(INGEST)
     trials, findings = [], []

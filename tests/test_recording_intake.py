@@ -16,7 +16,7 @@ from trunkline.recording.intake import Limits, align_clocks, take_in
 from trunkline.recording.session import read_session
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, 5e-3, np.deg2rad(6))
+FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0)
 REAL = Path(__file__).parents[2] / "shared/data/asl_trunk"
 
 

@@ -40,11 +40,11 @@ def test_low_pass_rounds_a_release_symmetrically_by_less_than_a_millimetre():
 def test_outliers_are_found_and_fast_motion_is_not():
     rng = np.random.default_rng(3)
     clean = swing(TIME) + rng.normal(scale=3e-4, size=(600, 2))
-    assert not outliers(TIME, clean, 8.0, 5e-3).any()
+    assert not outliers(TIME, clean, 8.0).any()
     places = [0, 100, 101, 350, 599]
     spoiled = clean.copy()
     spoiled[places] += [0.02, -0.015]
-    assert np.flatnonzero(outliers(TIME, spoiled, 8.0, 5e-3)).tolist() == places
+    assert np.flatnonzero(outliers(TIME, spoiled, 8.0)).tolist() == places
 
 
 def test_resampling_bridges_jitter_and_short_gaps():

@@ -116,7 +116,7 @@ def _smooth(time: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.nda
     columns = []
     for segment in np.moveaxis(positions, 1, 0):
         good = np.isfinite(segment[:, 0])
-        good[good] &= ~outliers(time[good], segment[good], 8.0, 5e-3)
+        good[good] &= ~outliers(time[good], segment[good], deviations=8.0)
         columns += [np.interp(grid, time[good], axis[good]) for axis in segment.T]
     rate = 1 / (grid[1] - grid[0])
     return grid, low_pass(np.stack(columns, axis=1), rate, min(20.0, rate / 5), 4)

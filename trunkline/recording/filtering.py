@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from trunkline.errors import InputError
 from trunkline.frames import make_continuous, tilt_of_gravity
@@ -18,7 +19,7 @@ class Filter:
     """rate: Hz of the uniform clock. cutoff: Hz, order: of the Butterworth low-pass.
 
     longest_bridge: s, longer gaps are filled and marked as not measured.
-    deviations, position_floor (m), angle_floor (rad): see `smoothing.outliers`.
+    deviations: see `smoothing.outliers`.
     """
 
     rate: float
@@ -26,8 +27,6 @@ class Filter:
     order: int
     longest_bridge: float
     deviations: float
-    position_floor: float
-    angle_floor: float
 
 
 @dataclass
@@ -79,7 +78,9 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
         time, samples = take.time[good], samples[good]
         if width == 7:
             samples[:, 3:] = make_continuous(samples[:, 3:])
-        inliers = ~_outliers(time, samples, settings)
+        inliers = ~outliers(time, samples[:, :3], settings.deviations)
+        if width == 7:
+            inliers &= ~outliers(time, samples[:, 3:], settings.deviations)
         dropped += int(np.sum(~inliers))
         time, samples = time[inliers], samples[inliers]
         if len(time) < 2 * settings.order:
@@ -88,7 +89,11 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
             )
         smooth = low_pass(resample(time, samples, grid), settings.rate, settings.cutoff, settings.order)
         columns[:, index] = smooth
-        measured[:, index] = bridged(time, grid, settings.longest_bridge)
+        # the low-pass carries what fills a gap some frames beyond its edges
+        filled_in = ~bridged(time, grid, settings.longest_bridge)
+        measured[:, index] = ~binary_dilation(
+            filled_in, iterations=round(settings.rate / settings.cutoff / 2)
+        )
         filled += int(np.sum(~bridged(time, grid, 1.5 / settings.rate)))
         removed.append(np.mean(np.square(samples - resample(grid, smooth, time)), axis=0))
     noise = np.sqrt(np.mean(removed, axis=0))
@@ -189,14 +194,6 @@ def average_static(trial: Trial) -> Trial:
         trial.tendon_positions.mean(axis=0, keepdims=True),
         0.0,
     )
-
-
-def _outliers(time: np.ndarray, samples: np.ndarray, settings: Filter) -> np.ndarray:
-    """Rows of (T, 3 or 7) whose position or orientation is off."""
-    bad = outliers(time, samples[:, :3], settings.deviations, settings.position_floor)
-    if samples.shape[1] == 7:  # a chord between unit quaternions is half the angle
-        bad |= outliers(time, samples[:, 3:], settings.deviations, settings.angle_floor / 2)
-    return bad
 
 
 def _on_pose_clock(take: Take, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

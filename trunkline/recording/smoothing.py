@@ -2,27 +2,31 @@
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.ndimage import median_filter
 from scipy.signal import butter, sosfiltfilt
 
-ROUNDS = 5  # of removing outliers; what bad rows hide shows once they are gone
+NEIGHBOURHOOD = 11  # rows, over which one has to stand out
+STAND_OUT = 4.0  # times the median of its neighbourhood
+ROUNDS = 3  # of removing outliers; what bad rows hide shows once they are gone
 
 
-def outliers(time: np.ndarray, columns: np.ndarray, deviations: float, floor: float) -> np.ndarray:
+def outliers(time: np.ndarray, columns: np.ndarray, deviations: float) -> np.ndarray:
     """Which rows of (T, C) disagree with their neighbours, however one looks at them: (T,). No NaN allowed.
 
     A row is predicted along a line from the two before it, the two behind it and the ones at its sides; the best
-    counts. So fast motion passes, and a good row beside a bad one. Three bad rows that agree with each other are
-    no noise but a segment taken for another, and pass.
+    counts. So a good row beside a bad one passes. Where the arm is shaken, all rows disagree somewhat, and one has
+    to stand out from them too. Three bad rows that agree with each other are no noise but a segment taken for
+    another, and pass.
 
     Args:
         time: (T,) s, increasing.
         deviations: allowed disagreement, in medians of it.
-        floor: always allowed; at an acceleration a, a good row may disagree by a (Δt)² / 2.
     """
     kept = np.arange(len(time))
     for _ in range(ROUNDS):
-        disagreement = _disagreement(time[kept], columns[kept])
-        good = disagreement <= max(deviations * np.median(disagreement), floor)
+        off = _disagreement(time[kept], columns[kept])
+        around = median_filter(off, NEIGHBOURHOOD, mode="mirror")
+        good = off <= np.maximum(deviations * np.median(off), STAND_OUT * around)
         if good.all():
             break
         kept = kept[good]
@@ -32,13 +36,13 @@ def outliers(time: np.ndarray, columns: np.ndarray, deviations: float, floor: fl
 
 
 def _disagreement(time: np.ndarray, columns: np.ndarray) -> np.ndarray:
-    """Distance of each row to the nearest of its three predictions; 0 where there is none."""
+    """Distance of each row to the nearest of its three predictions; 0 where there is none. Shape (T,)."""
     nearest = np.full(len(time), np.inf)
     for first, second in ((-2, -1), (1, 2), (-1, 1)):
         rows = np.arange(max(0, -first), len(time) - max(0, second))
-        before, after = rows + first, rows + second
-        share = ((time[rows] - time[before]) / (time[after] - time[before]))[:, None]
-        predicted = columns[before] + share * (columns[after] - columns[before])
+        before, after = time[rows] - time[rows + first], time[rows] - time[rows + second]
+        share = (before / (before - after))[:, None]
+        predicted = columns[rows + first] + share * (columns[rows + second] - columns[rows + first])
         nearest[rows] = np.minimum(nearest[rows], np.linalg.norm(columns[rows] - predicted, axis=1))
     return np.where(np.isfinite(nearest), nearest, 0.0)
 
