@@ -88,7 +88,8 @@ def error_figure(curves: pd.DataFrame) -> Figure:
 
 def distance_table(experiment: Experiment, index: int, replays: dict[str, Replay], segments) -> pd.DataFrame:
     """Distances from the base of a few segments: columns time_s, segment, source, distance_mm."""
-    chosen = np.unique(np.linspace(0, len(segments) - 1, SHOWN_SEGMENTS).astype(int))
+    outer = len(segments) // 3  # nearer the base, distances hardly change
+    chosen = np.unique(np.linspace(outer, len(segments) - 1, SHOWN_SEGMENTS).astype(int))
     sources = {"measured": experiment.positions} | {m: r.positions[index] for m, r in replays.items()}
     time = np.arange(experiment.frames) * experiment.frame_step
     return pd.concat(
@@ -108,7 +109,7 @@ def distance_figure(table: pd.DataFrame, trial: str) -> Figure:
                               (model, {"color": COLORS[model], "linewidth": 1.2})):
             for number, (_, rows) in enumerate(table[table.source == source].groupby("segment", sort=False)):
                 axis.plot(rows.time_s, rows.distance_mm, label=source if number == 0 else None, **style)
-        axis.set(xlabel="time (s)", title=f"{trial}: {model} model")
+        axis.set(xlabel="time (s)", title=f"{trial}: {model} model", ylim=0)
         axis.legend(loc="lower right")
     axes[0].set_ylabel("distance from the base (mm)")
     return figure

@@ -51,7 +51,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, report_cad
         name: scores(replayed, experiments, config.loss.kind, weights, length) for name, replayed in replays.items()
     }
     metrics |= {"evaluations": result.evaluations, "diverged": result.diverged, "at_bound": len(result.at_bound)}
-    metrics["per_joint_gain"] = _gain(metrics)
+    if result.factors:
+        metrics["per_joint_gain"] = _gain(metrics)
     for name in result.at_bound:
         print(f"{stage}: {name} ended on a bound of its range")
     artifacts = Path("artifacts") / stage
@@ -149,11 +150,12 @@ def write_plots(folder: Path, result: Identification, bounds, experiments, segme
         curves = plots.error_curves([experiments[i] for i in moving], _select(shown, moving))
         curves.to_csv(folder / "errors.csv", index=False, float_format="%.6g")
         save_figure(plots.error_figure(curves), folder / "errors.png")
-        last = moving[-1]
-        table = plots.distance_table(experiments[last], last, shown, segments)
+        kinds = [i for i in moving if experiments[i].kind == experiments[moving[-1]].kind]
+        widest = max(kinds, key=lambda i: float(np.ptp(experiments[i].positions, axis=0).max()))
+        table = plots.distance_table(experiments[widest], widest, shown, segments)
         table.to_csv(folder / "distances.csv", index=False, float_format="%.6g")
-        save_figure(plots.distance_figure(table, experiments[last].name), folder / "distances.png")
-        save_figure(plots.path_figure(experiments[last], last, shown), folder / "paths.png")
+        save_figure(plots.distance_figure(table, experiments[widest].name), folder / "distances.png")
+        save_figure(plots.path_figure(experiments[widest], widest, shown), folder / "paths.png")
 
 
 def _select(replays: dict, indices: list[int]) -> dict:
