@@ -16,6 +16,7 @@ from trunkline.reachability.maps import (
     LabelSettings,
     Maps,
     RigidSettings,
+    SpotCheckSettings,
     build_maps,
     check_maps,
 )
@@ -68,6 +69,12 @@ class Hybrid:
 
 
 @settings
+class SpotCheck:
+    count: PositiveInt
+    outside: PositiveFloat
+
+
+@settings
 class Config:
     most_triangles: int = Field(ge=100)
     seed: int = Field(ge=0)
@@ -75,6 +82,7 @@ class Config:
     labels: Labels
     soft: Soft
     hybrid: Hybrid
+    spot_check: SpotCheck
 
 
 def main(config: Config) -> None:
@@ -91,7 +99,15 @@ def main(config: Config) -> None:
         most_triangles=config.most_triangles,
         seed=config.seed,
     )
-    check = check_maps(maps, samples, LabelSettings(**vars(config.labels)), shape, step, config.seed)
+    check = check_maps(
+        maps,
+        samples,
+        LabelSettings(**vars(config.labels)),
+        SpotCheckSettings(**vars(config.spot_check)),
+        shape,
+        step=step,
+        seed=config.seed,
+    )
 
     with output_folder(ARTIFACTS) as folder:
         np.savez_compressed(folder / "grids.npz", **maps.arrays())
@@ -140,7 +156,12 @@ def metrics(maps: Maps, check: Check) -> dict:
             "watertight": all(mesh.is_closed() for mesh in soft),
             "triangles": max(len(mesh.faces) for mesh in soft),
         },
-        "hybrid": {"watertight": maps.hybrid.mesh.is_closed(), "triangles": len(maps.hybrid.mesh.faces)},
+        "hybrid": {
+            "found_inside": check.found_inside,
+            "found_outside": check.found_outside,
+            "watertight": maps.hybrid.mesh.is_closed(),
+            "triangles": len(maps.hybrid.mesh.faces),
+        },
     }
 
 

@@ -6,6 +6,7 @@ from scipy.spatial import cKDTree
 
 from trunkline.reachability.downward import sample_downward
 from trunkline.reachability.grid import Lattice, overlap
+from trunkline.reachability.hybrid_check import draw_inside_and_outside, find_poses, tip_position
 from trunkline.reachability.hybrid_map import minkowski_field, swept_cells
 from trunkline.reachability.labels import agreement, beyond_links, draw_points, label
 from trunkline.reachability.maps import RigidSettings, angle_name, build_rigid, build_soft
@@ -165,7 +166,7 @@ def test_blend_overlaps_an_angle_left_out():
     lattice = soft_lattice(samples, SHAPE, 0.015)
     own = [soft_field(tips, lattice, SHAPE) for tips in samples.tips]
     plain = overlap((own[1] + own[3]) / 2, own[2])  # what a headset would get from so coarse a set of angles
-    blended = heldout_overlap(samples, 2, np.radians(5), lattice, SHAPE)
+    blended = heldout_overlap(samples, 2, own[2], np.radians(5), lattice, SHAPE)
     assert blended > 0.85
     assert blended > plain + 0.08
 
@@ -206,3 +207,19 @@ def test_hybrid_of_two_balls_is_the_ball_of_both_radii():
     error = (result - true)[np.abs(true) < 0.015]
     assert np.abs(error).max() < 0.015
     assert abs(error.mean()) < 0.004
+
+
+def test_points_of_the_hybrid_map_are_reached_and_points_beside_it_are_not(rigid):
+    tips = curved_arm([0], 4000).tips[0]
+    cells, cells_lattice = swept_cells(tips, 0.02)
+    field, lattice = minkowski_field(rigid.field, rigid.lattice, cells, cells_lattice, smoothing=0.7, smallest=60)
+    inside, outside = draw_inside_and_outside(field, lattice, 0.03, 40, seed=0)
+    assert len(inside) == len(outside) == 40
+    where = {"seed": 0, "mount_offset": OFFSET, "avoid_collisions": True}
+    reach = find_poses(inside, tips, rigid.field, rigid.lattice, **where)
+    assert reach.found.mean() >= 0.97
+    mount, rotation = forward(reach.q[reach.found], OFFSET)
+    assert np.abs(rotation[:, :, 2] - [0, 0, -1]).max() < 1e-3
+    reached = tip_position(mount, rotation, tips[reach.tip[reach.found]])
+    assert np.linalg.norm(reached - inside[reach.found], axis=1).max() < 1e-3
+    assert find_poses(outside, tips, rigid.field, rigid.lattice, **where).found.mean() <= 0.03

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from trunkline.reachability.downward import sample_downward
 from trunkline.reachability.grid import Lattice
+from trunkline.reachability.hybrid_check import draw_inside_and_outside, find_poses
 from trunkline.reachability.hybrid_map import minkowski_field, swept_cells
 from trunkline.reachability.labels import Agreement, agreement, draw_points, label
 from trunkline.reachability.mesh import Surface, contains, surface
@@ -46,6 +47,14 @@ class HybridSettings:
     voxel: float
     smoothing: float
     smallest: int
+
+
+@dataclass(frozen=True)
+class SpotCheckSettings:
+    """See conf/reachability/config.yaml; outside in m."""
+
+    count: int
+    outside: float
 
 
 @dataclass(frozen=True)
@@ -103,13 +112,20 @@ class Maps:
 
 @dataclass(frozen=True)
 class Check:
-    """How good the maps are: agreement of the rigid mesh with labels at ``points``, overlap per held-out angle."""
+    """How good the maps are.
+
+    ``rigid``: agreement of the rigid mesh (``claimed``, (N,)) with labels (``reachable``, (N,)) at ``points``
+    (N, 3). ``heldout``: overlap at each inner gravity angle left out. ``found_inside``, ``found_outside``: shares
+    of points inside the hybrid map and a little outside it for which a pose of both arms was found.
+    """
 
     rigid: Agreement
     points: NDArray
     claimed: NDArray
     reachable: NDArray
     heldout: list[float]
+    found_inside: float
+    found_outside: float
 
 
 def angle_name(angle: float) -> str:
@@ -132,8 +148,7 @@ def build_maps(
     """All maps: ``soft_voxel`` in m; ``step`` in rad between soft fields, at most."""
     rigid_map = build_rigid(rigid, most_triangles, seed)
     soft_maps = build_soft(samples, shape, soft_voxel, step, most_triangles)
-    hanging = samples.tips[int(np.abs(samples.angles).argmin())]
-    cells, cells_lattice = swept_cells(hanging, hybrid.voxel)
+    cells, cells_lattice = swept_cells(samples.tips[samples.hanging()], hybrid.voxel)
     field, lattice = minkowski_field(
         rigid_map.field, rigid_map.lattice, cells, cells_lattice, hybrid.smoothing, hybrid.smallest
     )
@@ -164,9 +179,16 @@ def build_soft(
 
 
 def check_maps(
-    maps: Maps, samples: TipSamples, labels: LabelSettings, shape: SoftShape, step: float, seed: int
+    maps: Maps,
+    samples: TipSamples,
+    labels: LabelSettings,
+    spot_check: SpotCheckSettings,
+    shape: SoftShape,
+    *,
+    step: float,
+    seed: int,
 ) -> Check:
-    """Label points around the rigid map by inverse kinematics; leave out every inner gravity angle in turn."""
+    """Check the rigid map by inverse kinematics, the soft ones by leaving out angles, the hybrid by finding poses."""
     corners = maps.rigid.mesh.vertices
     points = draw_points(corners.min(axis=0) - labels.margin, corners.max(axis=0) + labels.margin, labels.count, seed)
     claimed = contains(maps.rigid.mesh, points)
@@ -179,9 +201,25 @@ def check_maps(
         mount_offset=maps.mount_offset,
         avoid_collisions=maps.self_collision,
     )
-    inner = range(1, len(samples.angles) - 1)
-    heldout = [heldout_overlap(samples, i, step, maps.soft.lattice, shape) for i in inner]
-    return Check(agreement(claimed, reachable), points, claimed, reachable, heldout)
+    heldout = [
+        heldout_overlap(samples, i, maps.soft.at(samples.angles[i]), step, maps.soft.lattice, shape)
+        for i in range(1, len(samples.angles) - 1)
+    ]
+    inside, outside = (
+        find_poses(
+            some,
+            samples.tips[samples.hanging()],
+            maps.rigid.field,
+            maps.rigid.lattice,
+            seed=seed,
+            mount_offset=maps.mount_offset,
+            avoid_collisions=maps.self_collision,
+        ).found.mean()
+        for some in draw_inside_and_outside(
+            maps.hybrid.field, maps.hybrid.lattice, spot_check.outside, spot_check.count, seed
+        )
+    )
+    return Check(agreement(claimed, reachable), points, claimed, reachable, heldout, float(inside), float(outside))
 
 
 def _placement(name: str, lattice: Lattice) -> dict[str, NDArray]:

@@ -19,6 +19,8 @@ SUN = np.array([0.35, -0.75, 0.55])  # towards the light
 POSE = (0.45, 0.0, 0.55)  # m, where the drawn Panda holds the mount
 RIGID, SOFT, HYBRID = IDENTIFIED, INITIAL, VALIDATE
 WIDEST_SHOWN = 1.0  # m, of the label points: those in the corners of their box say little
+GRAVITY_ARROW = 0.7  # of the arm's length
+SLICES = 5  # gravity angles in the slice of the soft maps
 SHOWN_DEG = (0.0, 60.0, 120.0)  # gravity angles of the paper's figure
 
 
@@ -36,6 +38,7 @@ def maps_figure(maps: Maps, samples: TipSamples) -> Figure:
 
     nearest = [int(np.abs(maps.soft.mesh_angles - np.radians(d)).argmin()) for d in SHOWN_DEG]
     b = _space(figure, 222, f"(b) Soft arm, gravity at {np.degrees(maps.soft.mesh_angles[nearest[0]]):.0f}°")
+    b.yaxis.set_major_locator(plt.MaxNLocator(3))
     _add_surface(b, maps.soft.meshes[nearest[0]], SOFT, 0.35)
     _add_line(b, np.array([[0, 0, 0], [0, 0, -length]]), MEASURED, 4)
     _frame(b, [maps.soft.meshes[nearest[0]].vertices, np.zeros((1, 3))])
@@ -48,7 +51,8 @@ def maps_figure(maps: Maps, samples: TipSamples) -> Figure:
         _add_surface(c, maps.soft.meshes[index], color, 0.40)
         _add_gravity(c, maps.soft.mesh_angles[index], length, color)
     _add_line(c, np.array([[0, 0, 0.06], [0, 0, 0]]), MEASURED, 6)
-    _frame(c, [maps.soft.meshes[i].vertices for i in nearest] + [np.zeros((1, 3))])
+    arrows = [GRAVITY_ARROW * length * _down(maps.soft.mesh_angles[i])[None] for i in nearest]
+    _frame(c, [maps.soft.meshes[i].vertices for i in nearest] + arrows)
 
     d = _space(figure, 224, "(d) Both: soft tip, soft arm hanging from the Panda")
     _add_surface(d, maps.hybrid.mesh, HYBRID, 0.22)
@@ -61,7 +65,7 @@ def maps_figure(maps: Maps, samples: TipSamples) -> Figure:
 
 def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
     """Slices through y = 0 with what they were checked against: labels, tips; and the hybrid around the rigid map."""
-    figure, (rigid, soft, hybrid) = plt.subplots(1, 3, figsize=(14, 5.4))
+    figure, (rigid, soft, hybrid) = plt.subplots(1, 3, figsize=(14, 6.2))
     _fill_slice(rigid, maps.rigid, RIGID)
     radius = np.hypot(check.points[:, 0], check.points[:, 1]) * np.where(check.points[:, 0] < 0, -1, 1)
     for right, mark, size in ((True, ".", 3), (False, "x", 40)):
@@ -71,21 +75,22 @@ def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
             rigid.scatter(radius[rows], check.points[rows, 2], s=size, marker=mark, zorder=3,
                           color=color if right else INITIAL, label=f"{name} ({rows.sum()})")
     rigid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8, markerscale=1.5)
-    rigid.set(title=f"Rigid: accuracy {100 * check.rigid.accuracy:.2f} %", xlabel="±radius (m)", ylabel="z (m)")
+    rigid.set(title=f"Rigid: {100 * check.rigid.accuracy:.1f} % of labels agree", xlabel="±radius (m)", ylabel="z (m)")
 
-    angles = maps.soft.mesh_angles
-    colors = plt.get_cmap("viridis")(np.linspace(0, 0.9, len(angles)))
+    shown = np.unique(np.linspace(0, len(samples.angles) - 1, SLICES).round().astype(int))
+    colors = plt.get_cmap("viridis")(np.linspace(0, 0.9, len(shown)))
     x, y, z = maps.soft.lattice.axes()
     middle = int(np.abs(y).argmin())
-    for index, (angle, color) in enumerate(zip(angles, colors, strict=True)):
+    for index, color in zip(shown, colors, strict=True):
+        angle = samples.angles[index]
         soft.contour(x, z, maps.soft.at(angle)[:, middle].T, levels=[0.0], colors=[color], linewidths=1.4)
         tips = samples.tips[index]
         near = np.abs(tips[:, 1]) < maps.soft.lattice.spacing / 2
         soft.scatter(tips[near, 0], tips[near, 2], s=2, color=color, label=f"{np.degrees(angle):.0f}°")
     soft.plot(0, 0, "k^", markersize=8)
-    soft.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=4, fontsize=8, markerscale=4,
-                title="gravity angle; dots: tips")
-    soft.set(title="Soft: maps and tips", xlabel="x (m)", ylabel="z (m)")
+    soft.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=5, fontsize=8, markerscale=4,
+                title="lines: maps, dots: tips, at gravity angle")
+    soft.set(title="Soft: the shell of its tips", xlabel="x (m)", ylabel="z (m)")
 
     _fill_slice(hybrid, maps.hybrid, HYBRID)
     x, y, z = maps.rigid.lattice.axes()
@@ -96,7 +101,7 @@ def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
     arm = panda_line(maps.mount_offset, maps.self_collision)
     hybrid.plot(arm[:, 0], arm[:, 2], color=MEASURED, linewidth=3, label="Panda")
     hybrid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8)
-    hybrid.set(title="Hybrid: both together", xlabel="x (m)", ylabel="z (m)")
+    hybrid.set(title=f"Hybrid: poses found for {100 * check.found_inside:.1f} % inside", xlabel="x (m)", ylabel="z (m)")
     rigid.set_xlim(-WIDEST_SHOWN, WIDEST_SHOWN)
     for axes in (rigid, soft, hybrid):
         axes.set_aspect("equal")
@@ -111,7 +116,7 @@ def heldout_figure(heldout: pd.DataFrame) -> Figure:
     bars = axes.bar(names, heldout["iou"], color=IDENTIFIED, width=0.6)
     axes.bar_label(bars, fmt="%.3f", padding=2, fontsize=9)
     axes.set(ylim=(0, 1.05), xlabel="gravity angle left out", ylabel="IoU",
-             title="Soft map blended from the other angles, against its own samples")
+             title="Soft map from the other angles, against its own")
     return figure
 
 
@@ -130,7 +135,9 @@ def _space(figure: Figure, position: int, title: str):
     axes = figure.add_subplot(position, projection="3d", computed_zorder=False)
     axes.set_title(title)
     axes.view_init(elev=18, azim=-60)
-    axes.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)")
+    axes.set_xlabel("x (m)", labelpad=8)
+    axes.set_ylabel("y (m)", labelpad=8)
+    axes.set_zlabel("z (m)", labelpad=10)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.pane.set_facecolor("white")
         axis.set_major_locator(plt.MaxNLocator(5))
@@ -154,8 +161,12 @@ def _add_line(axes, points: NDArray, color: str, width: float) -> None:
 
 
 def _add_gravity(axes, angle: float, length: float, color: str) -> None:
-    down = length * np.array([np.sin(angle), 0.0, -np.cos(angle)])
-    axes.quiver(0, 0, 0, *down, color=color, linewidth=2, arrow_length_ratio=0.08, zorder=6)
+    arrow = GRAVITY_ARROW * length * _down(angle)
+    axes.quiver(0, 0, 0, *arrow, color=color, linewidth=2, arrow_length_ratio=0.08, zorder=6)
+
+
+def _down(angle: float) -> NDArray:
+    return np.array([np.sin(angle), 0.0, -np.cos(angle)])
 
 
 def _frame(axes, vertices: list[NDArray]) -> None:

@@ -55,12 +55,14 @@ def soft_fields(samples: TipSamples, angles: NDArray, lattice: Lattice, shape: S
     return np.stack([soft_field(interpolator.tips(a), lattice, shape) for a in angles]).astype(np.float32)
 
 
-def heldout_overlap(samples: TipSamples, index: int, step: float, lattice: Lattice, shape: SoftShape) -> float:
-    """Overlap (IoU) at angle ``index`` of its own field with the blend that is made without its samples.
+def heldout_overlap(
+    samples: TipSamples, index: int, own: NDArray, step: float, lattice: Lattice, shape: SoftShape
+) -> float:
+    """Overlap (IoU) of ``own``, the field at angle ``index``, with the blend that is made without its samples.
 
     The blend is the headset's: linear between two fields ``step`` (rad) apart, here at its worst, half-way.
     """
     angle = samples.angles[index]
     beside = angle + step * np.array([-0.5, 0.5])
     fields = soft_fields(samples.without(index), beside, lattice, shape)
-    return overlap(blend(fields, beside, angle), soft_field(samples.tips[index], lattice, shape))
+    return overlap(blend(fields, beside, angle), own)

@@ -29,6 +29,10 @@ class TipSamples:
     tips: list[NDArray]
     tensions: list[NDArray]
 
+    def hanging(self) -> int:
+        """Index of the angle nearest to 0, at which the arm hangs straight down."""
+        return int(np.abs(self.angles).argmin())
+
     def without(self, index: int) -> "TipSamples":
         """All angles but one."""
         keep = [i for i in range(len(self.angles)) if i != index]

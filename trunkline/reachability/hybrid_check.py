@@ -1,0 +1,119 @@
+"""Spot check of the hybrid map: for a point, a rigid pose and tendon tensions that bring the soft tip there.
+
+The soft arm's base frame is the mount's turned by half a turn about x, so that its z axis points up while the
+end effector points down. With the tip at c in that frame and the base turned by yaw about the vertical, the
+mount must be at p = x - Rot_z(yaw) c. Pairs (c, yaw) whose p lies deepest inside the rigid map are tried.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunkline.reachability.grid import Lattice
+from trunkline.reachability.inverse import solve
+from trunkline.reachability.labels import beyond_links
+
+COARSE_YAWS, FINE_YAWS = 24, 72
+COARSE_TIPS = 600
+TRIES = 4  # pairs per point that go to inverse kinematics
+STARTS = 40
+DEEP = -0.01  # m; a pair whose mount lies this deep needs no finer search
+
+
+class Reach(NamedTuple):
+    """How each of N points is reached.
+
+    ``found`` (N,); ``q`` (N, 7) in rad; ``tip`` (N,), index of the soft sample; ``yaw`` (N,) of the soft arm's
+    base in rad. Rows that are not found hold nothing of use.
+    """
+
+    found: NDArray
+    q: NDArray
+    tip: NDArray
+    yaw: NDArray
+
+
+def find_poses(
+    points: NDArray,
+    tips: NDArray,
+    rigid: NDArray,
+    lattice: Lattice,
+    *,
+    seed: int,
+    mount_offset: float,
+    avoid_collisions: bool,
+) -> Reach:
+    """Rigid pose and soft sample for each of ``points``.
+
+    Args:
+        points: where the soft tip shall be, (N, 3) in m in the Panda's base frame.
+        tips: of the soft arm at gravity angle 0, (M, 3) in m in its base frame.
+        rigid: signed distance field of the rigid map on ``lattice``, in m.
+        seed: of the solver's starts and of the choice of tips for the first look.
+        mount_offset: from the flange to the mount, in m.
+        avoid_collisions: whether poses in which the Panda touches itself count.
+    """
+    few = np.random.default_rng(seed).permutation(len(tips))[:COARSE_TIPS]
+    reach = Reach(np.zeros(len(points), bool), np.zeros((len(points), 7)), np.zeros(len(points), int),
+                  np.zeros(len(points)))
+    tip, yaw = np.zeros((len(points), TRIES), int), np.zeros((len(points), TRIES))
+    for i, point in enumerate(points):
+        index, turn, depth = _deepest(point, tips[few], COARSE_YAWS, rigid, lattice)
+        index = few[index]
+        if depth[0] > DEEP:
+            index, turn, depth = _deepest(point, tips, FINE_YAWS, rigid, lattice)
+        tip[i], yaw[i] = index, turn
+    for attempt in range(TRIES):
+        left = np.flatnonzero(~reach.found)
+        mounts, rotations = mount_pose(points[left], tips[tip[left, attempt]], yaw[left, attempt])
+        near = ~beyond_links(mounts, mount_offset)
+        left, mounts, rotations = left[near], mounts[near], rotations[near]
+        result = solve(mounts, rotations, seed=seed + attempt, starts=STARTS, mount_offset=mount_offset,
+                       avoid_collisions=avoid_collisions)
+        at = left[result.success]
+        reach.found[at], reach.q[at] = True, result.q[result.success]
+        reach.tip[at], reach.yaw[at] = tip[at, attempt], yaw[at, attempt]
+    return reach
+
+
+def draw_inside_and_outside(
+    field: NDArray, lattice: Lattice, distance: float, count: int, seed: int
+) -> tuple[NDArray, NDArray]:
+    """Points uniform inside a map, and points ``distance`` m outside it (to a third more), (<= count, 3) each."""
+    upper = lattice.origin + lattice.spacing * (np.array(lattice.shape) - 1)
+    points = np.random.default_rng(seed).uniform(lattice.origin, upper, size=(500 * count, 3))
+    depth = lattice.sample(field, points)
+    outside = (depth >= distance) & (depth <= 4 / 3 * distance)
+    return points[depth < 0][:count], points[outside][:count]
+
+
+def mount_pose(points: NDArray, tips: NDArray, yaw: NDArray) -> tuple[NDArray, NDArray]:
+    """Positions (N, 3) and rotations (N, 3, 3) of the mount that bring ``tips`` (N, 3) to ``points`` (N, 3)."""
+    turn = np.zeros((len(yaw), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(yaw)
+    turn[:, 1, 0] = np.sin(yaw)
+    turn[:, 0, 1] = -turn[:, 1, 0]
+    turn[:, 2, 2] = 1.0
+    return points - np.einsum("nij,nj->ni", turn, tips), turn * np.array([1.0, -1.0, -1.0])
+
+
+def tip_position(mount: NDArray, rotation: NDArray, tip: NDArray) -> NDArray:
+    """Where soft ``tip`` (N, 3) is, in the Panda's base frame, with the mount at a pose (N, 3), (N, 3, 3)."""
+    return mount + np.einsum("nij,nj->ni", rotation * np.array([1.0, -1.0, -1.0]), tip)
+
+
+def _deepest(point: NDArray, tips: NDArray, yaws: int, rigid: NDArray, lattice: Lattice):
+    """Tips (TRIES,), yaws and depths whose mount lies deepest in the rigid map, no tip twice, deepest first."""
+    angles = 2 * np.pi * np.arange(yaws) / yaws
+    cos, sin = np.cos(angles), np.sin(angles)
+    x = point[0] - np.outer(tips[:, 0], cos) + np.outer(tips[:, 1], sin)
+    y = point[1] - np.outer(tips[:, 0], sin) - np.outer(tips[:, 1], cos)
+    z = np.broadcast_to((point[2] - tips[:, 2])[:, None], x.shape)
+    index = np.rint((np.stack([x, y, z]) - lattice.origin[:, None, None]) / lattice.spacing).astype(int)
+    last = np.array(lattice.shape)[:, None, None] - 1
+    depth = rigid[tuple(np.clip(index, 0, last))]
+    best = depth.argmin(axis=1)
+    depth = depth[np.arange(len(tips)), best]
+    order = np.argsort(depth, kind="stable")[:TRIES]
+    return order, angles[best[order]], depth[order]
