@@ -244,12 +244,11 @@ def test_real_recordings_without_orientations_or_base_body(tmp_path):
         (tmp_path / name).symlink_to(REAL / name)
     lines = "".join(f"  - {{file: {name}, experiment: release, split: identify}}\n" for name in names)
     head = "frame: {up: [0, 1, 0]}\nbase: {position: [0.1015, 0.0, 0.105]}\n"
-    (tmp_path / "session.yaml").write_text(
-        head + 'segments: {"1": disc_1, "2": disc_2, "3": disc_3}\ntrials:\n' + lines
-    )
+    (tmp_path / "session.yaml").write_text(head + "trials:\n" + lines)
     takes = [take for take, _ in taken(tmp_path)]
     assert len(takes) == 13
     for take in takes:
+        assert take.segments == ("1", "2", "3")
         trial, _ = filter_take(take, FILTER)
         assert trial.quaternions is None
         np.testing.assert_allclose(trial.gravity, [0, 0, -9.80665], atol=1e-9)

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
-from trunkline.recording.cdr import short_name
 from trunkline.recording.clock import (
     FrameFit,
     OffsetFit,
@@ -18,10 +17,9 @@ from trunkline.recording.clock import (
     first_motion_offset,
     fit_frames,
 )
-from trunkline.recording.log import Log, Topic, read_log
-from trunkline.recording.messages import JOINTS, POSES
 from trunkline.recording.session import FixedBase, Session, TrialEntry
-from trunkline.recording.streams import JointStream, PoseStream, joint_stream, pose_stream
+from trunkline.recording.source import Source, open_log
+from trunkline.recording.streams import PoseStream
 from trunkline.recording.take import Take
 
 UNIT = {"m": 1.0, "mm": 1e-3}
@@ -60,14 +58,14 @@ def take_in(
 
     Every take has the same segments: those that session.yaml maps, or all that any log shows.
     """
-    logs: dict[str, _Source | InputError] = {}
+    logs: dict[str, Source | InputError] = {}
     for trial in session.trials:
         if trial.file not in logs:
             try:
-                logs[trial.file] = _open(folder / trial.file, session)
+                logs[trial.file] = open_log(folder / trial.file, session.topics)
             except InputError as error:
                 logs[trial.file] = error
-    segments = _segments(session, [source for source in logs.values() if isinstance(source, _Source)])
+    segments = _segments(session, [source for source in logs.values() if isinstance(source, Source)])
     for trial in session.trials:
         source, findings = logs[trial.file], Findings()
         if isinstance(source, InputError):
@@ -87,78 +85,16 @@ def align_clocks(takes: list[Take], fits: list[OffsetFit | None]) -> tuple[float
     return offset, spread
 
 
-@dataclass
-class _Source:
-    """One log, decoded. log: without its messages, which are decoded."""
-
-    log: Log
-    pose_topic: str
-    poses: PoseStream
-    commands: JointStream | None
-    tendon_positions: JointStream | None
-
-
-def _open(path: Path, session: Session) -> _Source:
-    log = read_log(path)
-    poses = _choose(log, session.topics.poses, POSES, "pose")
-    if poses is None:
-        found = ", ".join(f"{t.name} ({t.schema})" for t in log.topics.values()) or "no readable message"
-        damage = f"; the log is damaged: {'; '.join(log.damage)}" if log.damage else ""
-        raise InputError(
-            f"{path}: no pose topic, found {found}{damage}, expected one of {', '.join(POSES)}"
-        )
-    joints = [
-        None if topic is None else joint_stream(topic)
-        for topic in (
-            _choose(log, session.topics.commands, JOINTS, "command", wanted=("command", "cmd", "target")),
-            _choose(
-                log,
-                session.topics.tendon_positions,
-                JOINTS,
-                "tendon position",
-                wanted=("state", "position"),
-            ),
-        )
-    ]
-    stream = pose_stream(poses)
-    if not len(stream.stamps):
-        raise InputError(f"{path}: {poses.name}: no message fits its schema {poses.schema}")
-    log.topics = {}  # decoded: the raw messages can go
-    return _Source(log, poses.name, stream, *joints)
-
-
-def _choose(
-    log: Log, name: str | None, registry: dict, role: str, wanted: tuple[str, ...] = ("",)
-) -> Topic | None:
-    """The topic that the session names, or the only one whose schema fits and whose name tells its role."""
-    fitting = [topic for topic in log.topics.values() if short_name(topic.schema) in registry]
-    if name is not None:
-        topic = log.topics.get(name)
-        if topic is not None and topic not in fitting:
-            expected = ", ".join(registry)
-            raise InputError(
-                f"{log.path}: {name}: found {topic.schema}, expected a {role} schema: {expected}"
-            )
-        return topic
-    told = [topic for topic in fitting if any(word in topic.name for word in wanted)]
-    if len(told) > 1:
-        found = ", ".join(topic.name for topic in told)
-        raise InputError(
-            f"{log.path}: {role} topic: found {found}, expected one, or its name in session.yaml: topics"
-        )
-    return told[0] if told else None
-
-
-def _segments(session: Session, sources: list[_Source]) -> dict[str, str]:
+def _segments(session: Session, sources: list[Source]) -> dict[str, str]:
     """Name in the log to name in the model of every segment, in the order of the map, or by name."""
     if session.segments is not None:
         return session.segments
-    names = {name for source in sources for name in source.poses.names} - {session.base}
+    names = {name for source in sources for name in source.poses.names if name != session.base}
     return {name: name for name in sorted(names)}
 
 
 def _take(
-    source: _Source,
+    source: Source,
     trial: TrialEntry,
     session: Session,
     segments: dict[str, str],
@@ -328,9 +264,7 @@ def _upright(up: np.ndarray) -> np.ndarray:
     return wxyz_from_rotation(Rotation.from_matrix(np.stack([x, np.cross(up, x), up], axis=1)))
 
 
-def _motors(
-    source: _Source, epoch: int, time: np.ndarray, limits: Limits, where: str, findings: Findings
-):
+def _motors(source: Source, epoch: int, time: np.ndarray, limits: Limits, where: str, findings: Findings):
     """Tendon names, and (command time, commands, tendon time, tendon positions) around the trial's frames."""
     streams = [source.commands, source.tendon_positions]
     tendons = next((stream.names for stream in streams if stream is not None), ())
