@@ -62,7 +62,7 @@ def take_in(
     for trial in session.trials:
         if trial.file not in logs:
             try:
-                logs[trial.file] = open_log(folder / trial.file, session.topics)
+                logs[trial.file] = open_log(folder / trial.file, session)
             except InputError as error:
                 logs[trial.file] = error
     segments = _segments(session, [source for source in logs.values() if isinstance(source, Source)])
@@ -147,7 +147,7 @@ def _take(
     base_positions, base_quaternions, positions, quaternions = _split_base(
         session, positions, quaternions, f"{where}: {source.pose_topic}"
     )
-    tendons, motors = _motors(source, epoch, time, limits, where, findings)
+    tendons, motors = _motors(source, epoch, poses.log_times[rows[0]], time, limits, where, findings)
     take = Take(
         trial.name,
         trial.experiment,
@@ -264,9 +264,22 @@ def _upright(up: np.ndarray) -> np.ndarray:
     return wxyz_from_rotation(Rotation.from_matrix(np.stack([x, np.cross(up, x), up], axis=1)))
 
 
-def _motors(source: Source, epoch: int, time: np.ndarray, limits: Limits, where: str, findings: Findings):
-    """Tendon names, and (command time, commands, tendon time, tendon positions) around the trial's frames."""
+def _motors(
+    source: Source,
+    epoch: int,
+    logged: int,
+    time: np.ndarray,
+    limits: Limits,
+    where: str,
+    findings: Findings,
+):
+    """Tendon names, and (command time, commands, tendon time, tendon positions) around the trial's frames.
+
+    epoch: ns, the stamp of the trial's first frame; logged: ns, when the recorder had it. Where messages of either
+    topic have no stamp, the log times of both count.
+    """
     streams = [source.commands, source.tendon_positions]
+    timed = all(stream is None or stream.timed for stream in streams)
     tendons = next((stream.names for stream in streams if stream is not None), ())
     arrays = []
     for stream, role in zip(streams, ("command", "tendon position"), strict=True):
@@ -278,8 +291,9 @@ def _motors(source: Source, epoch: int, time: np.ndarray, limits: Limits, where:
             raise InputError(
                 f"{where}: {role} topic: {found}, expected {', '.join(tendons)} as in the other topic"
             )
-        rows = _in_order(stream.stamps, limits.disorder, f"{where}: {role} topic", findings)
-        seconds = (stream.stamps[rows] - epoch) * 1e-9
+        stamps = stream.stamps if timed else stream.log_times - logged + epoch
+        rows = _in_order(stamps, limits.disorder, f"{where}: {role} topic", findings)
+        seconds = (stamps[rows] - epoch) * 1e-9
         pulls = stream.positions[rows][:, [stream.names.index(name) for name in tendons]]
         near = (seconds > -limits.clock_offset) & (seconds < time[-1] + limits.clock_offset)
         finite = np.isfinite(pulls).all(axis=1)

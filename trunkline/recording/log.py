@@ -29,11 +29,12 @@ CHUNK_HEADER = struct.Struct("<QQQI")
 
 @dataclass
 class Topic:
-    """Messages of one topic in log-time order. log_times: (N,) ns."""
+    """Messages of one topic in log-time order. log_times: (N,) ns. definition: the schema, in `schema_encoding`."""
 
     name: str
     schema: str
-    definition: str
+    schema_encoding: str
+    definition: bytes
     encoding: str
     messages: list[bytes]
     log_times: np.ndarray
@@ -193,7 +194,8 @@ def _by_topic(contents: _Contents) -> dict[str, Topic]:
         topics[channel.topic] = Topic(
             channel.topic,
             schema.name if schema else "",
-            schema.data.decode(errors="replace") if schema else "",
+            schema.encoding if schema else "",
+            schema.data if schema else b"",
             channel.message_encoding,
             [rows[i][1] for i in order],
             times[order],

@@ -22,8 +22,12 @@ class Entry(BaseModel):
 
 
 class Frame(Entry):
-    """The motion-capture frame: which way is up in it, and the unit of its positions."""
+    """The motion-capture frame: which way is up in it, and the unit of its positions.
 
+    name: the parent frame of the poses, for logs of transforms between several frames.
+    """
+
+    name: str | None = None
     up: Vector
     unit: Literal["m", "mm"] = "m"
 
@@ -46,9 +50,9 @@ class FixedBase(Entry):
 
 
 class Topics(Entry):
-    """Topic names; what is left out is found by its schema."""
+    """Topic names; what is left out is found by its schema. poses: one topic, or body to topic."""
 
-    poses: str | None = None
+    poses: str | dict[str, str] | None = None
     commands: str | None = None
     tendon_positions: str | None = None
 
@@ -76,6 +80,7 @@ class TrialEntry(Entry):
 class Session(Entry):
     """base: the body that marks the mount, or its pose. segments: name in the log to name in the model.
 
+    bodies, tendons: names of the poses and of the joints, in order, where messages hold them without names.
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
     that the stamps show.
     """
@@ -84,6 +89,8 @@ class Session(Entry):
     base: str | FixedBase
     segments: dict[str, str] | None = Field(default=None, min_length=1)
     topics: Topics = Topics()
+    bodies: list[str] | None = Field(default=None, min_length=1)
+    tendons: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"
     trials: list[TrialEntry] = Field(min_length=1)
 
