@@ -57,7 +57,7 @@ def open_log(path: Path, session: Session) -> Source:
         (session.topics.commands, "command", COMMAND_WORDS),
         (session.topics.tendon_positions, "tendon position", POSITION_WORDS),
     ):
-        topic = _choose(log, wanted, JOINTS, role, words)
+        topic = choose(log, wanted, JOINTS, role, words)
         stream = topic and _understood(f"{path}: {topic.name}", joint_stream, topic, session.tendons)
         if stream is not None and stream.unnamed is not None:
             found = f"found {stream.unnamed} numbers without names"
@@ -72,19 +72,19 @@ def open_log(path: Path, session: Session) -> Source:
 def pose_topics(log: Log, wanted: str | dict[str, str] | None) -> dict[str | None, Topic]:
     """The topic of all poses under None, or each body's topic under its name; empty where the log has none."""
     if isinstance(wanted, dict):
-        chosen = {body: _choose(log, name, POSES, "pose") for body, name in wanted.items()}
+        chosen = {body: choose(log, name, POSES, "pose") for body, name in wanted.items()}
         return {body: topic for body, topic in chosen.items() if topic is not None}
     if wanted is None:
         single = [topic for topic in _best(log, POSES) if short_name(topic.schema) in TOPIC_PER_BODY]
         if single:
             return dict(zip(_names_in(single), single, strict=True))
-    topic = _choose(log, wanted, POSES, "pose")
+    topic = choose(log, wanted, POSES, "pose")
     if topic is not None and short_name(topic.schema) in TOPIC_PER_BODY:
         return {topic.name.strip("/"): topic}
     return {} if topic is None else {None: topic}
 
 
-def _choose(
+def choose(
     log: Log, name: str | None, registry: dict, role: str, wanted: tuple[str, ...] = ("",)
 ) -> Topic | None:
     """The topic that the session names, or the only one whose schema fits best and whose name tells its role."""
