@@ -7,9 +7,9 @@ import pytest
 from mcap_ros2.decoder import DecoderFactory
 
 from demo.instruments import InstrumentSettings
-from demo.recorder import JOINT_STATE, RIGID_BODIES
 from tests.sessions import curl_truth, record
 from trunkline.recording.cdr import decode, parse_definition, short_name
+from trunkline.recording.definitions import JOINT_STATE, RIGID_BODIES
 from trunkline.recording.log import read_log
 from trunkline.recording.messages import JOINTS, POSES
 

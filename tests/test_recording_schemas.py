@@ -17,9 +17,9 @@ from mcap_ros2.writer import Writer as RosWriter
 from scipy.spatial.transform import Rotation
 
 from demo.instruments import InstrumentSettings
-from demo.recorder import HEADER, RIGID_BODIES, SEPARATOR
 from tests.sessions import curl_truth, record
 from trunkline.errors import InputError
+from trunkline.recording.definitions import HEADER, MARKERS, RIGID_BODIES, SEPARATOR
 from trunkline.recording.intake import Limits, take_in
 from trunkline.recording.session import Session, read_session
 from trunkline.recording.source import open_log
@@ -55,10 +55,6 @@ float64 x
 float64 y
 float64 z
 {GEOMETRY}"""
-MARKERS = f"""std_msgs/Header header
-uint32 frame_number
-mocap4r2_msgs/Marker[] markers
-{RIGID_BODIES[RIGID_BODIES.index(HEADER) :]}"""
 FLOAT_ARRAY = f"""std_msgs/MultiArrayLayout layout
 float64[] data
 {SEPARATOR}MSG: std_msgs/MultiArrayLayout

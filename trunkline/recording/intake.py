@@ -17,10 +17,14 @@ from trunkline.recording.clock import (
     first_motion_offset,
     fit_frames,
 )
+from trunkline.recording.frozen import frozen
 from trunkline.recording.session import FixedBase, Session, TrialEntry
 from trunkline.recording.source import Source, open_log
 from trunkline.recording.streams import PoseStream
+from trunkline.recording.swaps import find_swaps, usual_distances
 from trunkline.recording.take import Take
+from trunkline.recording.units import extent, likely_unit
+from trunkline.recording.vertical import check_vertical
 
 UNIT = {"m": 1.0, "mm": 1e-3}
 NORM_TOLERANCE = (
@@ -43,11 +47,27 @@ class Limits:
 
 
 @dataclass
+class Arm:
+    """What all logs together say. scale: m per unit of their positions. distances: between the base and the segments,
+    see `usual_distances`; None where there is too little to compare. note: on the unit, where it is not the declared.
+    """
+
+    scale: float
+    distances: np.ndarray | None
+    note: str | None
+
+
+@dataclass
 class Findings:
-    """What came out about a take. repairs: one sentence each. offset: of the motors' clock."""
+    """What came out about a take. repairs, warnings: one sentence each; what a warning names is left as it is.
+
+    frames: stamps over frame numbers. logged: stamps over log times in s. offset: of the motors' clock.
+    """
 
     repairs: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     frames: FrameFit | None = None
+    logged: FrameFit | None = None
     offset: OffsetFit | None = None
 
 
@@ -65,14 +85,16 @@ def take_in(
                 logs[trial.file] = open_log(folder / trial.file, session)
             except InputError as error:
                 logs[trial.file] = error
-    segments = _segments(session, [source for source in logs.values() if isinstance(source, Source)])
+    sources = [source for source in logs.values() if isinstance(source, Source)]
+    segments = _segments(session, sources)
+    arm = _arm(session, sources, segments)
     for trial in session.trials:
         source, findings = logs[trial.file], Findings()
         if isinstance(source, InputError):
             yield trial, source, findings
             continue
         try:
-            yield trial, _take(source, trial, session, segments, limits, findings), findings
+            yield trial, _take(source, trial, session, segments, arm, limits, findings), findings
         except InputError as error:
             yield trial, error, findings
 
@@ -85,6 +107,16 @@ def align_clocks(takes: list[Take], fits: list[OffsetFit | None]) -> tuple[float
     return offset, spread
 
 
+def settle_vertical(takes: list[Take], findings: list[Findings], session: Session) -> None:
+    """Give every take the vertical that its session's tilts prove, and say so; or say what looks wrong."""
+    up, said = check_vertical(takes, measured_base=not isinstance(session.base, FixedBase))
+    for take, found in zip(takes, findings, strict=True):
+        if up is not None:
+            take.up = up
+        if said is not None:
+            (found.warnings if up is None else found.repairs).append(said)
+
+
 def _segments(session: Session, sources: list[Source]) -> dict[str, str]:
     """Name in the log to name in the model of every segment, in the order of the map, or by name."""
     if session.segments is not None:
@@ -93,20 +125,47 @@ def _segments(session: Session, sources: list[Source]) -> dict[str, str]:
     return {name: name for name in sorted(names)}
 
 
+def _arm(session: Session, sources: list[Source], segments: dict[str, str]) -> Arm:
+    """The unit of the positions, and the usual distances."""
+    fixed = isinstance(session.base, FixedBase)
+    needed = list(segments) if fixed else [session.base, *segments]
+    logs = [
+        source.poses.positions[:, [source.poses.names.index(name) for name in needed]]
+        for source in sources
+        if set(needed) <= set(source.poses.names)
+    ]
+    scale, note = UNIT[session.frame.unit], None
+    found = likely_unit(logs)
+    if found is not None and found != session.frame.unit:
+        scale = UNIT[found]
+        apart = np.median([extent(positions) for positions in logs])
+        note = f"unit: bodies {apart:.4g} apart are no arm in {session.frame.unit}, as declared; taken as {found}"
+    if not logs or len(needed) < 3:
+        return Arm(scale, None, note)
+    logs = [scale * positions for positions in logs]
+    if fixed:
+        mount = np.array(session.base.position)
+        logs = [np.insert(positions, 0, mount, axis=1) for positions in logs]
+    return Arm(scale, usual_distances(logs), note)
+
+
 def _take(
     source: Source,
     trial: TrialEntry,
     session: Session,
     segments: dict[str, str],
+    arm: Arm,
     limits: Limits,
     findings: Findings,
 ) -> Take:
     """Check one trial. Raises InputError naming the file, and what is missing in it."""
     where = f"{source.log.path}: trial {trial.name}"
     findings.repairs += [f"log: {damage}" for damage in source.log.damage]
+    findings.repairs += [] if arm.note is None else [arm.note]
     poses = source.poses
     if poses.undecodable:
         findings.repairs.append(f"{poses.undecodable} messages that do not fit their schema dropped")
+    findings.logged = _log_fit(poses)
     stamps, findings.frames = _stamps(poses, session.clock, where, source.pose_topic)
     rows = _in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings)
     epoch = stamps[rows[0]]
@@ -134,8 +193,13 @@ def _take(
             )
     columns = [poses.names.index(name) for name in needed]
     positions, quaternions = _good_samples(
-        poses, rows, columns, UNIT[session.frame.unit], needed, findings
+        poses, rows, columns, arm.scale, needed, findings
     )
+    still = frozen(positions)
+    _count(still, "that only repeat the one before, to the last bit,", needed, findings)
+    positions[still] = np.nan
+    if quaternions is not None:
+        quaternions[still] = np.nan
     seen = np.isfinite(positions[..., 0]).mean(axis=0)
     for name, share in zip(needed, seen, strict=True):
         if share < limits.coverage:
@@ -147,6 +211,8 @@ def _take(
     base_positions, base_quaternions, positions, quaternions = _split_base(
         session, positions, quaternions, f"{where}: {source.pose_topic}"
     )
+    if arm.distances is not None:
+        _untangle(base_positions, positions, quaternions, arm.distances, segments, findings)
     tendons, motors = _motors(source, epoch, poses.log_times[rows[0]], time, limits, where, findings)
     take = Take(
         trial.name,
@@ -189,6 +255,32 @@ def _stamps(poses: PoseStream, clock: str, where: str, topic: str) -> tuple[np.n
         frames = poses.frames - poses.frames[0]
         return stamps[0] + np.round((fit.start + frames / fit.rate) * 1e9).astype(np.int64), fit
     return stamps, fit
+
+
+def _log_fit(poses: PoseStream) -> FrameFit | None:
+    """Stamps over log times: how the cameras' clock drifts against the recorder's, and how late messages come."""
+    if len(poses.stamps) < 10 or not poses.stamps.any() or not np.ptp(poses.log_times):
+        return None
+    return fit_frames(poses.stamps, (poses.log_times - poses.log_times[0]) * 1e-9)
+
+
+def _untangle(
+    base: np.ndarray,
+    positions: np.ndarray,
+    quaternions: np.ndarray | None,
+    distances: np.ndarray,
+    segments: dict[str, str],
+    findings: Findings,
+) -> None:
+    """Give labels that changed places back, in `positions` and `quaternions`."""
+    names = list(segments)
+    for swap in find_swaps(np.insert(positions, 0, base, axis=1), distances):
+        pair = [swap.first - 1, swap.second - 1]
+        for values in (positions, quaternions):
+            if values is not None:
+                values[np.ix_(swap.frames, pair)] = values[np.ix_(swap.frames, pair[::-1])]
+        count, (one, other) = int(swap.frames.sum()), (names[place] for place in pair)
+        findings.repairs.append(f"{one!r} and {other!r} were taken for each other in {count} frames, put right")
 
 
 def _in_order(stamps: np.ndarray, disorder: float, where: str, findings: Findings) -> np.ndarray:

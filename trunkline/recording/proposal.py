@@ -15,8 +15,11 @@ BASE_NAMES = ("base", "mount", "root", "origin")
 RESTING = 5e-3  # m; a trial whose every body stays within this, but for its worst hundredth, is at rest
 
 
-def propose(surveys: list[Survey]) -> str:
-    """The text of a session.yaml for logs of one folder; empty where none of them holds poses."""
+def propose(surveys: list[Survey], up: tuple[int, int, int] | None = None) -> str:
+    """The text of a session.yaml for logs of one folder; empty where none of them holds poses.
+
+    up: the axis against gravity, where the logs' maker says it.
+    """
     usable = [survey for survey in surveys if survey.poses is not None and len(survey.poses.stamps)]
     if not usable:
         return ""
@@ -24,7 +27,7 @@ def propose(surveys: list[Survey]) -> str:
     unit = likely_unit([survey.poses.positions for survey in usable]) or "m"
     scale = 1e-3 if unit == "mm" else 1.0
     base = next((name for word in BASE_NAMES for name in best.poses.names if word in name.lower()), None)
-    up = _up(best, base)
+    up = up or _up(best, base)
     frame = f"up: {list(up)}, unit: {unit}"
     if len(best.poses.parents) > 1:
         frame += f", name: {best.poses.parents[0]}"
