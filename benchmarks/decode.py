@@ -105,15 +105,10 @@ def plain_rosbags(path: Path) -> np.ndarray:
     reader = McapReader(path)
     reader.open()
     try:
-        return _arrange(store.deserialize_cdr(bytes(data), SCHEMA) for data in _raw(reader))
+        messages = reader.messages(reader.connections)
+        return _arrange(store.deserialize_cdr(data, SCHEMA) for _, _, data in messages)
     finally:
         reader.close()
-
-
-def _raw(reader: McapReader):
-    connections = list(reader.connections) if hasattr(reader, "connections") else []
-    for _, _, data in reader.messages(connections):
-        yield data
 
 
 def _types(definition: str) -> dict:
