@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from demo.truth import Truth
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
+from trunkline.progress import progress
 from trunkline.threads import thread_count
 
 SAMPLE_RATE = 500.0  # Hz, of the truth that the instruments see
@@ -99,7 +100,7 @@ def _tilts(plant, experiments, tendons, tracked, rng) -> list[Truth]:
     steps = round((experiments.settle + experiments.rest_duration) / plant.opt.timestep)
     controls = np.zeros((len(levels), steps, plant.nu))
     controls[:, :, :tendons] = plant.tendon_length0 + LOOSE
-    steadied = _simulate(plant, mounts, controls, experiments.settle, experiments.steady_factor)
+    steadied = _simulate("tilts", plant, mounts, controls, experiments.settle, experiments.steady_factor)
     # every repeat leaves out another tilt, so that the validate split holds all of them in turn
     splits = [
         "validate"
@@ -128,7 +129,7 @@ def _releases(plant, experiments, tendons, tracked, rng) -> list[Truth]:
         factor = experiments.release_factors[index % len(experiments.release_factors)]
         pull = experiments.release_pull * factor * _shares(azimuth, tendons)
         controls[index, :, tendons:] = strength[:, None] * pull
-    paths = _simulate(plant, mounts, controls)
+    paths = _simulate("releases", plant, mounts, controls)
     return [
         _truth(
             plant,
@@ -160,7 +161,7 @@ def _curls(plant, motors, experiments, tendons, tracked, rng) -> list[Truth]:
             commands[index, :, tendon - 1] = profile * level / 1000
             wound[index, :, tendon - 1] = _wind(commands[index, :, tendon - 1], motors, step)
     controls[:, :, :tendons] = plant.tendon_length0 - wound
-    paths = _simulate(plant, mounts, controls)
+    paths = _simulate("curls", plant, mounts, controls)
     stride = round(1 / (SAMPLE_RATE * step))
     truths = []
     for index, (level, group) in enumerate(pulled):
@@ -200,7 +201,12 @@ def _wind(command: np.ndarray, motors: Motors, step: float) -> np.ndarray:
 
 
 def _simulate(
-    plant: mujoco.MjModel, mounts: list, controls: np.ndarray, steady: float = 0.0, steady_factor: float = 1.0
+    label: str,
+    plant: mujoco.MjModel,
+    mounts: list[Rotation],
+    controls: np.ndarray,
+    steady: float = 0.0,
+    steady_factor: float = 1.0,
 ) -> np.ndarray:
     """Joint angles (n, T, nq) at SAMPLE_RATE of n trials that start straight and at rest.
 
@@ -214,13 +220,14 @@ def _simulate(
     damping *= steady_factor
     stride = round(1 / (SAMPLE_RATE * plant.opt.timestep))
     angles = np.empty((len(mounts), controls.shape[1] // stride, plant.nq))
-    for start in range(angles.shape[1]):
-        if start == round(steady * SAMPLE_RATE):
-            damping[:] = plant.dof_damping
-        angles[:, start] = batch.bind("qpos")
-        batch.rollout(
-            stride, control=np.ascontiguousarray(controls[:, start * stride : (start + 1) * stride]), record=()
-        )
+    with progress(angles.shape[1], f"record {label}", "instants") as bar:
+        for start in range(angles.shape[1]):
+            if start == round(steady * SAMPLE_RATE):
+                damping[:] = plant.dof_damping
+            angles[:, start] = batch.bind("qpos")
+            commanded = controls[:, start * stride : (start + 1) * stride]
+            batch.rollout(stride, control=np.ascontiguousarray(commanded), record=())
+            bar.update(1)
     return angles
 
 

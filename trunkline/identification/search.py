@@ -95,7 +95,7 @@ def polish(
     tolerance: float,
     report: Report,
 ) -> Found:
-    """Least squares on the same residuals (scipy's trust region within bounds); all columns of a Jacobian in one batch."""
+    """Least squares on the same residuals by scipy's trust region; all columns of a Jacobian in one batch."""
     convergence = Convergence()
 
     def residuals(vector: np.ndarray) -> np.ndarray:
