@@ -59,7 +59,8 @@ def error_map_figure(targets: pd.DataFrame) -> Figure:
         dots = ax.scatter(rows["x"] * 1e3, rows["z"] * 1e3, c=np.log10(rows["error_mm"] + 1e-3), s=6, linewidths=0,
                           vmin=-1.5, vmax=1)
         ax.plot(0, 0, "k^", markersize=5)
-        ax.set(aspect="equal", xlim=extent["x"], ylim=extent["z"], xlabel="x (mm)", title=f"θ_G = {np.degrees(angle):.0f}°")
+        ax.set(aspect="equal", xlim=extent["x"], ylim=extent["z"], xlabel="x (mm)")
+        ax.set_title(f"θ_G = {np.degrees(angle):.0f}°")
     axes[0, 0].set_ylabel("z (mm), base at the triangle")
     bar = figure.colorbar(dots, ax=axes[0], shrink=0.8, ticks=[-1, 0, 1])
     bar.ax.set_yticklabels(["0.1", "1", "10"])
