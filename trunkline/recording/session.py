@@ -74,18 +74,28 @@ class TrialEntry(Entry):
 
 
 class Session(Entry):
-    """base: the body that marks the mount, or its pose. segments: name in the log to name in the model.
+    """base: the body that marks the mount, or its pose. segments, tendons: name in the log to name in the model.
 
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
-    that the stamps show.
+    that the stamps show. With `log`, commands and tendon positions are dated by it too.
     """
 
     frame: Frame
     base: str | FixedBase
     segments: dict[str, str] | None = Field(default=None, min_length=1)
+    tendons: dict[str, str] | None = Field(default=None, min_length=1)
     topics: Topics = Topics()
     clock: Literal["stamp", "log", "frame"] = "stamp"
     trials: list[TrialEntry] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _one_to_one(self):
+        for key in ("segments", "tendons"):
+            names = list((getattr(self, key) or {}).values())
+            twice = next((name for name in names if names.count(name) > 1), None)
+            if twice is not None:
+                raise ValueError(f"{key}: found {twice!r} twice, expected each name of the model once")
+        return self
 
 
 def read_session(folder: Path) -> Session:
@@ -112,16 +122,12 @@ def read_session(folder: Path) -> Session:
     for index, trial in enumerate(session.trials):
         if trial.file not in logs:
             close = difflib.get_close_matches(trial.file, logs, n=1) or logs[:1]
-            expected = f"one of the folder's {len(logs)} logs" + (
-                f", such as {close[0]}" if close else ""
-            )
+            expected = f"one of the folder's {len(logs)} logs" + (f", such as {close[0]}" if close else "")
             raise InputError(f"{path}: trials.{index}.file: found {trial.file!r}, expected {expected}")
     names = [trial.name for trial in session.trials]
     for index, name in enumerate(names):
         if name in names[:index]:
-            raise InputError(
-                f"{path}: trials.{index}.name: found {name!r} again, expected each name once"
-            )
+            raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
     return session
 
 
@@ -137,6 +143,7 @@ def _describe(error: ValidationError) -> str:
     if problem["type"] == "extra_forbidden":
         return f"{key}: unknown key{more}"
     if problem["type"] == "value_error":
-        return f"{key}: {problem['msg'].removeprefix('Value error, ')}{more}"
+        key = f"{key}: " if problem["loc"] else ""
+        return f"{key}{problem['msg'].removeprefix('Value error, ')}{more}"
     expected = problem["msg"].removeprefix("Input should be ")
     return f"{key}: found {problem['input']!r}, expected {expected}{more}"

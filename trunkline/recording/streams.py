@@ -31,6 +31,7 @@ class PoseStream:
 class JointStream:
     """T messages, K joints. stamps, log_times: (T,) ns. positions: (T, K) m, NaN where absent."""
 
+    topic: str
     stamps: np.ndarray
     log_times: np.ndarray
     names: tuple[str, ...]
@@ -81,15 +82,13 @@ def joint_stream(topic: Topic) -> JointStream:
         stamps[rows] = joints.time
         positions[np.ix_(rows, [names.index(name) for name in joints.names])] = joints.positions
     undecodable = len(topic.messages) - int(kept.sum())
-    return JointStream(stamps[kept], topic.log_times[kept], names, positions[kept], undecodable)
+    return JointStream(topic.name, stamps[kept], topic.log_times[kept], names, positions[kept], undecodable)
 
 
 def _read(topic: Topic, reader) -> tuple[list, np.ndarray]:
     """(rows, what `reader` makes of them) for each batch, and which messages (N,) could be read."""
     definitions = parse_definition(topic.schema, topic.definition)
-    batches = [
-        (rows, reader(message)) for rows, message in decode(topic.messages, topic.schema, definitions)
-    ]
+    batches = [(rows, reader(message)) for rows, message in decode(topic.messages, topic.schema, definitions)]
     kept = np.zeros(len(topic.messages), bool)
     for rows, _ in batches:
         kept[rows] = True
