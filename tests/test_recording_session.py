@@ -81,6 +81,7 @@ def test_good_session(tmp_path):
         (("frame", "unit"), "cm", r"frame.unit: found 'cm', expected 'm' or 'mm'"),
         (("clock",), "utc", r"clock: found 'utc', expected 'stamp', 'log' or 'frame'"),
         (("tendons",), {"a": "t", "b": "t"}, r"tendons: found 't' twice, expected each name"),
+        (("base",), {"position": [0, 0, 0], "quaternion": [0, 0, 0, 0]}, r"base.*: quaternion: found norm zero"),
         (("base",), {"position": [0, 0], "quaternion": [1, 0, 0, 0]}, r"base"),
     ],
 )

@@ -44,6 +44,12 @@ class FixedBase(Entry):
     position: Vector
     quaternion: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
 
+    @model_validator(mode="after")
+    def _rotation(self):
+        if self.quaternion is not None and np.linalg.norm(self.quaternion) < 1e-6:
+            raise ValueError("quaternion: found norm zero, expected (w, x, y, z) of a rotation")
+        return self
+
 
 class Topics(Entry):
     """Topic names; what is left out is found by its schema."""
@@ -135,7 +141,7 @@ def _describe(error: ValidationError) -> str:
     """The first problem in one line, and how many more there are."""
     problems = error.errors()
     # a union reports each of its branches; the deepest says what is wrong within the branch that was meant
-    problem = max(problems, key=lambda p: (p["type"] == "extra_forbidden", -problems.index(p)))
+    problem = max(problems, key=lambda p: (p["type"] in ("extra_forbidden", "value_error"), -problems.index(p)))
     key = ".".join(str(part) for part in problem["loc"]) or "the file"
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     if problem["type"] == "missing":
