@@ -9,6 +9,8 @@ import pytest
 from tests.sessions import curl_truth
 from tests.test_recording_intake import edit_session, one_trial, taken
 from trunkline.errors import InputError
+from trunkline.recording.clock import OffsetFit
+from trunkline.recording.intake import align_clocks
 
 
 def curl(folder, change=lambda m: None):
@@ -92,3 +94,14 @@ def test_tendons_take_the_names_of_the_session(tmp_path):
     edit_session(tmp_path, "motor_3:", "motor_4:")
     edit_session(tmp_path, "tendon_3", "tendon_4")
     refused_curl(tmp_path, "command topic: found motor_1, motor_2, motor_3, expected 'motor_4' as in session.yaml")
+
+
+def test_only_takes_for_identification_set_the_clock(tmp_path):
+    take, _ = curl(tmp_path)
+    identify, validate = replace(take, split="identify"), replace(take, split="validate")
+    fits = [OffsetFit(0.1, 0.01), OffsetFit(0.3, 0.01), OffsetFit(0.3, 0.01)]
+    assert align_clocks([identify, validate, validate], fits) == (0.1, 0.0)
+    assert validate.clock_offset == identify.clock_offset == 0.1
+    for nothing in (None, OffsetFit(0.1, 0.9)):
+        assert align_clocks([identify, validate, validate], [nothing, *fits[1:]]) == (0.3, 0.0)
+    assert identify.clock_offset == 0.3

@@ -54,8 +54,15 @@ def take_in(folder: Path, session: Session, limits: Limits) -> Iterator[tuple[Tr
 
 
 def align_clocks(takes: list[Take], fits: list[OffsetFit | None]) -> tuple[float, float]:
-    """Give every take the offset that the session's takes agree on; the offset and its spread, s."""
-    offset, spread = agree_on_offset([fit for fit in fits if fit is not None])
+    """Give every take the offset that the session's takes agree on; the offset and its spread, s.
+
+    Only the takes for identification have a say, so that the others stay unseen until they validate; all have,
+    where those for identification tell nothing.
+    """
+    told = [(take.split, fit) for take, fit in zip(takes, fits, strict=True) if fit is not None]
+    offset, spread = agree_on_offset([fit for split, fit in told if split == "identify"])
+    if not np.isfinite(spread):
+        offset, spread = agree_on_offset([fit for _, fit in told])
     for take in takes:
         take.clock_offset = offset
     return offset, spread
