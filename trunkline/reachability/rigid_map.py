@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from trunkline.errors import InputError
 from trunkline.reachability.grid import Lattice, close_gaps, distance_from_cells, drop_specks, redistance
 from trunkline.reachability.panda import Q_MAX, forward
 
@@ -73,8 +74,14 @@ def rigid_field(shape: Profile, spacing: float, smoothing: float) -> tuple[NDArr
         shape: from ``profile``.
         spacing: of the lattice, in m.
         smoothing: standard deviation of a Gaussian over the field, in lattice steps.
+
+    Raises:
+        InputError: if the set is empty.
     """
     inside = shape.distance < 0
+    if not inside.any():
+        raise InputError(f"params.yaml: reachability.rigid.profile_voxel: found {shape.lattice.spacing:g} m and an "
+                         "empty profile, expected less, or a smaller reachability.rigid.smallest")
     r, z = shape.lattice.axes()
     reach, low, high = r[inside.any(axis=1)][-1], z[inside.any(axis=0)][0], z[inside.any(axis=0)][-1]
     lattice = Lattice.around([-reach, -reach, low], [reach, reach, high], spacing, 4 * spacing)
