@@ -128,6 +128,14 @@ def test_a_bad_thread_count_is_refused(monkeypatch, bad):
         thread_count()
 
 
+def test_the_last_line_of_progress_comes_once(capsys, monkeypatch):
+    monkeypatch.setattr("trunkline.progress.PLAIN_INTERVAL", 0.0)
+    with progress(2, "fit", "generations") as bar:
+        bar.update(1)
+        bar.update(1)
+    assert [line.split()[1] for line in capsys.readouterr().out.splitlines()] == ["1/2", "2/2"]
+
+
 def test_without_a_terminal_progress_ends_in_a_plain_line(capsys):
     with progress(4, "fit", "generations") as bar:
         for loss in (3.0, 2.0, 1.0, 0.51239):
