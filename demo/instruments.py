@@ -2,13 +2,17 @@
 clock of their own."""
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 from scipy.spatial.transform import Rotation
 
 from demo.truth import Truth
 
 BASE = "base"
+
+Share = Annotated[float, Field(ge=0, lt=1)]
 
 
 @dataclass
@@ -21,29 +25,29 @@ class InstrumentSettings:
     stamp_jitter_ms: standard deviation of a frame's stamp. delivery_ms: mean delay until a message is logged.
     motor_rate: Hz of the measured tendon positions. tendon_noise_mm: their standard deviation.
     clock_offset_s: what the motors' clock reads ahead of the cameras'.
-    up, heading_deg, origin: the vertical in the cameras' frame, its turn about it, and where the world's origin is.
+    up, heading_deg, origin: the vertical in the cameras' frame, its turn about it, and where the world's origin is (m).
     epoch_s: the cameras' clock at the first trial's begin. pause_s: between trials.
     """
 
-    frame_rate: float = 120.0
-    position_noise_mm: float = 0.3
-    orientation_noise_deg: float = 0.3
-    occlusions_per_s: float = 0.05
-    occlusion_ms: tuple[float, float] = (50.0, 300.0)
-    dropped_frames: float = 0.005
-    outliers: float = 0.0005
-    outlier_mm: float = 40.0
-    outlier_deg: float = 25.0
-    stamp_jitter_ms: float = 1.0
-    delivery_ms: float = 3.0
-    motor_rate: float = 200.0
-    tendon_noise_mm: float = 0.05
-    clock_offset_s: float = 0.137
-    up: tuple[float, float, float] = (0.0, 1.0, 0.0)
-    heading_deg: float = 25.0
-    origin: tuple[float, float, float] = (0.4, 1.1, -0.3)
-    epoch_s: int = 1_760_000_000
-    pause_s: float = 30.0
+    frame_rate: PositiveFloat
+    position_noise_mm: NonNegativeFloat
+    orientation_noise_deg: NonNegativeFloat
+    occlusions_per_s: NonNegativeFloat
+    occlusion_ms: tuple[PositiveFloat, PositiveFloat]
+    dropped_frames: Share
+    outliers: Share
+    outlier_mm: NonNegativeFloat
+    outlier_deg: NonNegativeFloat
+    stamp_jitter_ms: NonNegativeFloat
+    delivery_ms: NonNegativeFloat
+    motor_rate: PositiveFloat
+    tendon_noise_mm: NonNegativeFloat
+    clock_offset_s: float
+    up: tuple[float, float, float]
+    heading_deg: float
+    origin: tuple[float, float, float]
+    epoch_s: PositiveInt
+    pause_s: PositiveFloat
 
 
 @dataclass
@@ -140,7 +144,7 @@ def _in_mocap_frame(
     quaternions = np.empty((len(truth.time), bodies, 4))
     positions[:, 0], quaternions[:, 0] = truth.base_position, truth.base_quaternion
     positions[:, 1:], quaternions[:, 1:] = truth.positions, truth.quaternions
-    # linear between the truth's instants: within (1/480 s)² / 8 times the acceleration, some 0.03 mm
+    # linear between the truth's instants: within (1/500 s)² / 8 times the acceleration, some 0.03 mm
     row = np.clip(np.searchsorted(truth.time, time, side="right") - 1, 0, len(truth.time) - 2)
     share = ((time - truth.time[row]) / (truth.time[row + 1] - truth.time[row]))[:, None, None]
     position = positions[row] + share * (positions[row + 1] - positions[row])

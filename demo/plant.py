@@ -5,14 +5,18 @@ harden, scatter and have dry friction, the masses are off, and the cables are st
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import mujoco
 import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import unit_properties
 from trunkline.arm.mjcf import unit_name
 from trunkline.frames import STANDARD_GRAVITY
+
+Share = Annotated[float, Field(gt=0, lt=1)]
 
 
 @dataclass
@@ -29,24 +33,24 @@ class PlantSettings:
     armature: kg m². timestep: s. limit_solref: s and ratio, of the units closing on each other.
     """
 
-    modulus: float
-    density: float
-    core_ratio: float
-    mass_factor: float
-    stiffness_scatter: float
-    hardening: float
-    damping_ratio: float
-    dry_friction: float
-    tendon_friction: float
-    cable_stiffness: float
-    cable_damping: float
-    max_force: float
-    hole_ratio: float
-    link_ratio: float
-    link_mass_ratio: float
-    armature: float
-    timestep: float
-    limit_solref: list[float]
+    modulus: PositiveFloat
+    density: PositiveFloat
+    core_ratio: Share
+    mass_factor: PositiveFloat
+    stiffness_scatter: Annotated[float, Field(ge=0, lt=1)]
+    hardening: NonNegativeFloat
+    damping_ratio: PositiveFloat
+    dry_friction: NonNegativeFloat
+    tendon_friction: NonNegativeFloat
+    cable_stiffness: PositiveFloat
+    cable_damping: NonNegativeFloat
+    max_force: PositiveFloat
+    hole_ratio: Annotated[float, Field(gt=0, le=1)]
+    link_ratio: Share
+    link_mass_ratio: Share
+    armature: NonNegativeFloat
+    timestep: PositiveFloat
+    limit_solref: tuple[float, float]
 
 
 def build_plant(

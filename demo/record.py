@@ -5,8 +5,9 @@ from pathlib import Path
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 
+from demo.experiments import Experiments, Trial, curl_trials, release_trials, tilt_trials
 from demo.instruments import InstrumentSettings, measure
-from demo.laboratory import Experiments, Motors, record
+from demo.laboratory import SAMPLE_RATE, Motors, record
 from demo.plant import PlantSettings, build_plant
 from demo.recorder import write_log, write_session
 from trunkline.arm.mjcf import unit_name
@@ -24,8 +25,8 @@ class Arm:
     base_width: PositiveFloat
     tip_width: PositiveFloat
     units: PositiveInt
-    tendons: int = Field(ge=2)
-    tracked: list[PositiveInt]
+    tendons: int = Field(ge=3)  # fewer cannot bend the arm to every side
+    tracked: list[PositiveInt] = Field(min_length=1)
 
 
 @settings
@@ -36,6 +37,45 @@ class Config:
     motors: settings(Motors)
     experiments: settings(Experiments)
     instruments: settings(InstrumentSettings)
+
+    def __post_init__(self):
+        arm, tests = self.arm, self.experiments
+        _expect(arm.tip_width < arm.base_width, "arm.tip_width", arm.tip_width, f"less than {arm.base_width}")
+        tracked = max(arm.tracked) <= arm.units and _distinct(arm.tracked)
+        _expect(tracked, "arm.tracked", arm.tracked, f"distinct units from 1 to {arm.units}")
+        for group in tests.curl_tendons:
+            known = max(group) <= arm.tendons and _distinct(group)
+            _expect(known, "experiments.curl_tendons", group, f"distinct tendons from 1 to {arm.tendons}")
+        steps = 1 / (SAMPLE_RATE * self.plant.timestep)
+        whole = round(steps) >= 1 and abs(steps - round(steps)) < 1e-6
+        _expect(whole, "plant.timestep", self.plant.timestep, f"{1 / SAMPLE_RATE:g} s or a whole fraction of it")
+        shortest, longest = self.instruments.occlusion_ms
+        _expect(shortest <= longest, "instruments.occlusion_ms", [shortest, longest], "the shortest first")
+        _expect(any(self.instruments.up), "instruments.up", list(self.instruments.up), "a direction")
+        _check_trials("experiments.tilts", tilt_trials(tests), tests)
+        _check_trials("experiments.release_directions", release_trials(tests), tests)
+        _check_trials("experiments.curl_levels", curl_trials(tests), tests)
+
+
+def _check_trials(key: str, trials: list[Trial], experiments: Experiments) -> None:
+    names = [trial.name for trial in trials]
+    _expect(_distinct(names), key, _repeated(names), "a log of its own for each trial (names hold whole numbers)")
+    splits = {trial.split for trial in trials}
+    every = experiments.validate_every
+    _expect(len(splits) == 2, "experiments.validate_every", every, f"trials of {key} in both splits")
+
+
+def _expect(holds: bool, key: str, found, expected: str) -> None:
+    if not holds:
+        raise ValueError(f"{key}: found {found}, expected {expected}")
+
+
+def _distinct(values: list) -> bool:
+    return len(set(values)) == len(values)
+
+
+def _repeated(values: list) -> str:
+    return next((f"{value!r} twice" for value in values if values.count(value) > 1), "no repetition")
 
 
 def main(config: Config) -> None:

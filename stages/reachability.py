@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, PositiveInt
 
 from trunkline.config import settings
 from trunkline.errors import InputError
 from trunkline.plots import save_figure
+from trunkline.progress import progress
 from trunkline.reachability.maps import (
     Check,
     HybridSettings,
@@ -17,6 +18,7 @@ from trunkline.reachability.maps import (
     Maps,
     RigidSettings,
     SpotCheckSettings,
+    blend_angles,
     build_maps,
     check_maps,
 )
@@ -35,43 +37,43 @@ ARTIFACTS = Path("artifacts/reachability")
 class Rigid:
     mount_offset: float = Field(ge=0, le=0.5)
     self_collision: bool
-    poses: int = Field(ge=1000)
-    profile_voxel: PositiveFloat
-    voxel: PositiveFloat
-    closing: PositiveFloat
-    smoothing: float = Field(ge=0)
+    poses: int = Field(ge=1000, le=2**24)
+    profile_voxel: float = Field(ge=0.001, le=0.1)
+    voxel: float = Field(ge=0.005, le=0.1)
+    closing: float = Field(gt=0, le=0.2)
+    smoothing: float = Field(ge=0, le=5)
     smallest: PositiveInt
 
 
 @settings
 class Labels:
-    count: int = Field(ge=100)
+    count: int = Field(ge=100, le=1_000_000)
     starts: PositiveInt
     starts_in_doubt: PositiveInt
-    margin: PositiveFloat
+    margin: float = Field(gt=0, le=1)
 
 
 @settings
 class Soft:
-    tolerance: PositiveFloat
-    voxel: PositiveFloat
-    closing: PositiveFloat
-    smoothing: float = Field(ge=0)
+    tolerance: float = Field(gt=0, le=0.2)
+    voxel: float = Field(ge=0.003, le=0.1)
+    closing: float = Field(gt=0, le=0.2)
+    smoothing: float = Field(ge=0, le=5)
     smallest: PositiveInt
-    angle_step_deg: PositiveFloat
+    angle_step_deg: float = Field(ge=0.5, le=180)
 
 
 @settings
 class Hybrid:
-    voxel: PositiveFloat
-    smoothing: float = Field(ge=0)
+    voxel: float = Field(ge=0.007, le=0.1)
+    smoothing: float = Field(ge=0, le=5)
     smallest: PositiveInt
 
 
 @settings
 class SpotCheck:
-    count: PositiveInt
-    outside: PositiveFloat
+    count: int = Field(ge=1, le=10_000)
+    outside: float = Field(gt=0, le=0.2)
 
 
 @settings
@@ -89,25 +91,29 @@ def main(config: Config) -> None:
     samples = read_samples(SAMPLES)
     shape = SoftShape(config.soft.tolerance, config.soft.closing, config.soft.smoothing, config.soft.smallest)
     step = np.radians(config.soft.angle_step_deg)
-    maps = build_maps(
-        samples,
-        RigidSettings(**vars(config.rigid)),
-        shape,
-        HybridSettings(**vars(config.hybrid)),
-        soft_voxel=config.soft.voxel,
-        step=step,
-        most_triangles=config.most_triangles,
-        seed=config.seed,
-    )
-    check = check_maps(
-        maps,
-        samples,
-        LabelSettings(**vars(config.labels)),
-        SpotCheckSettings(**vars(config.spot_check)),
-        shape,
-        step=step,
-        seed=config.seed,
-    )
+    fields = len(blend_angles(samples.angles, step))
+    with progress(fields + len(samples.angles) + 2, "reachability", "parts") as bar:
+        maps = build_maps(
+            samples,
+            RigidSettings(**vars(config.rigid)),
+            shape,
+            HybridSettings(**vars(config.hybrid)),
+            soft_voxel=config.soft.voxel,
+            step=step,
+            most_triangles=config.most_triangles,
+            seed=config.seed,
+            done=lambda part: bar.update(1, done=part),
+        )
+        check = check_maps(
+            maps,
+            samples,
+            LabelSettings(**vars(config.labels)),
+            SpotCheckSettings(**vars(config.spot_check)),
+            shape,
+            step=step,
+            seed=config.seed,
+            done=lambda part: bar.update(1, done=part),
+        )
 
     with output_folder(ARTIFACTS) as folder:
         np.savez_compressed(folder / "grids.npz", **maps.arrays())

@@ -2,6 +2,7 @@
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tests.small_arm import small_spec
 from trunkline.frames import gravity_in_base, wxyz_from_rotation
@@ -24,8 +25,8 @@ def segments_of(model: mujoco.MjModel) -> tuple[str, ...]:
     return tuple(model.body(i).name for i in range(2, model.nbody))
 
 
-def _trial(model, name, experiment, split, level, gravity, frames, start, pulls, noise, rng) -> Trial:
-    """Step through `frames`, holding the pulls (T, K) from frame to frame, from the joint angles `start`."""
+def _trial(model, name, experiment, split, level, gravity, frames, start, pulls, noise, rng, substep=0.0) -> Trial:
+    """Step through `frames` from the joint angles `start`; between two frames the mean of their pulls (T, K) holds."""
     model = model.__copy__()
     model.opt.gravity[:] = gravity
     data = mujoco.MjData(model)
@@ -34,13 +35,16 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
     segments = segments_of(model)
     sites = [model.site(f"{s}_center").id for s in segments]
     positions, quaternions = np.empty((frames, len(sites), 3)), np.empty((frames, len(sites), 4))
-    from scipy.spatial.transform import Rotation
-
+    if substep:  # the first frame is this share of a frame after the start
+        step, model.opt.timestep = model.opt.timestep, substep * FRAME / 8
+        data.ctrl[:] = lengths[0]
+        mujoco.mj_step(model, data, 8)
+        model.opt.timestep = step
     for frame in range(frames):
         mujoco.mj_forward(model, data)
         positions[frame] = data.site_xpos[sites]
         quaternions[frame] = wxyz_from_rotation(Rotation.from_matrix(data.site_xmat[sites].reshape(-1, 3, 3)))
-        data.ctrl[:] = lengths[frame]
+        data.ctrl[:] = 0.5 * (lengths[frame] + lengths[min(frame + 1, frames - 1)])
         mujoco.mj_step(model, data, round(FRAME / model.opt.timestep))
     positions = positions + rng.normal(0, noise, positions.shape)
     return Trial(
@@ -65,12 +69,12 @@ def tilt(model, tilt_deg: float, split="identify", noise=0.0, seed=0) -> Trial:
                   pulls, noise, rng)
 
 
-def release(model, bend: float, split="identify", frames=120, noise=0.0, seed=0) -> Trial:
+def release(model, bend: float, split="identify", frames=120, noise=0.0, seed=0, substep=0.0) -> Trial:
     """Let go from every y hinge at `bend` rad and every x hinge at half of it."""
     start = np.tile([0.5 * bend, bend], model.nq // 2)
     rng = np.random.default_rng(seed)
     return _trial(model, f"release_{bend:.2f}_{split}", "release", split, None, gravity_in_base(0.0), frames, start,
-                  np.full((frames, 3), -SLACK), noise, rng)
+                  np.full((frames, 3), -SLACK), noise, rng, substep)
 
 
 def curl(model, level_mm: float, split="identify", frames=150, noise=0.0, seed=0, tendon=0) -> Trial:

@@ -15,6 +15,32 @@ RELEASE, CURL_BEGIN = 0.4, 0.3  # s
 RATE = 480.0  # Hz
 
 
+def instruments(**changes) -> InstrumentSettings:
+    """Cameras and motors of ordinary quality, with `changes`."""
+    ordinary = {
+        "frame_rate": 120.0,
+        "position_noise_mm": 0.3,
+        "orientation_noise_deg": 0.3,
+        "occlusions_per_s": 0.05,
+        "occlusion_ms": (50.0, 300.0),
+        "dropped_frames": 0.005,
+        "outliers": 0.0005,
+        "outlier_mm": 40.0,
+        "outlier_deg": 25.0,
+        "stamp_jitter_ms": 1.0,
+        "delivery_ms": 3.0,
+        "motor_rate": 200.0,
+        "tendon_noise_mm": 0.05,
+        "clock_offset_s": 0.137,
+        "up": (0.0, 1.0, 0.0),
+        "heading_deg": 25.0,
+        "origin": (0.4, 1.1, -0.3),
+        "epoch_s": 1_760_000_000,
+        "pause_s": 30.0,
+    }
+    return InstrumentSettings(**{**ordinary, **changes})
+
+
 def bent_truth(
     name: str,
     experiment: str,

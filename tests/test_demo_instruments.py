@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from demo.instruments import InstrumentSettings, measure, rotation_mocap_world
+from demo.instruments import measure, rotation_mocap_world
 from demo.recorder import write_log
-from tests.sessions import curl_truth, static_truth
+from tests.sessions import curl_truth, instruments, static_truth
 from trunkline.recording.smoothing import noise_level
 
-CLEAN = InstrumentSettings(
+CLEAN = instruments(
     position_noise_mm=0, orientation_noise_deg=0, occlusions_per_s=0, dropped_frames=0, outliers=0,
     stamp_jitter_ms=0, tendon_noise_mm=0, clock_offset_s=0,
 )  # fmt: skip
@@ -58,7 +58,7 @@ def test_the_same_seed_gives_the_same_log(tmp_path):
     logs = []
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         write_log(
-            tmp_path / name, measure(curl_truth(), InstrumentSettings(), np.random.default_rng(seed))
+            tmp_path / name, measure(curl_truth(), instruments(), np.random.default_rng(seed))
         )
         logs.append((tmp_path / name).read_bytes())
     assert logs[0] == logs[1] != logs[2]

@@ -1,6 +1,7 @@
 """The gate: every way in which a metric can be bad fails, by name; nothing passes by being absent."""
 
 import json
+import shutil
 import subprocess
 
 import pytest
@@ -135,6 +136,54 @@ def test_first_metrics_are_held_to_the_absolute_bounds(project):
     (project / "artifacts" / "new" / "metrics.json").write_text('{"a": 3}')
     (project / "tests" / "limits.yaml").write_text("new:\n  a: {max: 2, regression: 0.1}\n")
     assert found(project) == ["new: a: found 3, expected at most 2"]
+
+
+def test_a_second_version_is_found_behind_a_deletion(project):
+    (project / "artifacts" / "fit" / "metrics.json").unlink()
+    commit(project)
+    write(project, changed(validate=1.15))
+    commit(project)
+    assert found(project) == ["fit: error.validate: found 1.15, earlier 1, expected at most 0.1 worse"]
+
+
+def test_no_history_fails(project, monkeypatch):
+    shutil.rmtree(project / ".git")
+    monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(project.parent))
+    (problem,) = found(project)
+    assert problem.startswith("fit: artifacts/fit/metrics.json: no earlier version, `git log` says: fatal: not a git")
+    assert "\n" not in problem
+    monkeypatch.setenv("PATH", "")
+    assert found(project) == ["fit: artifacts/fit/metrics.json: no earlier version without Git, found no `git` command"]
+    assert gate.main(project) == 1
+
+
+def test_a_shallow_clone_fails_unless_it_holds_an_earlier_version(project, tmp_path_factory):
+    clone, deep = (tmp_path_factory.mktemp("clones") / name for name in ("shallow", "deep"))
+    (project / "unrelated").touch()
+    commit(project)
+    git(project, "clone", "-q", "--depth", "1", project.as_uri(), str(clone))
+    (problem,) = found(clone)
+    assert "artifacts/fit/metrics.json: no earlier version in a shallow clone" in problem
+    git(project, "clone", "-q", project.as_uri(), str(deep))
+    assert found(deep) == []
+    write(clone, changed(validate=1.15))
+    assert found(clone) == ["fit: error.validate: found 1.15, earlier 1, expected at most 0.1 worse"]
+
+
+@pytest.mark.parametrize(
+    ("earlier", "problem"),
+    [
+        ('{"accuracy": ', "fit: artifacts/fit/metrics.json: the version of"),
+        ('{"accuracy": 0.95}', "fit: error.validate: earlier None, expected a finite number to compare with"),
+        ("null", "fit: error.validate: earlier None, expected a finite number to compare with"),
+        (json.dumps(changed(accuracy=float("nan"))), "fit: accuracy: earlier nan, expected a finite number"),
+    ],
+)
+def test_an_earlier_version_that_holds_no_value_fails(project, earlier, problem):
+    (project / "artifacts" / "fit" / "metrics.json").write_text(earlier)
+    commit(project)
+    write(project, GOOD)
+    assert any(line.startswith(problem) for line in found(project)), found(project)
 
 
 @pytest.mark.parametrize(

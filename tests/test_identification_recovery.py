@@ -19,7 +19,7 @@ def identified(trials, model, parameters, per_joint=(), fine="none", coarse_fram
     bounds = {name: Bounds(*span) for name, span in parameters.items()}
     return identify(
         "test", model, experiments, segments_of(model), bounds, per_joint, "positions", WEIGHTS,
-        Coarse(8, 6, 1e-3, 1.0, coarse_frames, 8), Fine(fine, 0.1, 8, 4, 6, 1e-6), seed=3,
+        Coarse(8, 6, 1e-3, 1.0, coarse_frames, 8), Fine(fine, 0.1, 8, 4, 30, 1e-9), seed=3,
     )  # fmt: skip
 
 

@@ -60,6 +60,45 @@ def test_a_population_of_the_truth_replays_the_truth():
         assert other > 3 * truth
 
 
+def test_a_start_between_two_frames_is_where_it_was():
+    """A release 40 % of a frame late: the simulation leads in by the rest of that frame."""
+    model = small_model()
+    trial = release(model, 0.25, frames=60)
+    fine = release(model, 0.25, frames=60, substep=0.4)  # its frames are 0.4 of a frame after those of `trial`
+    held = trial.positions[:1].repeat(6, axis=0)
+    fine.positions = np.concatenate([held, fine.positions])
+    fine.quaternions = np.concatenate([trial.quaternions[:1].repeat(6, axis=0), fine.quaternions])
+    fine.measured = np.ones(fine.positions.shape[:2], bool)
+    fine.commands = fine.commands[:1].repeat(66, axis=0)
+    fine.time = np.arange(66) / 120
+    fine.start = (6 - 0.4) / 120
+    experiment = prepare(fine, model, 60)
+    assert experiment.lead == pytest.approx(0.4 / 120)
+    simulated = Population(model, [experiment], segments_of(model)).simulate(
+        candidate_fields(model, {"stiffness": model.jnt_stiffness[:1]})
+    )
+    assert position_error(simulated.positions[0][0], experiment.positions, experiment.measured) < 0.3e-3
+
+
+def test_a_static_shape_does_not_depend_on_where_it_starts():
+    model = small_model()
+    experiment = prepare(tilt(model, 60), model, 1)
+    fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * [0.7, 1.0, 3.0]})
+    shapes = []
+    for start in (experiment.start, np.zeros(model.nq)):
+        experiment.start = start
+        shapes.append(Population(model, [experiment], segments_of(model)).simulate(fields).positions[0])
+    np.testing.assert_allclose(*shapes, atol=0.1e-3)
+
+
+def test_a_start_that_nobody_saw_is_refused_by_name():
+    model = small_model()
+    trial = release(model, 0.2, frames=20)
+    trial.measured[:5] = False
+    with pytest.raises(InputError, match="release_0.20_identify: found 0 of 6 segments"):
+        prepare(trial, model, 20)
+
+
 def test_simulation_does_not_depend_on_threads(monkeypatch):
     model = small_model()
     experiments = [prepare(release(model, 0.25, frames=20), model, 20)]
@@ -95,10 +134,11 @@ def test_divergence_is_seen():
 def test_trials_of_another_arm_are_refused():
     model = small_model()
     trial = release(model, 0.2, frames=5)
-    trial.segments = (*trial.segments[:-1], "unit_99")
-    with pytest.raises(InputError, match="unit_99.*unit_01 to unit_06"):
-        prepare(trial, model, 5)
+    for name in ("unit_99", "tip", "base"):
+        trial.segments = (*trial.segments[:-1], name)
+        with pytest.raises(InputError, match=f"{name}.*unit_01 to unit_06.*`segments`"):
+            prepare(trial, model, 5)
     trial = curl(model, 20, frames=5)
     trial.tendons = ("tendon_1", "tendon_2", "cable")
-    with pytest.raises(InputError, match="cable"):
+    with pytest.raises(InputError, match="cable.*tendon_1 to tendon_3.*`tendons`"):
         prepare(trial, model, 5)

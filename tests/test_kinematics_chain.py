@@ -26,7 +26,8 @@ def test_payload_on_the_tip_counts_as_part_of_the_last_unit():
 
 
 def add_equality(spec):
-    spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1="unit_01_x", name2="unit_01_y", objtype=mujoco.mjtObj.mjOBJ_JOINT)
+    joint = mujoco.mjtObj.mjOBJ_JOINT
+    spec.add_equality(type=mujoco.mjtEq.mjEQ_JOINT, name1="unit_01_x", name2="unit_01_y", objtype=joint)
 
 
 def add_slide(spec):

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from trunkline.errors import InputError
 from trunkline.reachability.grid import (
     Lattice,
     blend,
@@ -109,7 +110,7 @@ def test_overlap_of_balls_is_the_ratio_of_volumes():
 @pytest.mark.parametrize("most", [20_000, 2_000])
 def test_mesh_of_a_ball_is_closed_outward_and_near(most):
     lattice = lattice_around(0.2)
-    mesh = surface(ball(lattice, 0.2), lattice, most)
+    mesh = surface(ball(lattice, 0.2), lattice, most, "reachability.soft")
     assert len(mesh.faces) <= most
     assert mesh.is_closed()
     assert mesh.mesh.volume == pytest.approx(4 / 3 * np.pi * 0.2**3, rel=0.04)
@@ -119,26 +120,32 @@ def test_mesh_of_a_ball_is_closed_outward_and_near(most):
 
 def test_mesh_of_a_set_that_leaves_the_lattice_is_closed():
     lattice = lattice_around(0.1, margin=0.0)
-    assert surface(ball(lattice, 0.12), lattice, 8000).is_closed()
+    assert surface(ball(lattice, 0.12), lattice, 8000, "reachability.soft").is_closed()
 
 
 def test_mesh_of_a_field_that_is_exactly_zero_on_lattice_points_is_closed():
     lattice = lattice_around(0.1)
     box = np.abs(points(lattice)).max(axis=-1) - 0.1
     assert (box == 0).any() or np.isclose(box, 0).any()
-    assert surface(np.round(box, 12), lattice, 8000).is_closed()
+    assert surface(np.round(box, 12), lattice, 8000, "reachability.soft").is_closed()
 
 
 def test_mesh_of_nothing_is_refused():
     lattice = lattice_around(0.1)
-    with pytest.raises(ValueError, match="no lattice point is inside"):
-        surface(ball(lattice, -1.0), lattice, 8000)
+    with pytest.raises(InputError, match="params.yaml: reachability.soft.voxel: found 0.01 m and an empty map"):
+        surface(ball(lattice, -1.0), lattice, 8000, "reachability.soft")
+
+
+def test_mesh_that_needs_more_triangles_is_refused():
+    lattice = lattice_around(0.2)
+    with pytest.raises(InputError, match=r"soft.voxel: found 0.01 m and \d+ triangles, expected 1 to .* 4"):
+        surface(np.abs(ball(lattice, 0.14)) - 0.04, lattice, 4, "reachability.soft")
 
 
 def test_contains_knows_a_shell():
     lattice = lattice_around(0.2)
     shell = np.abs(ball(lattice, 0.14)) - 0.04
-    mesh = surface(shell, lattice, 3000)
+    mesh = surface(shell, lattice, 3000, "reachability.soft")
     inside = np.random.default_rng(0).uniform(-0.25, 0.25, size=(1000, 3))
     true = np.abs(np.linalg.norm(inside, axis=1) - 0.14) - 0.04
     clear = np.abs(true) > 0.006
@@ -147,7 +154,7 @@ def test_contains_knows_a_shell():
 
 def test_obj_reads_back_as_the_same_closed_mesh(tmp_path):
     lattice = lattice_around(0.1)
-    mesh = surface(ball(lattice, 0.1), lattice, 2000)
+    mesh = surface(ball(lattice, 0.1), lattice, 2000, "reachability.soft")
     write_obj(tmp_path / "ball.obj", mesh, "ball")
     read = trimesh.load_mesh(tmp_path / "ball.obj")
     assert read.is_watertight

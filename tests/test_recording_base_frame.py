@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from demo.instruments import InstrumentSettings, measure, rotation_mocap_world
-from tests.sessions import static_truth
+from demo.instruments import measure, rotation_mocap_world
+from tests.sessions import instruments, static_truth
 from trunkline.frames import gravity_in_base, tilt_of_gravity
 from trunkline.recording.base_frame import average_base, gravity_from_up, to_base_frame
 
@@ -16,7 +16,7 @@ EXACT = {"position_noise_mm": 0, "orientation_noise_deg": 0, "outliers": 0, "occ
 @pytest.mark.parametrize("heading", [0.0, 130.0])
 def test_gravity_and_positions_do_not_depend_on_the_mocap_frame(up, heading):
     truth = static_truth(60.0)
-    settings = InstrumentSettings(up=up, heading_deg=heading, **EXACT)
+    settings = instruments(up=up, heading_deg=heading, **EXACT)
     m = measure(truth, settings, np.random.default_rng(0))
     base = average_base(m.positions[:, 0], m.quaternions[:, 0])
     gravity = gravity_from_up(base, np.array(up) / np.linalg.norm(up))
@@ -30,7 +30,7 @@ def test_gravity_and_positions_do_not_depend_on_the_mocap_frame(up, heading):
 
 
 def test_mocap_frame_has_the_declared_vertical():
-    settings = InstrumentSettings(up=(0.6, 0.0, 0.8), heading_deg=70)
+    settings = instruments(up=(0.6, 0.0, 0.8), heading_deg=70)
     np.testing.assert_allclose(rotation_mocap_world(settings).apply([0, 0, 1]), settings.up, atol=1e-12)
 
 

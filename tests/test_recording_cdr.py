@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from mcap_ros2.decoder import DecoderFactory
 
-from demo.instruments import InstrumentSettings
-from tests.sessions import curl_truth, record
+from tests.sessions import curl_truth, instruments, record
 from trunkline.recording.cdr import decode, parse_definition, short_name
 from trunkline.recording.definitions import JOINT_STATE, RIGID_BODIES
 from trunkline.recording.log import read_log
@@ -28,7 +27,7 @@ class Schema:
 def log(tmp_path_factory):
     """Half of the bodies hidden at some time, so that layouts vary."""
     folder = tmp_path_factory.mktemp("session")
-    record(folder, [curl_truth()], InstrumentSettings(occlusions_per_s=2.0))
+    record(folder, [curl_truth()], instruments(occlusions_per_s=2.0))
     return read_log(folder / "curl_40.mcap")
 
 

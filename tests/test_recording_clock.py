@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from demo.instruments import InstrumentSettings, measure
-from tests.sessions import curl_truth
+from demo.instruments import measure
+from tests.sessions import curl_truth, instruments
 from trunkline.recording.clock import (
     OffsetFit,
     agree_on_offset,
@@ -30,7 +30,7 @@ def test_frame_numbers_average_jitter_and_ignore_late_stamps():
 @pytest.mark.parametrize("offset", [-0.4, 0.0, 0.137])
 def test_offset_between_motors_and_cameras_is_recovered(offset):
     rng = np.random.default_rng(2)
-    settings = InstrumentSettings(clock_offset_s=offset, occlusions_per_s=0.3)
+    settings = instruments(clock_offset_s=offset, occlusions_per_s=0.3)
     m = measure(curl_truth(20.0), settings, rng)
     epoch = m.stamps[0]
     seconds, motors = (m.stamps - epoch) * 1e-9, (m.tendon_stamps - epoch) * 1e-9

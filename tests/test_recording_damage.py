@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from demo.instruments import InstrumentSettings, measure
+from demo.instruments import measure
 from demo.recorder import write_log, write_session
 from stages import ingest
-from tests.sessions import SEGMENTS, all_truths, curl_truth, record, release_truth, static_truth
+from tests.sessions import SEGMENTS, all_truths, curl_truth, instruments, record, release_truth, static_truth
 from tests.workbench import ROOT
 from trunkline.recording.frozen import frozen
 from trunkline.recording.intake import Limits, settle_vertical, take_in
@@ -17,7 +17,7 @@ from trunkline.recording.swaps import find_swaps, usual_distances
 from trunkline.stage import run_stage
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-CLEAN = InstrumentSettings(occlusions_per_s=0.3, outliers=0)
+CLEAN = instruments(occlusions_per_s=0.3, outliers=0)
 
 
 def session(folder, change=None, truths=None, settings=CLEAN):
@@ -72,7 +72,7 @@ def test_segments_taken_for_each_other_are_put_right(tmp_path, frames, pair):
 @pytest.mark.parametrize("truth", [release_truth(), static_truth(60.0), curl_truth(100.0)])
 def test_nothing_is_swapped_where_nothing_was(tmp_path, truth):
     for seed in range(3):
-        settings = InstrumentSettings(occlusions_per_s=2.0, outliers=0.01)
+        settings = instruments(occlusions_per_s=2.0, outliers=0.01)
         m = measure(truth, settings, np.random.default_rng(seed))
         assert find_swaps(m.positions, usual_distances([m.positions])) == []
 
@@ -92,7 +92,7 @@ def test_all_bodies_frozen_at_once_and_float32(tmp_path):
         m.positions[:] = m.positions.astype(np.float32)
         m.positions[100:140] = m.positions[100]
 
-    takes, _ = session(tmp_path, freeze, settings=InstrumentSettings(occlusions_per_s=0, outliers=0))
+    takes, _ = session(tmp_path, freeze, settings=instruments(occlusions_per_s=0, outliers=0))
     assert np.isnan(takes[0].positions[101:140]).all()
     assert np.isfinite(takes[0].positions[140:]).all()
 
@@ -158,7 +158,7 @@ def test_the_report_names_what_was_found(tmp_path, monkeypatch, capsys):
     (tmp_path / "conf").symlink_to(ROOT / "conf")
     (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
     monkeypatch.chdir(tmp_path)
-    record(tmp_path / "data/raw/demo", all_truths(), InstrumentSettings())
+    record(tmp_path / "data/raw/demo", all_truths(), instruments())
     edit(tmp_path / "data/raw/demo", "up: [0, 1, 0]", "up: [1, 0, 0]")
     run_stage("ingest", ingest.Config, ingest.main)
     report = json.loads((ingest.ARTIFACTS / "quality.json").read_text())["trials"]

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from demo.instruments import InstrumentSettings
-from tests.sessions import SEGMENTS, all_truths, record
+from tests.sessions import SEGMENTS, all_truths, instruments, record
 from tests.test_recording_schemas import CASES, write_foxglove, write_ros
 from trunkline.recording.inspect import main
 from trunkline.recording.intake import Limits, take_in
@@ -21,7 +20,7 @@ def inspect(capsys, *paths) -> tuple[str, str]:
 
 
 def test_a_lab_session_is_described_and_its_proposal_is_the_session(tmp_path, capsys):
-    record(tmp_path, all_truths(), InstrumentSettings())
+    record(tmp_path, all_truths(), instruments())
     right = read_session(tmp_path)
     said, proposed = inspect(capsys, tmp_path)
     assert "mocap4r2_msgs/msg/RigidBodies (cdr), poses: " in said
@@ -38,7 +37,7 @@ def test_a_lab_session_is_described_and_its_proposal_is_the_session(tmp_path, ca
 
 
 def test_experiments_are_told_apart_without_names(tmp_path, capsys):
-    record(tmp_path, all_truths(), InstrumentSettings())
+    record(tmp_path, all_truths(), instruments())
     right = {trial.file: trial for trial in read_session(tmp_path).trials}
     names = {}
     for index, path in enumerate(sorted(tmp_path.glob("*.mcap"))):
@@ -69,7 +68,7 @@ def test_every_schema_gets_a_proposal_that_is_read(tmp_path, capsys, encoding, k
 
 
 def test_a_damaged_log_is_described_as_such(tmp_path, capsys):
-    record(tmp_path, all_truths()[:1], InstrumentSettings())
+    record(tmp_path, all_truths()[:1], instruments())
     (path,) = tmp_path.glob("*.mcap")
     path.write_bytes(path.read_bytes()[:-2000])
     assert "damaged: cut off at byte" in inspect(capsys, path)[0]

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from demo.instruments import InstrumentSettings, measure
+from demo.instruments import measure
 from demo.recorder import write_log, write_session
-from tests.sessions import SEGMENTS, curl_truth, record, release_truth, static_truth
+from tests.sessions import SEGMENTS, curl_truth, instruments, record, release_truth, static_truth
 from trunkline.errors import InputError
 from trunkline.recording.filtering import Filter, filter_take
 from trunkline.recording.intake import Limits, align_clocks, take_in
@@ -29,12 +29,12 @@ def one_trial(folder, change, truth=None):
     """The take, or error, of a session of one trial whose measurement went through `change`."""
     m = measure(
         truth or release_truth(),
-        InstrumentSettings(occlusions_per_s=0, outliers=0),
+        instruments(occlusions_per_s=0, outliers=0),
         np.random.default_rng(0),
     )
     m = change(m) or m
     write_log(folder / f"{m.name}.mcap", m)
-    write_session(folder, [m], InstrumentSettings())
+    write_session(folder, [m], instruments())
     ((take, findings),) = taken(folder)
     return take, findings
 
@@ -55,7 +55,7 @@ def refused(result, message):
 
 
 def test_takes_carry_what_was_measured(tmp_path):
-    (m,) = record(tmp_path, [curl_truth()], InstrumentSettings())
+    (m,) = record(tmp_path, [curl_truth()], instruments())
     ((take, findings),) = taken(tmp_path)
     assert take.segments == SEGMENTS
     assert findings.repairs == []
@@ -74,7 +74,7 @@ def test_takes_carry_what_was_measured(tmp_path):
 
 
 def test_stamp_and_log_clocks(tmp_path):
-    (m,) = record(tmp_path, [release_truth()], InstrumentSettings())
+    (m,) = record(tmp_path, [release_truth()], instruments())
     edit_session(tmp_path, "clock: frame", "clock: stamp")
     ((take, _),) = taken(tmp_path)
     np.testing.assert_allclose(take.time, np.sort(m.stamps - m.stamps.min()) * 1e-9, atol=1e-9)
@@ -84,7 +84,7 @@ def test_stamp_and_log_clocks(tmp_path):
 
 
 def test_window_and_names_from_the_session(tmp_path):
-    record(tmp_path, [release_truth()], InstrumentSettings())
+    record(tmp_path, [release_truth()], instruments())
     edit_session(tmp_path, "split: identify", "split: identify, window: [0.5, 1.5]")
     edit_session(tmp_path, "base: base", "base: base\nsegments: {unit_08: tip, unit_02: root}")
     ((take, _),) = taken(tmp_path)
@@ -131,8 +131,8 @@ def test_segment_that_never_appears_is_refused_by_name(tmp_path):
 
 
 def test_segment_that_only_other_trials_have_is_refused_by_name(tmp_path):
-    record(tmp_path, [static_truth(0.0), release_truth()], InstrumentSettings())
-    m = measure(release_truth(), InstrumentSettings(), np.random.default_rng(0))
+    record(tmp_path, [static_truth(0.0), release_truth()], instruments())
+    m = measure(release_truth(), instruments(), np.random.default_rng(0))
     m.positions[:, 3] = m.quaternions[:, 3] = np.nan
     write_log(tmp_path / "release_a.mcap", m)
     good, bad = taken(tmp_path)
@@ -148,7 +148,7 @@ def test_base_that_never_appears_is_refused(tmp_path):
 
 
 def test_no_pose_topic_is_refused(tmp_path):
-    (m,) = record(tmp_path, [curl_truth()], InstrumentSettings())
+    (m,) = record(tmp_path, [curl_truth()], instruments())
     nothing = {
         key: getattr(m, key)[:0] for key in ("frames", "stamps", "logged", "positions", "quaternions")
     }
@@ -159,7 +159,7 @@ def test_no_pose_topic_is_refused(tmp_path):
 
 
 def test_named_topic_of_the_wrong_kind_is_refused(tmp_path):
-    record(tmp_path, [curl_truth()], InstrumentSettings())
+    record(tmp_path, [curl_truth()], instruments())
     edit_session(tmp_path, "poses: /rigid_bodies", "poses: /tendon_states")
     ((error, _),) = taken(tmp_path)
     assert "/tendon_states: found sensor_msgs/msg/JointState, expected a pose schema: mocap4r2" in str(
@@ -168,7 +168,7 @@ def test_named_topic_of_the_wrong_kind_is_refused(tmp_path):
 
 
 def test_topics_are_found_by_schema_and_name(tmp_path):
-    record(tmp_path, [curl_truth()], InstrumentSettings())
+    record(tmp_path, [curl_truth()], instruments())
     text = (tmp_path / "session.yaml").read_text().splitlines(keepends=True)
     (tmp_path / "session.yaml").write_text(
         "".join(line for line in text if not line.startswith("topics"))
@@ -214,7 +214,7 @@ def test_frames_slightly_out_of_order_are_sorted_and_said(tmp_path):
 
 
 def test_truncated_log_is_salvaged_with_the_loss_stated(tmp_path):
-    record(tmp_path, [release_truth()], InstrumentSettings())
+    record(tmp_path, [release_truth()], instruments())
     log = tmp_path / "release_a.mcap"
     data = log.read_bytes()
     ((whole, _),) = taken(tmp_path)

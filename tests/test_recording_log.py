@@ -152,3 +152,31 @@ def test_what_is_no_log_is_refused(tmp_path):
         damaged(tmp_path, b"time,x,y,z\n")
     with pytest.raises(InputError, match="no such file"):
         read_log(tmp_path / "missing.mcap")
+
+
+def two_channels(path: Path, schemas: tuple[str, str]):
+    """30 messages on one topic, every third by a second publisher."""
+    with open(path, "wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2", library="test")
+        ids = [writer.register_schema(name, "ros2msg", b"uint32 number") for name in schemas]
+        channels = [writer.register_channel("/a", "cdr", schema) for schema in ids]
+        for number in range(30):
+            writer.add_message(channels[number % 3 == 0], number, bytes([number]), number, number)
+        writer.finish()
+    return read_log(path)
+
+
+def test_channels_of_one_topic_are_one_stream(tmp_path):
+    log = two_channels(tmp_path / "log.mcap", ("a_msgs/msg/A", "a_msgs/msg/A"))
+    assert log.topics["/a"].messages == [bytes([number]) for number in range(30)]
+    assert log.topics["/a"].log_times.tolist() == list(range(30))
+    assert log.damage == []
+
+
+def test_another_schema_on_a_topic_is_left_out_and_said(tmp_path):
+    log = two_channels(tmp_path / "log.mcap", ("a_msgs/msg/A", "a_msgs/msg/B"))
+    assert log.topics["/a"].schema == "a_msgs/msg/A"
+    assert log.topics["/a"].messages == [bytes([number]) for number in range(30) if number % 3]
+    (said,) = log.damage
+    assert "/a: 10 messages of another schema (a_msgs/msg/B, cdr) left out, 20 are a_msgs/msg/A" in said

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
-from demo.instruments import InstrumentSettings
-from tests.sessions import curl_truth, record
+from tests.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
 from trunkline.recording.intake import Limits, take_in
 from trunkline.recording.log import MAGIC, read_log
@@ -27,7 +26,7 @@ AGAIN = settings(max_examples=25, deadline=None, suppress_health_check=[HealthCh
 def folder(tmp_path_factory):
     """A session of one curl, whose log is overwritten by each example."""
     path = tmp_path_factory.mktemp("session")
-    record(path, [curl_truth()], InstrumentSettings())
+    record(path, [curl_truth()], instruments())
     return path
 
 

@@ -5,8 +5,8 @@ import csv
 import numpy as np
 import pytest
 
-from demo.instruments import InstrumentSettings, measure
-from tests.sessions import SEGMENTS, release_truth
+from demo.instruments import measure
+from tests.sessions import SEGMENTS, instruments, release_truth
 from trunkline.recording.intake import Limits, take_in
 from trunkline.recording.motive import main, read_export
 from trunkline.recording.session import read_session
@@ -18,7 +18,7 @@ LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 @pytest.fixture(scope="module")
 def measured():
     """A release with y up, and gaps."""
-    settings = InstrumentSettings(occlusions_per_s=1.0, dropped_frames=0.0)
+    settings = instruments(occlusions_per_s=1.0, dropped_frames=0.0)
     return measure(release_truth(), settings, np.random.default_rng(3))
 
 

@@ -16,8 +16,7 @@ from mcap_ros2.decoder import DecoderFactory
 from mcap_ros2.writer import Writer as RosWriter
 from scipy.spatial.transform import Rotation
 
-from demo.instruments import InstrumentSettings
-from tests.sessions import curl_truth, record
+from tests.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
 from trunkline.recording.definitions import HEADER, MARKERS, RIGID_BODIES, SEPARATOR
 from trunkline.recording.intake import Limits, take_in
@@ -369,7 +368,7 @@ def rewrite_motors(source, target):
 
 
 def test_float_arrays_count_by_log_time(tmp_path):
-    record(tmp_path, [curl_truth()], InstrumentSettings())
+    record(tmp_path, [curl_truth()], instruments())
     limits = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
     ((_, stamped, _),) = take_in(tmp_path, read_session(tmp_path), limits)
     log = tmp_path / "curl_40.mcap"
@@ -378,7 +377,7 @@ def test_float_arrays_count_by_log_time(tmp_path):
     ((_, refused, _),) = take_in(tmp_path, read_session(tmp_path), limits)
     assert "/tendon_commands: found 3 numbers without names, expected `tendons`" in str(refused)
     session = read_session(tmp_path)
-    session.tendons = ["tendon_1", "tendon_2", "tendon_3"]
+    session.tendons = {"1": "tendon_1", "2": "tendon_2", "3": "tendon_3"}
     ((_, take, found),) = take_in(tmp_path, session, limits)
     assert take.tendons == stamped.tendons
     # the recorder dates all messages by one clock, so that of the offset of 137 ms only the delivery's jitter is left

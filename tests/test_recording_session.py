@@ -80,6 +80,8 @@ def test_good_session(tmp_path):
         (("frame", "up"), [0, 1], r"frame.up.2: missing"),
         (("frame", "unit"), "cm", r"frame.unit: found 'cm', expected 'm' or 'mm'"),
         (("clock",), "utc", r"clock: found 'utc', expected 'stamp', 'log' or 'frame'"),
+        (("tendons",), {"a": "t", "b": "t"}, r"tendons: found 't' twice, expected each name"),
+        (("base",), {"position": [0, 0, 0], "quaternion": [0, 0, 0, 0]}, r"base.*: quaternion: found norm zero"),
         (("base",), {"position": [0, 0], "quaternion": [1, 0, 0, 0]}, r"base"),
     ],
 )

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from trunkline.errors import InputError
 from trunkline.recording.take import Take, read_takes, write_takes
 from trunkline.recording.trial import Trial, read_trials, write_trials
 
@@ -71,3 +72,12 @@ def test_round_trip(tmp_path, rows, write, read):
                 np.testing.assert_array_equal(getattr(other, key), value, err_msg=key)
             else:
                 assert getattr(other, key) == value, key
+
+
+@pytest.mark.parametrize(("read", "stage"), [(read_takes, "ingest"), (read_trials, "filter")])
+def test_missing_tables_name_the_file_and_the_stage_to_run(tmp_path, read, stage):
+    with pytest.raises(InputError, match=rf"trials\.parquet: no such file, .*dvc repro {stage}"):
+        read(tmp_path)
+    (tmp_path / "trials.parquet").write_bytes(b"")
+    with pytest.raises(InputError, match=rf"trials\.parquet: not readable as Parquet, .*dvc repro {stage}"):
+        read(tmp_path)

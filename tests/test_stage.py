@@ -18,6 +18,9 @@ from trunkline.threads import thread_count
 ROOT = Path(__file__).parents[1]
 
 STAGE = """
+import numpy as np
+from threadpoolctl import threadpool_info
+
 from trunkline.config import settings
 from trunkline.errors import InputError
 from trunkline.stage import output_folder, run_stage
@@ -27,6 +30,7 @@ class Config:
     count: int
 
 def main(config):
+    print("BLAS threads:", {pool["num_threads"] for pool in threadpool_info() if pool["user_api"] == "blas"})
     with output_folder("artifacts/fit") as out:
         (out / "first.txt").write_text("half")
         if config.count > 1:
@@ -56,6 +60,11 @@ def test_a_stage_that_succeeds_writes_everything(run, tmp_path):
     assert done.returncode == 0, done.stderr
     assert sorted(file.name for file in (tmp_path / "artifacts/fit").iterdir()) == ["first.txt", "second.txt"]
     assert "peak memory" in done.stdout
+
+
+def test_blas_keeps_to_one_thread(run, monkeypatch):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
+    assert "BLAS threads: {1}" in run(1).stdout
 
 
 def test_a_users_mistake_is_one_line_and_leaves_the_old_results(run, tmp_path):
@@ -117,6 +126,14 @@ def test_a_bad_thread_count_is_refused(monkeypatch, bad):
     monkeypatch.setenv("TRUNKLINE_THREADS", bad)
     with pytest.raises(InputError, match="TRUNKLINE_THREADS: found"):
         thread_count()
+
+
+def test_the_last_line_of_progress_comes_once(capsys, monkeypatch):
+    monkeypatch.setattr("trunkline.progress.PLAIN_INTERVAL", 0.0)
+    with progress(2, "fit", "generations") as bar:
+        bar.update(1)
+        bar.update(1)
+    assert [line.split()[1] for line in capsys.readouterr().out.splitlines()] == ["1/2", "2/2"]
 
 
 def test_without_a_terminal_progress_ends_in_a_plain_line(capsys):

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from demo.instruments import InstrumentSettings
-from tests.sessions import all_truths, record
+from tests.sessions import all_truths, instruments, record
 
 ROOT = Path(__file__).parents[1]
 
@@ -12,5 +12,5 @@ def workbench(folder: Path, settings: InstrumentSettings | None = None) -> Path:
     """Make `folder` a project with the settings of this one and the small session as data/raw/demo."""
     (folder / "conf").symlink_to(ROOT / "conf")
     (folder / "params.yaml").write_text((ROOT / "params.yaml").read_text())
-    record(folder / "data/raw/demo", all_truths(), settings or InstrumentSettings())
+    record(folder / "data/raw/demo", all_truths(), settings or instruments())
     return folder

@@ -46,7 +46,7 @@ class _Lines:
         """Count ``n`` more units and, every few seconds, print a line with ``info``."""
         self._done += n
         self._info = info | {f"{self._unit}/s": self._rate.add(n)}
-        if time.monotonic() - self._printed >= PLAIN_INTERVAL:
+        if self._done < self._total and time.monotonic() - self._printed >= PLAIN_INTERVAL:
             self.line()
 
     def line(self) -> None:

@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TypeVar
 
+from threadpoolctl import threadpool_limits
+
 from trunkline.config import load_config
 from trunkline.errors import InputError
 from trunkline.pipeline.settings import check_once
@@ -24,12 +26,15 @@ def run_stage(
 ) -> None:
     """Call ``main`` with the stage's settings; a user's mistake ends in one line and exit code 1.
 
-    ``root`` holds the stage's ``params.yaml`` and ``conf/``.
+    ``root`` holds the stage's ``params.yaml`` and ``conf/``. Meanwhile BLAS keeps to one thread, as its sums, and
+    so the results, otherwise depend on how many cores there are; ``TRUNKLINE_THREADS`` is for what does not.
     """
     started = time.monotonic()
     try:
         check_once()
-        main(load_config(schema, name, root))
+        config = load_config(schema, name, root)
+        with threadpool_limits(1, user_api="blas"):
+            main(config)
     except InputError as error:
         sys.stdout.flush()
         print(f"error: {error}", file=sys.stderr)

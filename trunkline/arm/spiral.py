@@ -24,7 +24,8 @@ def growth_rate(length: float, base_width: float, tip_width: float) -> float:
     shortest, longest = (_length(b, base_width, tip_width) for b in GROWTH_BRACKET[::-1])
     if not shortest < length < longest:
         raise InputError(
-            f"arm.length: found {length} m, expected between {shortest:.4g} and {longest:.4g} m for widths {base_width} to {tip_width} m"
+            f"arm.length: found {length} m, expected between {shortest:.4g} and {longest:.4g} m "
+            f"for widths of {base_width} to {tip_width} m"
         )
     return brentq(lambda b: _length(b, base_width, tip_width) - length, *GROWTH_BRACKET, xtol=1e-14)
 

@@ -27,7 +27,7 @@ class Replay:
 
 
 def replay(model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...]) -> Replay:
-    """Simulate `experiments` with `model` as it is, at its own time step."""
+    """Simulate `experiments` with `model` as it is, its time step fitted to divide a frame evenly."""
     fields = {STRUCTURE: np.array(getattr(model, STRUCTURE))[None]}
     simulated = Population(model, experiments, segments).simulate(fields)
     return Replay([positions[0] for positions in simulated.positions])
@@ -45,7 +45,7 @@ def scores(
 ) -> dict[str, dict[str, float]]:
     """Per split the loss and the errors, each the mean over trials; `by_experiment` splits them further.
 
-    A simulation that diverged counts as wrong by the arm's whole length.
+    Where a simulation diverged, its segments count as the arm's length away along every axis.
     """
     table: dict[str, dict] = {}
     for split in ("identify", "validate"):

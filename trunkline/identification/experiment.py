@@ -12,6 +12,11 @@ from trunkline.recording.trial import Trial
 SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend takes up
 
 
+QUIET_FRAMES = 3  # before the start: there the low-pass has not yet smeared the motion into the hold
+LOOK_BACK = 30  # frames in which to look for a start pose that enough cameras saw
+SEEN_SHARE = 0.6  # of the segments that must be measured in the frame of the start pose
+
+
 @dataclass
 class Experiment:
     """One simulation per candidate, of T frames at `frame_step` seconds; a static trial has T = 1.
@@ -19,11 +24,13 @@ class Experiment:
     Attributes:
         name, kind, split: as in the trial; kind is its experiment.
         gravity: m/s², base frame. Shape (3,).
-        start: joint angles of the first frame, at rest. Shape (nq,).
-        controls: commanded tendon lengths from each frame to the next, m. Shape (T, nu).
+        start: joint angles from which it starts, at rest. Shape (nq,).
+        lead: s from the start to the first frame.
+        controls: commanded tendon lengths, m, held from one frame to the next: row 0 from the start to the first
+            frame, row t from frame t - 1 to frame t. Shape (T, nu).
         positions: measured segments, m, base frame. Shape (T, S, 3).
         measured: where they count. Shape (T, S).
-        fit: how well the start matches the first frame.
+        fit: how well the start matches the measurement.
     """
 
     name: str
@@ -31,6 +38,7 @@ class Experiment:
     split: str
     gravity: np.ndarray
     start: np.ndarray
+    lead: float
     controls: np.ndarray
     positions: np.ndarray
     measured: np.ndarray
@@ -46,28 +54,49 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int) -> Experiment:
     """Set up one trial: from its detected start, for at most `frames` frames.
 
     Raises:
-        InputError: if a tracked segment or a commanded tendon is not in the model, or nothing is left to compare.
+        InputError: if a tracked segment or a commanded tendon is not in the model, or too little was measured.
     """
     check_names(trial, model)
-    first = 0 if trial.experiment == "static_tilt" else int(np.searchsorted(trial.time, trial.start - 1e-9))
-    window = slice(first, first + frames)
+    static = trial.experiment == "static_tilt"
+    step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 else 0.0
+    # the frame at the start or just before it; the pose there is that of the arm still held
+    held = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
+    window = slice(0, 1) if static else slice(held + 1, held + 1 + frames)
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
-    quaternions = None if trial.quaternions is None else trial.quaternions[first]
-    seen = np.where(measured[0][:, None], positions[0], np.nan)
-    fit = fit_pose(model, trial.segments, seen, quaternions)
+    seen = _start_frame(trial, held)
+    fit = fit_pose(
+        model,
+        trial.segments,
+        np.where(trial.measured[seen][:, None], trial.positions[seen], np.nan),
+        None if trial.quaternions is None else trial.quaternions[seen],
+    )
+    lengths = commanded_lengths(trial, model)
     return Experiment(
         name=trial.name,
         kind=trial.experiment,
         split=trial.split,
         gravity=trial.gravity,
         start=fit.qpos,
-        controls=commanded_lengths(trial, model)[window],
+        lead=0.0 if static else max(float(trial.time[held + 1] - max(trial.start, trial.time[held])), 1e-4),
+        controls=lengths[:1] if static else 0.5 * (lengths[:-1] + lengths[1:])[held : held + len(positions)],
         positions=positions,
         measured=measured,
-        frame_step=float(np.median(np.diff(trial.time))) if len(trial.time) > 1 else 0.0,
+        frame_step=step,
         fit=fit,
+    )
+
+
+def _start_frame(trial: Trial, held: int) -> int:
+    """The last frame, a few before `held`, in which enough segments were measured."""
+    latest = max(held - QUIET_FRAMES, 0)
+    for frame in range(latest, max(latest - LOOK_BACK, -1), -1):
+        if trial.measured[frame].mean() >= SEEN_SHARE:
+            return frame
+    raise InputError(
+        f"trial {trial.name}: found {int(trial.measured[latest].sum())} of {len(trial.segments)} segments measured at "
+        f"its start, {trial.time[latest]:.2f} s, expected {SEEN_SHARE:.0%} of them"
     )
 
 
@@ -84,15 +113,14 @@ def commanded_lengths(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
 
 def check_names(trial: Trial, model: mujoco.MjModel) -> None:
     """Refuse a trial whose segments or tendons the model does not have."""
-    sites = {model.site(i).name.removesuffix("_center") for i in range(model.nsite)} - {"base"}
+    sites = [model.site(i).name for i in range(model.nsite)]
+    units = [name.removesuffix("_center") for name in sites if name.endswith("_center") and name != "base_center"]
     tendons = [model.tendon(i).name for i in range(model.ntendon)]
-    for kind, found, expected in (("segment", trial.segments, sites), ("tendon", trial.tendons, tendons)):
+    for kind, found, expected in (("segment", trial.segments, units), ("tendon", trial.tendons, tendons)):
         unknown = [name for name in found if name not in expected]
         if unknown:
-            units = sorted(name for name in expected if "_tendon_" not in name and name != "tip")
+            valid = f"one of {expected[0]} to {expected[-1]}" if expected else "none, as the arm has none"
             raise InputError(
-                f"trial {trial.name}: {kind} {unknown[0]!r} is not in the arm, expected {kind}s among "
-                f"{units[0]} to {units[-1]}; map the log's names under `segments` in session.yaml"
-                if units
-                else f"trial {trial.name}: {kind} {unknown[0]!r} is not in the arm, which has none"
+                f"trial {trial.name}: {kind} {unknown[0]!r} is not in the arm, expected {valid}; "
+                f"session.yaml can map the log's names under `{kind}s`"
             )

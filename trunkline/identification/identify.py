@@ -13,7 +13,7 @@ from trunkline.identification.problem import Bounds, Problem
 from trunkline.identification.search import Convergence, Found, evolve, jacobian, polish
 from trunkline.progress import progress
 
-BOUND_TOLERANCE = 1e-3  # of the range: closer to an end counts as on it
+BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
 
 
 @dataclass
@@ -55,14 +55,18 @@ class Identification:
 
     models: "initial", "coarse" and "identified", each a compiled model.
     values: identified scalars. factors: per-joint factors (units,) by parameter, empty if there are none.
-    certainty: of the scalars, in ln(value). at_bound: names of what ended on a bound.
+    certainty: of the scalars, in ln(value), before joints got factors.
+    factor_certainty: of all factors, given the scalars; None without factors.
+    at_bound: names of what ended on a bound. converged: which searches stopped for that reason.
     """
 
     models: dict[str, mujoco.MjModel]
     values: dict[str, float]
     factors: dict[str, np.ndarray]
     certainty: Certainty
+    factor_certainty: Certainty | None
     at_bound: list[str]
+    converged: dict[str, bool]
     convergence: dict[str, Convergence]
     evaluations: int
     diverged: int
@@ -99,24 +103,26 @@ def identify(
     with progress(coarse.generations, f"{label} coarse", "generations") as bar:
         found = evolve(
             rough, low, high, start, coarse.population, coarse.generations, coarse.tolerance, seed,
-            lambda best: bar.update(1, best_loss=best, evaluations=rough.evaluations, steps=rough.steps),
+            lambda best: bar.update(1, best_loss=best, **rough.effort()),
         )  # fmt: skip
-    convergence = {"coarse": found.convergence}
+    searches = {"coarse": found}
     exact = Problem(model, seen, segments, parameters, loss, weights)
-    scalars = found.vector
     if coarse.polish_iterations:
-        polished = _polish(exact, low, high, scalars, coarse.polish_iterations, coarse.tolerance, f"{label} polish")
-        convergence["polish"], scalars = polished.convergence, polished.vector
+        found = _polish(exact, low, high, found.vector, coarse.polish_iterations, coarse.tolerance, f"{label} polish")
+        searches["polish"] = found
+    scalars = found.vector
     values = dict(zip(parameters, np.exp(scalars).tolist(), strict=True))
     coarse_model = _with(model, values, {})
-    blocks, columns = jacobian(exact, scalars, high)
+    scalar_certainty = certainty(*(found.linearisation or jacobian(exact, scalars, high)))
     problems = [rough, exact]
 
     factors: dict[str, np.ndarray] = {}
+    factor_certainty = None
     if per_joint and fine.method != "none":
         joints = Problem(coarse_model, seen, segments, {}, loss, weights, per_joint=per_joint)
-        found = _fine(joints, fine, seed, label)
-        convergence["per_joint"] = found.convergence
+        searches["per_joint"] = found = _fine(joints, fine, seed, label)
+        highest = joints.bounds(fine.range)[1]
+        factor_certainty = certainty(*(found.linearisation or jacobian(joints, found.vector, highest)))
         factors = dict(zip(per_joint, found.vector.reshape(len(per_joint), -1), strict=True))
         problems.append(joints)
 
@@ -124,9 +130,11 @@ def identify(
         models={"initial": model, "coarse": coarse_model, "identified": _with(coarse_model, {}, factors)},
         values=values,
         factors=factors,
-        certainty=certainty(blocks, columns),
+        certainty=scalar_certainty,
+        factor_certainty=factor_certainty,
         at_bound=_at_bound(parameters, scalars, low, high) + _factors_at_bound(factors, fine.range),
-        convergence=convergence,
+        converged={name: search.converged for name, search in searches.items()},
+        convergence={name: search.convergence for name, search in searches.items()},
         evaluations=sum(p.evaluations for p in problems),
         diverged=sum(p.diverged for p in problems),
         steps=sum(p.steps for p in problems),
@@ -145,7 +153,7 @@ def _polish(problem: Problem, low, high, start, iterations: int, tolerance: floa
     with progress(iterations, label, "iterations") as bar:
         return polish(
             problem, low, high, start, iterations, tolerance,
-            lambda best: bar.update(1, best_loss=best, evaluations=problem.evaluations, steps=problem.steps),
+            lambda best: bar.update(1, best_loss=best, **problem.effort()),
         )  # fmt: skip
 
 
@@ -158,7 +166,7 @@ def _fine(problem: Problem, fine: Fine, seed: int, label: str) -> Found:
     with progress(fine.generations, f"{label} per joint", "generations") as bar:
         return evolve(
             problem, low, high, start, fine.population, fine.generations, fine.tolerance, seed,
-            lambda best: bar.update(1, best_loss=best, evaluations=problem.evaluations, steps=problem.steps),
+            lambda best: bar.update(1, best_loss=best, **problem.effort()),
         )  # fmt: skip
 
 
@@ -184,5 +192,5 @@ def _factors_at_bound(factors: dict[str, np.ndarray], span: float) -> list[str]:
     return [
         f"{name} of unit {index + 1}"
         for name, values in factors.items()
-        for index in np.flatnonzero(np.abs(values - 1) > span * (1 - 2 * BOUND_TOLERANCE))
+        for index in np.flatnonzero(np.abs(values - 1) > span * (1 - 2 * BOUND_TOLERANCE))  # the range is 2 spans
     ]

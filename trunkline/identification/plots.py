@@ -15,7 +15,8 @@ from trunkline.plots import IDENTIFIED, INITIAL, MEASURED
 
 ERROR_CUTOFF = 6.0  # Hz, of the low-pass over error curves, as the paper filters its figure
 SHOWN_SEGMENTS = 5
-COLORS = {"initial": INITIAL, "identified": IDENTIFIED}
+NARROWEST = 60.0  # mm, of an axis: noise shall not look like motion
+COLORS = {"CAD": INITIAL, "initial": INITIAL, "identified": IDENTIFIED}
 
 
 def convergence_table(identification: Identification) -> pd.DataFrame:
@@ -36,7 +37,7 @@ def convergence_figure(identification: Identification) -> Figure:
     for axis, (phase, history) in zip(axes[0], phases.items(), strict=True):
         axis.semilogy(history.best, color=IDENTIFIED, marker="o", markersize=3, label="best")
         if history.mean != history.best:
-            axis.semilogy(history.mean, color="#999999", label="mean of the population")
+            axis.semilogy(history.mean, color="#999999", label="mean of a generation's trials")
             axis.legend()
         axis.set(title=phase.replace("_", " "), xlabel="generation" if history.mean != history.best else "iteration")
     axes[0, 0].set_ylabel("loss")
@@ -52,6 +53,7 @@ def error_curves(experiments: list[Experiment], replays: dict[str, Replay]) -> p
     step = experiments[0].frame_step
     low_pass = butter(2, ERROR_CUTOFF, fs=1 / step, output="sos")
     tables = []
+    unseen = np.stack([~e.measured[:frames] for e in experiments], axis=1)
     for model, replayed in replays.items():
         error = np.stack(
             [
@@ -60,18 +62,24 @@ def error_curves(experiments: list[Experiment], replays: dict[str, Replay]) -> p
             ],
             axis=1,
         )
-        rate = np.gradient(error, step, axis=0)
+        rate = np.ma.array(np.gradient(error, step, axis=0), mask=unseen)
+        error = np.ma.array(error, mask=unseen)
         tables.append(
             pd.DataFrame(
                 {
                     "time_s": np.arange(frames) * step,
                     "model": model,
-                    "position_error_mm": sosfiltfilt(low_pass, np.abs(error).mean(axis=(1, 2))) * 1e3,
-                    "velocity_error_mm_s": sosfiltfilt(low_pass, np.abs(rate).mean(axis=(1, 2))) * 1e3,
+                    "position_error_mm": _smooth(low_pass, error) * 1e3,
+                    "velocity_error_mm_s": _smooth(low_pass, rate) * 1e3,
                 }
             )
         )
     return pd.concat(tables)
+
+
+def _smooth(low_pass: np.ndarray, errors: np.ma.MaskedArray) -> np.ndarray:
+    """Mean size of (T, trials, S) errors in each frame, low-pass filtered. Shape (T,)."""
+    return sosfiltfilt(low_pass, np.abs(errors).mean(axis=(1, 2)).filled(0.0))
 
 
 def error_figure(curves: pd.DataFrame) -> Figure:
@@ -104,7 +112,8 @@ def distance_table(experiment: Experiment, index: int, replays: dict[str, Replay
 def distance_figure(table: pd.DataFrame, trial: str) -> Figure:
     """Measured against simulated distances of a few segments over time."""
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
-    for axis, model in zip(axes, COLORS, strict=True):
+    models = [name for name in table.source.unique() if name != "measured"]
+    for axis, model in zip(axes, models, strict=True):
         for source, style in (("measured", {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45}),
                               (model, {"color": COLORS[model], "linewidth": 1.2})):
             for number, (_, rows) in enumerate(table[table.source == source].groupby("segment", sort=False)):
@@ -125,6 +134,9 @@ def path_figure(experiment: Experiment, index: int, replays: dict[str, Replay]) 
         for model, replayed in replays.items():
             axis.plot(time, replayed.positions[index][:, -1, number] * 1e3, color=COLORS[model], lw=1.2, label=model)
         axis.set_ylabel(f"{name} (mm)")
+        low, high = axis.get_ylim()
+        spare = max(0.0, NARROWEST - (high - low)) / 2
+        axis.set_ylim(low - spare, high + spare)
     axes[0].set_title(f"Last tracked segment in the base frame, {experiment.name}")
     axes[0].legend(ncols=3, loc="upper right")
     axes[-1].set_xlabel("time (s)")
@@ -152,7 +164,7 @@ def shape_figure(table: pd.DataFrame) -> Figure:
             axis.annotate(f"{rows.tilt_deg.iloc[0]:.0f}°", (x[-1], z[-1]), xytext=(6, 0), textcoords="offset points")
         else:
             axis.plot(x, z, color=COLORS[source], linewidth=1.6 if source == "identified" else 1.1)
-    for source, style in (("measured", "o"), ("initial", "-"), ("identified", "-")):
+    for source, style in (("measured", "o"), ("initial", "-"), ("identified", "-")):  # no CAD beside statics
         axis.plot([], [], style, color=COLORS.get(source, MEASURED), label=source)
     axis.legend(loc="upper right")
     axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Static shapes per tilt, validate split")

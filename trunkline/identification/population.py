@@ -12,8 +12,10 @@ from trunkline.identification.experiment import Experiment
 from trunkline.threads import thread_count
 
 RELAXATION = 0.2  # s, damping over stiffness while a static shape settles: quick, without swinging
-SETTLE_TIME = 1.6  # s, leaves 0.03 % of the distance between where a shape starts and where it rests
 SETTLE_STEP = 0.002  # s
+SETTLE_CHUNK = 100  # steps between looks at whether a shape rests
+SETTLE_TIME = 10.0  # s, the most; a shape that does not rest by then counts as diverged
+REST_SPEED = 1e-4  # rad/s of the fastest hinge; with the relaxation above some 1e-5 rad are left then
 
 
 @dataclass
@@ -87,7 +89,7 @@ class Population:
         return [self._model.site(f"{name}_center").id for name in self._segments]
 
     def _settle(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
-        """Static shapes: friction off, heavily damped until at rest."""
+        """Static shapes: friction off, heavily damped, until each is at rest."""
         batch = self._batch("static", experiments, fields, count)
         batch.expand("opt.timestep")[:] = SETTLE_STEP
         for name in ("dof_frictionloss", "tendon_frictionloss", "dof_dampingpoly"):
@@ -100,35 +102,40 @@ class Population:
             batch.bind("ctrl")[:] = controls
             if self._model.na:
                 batch.bind("act")[:] = controls
-        steps, seen = round(SETTLE_TIME / SETTLE_STEP), batch.bind("site_xpos")
-        batch.step(nstep=steps, stage=mujoco.mjtStage.mjSTAGE_POS)
+        seen, speed = batch.bind("site_xpos"), batch.bind("qvel")
+        moving, steps = np.arange(batch.nsim, dtype=np.int32), 0
+        for _ in range(round(SETTLE_TIME / SETTLE_STEP / SETTLE_CHUNK)):
+            if not len(moving):
+                break
+            batch.step(ids=moving, nstep=SETTLE_CHUNK, stage=mujoco.mjtStage.mjSTAGE_POS)
+            steps += SETTLE_CHUNK * len(moving)
+            moving = moving[~(np.abs(speed[moving]).max(axis=1) < REST_SPEED)]
         shapes = seen[:, None, self._sites()]
+        shapes[moving] = np.nan
         results = [shapes[t * count : (t + 1) * count] for t in range(len(experiments))]
-        return results, steps * batch.nsim
+        return results, steps
 
     def _run(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
-        """Releases and curls: frame by frame, commands held from one frame to the next."""
+        """Releases and curls: from the start to the first frame, then frame by frame."""
         batch = self._batch("dynamic", experiments, fields, count)
         frame_step = experiments[0].frame_step
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))
-        batch.expand("opt.timestep")[:] = frame_step / substeps
+        timestep = batch.expand("opt.timestep")
+        timestep[:] = np.repeat([e.lead / substeps for e in experiments], count)
         sites = self._sites()
         lengths = [e.frames for e in experiments]
         results = [np.empty((count, frames, len(sites), 3)) for frames in lengths]
         seen, control = batch.bind("site_xpos"), batch.bind("ctrl")
         if self._model.na:
             batch.bind("act")[:] = np.repeat([e.controls[0] for e in experiments], count, axis=0)
-        batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
         steps = 0
         for frame in range(max(lengths)):
-            active = sum(frames > frame for frames in lengths)
-            for t in range(active):
-                block = slice(t * count, (t + 1) * count)
-                results[t][:, frame] = seen[block, sites]
-                control[block] = experiments[t].controls[frame]
-            running = sum(frames > frame + 1 for frames in lengths)
-            if running:
-                ids = np.arange(running * count, dtype=np.int32)
-                batch.step(ids=ids, nstep=substeps, stage=mujoco.mjtStage.mjSTAGE_POS)
-                steps += substeps * len(ids)
+            running = sum(frames > frame for frames in lengths)
+            control[: running * count] = np.repeat([e.controls[frame] for e in experiments[:running]], count, axis=0)
+            ids = np.arange(running * count, dtype=np.int32)
+            batch.step(ids=ids, nstep=substeps, stage=mujoco.mjtStage.mjSTAGE_POS)
+            steps += substeps * len(ids)
+            timestep[:] = frame_step / substeps
+            for t in range(running):
+                results[t][:, frame] = seen[t * count : (t + 1) * count, sites]
         return results, steps

@@ -71,7 +71,9 @@ def _gauss_newton(model, data, qpos, sites, positions, targets, seen, free, max_
     lower, upper = model.jnt_range.T * LIMIT_GIVE
     damping = 1e-3
     cost, jacobian, residual = _linearise(model, data, qpos, sites, positions, targets, seen, smooth)
-    for iteration in range(1, max_iterations + 1):
+    iteration, settled = 0, False
+    while not settled and iteration < max_iterations:
+        iteration += 1
         jacobian = jacobian[:, free]
         normal = jacobian.T @ jacobian
         normal += damping * np.diag(np.diag(normal))
@@ -90,8 +92,6 @@ def _gauss_newton(model, data, qpos, sites, positions, targets, seen, free, max_
         else:
             damping *= 8
             jacobian = _linearise(model, data, qpos, sites, positions, targets, seen, smooth)[1]
-        if settled:
-            break
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
     offsets = np.linalg.norm(data.site_xpos[sites] - positions, axis=1)

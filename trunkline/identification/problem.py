@@ -1,16 +1,17 @@
 """What is searched for: parameters with bounds, a model, experiments and a loss; candidates in, losses out."""
 
-from dataclasses import dataclass, field
+import time
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from trunkline.arm.parameters import PARAMETERS, candidate_fields, unit_of_hinge
+from trunkline.arm.parameters import candidate_fields, unit_of_hinge
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
 from trunkline.identification.population import Population
 
-DIVERGED_LOSS = 1e3  # far above any loss of a simulation that stays finite, and finite
+DIVERGED_LOSS = 1e3  # finite, and with sensible weights far above the loss of any arm that stays in one piece
 
 
 @dataclass
@@ -37,10 +38,10 @@ class Problem:
     weights: LossWeights
     step_factor: float = 1.0
     per_joint: tuple[str, ...] = ()
-    fixed: dict[str, float] = field(default_factory=dict)
     evaluations: int = 0
     diverged: int = 0
     steps: int = 0
+    seconds: float = 0.0
 
     def __post_init__(self):
         self._population = Population(self.model, self.experiments, self.segments, self.step_factor)
@@ -50,7 +51,6 @@ class Problem:
         """Model fields of candidates (C, P)."""
         scalars = len(self.parameters)
         values = {name: np.exp(vectors[:, i]) for i, name in enumerate(self.parameters)}
-        values |= {name: np.full(len(vectors), value) for name, value in self.fixed.items()}
         blocks = vectors[:, scalars:].reshape(len(vectors), len(self.per_joint), self.units)
         return candidate_fields(
             self.model, values, {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
@@ -58,7 +58,9 @@ class Problem:
 
     def residuals(self, vectors: np.ndarray) -> list[np.ndarray]:
         """Residuals per trial, weighted so that the sum of ½ r² over all of them is the loss. Each (C, R)."""
+        begun = time.perf_counter()
         simulated = self._population.simulate(self.fields(vectors))
+        self.seconds += time.perf_counter() - begun
         self.evaluations += len(vectors)
         self.diverged += int(simulated.diverged.sum())
         self.steps += simulated.steps
@@ -88,5 +90,6 @@ class Problem:
             np.array(high + [1 + per_joint_range] * joints),
         )
 
-    def unit(self, name: str) -> str:
-        return PARAMETERS[name].unit
+    def effort(self) -> dict[str, float]:
+        """What a progress bar shows: evaluations so far, and the simulator's speed."""
+        return {"evaluations": self.evaluations, "steps/s": self.steps / max(self.seconds, 1e-9)}

@@ -50,7 +50,13 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, report_cad
     metrics = {
         name: scores(replayed, experiments, config.loss.kind, weights, length) for name, replayed in replays.items()
     }
-    metrics |= {"evaluations": result.evaluations, "diverged": result.diverged, "at_bound": len(result.at_bound)}
+    metrics |= {
+        "evaluations": result.evaluations,
+        "diverged": result.diverged,
+        "at_bound": len(result.at_bound),
+        "converged": result.converged,
+        "start_fit": _start_fit(experiments),
+    }
     if result.factors:
         metrics["per_joint_gain"] = _gain(metrics)
     for name in result.at_bound:
@@ -61,6 +67,16 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, report_cad
         write_json(folder / "parameters.json", parameter_table(result, bounds))
         write_json(folder / "metrics.json", metrics)
         write_plots(folder, result, bounds, experiments, segments, replays)
+
+
+def _start_fit(experiments: list[Experiment]) -> dict[str, float]:
+    """How far the poses from which simulations start are from the measured ones."""
+    residuals = [e.fit.residuals[np.isfinite(e.fit.residuals)] * 1e3 for e in experiments]
+    return {
+        "mean_mm": float(np.mean([r.mean() for r in residuals])),
+        "max_mm": float(np.max([r.max() for r in residuals])),
+        "unconverged": sum(not e.fit.converged for e in experiments),
+    }
 
 
 def read_spec(path: Path) -> mujoco.MjSpec:
@@ -105,7 +121,11 @@ def _gain(metrics: dict) -> dict[str, float]:
 
 
 def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
-    """parameters.json: values, 95 % intervals, correlations, factors, and what the data leave open."""
+    """parameters.json: values, 95 % intervals, correlations, factors, and what the data leave open.
+
+    A value is the scalar of the scaling law; the model's joint i has that times α^{3(i-1)} times its factor.
+    Intervals are given what earlier stages found, and those of factors given the scalars.
+    """
     names, certainty = list(result.values), result.certainty
     initial = result.models["initial"]
     scalars = {
@@ -125,16 +145,26 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
         "correlation": {a: dict(zip(names, certainty.correlation[i], strict=True)) for i, a in enumerate(names)},
         "condition": certainty.condition,
         "weakest_direction": weakest_in_words(names, certainty.weakest),
-        "per_joint": result.factors,
+        "per_joint": _factor_table(result),
         "at_bound": result.at_bound,
+    }
+
+
+def _factor_table(result: Identification) -> dict:
+    """Factors on top of the scaling law, unit by unit, with the half width of their 95 % intervals."""
+    if not result.factors:
+        return {}
+    widths = result.factor_certainty.half_width.reshape(len(result.factors), -1)
+    return {
+        name: {"factor": factors, "half_width_95": width}
+        for (name, factors), width in zip(result.factors.items(), widths, strict=True)
     }
 
 
 def write_plots(folder: Path, result: Identification, bounds, experiments, segments, replays) -> None:
     """PNGs for people and CSV for `dvc plots`."""
-    shown = {name: replays[name] for name in ("initial", "identified")}
-    if "cad" in replays:
-        shown["initial"] = replays["cad"]
+    first = {"CAD": replays["cad"]} if "cad" in replays else {"initial": replays["initial"]}
+    shown = first | {"identified": replays["identified"]}
     plots.convergence_table(result).to_csv(folder / "convergence.csv", index=False, float_format="%.6g")
     save_figure(plots.convergence_figure(result), folder / "convergence.png")
     units = {name: PARAMETERS[name].unit for name in result.values}

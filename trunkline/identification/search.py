@@ -14,7 +14,7 @@ Report = Callable[[float], None]  # called with the best loss after each generat
 
 @dataclass
 class Convergence:
-    """Best and mean loss of each generation; for least squares both are the iterate's."""
+    """Best loss so far and mean loss of each generation's trials; for least squares both are the iterate's."""
 
     best: list[float] = field(default_factory=list)
     mean: list[float] = field(default_factory=list)
@@ -24,13 +24,14 @@ class Convergence:
 class Found:
     """Result of a search.
 
-    vector: the best candidate z. loss: its loss. success: stopped because converged, not because time was up.
+    vector: the best candidate z. converged: stopped for that reason, not because its time was up.
+    linearisation: of least squares, residuals (R,) and Jacobians (R, P) per trial at the last iterate.
     """
 
     vector: np.ndarray
-    loss: float
     convergence: Convergence
-    success: bool
+    converged: bool
+    linearisation: tuple[list[np.ndarray], list[np.ndarray]] | None = None
 
 
 def evolve(
@@ -83,7 +84,7 @@ def evolve(
         vectorized=True,
         callback=note,
     )
-    return Found(result.x, float(result.fun), convergence, bool(result.success))
+    return Found(result.x, convergence, bool(result.success))
 
 
 def polish(
@@ -95,14 +96,15 @@ def polish(
     tolerance: float,
     report: Report,
 ) -> Found:
-    """Least squares on the same residuals (scipy's trust region within bounds); all columns of a Jacobian in one batch."""
-    convergence = Convergence()
+    """Least squares on the same residuals by scipy's trust region; all columns of a Jacobian in one batch."""
+    convergence, last = Convergence(), None
 
     def residuals(vector: np.ndarray) -> np.ndarray:
         return np.concatenate([block[0] for block in problem.residuals(vector[None])])
 
     def derivatives(vector: np.ndarray) -> np.ndarray:
-        blocks, columns = jacobian(problem, vector, high)
+        nonlocal last
+        blocks, columns = last = jacobian(problem, vector, high)
         loss = 0.5 * sum(float(block @ block) for block in blocks)
         convergence.best.append(loss)
         convergence.mean.append(loss)
@@ -115,7 +117,7 @@ def polish(
     )
     convergence.best.append(float(result.cost))
     convergence.mean.append(float(result.cost))
-    return Found(result.x, float(result.cost), convergence, bool(result.success))
+    return Found(result.x, convergence, result.status > 0, last)
 
 
 def jacobian(

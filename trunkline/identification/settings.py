@@ -56,15 +56,17 @@ class FineSettings:
 class IdentificationSettings:
     seed: NonNegativeInt
     frames: PositiveInt
-    experiments: list[Literal["static_tilt", "release", "curl"]]
-    reported: list[Literal["static_tilt", "release", "curl"]]
+    experiments: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
+    reported: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
     loss: Loss
-    parameters: dict[ParameterName, Range]
+    parameters: dict[ParameterName, Range] = Field(min_length=1)
     per_joint: list[Literal["stiffness", "damping"]]
     coarse: CoarseSettings
     fine: FineSettings
 
     def __post_init__(self):
+        if not set(self.experiments) <= set(self.reported):
+            raise ValueError(f"reported: found {self.reported}, expected at least {self.experiments}")
         missing = set(self.per_joint) - set(self.parameters)
         if missing:
             raise ValueError(f"per_joint: found {sorted(missing)[0]!r}, expected one of {sorted(self.parameters)}")

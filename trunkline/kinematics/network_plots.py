@@ -38,7 +38,7 @@ def tip_error_figure(errors: dict[str, np.ndarray], length: float) -> Figure:
     right.set(xscale="log", xlim=(1e-2, 1e2), xlabel="tip position error after FK (mm)", ylabel="targets below (%)")
     right.axvline(0.01 * length * 1e3, color=MEASURED, linestyle="--", linewidth=1)
     right.text(0.0105 * length * 1e3, 5, "1 % of length", fontsize=8)
-    right.legend(loc="upper left")
+    right.legend(loc="center left")
     figure.suptitle("Tip error of the network: its lengths fed back through the statics")
     return figure
 
@@ -51,15 +51,17 @@ def error_map_figure(targets: pd.DataFrame) -> Figure:
     """
     angles = np.unique(targets["theta_g"])
     shown = angles[np.unique(np.linspace(0, len(angles) - 1, 4).round().astype(int))]
-    figure, axes = plt.subplots(1, len(shown), figsize=(3.2 * len(shown), 3.9), squeeze=False, sharey=True)
+    figure, axes = plt.subplots(1, len(shown), figsize=(3.1 * len(shown), 3.6), squeeze=False, sharey=True)
+    extent = targets[["x", "z"]].agg(["min", "max"]) * 1e3 + np.array([[-20], [20]])
     for ax, angle in zip(axes[0], shown, strict=True):
         rows = targets[(targets["theta_g"] == angle) & (targets["y"].abs() < SLICE)]
         rows = rows.sort_values("error_mm")
         dots = ax.scatter(rows["x"] * 1e3, rows["z"] * 1e3, c=np.log10(rows["error_mm"] + 1e-3), s=6, linewidths=0,
                           vmin=-1.5, vmax=1)
         ax.plot(0, 0, "k^", markersize=5)
-        ax.set(aspect="equal", xlabel="x (mm)", title=f"θ_G = {np.degrees(angle):.0f}°")
-    axes[0, 0].set_ylabel("z (mm)")
+        ax.set(aspect="equal", xlim=extent["x"], ylim=extent["z"], xlabel="x (mm)")
+        ax.set_title(f"θ_G = {np.degrees(angle):.0f}°")
+    axes[0, 0].set_ylabel("z (mm), base at the triangle")
     bar = figure.colorbar(dots, ax=axes[0], shrink=0.8, ticks=[-1, 0, 1])
     bar.ax.set_yticklabels(["0.1", "1", "10"])
     bar.set_label("tip error (mm)")

@@ -2,7 +2,9 @@
 
 Each metric has an absolute bound and, where it makes sense, an allowed regression against the value committed
 before. The earlier value is HEAD's, or, where the file is as in HEAD (a fresh clone, CI), the one before the
-last commit that changed it. The gate fails closed: what is missing, null, not a number or not finite fails.
+last commit that changed it. The gate fails closed: what is missing, null, not a number or not finite fails, and
+so does an earlier value that cannot be had (no Git, a shallow clone, an earlier file without the key). Only a
+file without another version in a whole history has none; a new key gets its `regression` one commit later.
 """
 
 import json
@@ -78,7 +80,12 @@ def failures(limits: Limits, root: Path) -> list[str]:
         except ValueError as error:
             found += [f"{stage}: {key}: {name} is not JSON: {error}" for key in keys]
             continue
-        earlier = earlier_metrics(name, root)
+        earlier = None
+        if any(limit.regression is not None for limit in keys.values()):
+            try:
+                earlier = earlier_metrics(name, root)
+            except InputError as error:
+                found.append(f"{stage}: {error}")
         for key, limit in keys.items():
             found += [f"{stage}: {key}: {problem}" for problem in _problems(limit, key, metrics, earlier)]
     return found
@@ -104,8 +111,10 @@ def _problems(limit: Limit, key: str, metrics: Any, earlier: Any) -> list[str]:
             problems.append(f"{limit.below.key}: found {other!r}, expected a finite number to compare with")
         elif value * factor > other:
             problems.append(f"found {value:g}, expected {factor:g} times below {limit.below.key}, {other:g}")
-    before = lookup(earlier, key)
-    if limit.regression is not None and _finite(before):
+    if limit.regression is not None and earlier is not None:
+        before = lookup(earlier, key)
+        if not _finite(before):
+            return [*problems, f"earlier {before!r}, expected a finite number to compare with"]
         allowed = max(limit.regression * abs(before), limit.slack)
         worse = value - before if limit.max is not None else before - value
         if worse > allowed:
@@ -131,21 +140,36 @@ def _finite(value: Any) -> bool:
 
 
 def earlier_metrics(name: str, root: Path) -> Any:
-    """The metrics committed before those in the working tree; None if Git holds no other version."""
-    for commit in _git(root, "log", "-2", "--format=%H", "--", name).split():
-        text = _git(root, "show", f"{commit}:./{name}")
-        if text and text != (root / name).read_text(encoding="utf-8"):
-            try:
-                return json.loads(text)
-            except ValueError:
-                return None
+    """The metrics committed before those in the working tree; None if there never was another version.
+
+    Raises:
+        InputError: if the history cannot be read or is cut short, or the earlier file is not JSON.
+    """
+    now = (root / name).read_text(encoding="utf-8")
+    for commit in _git(root, name, "log", "--diff-filter=AM", "--format=%H", "--", name).split():
+        text = _git(root, name, "show", f"{commit}:./{name}")
+        if text == now:
+            continue
+        try:
+            return json.loads(text) or {}
+        except ValueError as error:
+            raise InputError(f"{name}: the version of {commit[:10]} is not JSON: {error}") from None
+    if _git(root, name, "rev-parse", "--is-shallow-repository").strip() != "false":
+        raise InputError(f"{name}: no earlier version in a shallow clone, expected the whole history "
+                         f"(`git fetch --unshallow`)")
     return None
 
 
-def _git(root: Path, *arguments: str) -> str:
-    """Output of a git command in ``root``; empty where it fails (no repository, no such file)."""
-    done = subprocess.run(["git", *arguments], cwd=root, capture_output=True, text=True, check=False)
-    return done.stdout if done.returncode == 0 else ""
+def _git(root: Path, name: str, *arguments: str) -> str:
+    """Output of a git command in ``root``; InputError, naming the metrics ``name``, where it fails."""
+    try:
+        done = subprocess.run(["git", *arguments], cwd=root, capture_output=True, encoding="utf-8",
+                              errors="replace", check=False)  # fmt: skip
+    except FileNotFoundError:
+        raise InputError(f"{name}: no earlier version without Git, found no `git` command") from None
+    if done.returncode:
+        raise InputError(f"{name}: no earlier version, `git {arguments[0]}` says: {done.stderr}")
+    return done.stdout
 
 
 def main(root: Path = Path(".")) -> int:

@@ -1,8 +1,8 @@
 """Independent labels for the rigid map: can inverse kinematics bring the mount to a point, straight down?
 
 The map comes from forward kinematics of exact samples; the labels come from a damped least-squares solver
-that knows nothing of them. Points in doubt (the map says yes, the solver no) are tried with more starts before
-they count as errors of the map.
+that knows nothing of them, and is not told what the map says: every point that the first starts do not reach gets
+the same further ones, but for points that the links' lengths rule out.
 """
 
 from typing import NamedTuple
@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunkline.errors import InputError
 from trunkline.reachability.inverse import solve
 from trunkline.reachability.panda import DH_A, DH_D, FLANGE
 
@@ -43,7 +44,6 @@ def beyond_links(points: NDArray, mount_offset: float) -> NDArray:
 
 def label(
     points: NDArray,
-    claimed: NDArray,
     *,
     seed: int,
     starts: int,
@@ -55,10 +55,9 @@ def label(
 
     Args:
         points: in m.
-        claimed: what the map says, (N,); the solver spends ``starts_in_doubt`` more starts where it alone says yes.
         seed: of the random starts.
         starts: most starts for every point.
-        starts_in_doubt: most further starts for points in doubt.
+        starts_in_doubt: most further starts for every point that those do not reach.
         mount_offset: from the flange to the mount, in m.
         avoid_collisions: whether solutions in which the arm touches itself count.
     """
@@ -68,14 +67,19 @@ def label(
         result = solve(points[todo], seed=round_seed, starts=round_starts, mount_offset=mount_offset,
                        avoid_collisions=avoid_collisions)
         reached[todo] = result.success
-        todo = np.flatnonzero(claimed & ~reached)
+        todo = todo[~result.success]
     return reached
 
 
 def agreement(claimed: NDArray, reachable: NDArray) -> Agreement:
-    """Accuracy, true and false positive rates of ``claimed`` (N,) against labels ``reachable`` (N,)."""
+    """Accuracy, true and false positive rates of ``claimed`` (N,) against labels ``reachable`` (N,).
+
+    Raises:
+        InputError: if all labels are the same, so that a rate would have nothing to stand on.
+    """
     yes, no = int(reachable.sum()), int((~reachable).sum())
     if not yes or not no:
-        raise ValueError(f"labels: found {yes} reachable and {no} unreachable points, expected some of both")
+        raise InputError(f"params.yaml: reachability.labels: found {yes} reachable and {no} unreachable points, "
+                         "expected some of both; a larger `count` or `margin` gives them")
     return Agreement(float((claimed == reachable).mean()), float(claimed[reachable].mean()),
                      float(claimed[~reachable].mean()), yes, no)

@@ -1,5 +1,6 @@
 """All three maps from their inputs, and the checks that tell how good they are."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -144,15 +145,18 @@ def build_maps(
     step: float,
     most_triangles: int,
     seed: int,
+    done: Callable[[str], None],
 ) -> Maps:
-    """All maps: ``soft_voxel`` in m; ``step`` in rad between soft fields, at most."""
+    """All maps: ``soft_voxel`` in m; ``step`` in rad between soft fields, at most; ``done`` hears of each part."""
     rigid_map = build_rigid(rigid, most_triangles, seed)
-    soft_maps = build_soft(samples, shape, soft_voxel, step, most_triangles)
+    done("rigid")
+    soft_maps = build_soft(samples, shape, soft_voxel, step, most_triangles, done)
     cells, cells_lattice = swept_cells(samples.tips[samples.hanging()], hybrid.voxel)
     field, lattice = minkowski_field(
         rigid_map.field, rigid_map.lattice, cells, cells_lattice, hybrid.smoothing, hybrid.smallest
     )
-    hybrid_map = Map(field, lattice, surface(field, lattice, most_triangles))
+    hybrid_map = Map(field, lattice, surface(field, lattice, most_triangles, "reachability.hybrid"))
+    done("hybrid")
     return Maps(rigid_map, soft_maps, hybrid_map, rigid.mount_offset, rigid.self_collision)
 
 
@@ -161,21 +165,27 @@ def build_rigid(rigid: RigidSettings, most_triangles: int, seed: int) -> Map:
     poses = sample_downward(rigid.poses, seed, rigid.mount_offset, rigid.self_collision)
     outline = profile(poses, rigid.mount_offset, rigid.profile_voxel, rigid.closing, rigid.smallest)
     field, lattice = rigid_field(outline, rigid.voxel, rigid.smoothing)
-    return Map(field, lattice, surface(field, lattice, most_triangles))
+    return Map(field, lattice, surface(field, lattice, most_triangles, "reachability.rigid"))
+
+
+def blend_angles(sampled: NDArray, step: float) -> NDArray:
+    """``sampled`` angles (A,) and evenly between them as many as it takes to be no more than ``step`` apart; rad."""
+    angles = [sampled[:1]]
+    for low, high in zip(sampled[:-1], sampled[1:], strict=True):
+        angles.append(np.linspace(low, high, int(np.ceil((high - low) / step - 1e-6)) + 1)[1:])
+    return np.concatenate(angles)
 
 
 def build_soft(
-    samples: TipSamples, shape: SoftShape, voxel: float, step: float, most_triangles: int
+    samples: TipSamples, shape: SoftShape, voxel: float, step: float, most_triangles: int, done: Callable[[str], None]
 ) -> SoftMaps:
-    """Fields at the sampled angles and between them, no more than ``step`` (rad) apart; meshes at the sampled ones."""
-    angles = [samples.angles[:1]]
-    for low, high in zip(samples.angles[:-1], samples.angles[1:], strict=True):
-        angles.append(np.linspace(low, high, int(np.ceil((high - low) / step - 1e-6)) + 1)[1:])
-    angles = np.concatenate(angles)
+    """Fields at the ``blend_angles``; meshes at the sampled ones. ``done`` hears of each field by its name."""
+    angles = blend_angles(samples.angles, step)
     lattice = soft_lattice(samples, shape, voxel)
-    fields = soft_fields(samples, angles, lattice, shape)
+    fields = soft_fields(samples, angles, lattice, shape, lambda angle: done(angle_name(angle)))
     sampled = [fields[np.abs(angles - a).argmin()] for a in samples.angles]
-    return SoftMaps(angles, fields, lattice, samples.angles, [surface(f, lattice, most_triangles) for f in sampled])
+    meshes = [surface(field, lattice, most_triangles, "reachability.soft") for field in sampled]
+    return SoftMaps(angles, fields, lattice, samples.angles, meshes)
 
 
 def check_maps(
@@ -187,24 +197,29 @@ def check_maps(
     *,
     step: float,
     seed: int,
+    done: Callable[[str], None],
 ) -> Check:
-    """Check the rigid map by inverse kinematics, the soft ones by leaving out angles, the hybrid by finding poses."""
+    """Check the rigid map by inverse kinematics, the soft ones by leaving out angles, the hybrid by finding poses.
+
+    ``done`` hears of each check, of the soft one once per angle left out.
+    """
     corners = maps.rigid.mesh.vertices
     points = draw_points(corners.min(axis=0) - labels.margin, corners.max(axis=0) + labels.margin, labels.count, seed)
     claimed = contains(maps.rigid.mesh, points)
     reachable = label(
         points,
-        claimed,
         seed=seed,
         starts=labels.starts,
         starts_in_doubt=labels.starts_in_doubt,
         mount_offset=maps.mount_offset,
         avoid_collisions=maps.self_collision,
     )
-    heldout = [
-        heldout_overlap(samples, i, maps.soft.at(samples.angles[i]), step, maps.soft.lattice, shape)
-        for i in range(1, len(samples.angles) - 1)
-    ]
+    done("labels")
+    heldout = []
+    for i in range(1, len(samples.angles) - 1):
+        own = maps.soft.at(samples.angles[i])
+        heldout.append(heldout_overlap(samples, i, own, step, maps.soft.lattice, shape))
+        done(f"held-out {angle_name(samples.angles[i])}")
     inside, outside = (
         find_poses(
             some,
@@ -219,6 +234,7 @@ def check_maps(
             maps.hybrid.field, maps.hybrid.lattice, spot_check.outside, spot_check.count, seed
         )
     )
+    done("spot check")
     return Check(agreement(claimed, reachable), points, claimed, reachable, heldout, float(inside), float(outside))
 
 

@@ -9,6 +9,7 @@ import trimesh
 from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
+from trunkline.errors import InputError
 from trunkline.reachability.grid import Lattice
 
 # Lattice points at exactly the level make marching cubes emit degenerate triangles and open edges.
@@ -38,14 +39,17 @@ class Surface:
         return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
 
 
-def surface(field: NDArray, lattice: Lattice, most_triangles: int) -> Surface:
+def surface(field: NDArray, lattice: Lattice, most_triangles: int, settings: str) -> Surface:
     """Closed mesh of the zero level of ``field`` on a 3-D ``lattice``, with at most ``most_triangles``.
 
+    ``settings`` is the section of params.yaml in which the field's ``voxel`` is set, for errors.
+
     Raises:
-        ValueError: if nothing is inside, or no tolerance brings the mesh below ``most_triangles``.
+        InputError: if nothing is inside, or no tolerance brings the mesh below ``most_triangles``.
     """
     if not (field < 0).any():
-        raise ValueError("nothing to mesh: no lattice point is inside the surface")
+        raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and an empty map, "
+                         f"expected less, or a smaller {settings}.smallest")
     # The border counts as outside, so that a set that leaves the lattice is closed there.
     padded = np.pad(np.asarray(field, dtype=np.float32), 1, constant_values=lattice.spacing)
     level = LEVEL * lattice.spacing
@@ -58,8 +62,8 @@ def surface(field: NDArray, lattice: Lattice, most_triangles: int) -> Surface:
         tolerance *= TOLERANCE_GROWTH
         simple = solid.simplify(tolerance)
     if not 0 < simple.num_tri() <= most_triangles:
-        raise ValueError(f"mesh: {simple.num_tri()} triangles at a tolerance of {tolerance:.3g} m, "
-                         f"expected 1 to {most_triangles}; use a larger voxel")
+        raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and {simple.num_tri()} "
+                         f"triangles, expected 1 to reachability.most_triangles, {most_triangles}")
     mesh = simple.to_mesh()
     return Surface(np.asarray(mesh.vert_properties[:, :3], float), np.asarray(mesh.tri_verts, int), tolerance)
 

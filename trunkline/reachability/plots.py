@@ -65,7 +65,7 @@ def maps_figure(maps: Maps, samples: TipSamples) -> Figure:
 
 def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
     """Slices through y = 0 with what they were checked against: labels, tips; and the hybrid around the rigid map."""
-    figure, (rigid, soft, hybrid) = plt.subplots(1, 3, figsize=(14, 6.2))
+    figure, (rigid, soft, hybrid) = plt.subplots(1, 3, figsize=(14, 5.7))
     _fill_slice(rigid, maps.rigid, RIGID)
     radius = np.hypot(check.points[:, 0], check.points[:, 1]) * np.where(check.points[:, 0] < 0, -1, 1)
     for right, mark, size in ((True, ".", 3), (False, "x", 40)):

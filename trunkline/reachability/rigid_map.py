@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from trunkline.reachability.grid import Lattice, close_gaps, drop_specks, redistance
+from trunkline.errors import InputError
+from trunkline.reachability.grid import Lattice, close_gaps, distance_from_cells, drop_specks, redistance
 from trunkline.reachability.panda import Q_MAX, forward
 
 
@@ -58,7 +59,7 @@ def profile(q: NDArray, mount_offset: float, spacing: float, closing: float, sma
     cells = np.concatenate([cells[:0:-1], cells])
     cells = drop_specks(close_gaps(cells, closing / spacing), smallest)
     # A cell counts as soon as the set touches it: its border lies half a cell too far out on average.
-    distance = _cell_distance(cells, spacing)[len(cells) // 2:] + 0.5 * spacing
+    distance = distance_from_cells(cells, spacing)[len(cells) // 2:] + 0.5 * spacing
     lattice = Lattice(np.array([0.0, right.origin[1]]), spacing, distance.shape)
     window = 2 * int(np.ceil(closing / spacing)) + 1
     widest = _per_cell(np.maximum, lattice, plane, azimuth, -np.inf, window)
@@ -73,8 +74,14 @@ def rigid_field(shape: Profile, spacing: float, smoothing: float) -> tuple[NDArr
         shape: from ``profile``.
         spacing: of the lattice, in m.
         smoothing: standard deviation of a Gaussian over the field, in lattice steps.
+
+    Raises:
+        InputError: if the set is empty.
     """
     inside = shape.distance < 0
+    if not inside.any():
+        raise InputError(f"params.yaml: reachability.rigid.profile_voxel: found {shape.lattice.spacing:g} m and an "
+                         "empty profile, expected less, or a smaller reachability.rigid.smallest")
     r, z = shape.lattice.axes()
     reach, low, high = r[inside.any(axis=1)][-1], z[inside.any(axis=0)][0], z[inside.any(axis=0)][-1]
     lattice = Lattice.around([-reach, -reach, low], [reach, reach, high], spacing, 4 * spacing)
@@ -93,12 +100,6 @@ def _cylinder(q: NDArray, mount_offset: float) -> tuple[NDArray, NDArray, NDArra
         azimuth = np.abs((azimuth + np.pi) % (2 * np.pi) - np.pi)
         chunks.append(np.column_stack([np.hypot(position[:, 0], position[:, 1]), position[:, 2], azimuth]))
     return tuple(np.concatenate(chunks).T)
-
-
-def _cell_distance(cells: NDArray, spacing: float) -> NDArray:
-    outside = ndimage.distance_transform_edt(~cells)
-    inside = ndimage.distance_transform_edt(cells)
-    return spacing * np.where(cells, 0.5 - inside, outside - 0.5)
 
 
 def _per_cell(choose, lattice: Lattice, plane: NDArray, values: NDArray, empty: float, window: int) -> NDArray:

@@ -4,6 +4,7 @@ An arm that only bends reaches a shell, not a solid: two parameters of three mov
 third hardly. The map is the set of points within ``tolerance`` of a sampled tip, so that it has an inside.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,10 +50,16 @@ def soft_field(tips: NDArray, lattice: Lattice, shape: SoftShape) -> NDArray:
     return ndimage.gaussian_filter(without_specks(field, lattice.spacing, shape.smallest), shape.smoothing)
 
 
-def soft_fields(samples: TipSamples, angles: NDArray, lattice: Lattice, shape: SoftShape) -> NDArray:
-    """Fields (len(angles), ...) at gravity ``angles`` (rad), sampled ones or between them."""
+def soft_fields(
+    samples: TipSamples, angles: NDArray, lattice: Lattice, shape: SoftShape, done: Callable[[float], None]
+) -> NDArray:
+    """Fields (len(angles), ...) at gravity ``angles`` (rad), sampled ones or between them; ``done`` hears of each."""
     interpolator = TipInterpolator(samples, shape.tolerance / 2)
-    return np.stack([soft_field(interpolator.tips(a), lattice, shape) for a in angles]).astype(np.float32)
+    fields = np.empty((len(angles), *lattice.shape), np.float32)
+    for field, angle in zip(fields, angles, strict=True):
+        field[:] = soft_field(interpolator.tips(angle), lattice, shape)
+        done(angle)
+    return fields
 
 
 def heldout_overlap(
@@ -64,5 +71,5 @@ def heldout_overlap(
     """
     angle = samples.angles[index]
     beside = angle + step * np.array([-0.5, 0.5])
-    fields = soft_fields(samples.without(index), beside, lattice, shape)
+    fields = soft_fields(samples.without(index), beside, lattice, shape, lambda _: None)
     return overlap(blend(fields, beside, angle), own)

@@ -1,7 +1,7 @@
 """From the logs of a session to checked takes: what is usable, what was repaired, what had to be refused."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
+from trunkline.recording.checks import Findings, Limits, in_order
 from trunkline.recording.clock import (
     FrameFit,
     OffsetFit,
@@ -18,6 +19,7 @@ from trunkline.recording.clock import (
     fit_frames,
 )
 from trunkline.recording.frozen import frozen
+from trunkline.recording.motors import check_curl, read_motors
 from trunkline.recording.session import FixedBase, Session, TrialEntry
 from trunkline.recording.source import Source, open_log
 from trunkline.recording.streams import PoseStream
@@ -27,23 +29,7 @@ from trunkline.recording.units import extent, likely_unit
 from trunkline.recording.vertical import check_vertical
 
 UNIT = {"m": 1.0, "mm": 1e-3}
-NORM_TOLERANCE = (
-    0.01  # of a quaternion's length; float32 rounding is far below, anything above is no rotation
-)
-
-
-@dataclass
-class Limits:
-    """What a trial must have. duration: s. coverage: share of frames in which a body is seen.
-
-    disorder: s by which a stamp may be behind one before it and still be sorted in.
-    clock_offset: s, the largest looked for between motors and cameras.
-    """
-
-    duration: float
-    coverage: float
-    disorder: float
-    clock_offset: float
+NORM_TOLERANCE = 0.01  # of a quaternion's length; float32 rounding is far below, anything above is no rotation
 
 
 @dataclass
@@ -57,23 +43,7 @@ class Arm:
     note: str | None
 
 
-@dataclass
-class Findings:
-    """What came out about a take. repairs, warnings: one sentence each; what a warning names is left as it is.
-
-    frames: stamps over frame numbers. logged: stamps over log times in s. offset: of the motors' clock.
-    """
-
-    repairs: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
-    frames: FrameFit | None = None
-    logged: FrameFit | None = None
-    offset: OffsetFit | None = None
-
-
-def take_in(
-    folder: Path, session: Session, limits: Limits
-) -> Iterator[tuple[TrialEntry, Take | InputError, Findings]]:
+def take_in(folder: Path, session: Session, limits: Limits) -> Iterator[tuple[TrialEntry, Take | InputError, Findings]]:
     """Read trial by trial. A trial that cannot be used comes as the error that says why.
 
     Every take has the same segments: those that session.yaml maps, or all that any log shows.
@@ -88,20 +58,28 @@ def take_in(
     sources = [source for source in logs.values() if isinstance(source, Source)]
     segments = _segments(session, sources)
     arm = _arm(session, sources, segments)
+    joint_topics = tuple(sorted({name for source in sources for name in source.joint_topics}))
     for trial in session.trials:
         source, findings = logs[trial.file], Findings()
         if isinstance(source, InputError):
             yield trial, source, findings
             continue
         try:
-            yield trial, _take(source, trial, session, segments, arm, limits, findings), findings
+            yield trial, _take(source, trial, session, segments, arm, joint_topics, limits, findings), findings
         except InputError as error:
             yield trial, error, findings
 
 
 def align_clocks(takes: list[Take], fits: list[OffsetFit | None]) -> tuple[float, float]:
-    """Give every take the offset that the session's takes agree on; the offset and its spread, s."""
-    offset, spread = agree_on_offset([fit for fit in fits if fit is not None])
+    """Give every take the offset that the session's takes agree on; the offset and its spread, s.
+
+    Only the takes for identification have a say, so that the others stay unseen until they validate; all have,
+    where those for identification tell nothing.
+    """
+    told = [(take.split, fit) for take, fit in zip(takes, fits, strict=True) if fit is not None]
+    offset, spread = agree_on_offset([fit for split, fit in told if split == "identify"])
+    if not np.isfinite(spread):
+        offset, spread = agree_on_offset([fit for _, fit in told])
     for take in takes:
         take.clock_offset = offset
     return offset, spread
@@ -155,10 +133,15 @@ def _take(
     session: Session,
     segments: dict[str, str],
     arm: Arm,
+    joint_topics: tuple[str, ...],
     limits: Limits,
     findings: Findings,
 ) -> Take:
-    """Check one trial. Raises InputError naming the file, and what is missing in it."""
+    """Check one trial; `joint_topics` are those of all logs.
+
+    Raises:
+        InputError: naming the file, and what is missing in it.
+    """
     where = f"{source.log.path}: trial {trial.name}"
     findings.repairs += [f"log: {damage}" for damage in source.log.damage]
     findings.repairs += [] if arm.note is None else [arm.note]
@@ -167,34 +150,26 @@ def _take(
         findings.repairs.append(f"{poses.undecodable} messages that do not fit their schema dropped")
     findings.logged = _log_fit(poses)
     stamps, findings.frames = _stamps(poses, session.clock, where, source.pose_topic)
-    rows = _in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings)
+    rows = in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings)
     epoch = stamps[rows[0]]
     time = (stamps[rows] - epoch) * 1e-9
     if trial.window is not None:
         inside = (time >= trial.window[0]) & (time <= trial.window[1])
         rows, time = rows[inside], time[inside]
         if not len(time):
-            raise InputError(
-                f"{where}: window {list(trial.window)} s holds no pose, the log has {_seconds(stamps)} s"
-            )
+            raise InputError(f"{where}: window {list(trial.window)} s holds no pose, the log has {_seconds(stamps)} s")
         epoch, time = epoch + round(time[0] * 1e9), time - time[0]
     if time[-1] < limits.duration:
         lost = f" (damaged: {'; '.join(source.log.damage)})" if source.log.damage else ""
         expected = f"expected at least {limits.duration:g} s"
-        raise InputError(
-            f"{where}: found {time[-1]:.2f} s of poses in {len(time)} frames{lost}, {expected}"
-        )
+        raise InputError(f"{where}: found {time[-1]:.2f} s of poses in {len(time)} frames{lost}, {expected}")
 
     needed = list(segments) if isinstance(session.base, FixedBase) else [session.base, *segments]
     for name in needed:
         if name not in poses.names:
-            raise InputError(
-                f"{where}: {name!r} never appears in {source.pose_topic}, found {', '.join(poses.names)}"
-            )
+            raise InputError(f"{where}: {name!r} never appears in {source.pose_topic}, found {', '.join(poses.names)}")
     columns = [poses.names.index(name) for name in needed]
-    positions, quaternions = _good_samples(
-        poses, rows, columns, arm.scale, needed, findings
-    )
+    positions, quaternions = _good_samples(poses, rows, columns, arm.scale, needed, findings)
     still = frozen(positions)
     _count(still, "that only repeat the one before, to the last bit,", needed, findings)
     positions[still] = np.nan
@@ -204,16 +179,17 @@ def _take(
     for name, share in zip(needed, seen, strict=True):
         if share < limits.coverage:
             expected = f"expected at least {100 * limits.coverage:g} %"
-            raise InputError(
-                f"{where}: {name!r} is seen in {100 * share:.1f} % of {len(time)} frames, {expected}"
-            )
+            raise InputError(f"{where}: {name!r} is seen in {100 * share:.1f} % of {len(time)} frames, {expected}")
 
     base_positions, base_quaternions, positions, quaternions = _split_base(
         session, positions, quaternions, f"{where}: {source.pose_topic}"
     )
     if arm.distances is not None:
         _untangle(base_positions, positions, quaternions, arm.distances, segments, findings)
-    tendons, motors = _motors(source, epoch, poses.log_times[rows[0]], time, limits, where, findings)
+    logged = poses.log_times[rows[0]]
+    tendons, motors = read_motors(source, session, epoch, logged, time, limits, where, findings)
+    if trial.experiment == "curl":
+        check_curl(source, session, joint_topics, motors, epoch, logged, time, limits, where)
     take = Take(
         trial.name,
         trial.experiment,
@@ -241,14 +217,10 @@ def _stamps(poses: PoseStream, clock: str, where: str, topic: str) -> tuple[np.n
     """When each frame was taken, ns, by the clock that the session names."""
     stamps = poses.log_times if clock == "log" else poses.stamps
     if not stamps.any():
-        raise InputError(
-            f"{where}: {topic}: all stamps are zero, expected `clock: log` in session.yaml for such logs"
-        )
+        raise InputError(f"{where}: {topic}: all stamps are zero, expected `clock: log` in session.yaml for such logs")
     if poses.frames is None or len(stamps) < 10 or np.any(np.diff(poses.frames) <= 0):
         if clock == "frame":
-            raise InputError(
-                f"{where}: {topic}: frame numbers do not increase, expected `clock: stamp` or `log`"
-            )
+            raise InputError(f"{where}: {topic}: frame numbers do not increase, expected `clock: stamp` or `log`")
         return stamps, None
     fit = fit_frames(stamps, poses.frames)
     if clock == "frame":
@@ -281,24 +253,6 @@ def _untangle(
                 values[np.ix_(swap.frames, pair)] = values[np.ix_(swap.frames, pair[::-1])]
         count, (one, other) = int(swap.frames.sum()), (names[place] for place in pair)
         findings.repairs.append(f"{one!r} and {other!r} were taken for each other in {count} frames, put right")
-
-
-def _in_order(stamps: np.ndarray, disorder: float, where: str, findings: Findings) -> np.ndarray:
-    """Rows in the order of time, each instant once; refused if time runs back by more than `disorder` s."""
-    back = np.maximum.accumulate(stamps) - stamps
-    if back.max(initial=0) > disorder * 1e9:
-        worst = int(np.argmax(back > disorder * 1e9))
-        found = f"time runs backwards by {back[worst] * 1e-9:.3f} s at message {worst}"
-        raise InputError(f"{where}: {found}, expected no step back beyond {disorder:g} s")
-    rows = np.argsort(stamps, kind="stable")
-    if np.any(back > 0):
-        findings.repairs.append(f"{int(np.sum(back > 0))} frames out of order sorted by their stamps")
-    fresh = np.diff(stamps[rows], prepend=stamps[rows[0]] - 1) > 0
-    if not fresh.all():
-        findings.repairs.append(
-            f"{int(np.sum(~fresh))} frames with a stamp that was there already dropped"
-        )
-    return rows[fresh]
 
 
 def _good_samples(
@@ -342,9 +296,7 @@ def _split_base(session: Session, positions: np.ndarray, quaternions: np.ndarray
         ones = np.ones((len(positions), 1))
         return ones * np.array(session.base.position), ones * np.array(quaternion), positions, quaternions
     if quaternions is None:
-        raise InputError(
-            f"{where}: no orientations, expected `base` in session.yaml as a fixed pose for such logs"
-        )
+        raise InputError(f"{where}: no orientations, expected `base` in session.yaml as a fixed pose for such logs")
     return positions[:, 0], quaternions[:, 0], positions[:, 1:], quaternions[:, 1:]
 
 
@@ -354,45 +306,6 @@ def _upright(up: np.ndarray) -> np.ndarray:
     x -= x @ up * up
     x /= np.linalg.norm(x)
     return wxyz_from_rotation(Rotation.from_matrix(np.stack([x, np.cross(up, x), up], axis=1)))
-
-
-def _motors(
-    source: Source,
-    epoch: int,
-    logged: int,
-    time: np.ndarray,
-    limits: Limits,
-    where: str,
-    findings: Findings,
-):
-    """Tendon names, and (command time, commands, tendon time, tendon positions) around the trial's frames.
-
-    epoch: ns, the stamp of the trial's first frame; logged: ns, when the recorder had it. Where messages of either
-    topic have no stamp, the log times of both count.
-    """
-    streams = [source.commands, source.tendon_positions]
-    timed = all(stream is None or stream.timed for stream in streams)
-    tendons = next((stream.names for stream in streams if stream is not None), ())
-    arrays = []
-    for stream, role in zip(streams, ("command", "tendon position"), strict=True):
-        if stream is None or not len(stream.stamps):
-            arrays += [np.empty(0), np.empty((0, len(tendons)))]
-            continue
-        if set(stream.names) != set(tendons):
-            found = f"found {', '.join(stream.names)}"
-            raise InputError(
-                f"{where}: {role} topic: {found}, expected {', '.join(tendons)} as in the other topic"
-            )
-        stamps = stream.stamps if timed else stream.log_times - logged + epoch
-        rows = _in_order(stamps, limits.disorder, f"{where}: {role} topic", findings)
-        seconds = (stamps[rows] - epoch) * 1e-9
-        pulls = stream.positions[rows][:, [stream.names.index(name) for name in tendons]]
-        near = (seconds > -limits.clock_offset) & (seconds < time[-1] + limits.clock_offset)
-        finite = np.isfinite(pulls).all(axis=1)
-        if not finite.all():
-            findings.repairs.append(f"{int(np.sum(~finite))} {role} messages that are not finite dropped")
-        arrays += [seconds[near & finite], pulls[near & finite]]
-    return tuple(tendons), arrays
 
 
 def _seconds(stamps: np.ndarray) -> str:

@@ -86,7 +86,8 @@ def read_log(path: Path) -> Log:
     nameless = sum(channel not in contents.channels for channel, *_ in contents.messages)
     if nameless:
         damage.append(f"{nameless} messages on channels that nothing describes lost")
-    return Log(Path(path), _by_topic(contents), damage)
+    topics = _by_topic(contents, damage)
+    return Log(Path(path), topics, damage)
 
 
 def _read_all(data: bytes, contents: _Contents, damage: list[str], path: Path) -> int | None:
@@ -110,9 +111,7 @@ def _read_all(data: bytes, contents: _Contents, damage: list[str], path: Path) -
                         found = "wrong checksum over messages outside chunks"
                         raise InputError(f"{path}: {found}, none can be trusted")
                     if not damage:
-                        damage.append(
-                            "the data section's checksum is wrong though every chunk's is right"
-                        )
+                        damage.append("the data section's checksum is wrong though every chunk's is right")
             elif opcode == Opcode.STATISTICS:
                 contents.expected = Statistics.read(_stream(body)).message_count
             else:
@@ -196,27 +195,31 @@ def _read_cut_chunk(rest: bytes, contents: _Contents) -> str:
     return f", {len(contents.messages) - before} messages of the chunk that was cut are readable"
 
 
-def _by_topic(contents: _Contents) -> dict[str, Topic]:
-    by_channel: dict[int, list[tuple[int, bytes]]] = {}
-    for channel, log_time, data in contents.messages:
-        by_channel.setdefault(channel, []).append((log_time, data))
-    topics = {}
-    for channel_id, rows in by_channel.items():
+def _by_topic(contents: _Contents, damage: list[str]) -> dict[str, Topic]:
+    """Messages by topic, of all its channels: a recorder opens one for each publisher.
+
+    A topic has one schema and encoding, those of most of its messages; others are left out, and that is said.
+    """
+    by_topic: dict[str, dict[tuple, list[tuple[int, bytes]]]] = {}
+    for channel_id, log_time, data in contents.messages:
         channel = contents.channels.get(channel_id)
         if channel is None:
             continue
         schema = contents.schemas.get(channel.schema_id)
+        said = (schema.name, schema.encoding, schema.data) if schema else ("", "", b"")
+        kind = (*said, channel.message_encoding)
+        by_topic.setdefault(channel.topic, {}).setdefault(kind, []).append((log_time, data))
+    topics = {}
+    for name, kinds in by_topic.items():
+        (schema, schema_encoding, definition, encoding), rows = max(kinds.items(), key=lambda item: len(item[1]))
+        for kind, others in kinds.items():
+            if others is not rows:
+                left = f"{len(others)} messages of another schema ({kind[0] or 'none'}, {kind[3]}) left out"
+                damage.append(f"{name}: {left}, {len(rows)} are {schema or 'none'}, {encoding}")
         times = np.array([time for time, _ in rows], np.int64)
         order = np.argsort(times, kind="stable")
-        topics[channel.topic] = Topic(
-            channel.topic,
-            schema.name if schema else "",
-            schema.encoding if schema else "",
-            schema.data if schema else b"",
-            channel.message_encoding,
-            [rows[i][1] for i in order],
-            times[order],
-        )
+        messages = [rows[i][1] for i in order]
+        topics[name] = Topic(name, schema, schema_encoding, definition, encoding, messages, times[order])
     return topics
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.recording.intake import Findings
+from trunkline.recording.checks import Findings
 from trunkline.recording.smoothing import noise_level
 from trunkline.recording.take import Take
 

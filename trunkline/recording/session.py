@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
 from yaml import YAMLError
 
 from trunkline.errors import InputError
@@ -48,6 +48,12 @@ class FixedBase(Entry):
     position: Vector
     quaternion: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
 
+    @model_validator(mode="after")
+    def _rotation(self):
+        if self.quaternion is not None and np.linalg.norm(self.quaternion) < 1e-6:
+            raise ValueError("quaternion: found norm zero, expected (w, x, y, z) of a rotation")
+        return self
+
 
 class Topics(Entry):
     """Topic names; what is left out is found by its schema. poses: one topic, or body to topic."""
@@ -78,21 +84,35 @@ class TrialEntry(Entry):
 
 
 class Session(Entry):
-    """base: the body that marks the mount, or its pose. segments: name in the log to name in the model.
+    """base: the body that marks the mount, or its pose. segments, tendons: name in the log to name in the model.
 
-    bodies, tendons: names of the poses and of the joints, in order, where messages hold them without names.
+    bodies: names of the poses, in order, where messages hold them without. A list of tendons does the same for numbers.
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
-    that the stamps show.
+    that the stamps show. With `log`, commands and tendon positions are dated by it too.
     """
 
     frame: Frame
     base: str | FixedBase
     segments: dict[str, str] | None = Field(default=None, min_length=1)
+    tendons: dict[str, str] | None = Field(default=None, min_length=1)
     topics: Topics = Topics()
     bodies: list[str] | None = Field(default=None, min_length=1)
-    tendons: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"
     trials: list[TrialEntry] = Field(min_length=1)
+
+    @field_validator("tendons", mode="before")
+    @classmethod
+    def _by_place(cls, names):
+        return {str(place): name for place, name in enumerate(names, 1)} if isinstance(names, list) else names
+
+    @model_validator(mode="after")
+    def _one_to_one(self):
+        for key in ("segments", "tendons"):
+            names = list((getattr(self, key) or {}).values())
+            twice = next((name for name in names if names.count(name) > 1), None)
+            if twice is not None:
+                raise ValueError(f"{key}: found {twice!r} twice, expected each name of the model once")
+        return self
 
 
 def read_session(folder: Path) -> Session:
@@ -119,16 +139,12 @@ def read_session(folder: Path) -> Session:
     for index, trial in enumerate(session.trials):
         if trial.file not in logs:
             close = difflib.get_close_matches(trial.file, logs, n=1) or logs[:1]
-            expected = f"one of the folder's {len(logs)} logs" + (
-                f", such as {close[0]}" if close else ""
-            )
+            expected = f"one of the folder's {len(logs)} logs" + (f", such as {close[0]}" if close else "")
             raise InputError(f"{path}: trials.{index}.file: found {trial.file!r}, expected {expected}")
     names = [trial.name for trial in session.trials]
     for index, name in enumerate(names):
         if name in names[:index]:
-            raise InputError(
-                f"{path}: trials.{index}.name: found {name!r} again, expected each name once"
-            )
+            raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
     return session
 
 
@@ -136,7 +152,7 @@ def _describe(error: ValidationError) -> str:
     """The first problem in one line, and how many more there are."""
     problems = error.errors()
     # a union reports each of its branches; the deepest says what is wrong within the branch that was meant
-    problem = max(problems, key=lambda p: (p["type"] == "extra_forbidden", -problems.index(p)))
+    problem = max(problems, key=lambda p: (p["type"] in ("extra_forbidden", "value_error"), -problems.index(p)))
     key = ".".join(str(part) for part in problem["loc"]) or "the file"
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     if problem["type"] == "missing":
@@ -144,6 +160,7 @@ def _describe(error: ValidationError) -> str:
     if problem["type"] == "extra_forbidden":
         return f"{key}: unknown key{more}"
     if problem["type"] == "value_error":
-        return f"{key}: {problem['msg'].removeprefix('Value error, ')}{more}"
+        key = f"{key}: " if problem["loc"] else ""
+        return f"{key}{problem['msg'].removeprefix('Value error, ')}{more}"
     expected = problem["msg"].removeprefix("Input should be ")
     return f"{key}: found {problem['input']!r}, expected {expected}{more}"

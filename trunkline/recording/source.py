@@ -16,13 +16,17 @@ COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "positio
 
 @dataclass
 class Source:
-    """One log, decoded. log: without its messages, which are decoded. pose_topic: for people to read."""
+    """One log, decoded. log: without its messages, which are decoded. pose_topic: for people to read.
+
+    joint_topics: all whose schema is in `JOINTS`.
+    """
 
     log: Log
     pose_topic: str
     poses: PoseStream
     commands: JointStream | None
     tendon_positions: JointStream | None
+    joint_topics: tuple[str, ...]
 
 
 def open_log(path: Path, session: Session) -> Source:
@@ -35,10 +39,10 @@ def open_log(path: Path, session: Session) -> Source:
     topics = pose_topics(log, session.topics.poses)
     if not topics:
         found = ", ".join(f"{t.name} ({t.schema})" for t in log.topics.values()) or "no readable message"
+        wanted = session.topics.poses
+        named = "" if wanted is None else f"{wanted!r} of session.yaml with "
         damage = f"; the log is damaged: {'; '.join(log.damage)}" if log.damage else ""
-        raise InputError(
-            f"{path}: no pose topic, found {found}{damage}, expected one of {', '.join(POSES)}"
-        )
+        raise InputError(f"{path}: no pose topic, found {found}{damage}, expected {named}one of {', '.join(POSES)}")
     name = ", ".join(topic.name for topic in topics.values())
     where = f"{path}: {name}"
     poses = _understood(where, pose_stream, topics, session.bodies, session.frame.name)
@@ -58,15 +62,16 @@ def open_log(path: Path, session: Session) -> Source:
         (session.topics.tendon_positions, "tendon position", POSITION_WORDS),
     ):
         topic = choose(log, wanted, JOINTS, role, words)
-        stream = topic and _understood(f"{path}: {topic.name}", joint_stream, topic, session.tendons)
-        if stream is not None and stream.unnamed is not None:
+        stream = topic and _understood(f"{path}: {topic.name}", joint_stream, topic)
+        if stream is not None and stream.unnamed is not None and session.tendons is None:
             found = f"found {stream.unnamed} numbers without names"
             raise InputError(
                 f"{path}: {topic.name}: {found}, expected `tendons` in session.yaml to name them, in order"
             )
         joints.append(stream)
+    joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
-    return Source(log, name, poses, *joints)
+    return Source(log, name, poses, *joints, joint_topics)
 
 
 def pose_topics(log: Log, wanted: str | dict[str, str] | None) -> dict[str | None, Topic]:
@@ -92,16 +97,12 @@ def choose(
         topic = log.topics.get(name)
         if topic is not None and short_name(topic.schema) not in registry:
             expected = ", ".join(registry)
-            raise InputError(
-                f"{log.path}: {name}: found {topic.schema}, expected a {role} schema: {expected}"
-            )
+            raise InputError(f"{log.path}: {name}: found {topic.schema}, expected a {role} schema: {expected}")
         return topic
     told = _best(log, registry, wanted)
     if len(told) > 1:
         found = ", ".join(topic.name for topic in told)
-        raise InputError(
-            f"{log.path}: {role} topic: found {found}, expected one, or its name in session.yaml: topics"
-        )
+        raise InputError(f"{log.path}: {role} topic: found {found}, expected one, or its name in session.yaml: topics")
     return told[0] if told else None
 
 

@@ -40,6 +40,7 @@ class JointStream:
     timed: whether the messages have stamps; without, stamps are the log times. unnamed: as for poses.
     """
 
+    topic: str
     stamps: np.ndarray
     log_times: np.ndarray
     names: tuple[str, ...]
@@ -103,8 +104,8 @@ def pose_stream(
     return stream
 
 
-def joint_stream(topic: Topic, tendons: Sequence[str] | None = None) -> JointStream:
-    """All messages of a topic whose schema is in `JOINTS`; `tendons` names the numbers where messages do not.
+def joint_stream(topic: Topic) -> JointStream:
+    """All messages of a topic whose schema is in `JOINTS`; numbers without names go by their place, from 1.
 
     Raises:
         ValueError: the messages cannot be read at all.
@@ -116,7 +117,7 @@ def joint_stream(topic: Topic, tendons: Sequence[str] | None = None) -> JointStr
             positions = joints.positions.reshape(rows.size, joints.positions.shape[-1])
         except READING:
             continue
-        names = joints.names if joints.names is not None else tendons
+        names = joints.names
         if names is None:
             unnamed = max(unnamed or 0, positions.shape[1])
             names = [str(number + 1) for number in range(positions.shape[1])]
@@ -132,6 +133,7 @@ def joint_stream(topic: Topic, tendons: Sequence[str] | None = None) -> JointStr
         if timed:
             stamps[rows] = time
     return JointStream(
+        topic.name,
         stamps[kept],
         topic.log_times[kept],
         names,

@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from trunkline.recording.trial import columns_of, long_table, pose_table, stack
+from trunkline.recording.trial import long_table, pose_table, read_tables, stack
 
 BASE = "base"  # the base body's name in poses.parquet
 
@@ -100,12 +100,10 @@ def write_takes(folder: Path, takes: list[Take]) -> None:
 
 
 def read_takes(folder: Path) -> list[Take]:
-    """The takes that `write_takes` wrote into `folder`, in the same order."""
-    folder = Path(folder)
-    poses = columns_of(pq.read_table(folder / "poses.parquet"))
-    pulls = columns_of(pq.read_table(folder / "commands.parquet"))
+    """The takes that `write_takes` wrote into `folder`, in the same order. Raises InputError as `read_tables`."""
+    rows, poses, pulls = read_tables(folder, "ingest")
     takes, pose_row, pull_row = [], 0, 0
-    for row in pq.read_table(folder / "trials.parquet").to_pylist():
+    for row in rows:
         shape = (row["frames"], 1 + len(row["segments"]))
         pose = {key: column[pose_row : pose_row + shape[0] * shape[1]] for key, column in poses.items()}
         pose_row += shape[0] * shape[1]

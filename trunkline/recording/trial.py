@@ -11,6 +11,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from trunkline.errors import InputError
+
 EXPERIMENTS = ("static_tilt", "release", "curl")
 SPLITS = ("identify", "validate")
 
@@ -87,19 +89,15 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
     ]
     pq.write_table(pa.concat_tables(poses), Path(folder) / "poses.parquet")
     commands = [
-        long_table(
-            t.name, t.time, "tendon", t.tendons, {"command": t.commands, "position": t.tendon_positions}
-        )
+        long_table(t.name, t.time, "tendon", t.tendons, {"command": t.commands, "position": t.tendon_positions})
         for t in trials
     ]
     pq.write_table(pa.concat_tables(commands), Path(folder) / "commands.parquet")
 
 
 def read_trials(folder: Path) -> list[Trial]:
-    """The trials that `write_trials` wrote into `folder`, in the same order."""
-    rows = pq.read_table(Path(folder) / "trials.parquet").to_pylist()
-    poses = columns_of(pq.read_table(Path(folder) / "poses.parquet"))
-    commands = columns_of(pq.read_table(Path(folder) / "commands.parquet"))
+    """The trials that `write_trials` wrote into `folder`, in the same order. Raises InputError as `read_tables`."""
+    rows, poses, commands = read_tables(folder, "filter")
     trials, pose_row, command_row = [], 0, 0
     for row in rows:
         shape = (row["frames"], len(row["segments"]))
@@ -128,6 +126,26 @@ def read_trials(folder: Path) -> list[Trial]:
             )
         )
     return trials
+
+
+def read_tables(folder: Path, stage: str) -> tuple[list[dict], dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Rows of trials.parquet, columns of poses.parquet and of commands.parquet, which `stage` writes.
+
+    Raises:
+        InputError: one is missing or no such table.
+    """
+    tables = []
+    for name in ("trials", "poses", "commands"):
+        path = Path(folder) / f"{name}.parquet"
+        expected = f"expected what the {stage} stage writes (run `dvc repro {stage}`)"
+        if not path.is_file():
+            raise InputError(f"{path}: no such file, {expected}")
+        try:
+            tables.append(pq.read_table(path))
+        except pa.ArrowInvalid as error:
+            raise InputError(f"{path}: not readable as Parquet, {expected}") from error
+    trials, poses, commands = tables
+    return trials.to_pylist(), columns_of(poses), columns_of(commands)
 
 
 def pose_table(

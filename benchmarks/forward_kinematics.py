@@ -1,0 +1,56 @@
+"""Forward kinematics side by side: solving for equilibria against stepping MuJoCo until it rests.
+
+    python -m benchmarks.forward_kinematics [arm.xml]
+
+Same arm, same targets, same threads (TRUNKLINE_THREADS). Compilation is not counted.
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+
+from trunkline.frames import gravity_in_base
+from trunkline.kinematics.chain import load_model, read_chain
+from trunkline.kinematics.sampling import pull_directions, sample_angle
+from trunkline.kinematics.settle import settle
+from trunkline.kinematics.statics import equilibrium, forward
+from trunkline.threads import thread_count
+
+SETTLED, SOLVED, DIRECTIONS, STEPS = 48, 1000, 72, 100
+
+
+def main(path: Path) -> None:
+    model = load_model(path)
+    chain = read_chain(model)
+    rng = np.random.default_rng(0)
+    tensions = pull_directions(chain, rng.uniform(0, 2 * np.pi, SOLVED)) * rng.uniform(0, 1, (SOLVED, 1)) ** 2
+    gravity = gravity_in_base(rng.uniform(0, np.radians(120), SOLVED))
+    rest = equilibrium(chain, tensions, gravity)
+    forward(chain, rest.lengths[:2], gravity[:2])  # compiles
+    sample_angle(chain, 0.5, 8, 8, rng)
+
+    print(f"{path}: {chain.units} units, {chain.tendons} tendons, {thread_count()} threads")
+    few = slice(0, SETTLED)
+    commands = rest.lengths[few] - tensions[few] / chain.gain
+    settled = timed("MuJoCo stepped until it rests", SETTLED, lambda: settle(model, commands, gravity[few]))
+    timed("statics, tensions given, from rest", SOLVED, lambda: equilibrium(chain, tensions, gravity))
+    found = timed("statics, lengths given, from rest", SOLVED, lambda: forward(chain, rest.lengths, gravity))
+    count = DIRECTIONS * STEPS + 8 * STEPS
+    timed("statics, along paths (as fk_dataset)", count, lambda: sample_angle(chain, 0.5, DIRECTIONS, STEPS, rng))
+    deviation = np.linalg.norm(settled.position - found.position[few], axis=1) * 1e3
+    print(f"tips of the first and the third: median {np.median(deviation):.2g} mm, max {deviation.max():.2g} mm apart")
+
+
+def timed(name: str, count: int, work):
+    """Run `work`, print its rate, return its result."""
+    started = time.perf_counter()
+    result = work()
+    seconds = time.perf_counter() - started
+    print(f"{name:40s} {count / seconds:12.1f} samples/s   ({count} in {seconds:.2f} s)")
+    return result
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "artifacts/identify_control/arm.xml"))

@@ -1,0 +1,90 @@
+"""The experiments of the paper's table, as a plan: which trials there are, and which are kept for validation."""
+
+from dataclasses import dataclass
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+
+Tilt = Annotated[float, Field(ge=0, le=180)]
+Azimuth = Annotated[float, Field(ge=0, lt=360)]
+Group = Annotated[list[PositiveInt], Field(min_length=1)]
+
+
+@dataclass
+class Experiments:
+    """The list of trials. Angles in degrees, levels in mm, times in s, forces in N.
+
+    mount_position: m, of the arm's mount in the world.
+    tilts: each recorded `tilt_repeats` times at rest for `rest_duration`, after a hand has steadied the arm for
+    `settle` (all damping `steady_factor` times as large); the mount is set to within `tilt_scatter_deg` about
+    both horizontal axes.
+    release_directions: azimuths (deg from +x) to which the arm is bent, with a pull of `release_pull` N times one
+    of `release_factors` in turn, growing over `bend_duration`; recorded `bend_settle` later for `hold_duration`
+    of hold and `release_duration` after letting go.
+    curl_levels: pulled by each of `curl_tendons` (lists of tendons pulled together); a cycle is `curl_rest`, a
+    ramp of `curl_ramp`, a hold of `curl_hold`, the ramp back and a rest of `curl_hold`.
+    validate_every: about one in so many trials of each experiment is in the validate split.
+    """
+
+    mount_position: tuple[float, float, float]
+    tilts: Annotated[list[Tilt], Field(min_length=1)]
+    tilt_repeats: PositiveInt
+    tilt_scatter_deg: NonNegativeFloat
+    settle: PositiveFloat
+    steady_factor: Annotated[float, Field(ge=1)]
+    rest_duration: PositiveFloat
+    release_directions: Annotated[list[Azimuth], Field(min_length=1)]
+    release_pull: PositiveFloat
+    release_factors: Annotated[list[PositiveFloat], Field(min_length=1)]
+    bend_duration: PositiveFloat
+    bend_settle: PositiveFloat
+    hold_duration: PositiveFloat
+    release_duration: PositiveFloat
+    curl_levels: Annotated[list[PositiveFloat], Field(min_length=1)]
+    curl_tendons: Annotated[list[Group], Field(min_length=1)]
+    curl_rest: PositiveFloat
+    curl_ramp: PositiveFloat
+    curl_hold: PositiveFloat
+    validate_every: Annotated[int, Field(ge=2)]
+
+
+class Trial(NamedTuple):
+    """A trial to be recorded; `level` as the session names it, None where it has none."""
+
+    name: str
+    experiment: str
+    level: float | None
+    split: str
+
+
+def tilt_trials(experiments: Experiments) -> list[Trial]:
+    """All tilts, once a repeat; every repeat leaves out another tilt, so that each is validated in turn."""
+    return [
+        Trial(f"tilt_{tilt:03.0f}_{chr(ord('a') + repeat)}", "static_tilt", tilt, _split(repeat, index, experiments))
+        for repeat in range(experiments.tilt_repeats)
+        for index, tilt in enumerate(experiments.tilts)
+    ]
+
+
+def release_trials(experiments: Experiments) -> list[Trial]:
+    """One a direction."""
+    last = experiments.validate_every - 1
+    return [
+        Trial(f"release_{azimuth:03.0f}", "release", None, _split(last, index, experiments))
+        for index, azimuth in enumerate(experiments.release_directions)
+    ]
+
+
+def curl_trials(experiments: Experiments) -> list[Trial]:
+    """All levels, once a group of tendons; every group leaves out other levels, so that all are identified from."""
+    return [
+        Trial(f"curl_{'_'.join(map(str, group))}_{level:03.0f}", "curl", level, _split(row, index, experiments))
+        for row, group in enumerate(experiments.curl_tendons)
+        for index, level in enumerate(experiments.curl_levels)
+    ]
+
+
+def _split(row: int, index: int, experiments: Experiments) -> str:
+    """One in every `validate_every` trials of a row is for validation, in each row one further along."""
+    every = experiments.validate_every
+    return "validate" if index % every == row % every else "identify"

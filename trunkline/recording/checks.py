@@ -1,0 +1,52 @@
+"""What a trial must have, and what is said about one that had to be repaired."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.recording.clock import FrameFit, OffsetFit
+
+
+@dataclass
+class Limits:
+    """What a trial must have. duration: s. coverage: share of frames in which a body is seen.
+
+    disorder: s by which a stamp may be behind one before it and still be sorted in.
+    clock_offset: s, the largest looked for between motors and cameras.
+    """
+
+    duration: float
+    coverage: float
+    disorder: float
+    clock_offset: float
+
+
+@dataclass
+class Findings:
+    """What came out about a take. repairs, warnings: one sentence each; what a warning names is left as it is.
+
+    frames: stamps over frame numbers. logged: stamps over log times in s. offset: of the motors' clock.
+    """
+
+    repairs: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    frames: FrameFit | None = None
+    logged: FrameFit | None = None
+    offset: OffsetFit | None = None
+
+
+def in_order(stamps: np.ndarray, disorder: float, where: str, findings: Findings) -> np.ndarray:
+    """Rows in the order of time, each instant once; refused if time runs back by more than `disorder` s."""
+    back = np.maximum.accumulate(stamps) - stamps
+    if back.max(initial=0) > disorder * 1e9:
+        worst = int(np.argmax(back > disorder * 1e9))
+        found = f"time runs backwards by {back[worst] * 1e-9:.3f} s at message {worst}"
+        raise InputError(f"{where}: {found}, expected no step back beyond {disorder:g} s")
+    rows = np.argsort(stamps, kind="stable")
+    if np.any(back > 0):
+        findings.repairs.append(f"{int(np.sum(back > 0))} frames out of order sorted by their stamps")
+    fresh = np.diff(stamps[rows], prepend=stamps[rows[0]] - 1) > 0
+    if not fresh.all():
+        findings.repairs.append(f"{int(np.sum(~fresh))} frames with a stamp that was there already dropped")
+    return rows[fresh]

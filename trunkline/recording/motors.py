@@ -1,0 +1,132 @@
+"""The tendons of a trial: commands and measured positions around its frames."""
+
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.recording.checks import Findings, Limits, in_order
+from trunkline.recording.messages import JOINTS
+from trunkline.recording.session import Session
+from trunkline.recording.source import Source
+from trunkline.recording.streams import JointStream
+
+ROLES = ("command", "tendon position")
+
+
+def read_motors(
+    source: Source,
+    session: Session,
+    epoch: int,
+    logged: int,
+    time: np.ndarray,
+    limits: Limits,
+    where: str,
+    findings: Findings,
+) -> tuple[tuple[str, ...], list[np.ndarray]]:
+    """K tendon names, and [command time, commands (Tc, K), tendon time, tendon positions (Tm, K)], s and m.
+
+    Args: epoch, logged: ns, the stamp of the trial's first frame and when the recorder had it; time (T,) s from there.
+
+    Raises:
+        InputError: the tendons of a topic are not those of session.yaml, or of the other topic.
+    """
+    streams = [source.commands, source.tendon_positions]
+    tendons = next((stream.names for stream in streams if stream is not None), ())
+    if session.tendons is not None:
+        tendons = tuple(session.tendons.values())
+    recorder = _by_recorder(source, session)
+    arrays = []
+    for stream, role in zip(streams, ROLES, strict=True):
+        if stream is None or not len(stream.stamps):
+            arrays += [np.empty(0), np.empty((0, len(tendons)))]
+            continue
+        columns = _columns(stream, session.tendons, tendons, f"{where}: {role} topic")
+        stamps = _stamps(stream, recorder, epoch - logged)
+        if recorder and session.clock != "log":
+            findings.repairs.append(f"{role} messages dated by the recorder's clock, as not all have stamps")
+        rows = in_order(stamps, limits.disorder, f"{where}: {role} topic", findings)
+        seconds = (stamps[rows] - epoch) * 1e-9
+        pulls = stream.positions[rows][:, columns]
+        near = (seconds > -limits.clock_offset) & (seconds < time[-1] + limits.clock_offset)
+        finite = np.isfinite(pulls).all(axis=1)
+        if not finite.all():
+            findings.repairs.append(f"{int(np.sum(~finite))} {role} messages that are not finite dropped")
+        arrays += [seconds[near & finite], pulls[near & finite]]
+    return tuple(tendons), arrays
+
+
+def check_curl(
+    source: Source,
+    session: Session,
+    joint_topics: tuple[str, ...],
+    motors: list[np.ndarray],
+    epoch: int,
+    logged: int,
+    time: np.ndarray,
+    limits: Limits,
+    where: str,
+) -> None:
+    """A curl needs commands or tendon positions: raises InputError with what there is instead.
+
+    Args: joint_topics: of all logs of the session. motors: from `read_motors`.
+    """
+    kind = ", ".join(JOINTS)
+    others = f"{', '.join(joint_topics) or 'none'} ({kind})"
+    for key in ("commands", "tendon_positions"):
+        name = getattr(session.topics, key)
+        if name is not None and name not in joint_topics:
+            raise InputError(f"{where}: topics.{key}: found {name!r}, which no log has, expected one of: {others}")
+    if any(pulls.size for pulls in motors[1::2]):
+        return
+    recorder = _by_recorder(source, session)
+    found = [
+        f"no {role} topic"
+        if stream is None
+        else f"{len(stream.stamps)} messages on {stream.topic}{_distance(stream, recorder, epoch, logged, time)}"
+        for stream, role in zip((source.commands, source.tendon_positions), ROLES, strict=True)
+    ]
+    expected = f"expected commands or tendon positions within {limits.clock_offset:g} s of the poses"
+    topics = (
+        f" among: {', '.join(source.joint_topics) or 'none'} ({kind})"
+        if not any((source.commands, source.tendon_positions))
+        else ""
+    )
+    raise InputError(f"{where}: found {' and '.join(found)}{topics}, {expected}")
+
+
+def _by_recorder(source: Source, session: Session) -> bool:
+    """Whether the recorder's clock dates commands and positions: where that is meant, or one of them has no other."""
+    streams = [stream for stream in (source.commands, source.tendon_positions) if stream is not None]
+    return session.clock == "log" or any(not s.timed or not s.stamps.any() for s in streams if len(s.stamps))
+
+
+def _stamps(stream: JointStream, recorder: bool, shift: int) -> np.ndarray:
+    """When each message was sent, ns: by its header, or by the recorder, whose clock is `shift` ns behind."""
+    return stream.log_times + shift if recorder else stream.stamps
+
+
+def _columns(stream: JointStream, mapped: dict[str, str] | None, tendons: tuple[str, ...], where: str) -> list[int]:
+    """Where each of `tendons` is in the stream. With a map, a topic may carry either name, and further joints."""
+    names = list(stream.names)
+    if mapped is None:
+        if set(names) != set(tendons):
+            expected = f"expected {', '.join(tendons)} as in the other topic"
+            raise InputError(f"{where}: found {', '.join(names)}, {expected}")
+        return [names.index(name) for name in tendons]
+    columns = []
+    for logged, tendon in mapped.items():
+        if logged not in names and tendon not in names:
+            raise InputError(f"{where}: found {', '.join(names)}, expected {logged!r} as in session.yaml: tendons")
+        columns.append(names.index(logged if logged in names else tendon))
+    return columns
+
+
+def _distance(stream: JointStream, recorder: bool, epoch: int, logged: int, time: np.ndarray) -> str:
+    """How far the stream's nearest message is from the trial, in words; nothing where it has none."""
+    if not len(stream.stamps):
+        return ""
+    seconds = (_stamps(stream, recorder, epoch - logged) - epoch) * 1e-9
+    apart = np.maximum(np.maximum(-seconds, seconds - time[-1]), 0)
+    nearest = int(apart.argmin())
+    if apart[nearest] == 0:
+        return ", none finite"
+    return f", {apart[nearest]:.3f} s {'before' if seconds[nearest] < 0 else 'after'} the poses"
