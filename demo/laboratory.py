@@ -110,8 +110,9 @@ def record_curls(plant, motors: Motors, experiments: Experiments, tendons: int, 
     for index, trial in enumerate(trials):
         truth = view.truth(trial, Rotation.identity(), paths[index])
         truth.tendons = tuple(f"tendon_{k + 1}" for k in range(tendons))
-        truth.command_time, truth.commands = time[::stride], commands[index, ::stride]
-        truth.tendon_positions = wound[index, ::stride]
+        sampled = slice(None, len(truth.time) * stride, stride)
+        truth.command_time, truth.commands = time[sampled], commands[index, sampled]
+        truth.tendon_positions = wound[index, sampled]
         truths.append(truth)
     return truths
 

@@ -26,7 +26,7 @@ CONFIG = load_config(Config, "record", DEMO)
 SHORT = replace(
     CONFIG.experiments, tilts=[0.0, 90.0], tilt_repeats=1, settle=0.05, rest_duration=0.05,
     release_directions=[0.0, 90.0], bend_duration=0.05, bend_settle=0.02, hold_duration=0.033, release_duration=0.1,
-    curl_levels=[20.0], curl_tendons=[[1]], curl_rest=0.05, curl_ramp=0.1, curl_hold=0.05,
+    curl_levels=[20.0], curl_tendons=[[1]], curl_rest=0.0515, curl_ramp=0.1, curl_hold=0.05,
 )  # fmt: skip
 
 
@@ -50,6 +50,13 @@ def test_a_seed_is_one_session_and_another_seed_is_another():
         np.testing.assert_array_equal(a.tendon_positions, b.tendon_positions)
         assert np.abs(a.positions[-1] - c.positions[-1]).max() > 1e-6, a.name
     assert np.abs(first[0].base_quaternion - other[0].base_quaternion).max() > 1e-4
+
+
+def test_every_array_of_a_trial_is_on_its_clock():
+    """Also where a duration is not a whole number of samples, as the session's are not."""
+    for truth in session(1):
+        assert len(truth.time) == len(truth.positions) == len(truth.quaternions) == len(truth.tendon_positions)
+        assert len(truth.command_time) == len(truth.commands)
 
 
 def test_motors_lag_behind_their_commands():
