@@ -376,9 +376,9 @@ def test_float_arrays_count_by_log_time(tmp_path):
     rewrite_motors(original, log)
     ((_, refused, _),) = take_in(tmp_path, read_session(tmp_path), limits)
     assert "/tendon_commands: found 3 numbers without names, expected `tendons`" in str(refused)
-    session = read_session(tmp_path)
-    session.tendons = {"1": "tendon_1", "2": "tendon_2", "3": "tendon_3"}
-    ((_, take, found),) = take_in(tmp_path, session, limits)
+    with open(tmp_path / "session.yaml", "a") as file:
+        file.write("tendons: [tendon_1, tendon_2, tendon_3]\n")
+    ((_, take, found),) = take_in(tmp_path, read_session(tmp_path), limits)
     assert take.tendons == stamped.tendons
     # the recorder dates all messages by one clock, so that of the offset of 137 ms only the delivery's jitter is left
     pulls = np.interp(take.command_time, stamped.command_time - 0.137, stamped.commands[:, 0])
