@@ -9,7 +9,7 @@ from trunkline.config import settings
 from trunkline.errors import InputError
 from trunkline.plots import save_figure
 from trunkline.progress import progress
-from trunkline.recording.intake import Limits, align_clocks, take_in
+from trunkline.recording.intake import Limits, align_clocks, settle_vertical, take_in
 from trunkline.recording.plots import quality_figure
 from trunkline.recording.quality import judge, report, summary
 from trunkline.recording.session import read_session
@@ -50,6 +50,7 @@ def main(config: Config) -> None:
         raise InputError(
             f"{folder}: all {len(refused)} trials refused, the first: {next(iter(refused.values()))}"
         )
+    settle_vertical(takes, findings, session)
     offset, spread = align_clocks(takes, [found.offset for found in findings])
     qualities = [judge(take, found) for take, found in zip(takes, findings, strict=True)]
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:

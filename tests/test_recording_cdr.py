@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from mcap_ros2.decoder import DecoderFactory
 
-from demo.recorder import JOINT_STATE, RIGID_BODIES
 from tests.sessions import curl_truth, instruments, record
 from trunkline.recording.cdr import decode, parse_definition, short_name
+from trunkline.recording.definitions import JOINT_STATE, RIGID_BODIES
 from trunkline.recording.log import read_log
 from trunkline.recording.messages import JOINTS, POSES
 
@@ -19,7 +19,7 @@ class Schema:
             1,
             topic.schema,
             "ros2msg",
-            topic.definition.encode(),
+            topic.definition,
         )
 
 
@@ -38,7 +38,7 @@ def test_batches_equal_the_reference_decoder(log, name):
     reference = DecoderFactory().decoder_for("cdr", Schema(topic))
     count, layouts = 0, 0
     for rows, message in decode(
-        topic.messages, topic.schema, parse_definition(topic.schema, topic.definition)
+        topic.messages, topic.schema, parse_definition(topic.schema, topic.definition.decode())
     ):
         batch = reader(message)
         layouts += 1
@@ -92,7 +92,7 @@ def test_big_endian_markers_and_padding():
 def test_messages_that_do_not_fit_are_left_out(log):
     topic = log.topics["/tendon_states"]
     broken = [*topic.messages[:5], topic.messages[0][:-3], b"", b"\0\1\0\0" + b"\xff" * 60]
-    definitions = parse_definition(topic.schema, topic.definition)
+    definitions = parse_definition(topic.schema, topic.definition.decode())
     kept = np.concatenate([rows for rows, _ in decode(broken, topic.schema, definitions)])
     assert sorted(kept) == [0, 1, 2, 3, 4]
 

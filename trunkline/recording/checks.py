@@ -24,10 +24,15 @@ class Limits:
 
 @dataclass
 class Findings:
-    """What came out about a take. repairs: one sentence each. offset: of the motors' clock."""
+    """What came out about a take. repairs, warnings: one sentence each; what a warning names is left as it is.
+
+    frames: stamps over frame numbers. logged: stamps over log times in s. offset: of the motors' clock.
+    """
 
     repairs: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     frames: FrameFit | None = None
+    logged: FrameFit | None = None
     offset: OffsetFit | None = None
 
 

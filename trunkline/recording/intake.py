@@ -1,6 +1,7 @@
 """From the logs of a session to checked takes: what is usable, what was repaired, what had to be refused."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +18,29 @@ from trunkline.recording.clock import (
     first_motion_offset,
     fit_frames,
 )
+from trunkline.recording.frozen import frozen
 from trunkline.recording.motors import check_curl, read_motors
 from trunkline.recording.session import FixedBase, Session, TrialEntry
 from trunkline.recording.source import Source, open_log
 from trunkline.recording.streams import PoseStream
+from trunkline.recording.swaps import find_swaps, usual_distances
 from trunkline.recording.take import Take
+from trunkline.recording.units import extent, likely_unit
+from trunkline.recording.vertical import check_vertical
 
 UNIT = {"m": 1.0, "mm": 1e-3}
 NORM_TOLERANCE = 0.01  # of a quaternion's length; float32 rounding is far below, anything above is no rotation
+
+
+@dataclass
+class Arm:
+    """What all logs together say. scale: m per unit of their positions. distances: between the base and the segments,
+    see `usual_distances`; None where there is too little to compare. note: on the unit, where it is not the declared.
+    """
+
+    scale: float
+    distances: np.ndarray | None
+    note: str | None
 
 
 def take_in(folder: Path, session: Session, limits: Limits) -> Iterator[tuple[TrialEntry, Take | InputError, Findings]]:
@@ -36,11 +52,12 @@ def take_in(folder: Path, session: Session, limits: Limits) -> Iterator[tuple[Tr
     for trial in session.trials:
         if trial.file not in logs:
             try:
-                logs[trial.file] = open_log(folder / trial.file, session.topics)
+                logs[trial.file] = open_log(folder / trial.file, session)
             except InputError as error:
                 logs[trial.file] = error
     sources = [source for source in logs.values() if isinstance(source, Source)]
     segments = _segments(session, sources)
+    arm = _arm(session, sources, segments)
     joint_topics = tuple(sorted({name for source in sources for name in source.joint_topics}))
     for trial in session.trials:
         source, findings = logs[trial.file], Findings()
@@ -48,7 +65,7 @@ def take_in(folder: Path, session: Session, limits: Limits) -> Iterator[tuple[Tr
             yield trial, source, findings
             continue
         try:
-            yield trial, _take(source, trial, session, segments, joint_topics, limits, findings), findings
+            yield trial, _take(source, trial, session, segments, arm, joint_topics, limits, findings), findings
         except InputError as error:
             yield trial, error, findings
 
@@ -68,6 +85,16 @@ def align_clocks(takes: list[Take], fits: list[OffsetFit | None]) -> tuple[float
     return offset, spread
 
 
+def settle_vertical(takes: list[Take], findings: list[Findings], session: Session) -> None:
+    """Give every take the vertical that its session's tilts prove, and say so; or say what looks wrong."""
+    up, said = check_vertical(takes, measured_base=not isinstance(session.base, FixedBase))
+    for take, found in zip(takes, findings, strict=True):
+        if up is not None:
+            take.up = up
+        if said is not None:
+            (found.warnings if up is None else found.repairs).append(said)
+
+
 def _segments(session: Session, sources: list[Source]) -> dict[str, str]:
     """Name in the log to name in the model of every segment, in the order of the map, or by name."""
     if session.segments is not None:
@@ -76,11 +103,36 @@ def _segments(session: Session, sources: list[Source]) -> dict[str, str]:
     return {name: name for name in sorted(names)}
 
 
+def _arm(session: Session, sources: list[Source], segments: dict[str, str]) -> Arm:
+    """The unit of the positions, and the usual distances."""
+    fixed = isinstance(session.base, FixedBase)
+    needed = list(segments) if fixed else [session.base, *segments]
+    logs = [
+        source.poses.positions[:, [source.poses.names.index(name) for name in needed]]
+        for source in sources
+        if set(needed) <= set(source.poses.names)
+    ]
+    scale, note = UNIT[session.frame.unit], None
+    found = likely_unit(logs)
+    if found is not None and found != session.frame.unit:
+        scale = UNIT[found]
+        apart = np.median([extent(positions) for positions in logs])
+        note = f"unit: bodies {apart:.4g} apart are no arm in {session.frame.unit}, as declared; taken as {found}"
+    if not logs or len(needed) < 3:
+        return Arm(scale, None, note)
+    logs = [scale * positions for positions in logs]
+    if fixed:
+        mount = np.array(session.base.position)
+        logs = [np.insert(positions, 0, mount, axis=1) for positions in logs]
+    return Arm(scale, usual_distances(logs), note)
+
+
 def _take(
     source: Source,
     trial: TrialEntry,
     session: Session,
     segments: dict[str, str],
+    arm: Arm,
     joint_topics: tuple[str, ...],
     limits: Limits,
     findings: Findings,
@@ -92,9 +144,11 @@ def _take(
     """
     where = f"{source.log.path}: trial {trial.name}"
     findings.repairs += [f"log: {damage}" for damage in source.log.damage]
+    findings.repairs += [] if arm.note is None else [arm.note]
     poses = source.poses
     if poses.undecodable:
         findings.repairs.append(f"{poses.undecodable} messages that do not fit their schema dropped")
+    findings.logged = _log_fit(poses)
     stamps, findings.frames = _stamps(poses, session.clock, where, source.pose_topic)
     rows = in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings)
     epoch = stamps[rows[0]]
@@ -115,7 +169,12 @@ def _take(
         if name not in poses.names:
             raise InputError(f"{where}: {name!r} never appears in {source.pose_topic}, found {', '.join(poses.names)}")
     columns = [poses.names.index(name) for name in needed]
-    positions, quaternions = _good_samples(poses, rows, columns, UNIT[session.frame.unit], needed, findings)
+    positions, quaternions = _good_samples(poses, rows, columns, arm.scale, needed, findings)
+    still = frozen(positions)
+    _count(still, "that only repeat the one before, to the last bit,", needed, findings)
+    positions[still] = np.nan
+    if quaternions is not None:
+        quaternions[still] = np.nan
     seen = np.isfinite(positions[..., 0]).mean(axis=0)
     for name, share in zip(needed, seen, strict=True):
         if share < limits.coverage:
@@ -125,9 +184,12 @@ def _take(
     base_positions, base_quaternions, positions, quaternions = _split_base(
         session, positions, quaternions, f"{where}: {source.pose_topic}"
     )
-    tendons, motors = read_motors(source, session, epoch, time, limits, where, findings)
+    if arm.distances is not None:
+        _untangle(base_positions, positions, quaternions, arm.distances, segments, findings)
+    logged = poses.log_times[rows[0]]
+    tendons, motors = read_motors(source, session, epoch, logged, time, limits, where, findings)
     if trial.experiment == "curl":
-        check_curl(source, session, joint_topics, motors, epoch, time, limits, where)
+        check_curl(source, session, joint_topics, motors, epoch, logged, time, limits, where)
     take = Take(
         trial.name,
         trial.experiment,
@@ -165,6 +227,32 @@ def _stamps(poses: PoseStream, clock: str, where: str, topic: str) -> tuple[np.n
         frames = poses.frames - poses.frames[0]
         return stamps[0] + np.round((fit.start + frames / fit.rate) * 1e9).astype(np.int64), fit
     return stamps, fit
+
+
+def _log_fit(poses: PoseStream) -> FrameFit | None:
+    """Stamps over log times: how the cameras' clock drifts against the recorder's, and how late messages come."""
+    if len(poses.stamps) < 10 or not poses.stamps.any() or not np.ptp(poses.log_times):
+        return None
+    return fit_frames(poses.stamps, (poses.log_times - poses.log_times[0]) * 1e-9)
+
+
+def _untangle(
+    base: np.ndarray,
+    positions: np.ndarray,
+    quaternions: np.ndarray | None,
+    distances: np.ndarray,
+    segments: dict[str, str],
+    findings: Findings,
+) -> None:
+    """Give labels that changed places back, in `positions` and `quaternions`."""
+    names = list(segments)
+    for swap in find_swaps(np.insert(positions, 0, base, axis=1), distances):
+        pair = [swap.first - 1, swap.second - 1]
+        for values in (positions, quaternions):
+            if values is not None:
+                values[np.ix_(swap.frames, pair)] = values[np.ix_(swap.frames, pair[::-1])]
+        count, (one, other) = int(swap.frames.sum()), (names[place] for place in pair)
+        findings.repairs.append(f"{one!r} and {other!r} were taken for each other in {count} frames, put right")
 
 
 def _good_samples(

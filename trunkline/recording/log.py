@@ -5,6 +5,7 @@ data section's. An intact log gives what `mcap.reader.make_reader` gives. From a
 chunks and the readable beginning of a last chunk that was cut off; what is lost is counted and said.
 """
 
+import hashlib
 import struct
 import zlib
 from collections.abc import Iterator
@@ -25,15 +26,17 @@ MAGIC = b"\x89MCAP0\r\n"
 RECORD_HEADER = struct.Struct("<BQ")
 MESSAGE_HEADER = struct.Struct("<HIQQ")
 CHUNK_HEADER = struct.Struct("<QQQI")
+LARGEST_EXPANSION = 1000  # of a chunk's bytes by decompression; poses shrink by less than 20
 
 
 @dataclass
 class Topic:
-    """Messages of one topic in log-time order. log_times: (N,) ns."""
+    """Messages of one topic in log-time order. log_times: (N,) ns. definition: the schema, in `schema_encoding`."""
 
     name: str
     schema: str
-    definition: str
+    schema_encoding: str
+    definition: bytes
     encoding: str
     messages: list[bytes]
     log_times: np.ndarray
@@ -56,6 +59,7 @@ class _Contents:
     channels: dict[int, Channel] = field(default_factory=dict)
     messages: list[tuple[int, int, bytes]] = field(default_factory=list)
     expected: int | None = None  # messages, by the log's own statistics
+    chunks: set[bytes] = field(default_factory=set)  # digests of those read
 
 
 def read_log(path: Path) -> Log:
@@ -74,9 +78,14 @@ def read_log(path: Path) -> Log:
     end = _read_all(data, contents, damage, path)
     if end is not None:
         damage.append(f"cut off at byte {len(data)}" + _read_cut_chunk(data[end:], contents))
-    if contents.expected is not None and contents.expected != len(contents.messages):
+    if contents.expected is not None and contents.expected > len(contents.messages):
         lost = contents.expected - len(contents.messages)
         damage.append(f"{lost} of {contents.expected} messages lost")
+    elif contents.expected is not None and contents.expected < len(contents.messages):
+        damage.append(f"{len(contents.messages)} messages found, of {contents.expected} by the log's statistics")
+    nameless = sum(channel not in contents.channels for channel, *_ in contents.messages)
+    if nameless:
+        damage.append(f"{nameless} messages on channels that nothing describes lost")
     topics = _by_topic(contents, damage)
     return Log(Path(path), topics, damage)
 
@@ -90,7 +99,11 @@ def _read_all(data: bytes, contents: _Contents, damage: list[str], path: Path) -
             if opcode == Opcode.FOOTER and data[end:] == MAGIC:
                 return None
             if opcode == Opcode.CHUNK:
+                digest = hashlib.sha256(body).digest()
+                if digest in contents.chunks:
+                    raise ValueError("it is there twice")
                 _read_records(_chunk_data(body), contents)
+                contents.chunks.add(digest)
             elif opcode == Opcode.DATA_END:
                 crc = DataEnd.read(_stream(body)).data_section_crc
                 if crc and crc != zlib.crc32(data[:position]):
@@ -134,28 +147,36 @@ def _read_record(opcode: int, body: bytes, contents: _Contents) -> None:
         contents.messages.append((channel, log_time, body[MESSAGE_HEADER.size :]))
     elif opcode == Opcode.SCHEMA:
         schema = Schema.read(_stream(body))
-        contents.schemas[schema.id] = schema
+        if contents.schemas.setdefault(schema.id, schema) != schema:
+            raise ValueError(f"schema {schema.id} is described before, and differently")
     elif opcode == Opcode.CHANNEL:
         channel = Channel.read(_stream(body))
-        contents.channels[channel.id] = channel
+        if contents.channels.setdefault(channel.id, channel) != channel:
+            raise ValueError(f"channel {channel.id} is described before, and differently")
 
 
 def _chunk_data(body: bytes) -> bytes:
     """The records in a chunk, checked. Raises ValueError where they are not what was written."""
     chunk = Chunk.read(_stream(body))
-    if chunk.compression == "zstd":
-        data = zstandard.ZstdDecompressor().decompressobj().decompress(chunk.data)
-    elif chunk.compression == "lz4":
-        data = lz4.frame.decompress(chunk.data)
-    elif chunk.compression == "":
-        data = chunk.data
-    else:
-        raise ValueError(f"unknown compression {chunk.compression!r}")
+    data = _decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
     if len(data) != chunk.uncompressed_size:
         raise ValueError(f"{len(data)} bytes, expected {chunk.uncompressed_size}")
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise ValueError("wrong checksum")
     return data
+
+
+def _decompress(compression: str, data: bytes, size: int) -> bytes:
+    """At most `size` + 1 bytes, so that a damaged chunk takes no more memory than an intact one."""
+    if compression == "":
+        return data
+    if size > LARGEST_EXPANSION * len(data):
+        raise ValueError(f"{len(data)} bytes said to expand to {size}")
+    if compression == "zstd":
+        return zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
+    if compression == "lz4":
+        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
+    raise ValueError(f"unknown compression {compression!r}")
 
 
 def _read_cut_chunk(rest: bytes, contents: _Contents) -> str:
@@ -166,12 +187,9 @@ def _read_cut_chunk(rest: bytes, contents: _Contents) -> str:
     try:
         (name_length,) = struct.unpack_from("<I", body, CHUNK_HEADER.size)
         start = CHUNK_HEADER.size + 4 + name_length
-        compression, data = body[start - name_length : start], body[start + 8 :]
-        if compression == b"zstd":
-            data = zstandard.ZstdDecompressor().decompressobj().decompress(data)
-        elif compression == b"lz4":
-            data = lz4.frame.LZ4FrameDecompressor().decompress(data)
-        _read_records(data, contents)
+        compression, data = body[start - name_length : start].decode(), body[start + 8 :]
+        size = min(CHUNK_HEADER.unpack_from(body)[2], LARGEST_EXPANSION * len(data))
+        _read_records(_decompress(compression, data, size), contents)
     except Exception:  # what a cut does to a compressed stream is not specified
         pass
     return f", {len(contents.messages) - before} messages of the chunk that was cut are readable"
@@ -188,19 +206,20 @@ def _by_topic(contents: _Contents, damage: list[str]) -> dict[str, Topic]:
         if channel is None:
             continue
         schema = contents.schemas.get(channel.schema_id)
-        kind = (schema.name if schema else "", schema.data if schema else b"", channel.message_encoding)
+        said = (schema.name, schema.encoding, schema.data) if schema else ("", "", b"")
+        kind = (*said, channel.message_encoding)
         by_topic.setdefault(channel.topic, {}).setdefault(kind, []).append((log_time, data))
     topics = {}
     for name, kinds in by_topic.items():
-        (schema, definition, encoding), rows = max(kinds.items(), key=lambda item: len(item[1]))
+        (schema, schema_encoding, definition, encoding), rows = max(kinds.items(), key=lambda item: len(item[1]))
         for kind, others in kinds.items():
             if others is not rows:
-                left = f"{len(others)} messages of another schema ({kind[0] or 'none'}, {kind[2]}) left out"
+                left = f"{len(others)} messages of another schema ({kind[0] or 'none'}, {kind[3]}) left out"
                 damage.append(f"{name}: {left}, {len(rows)} are {schema or 'none'}, {encoding}")
         times = np.array([time for time, _ in rows], np.int64)
         order = np.argsort(times, kind="stable")
         messages = [rows[i][1] for i in order]
-        topics[name] = Topic(name, schema, definition.decode(errors="replace"), encoding, messages, times[order])
+        topics[name] = Topic(name, schema, schema_encoding, definition, encoding, messages, times[order])
     return topics
 
 

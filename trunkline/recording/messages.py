@@ -1,7 +1,8 @@
 """The one registry of message schemas: schema name to the function that reads poses or joints from it.
 
-A function here takes one decoded message, or a batch of one layout (see `cdr.decode`): numbers have shape ()
-or (n,), so write along the last axes. Adding a schema is one such function under `@poses` or `@joints`.
+A function here takes one decoded message, or a batch of one layout (see `encodings`): numbers have shape () or
+(n,), so write along the last axes. Adding a schema is one such function under `@poses` or `@joints`. Where a log
+holds several of them, the one that is registered first is read.
 """
 
 from collections.abc import Callable
@@ -11,48 +12,54 @@ import numpy as np
 
 
 class Poses(NamedTuple):
-    """time: (...) ns. names: S. positions: (..., S, 3) in the log's unit.
+    """positions: (..., S, 3) in the log's unit. orientations: (..., S, 4) wxyz, or None.
 
-    orientations: (..., S, 4) wxyz, or None. frame: (...) frame number, or None where the schema has none.
+    time: ns, (...) or, where every body has its own, (..., S); None where only the recorder's clock tells.
+    names: S, or an array (..., S) where messages of one layout may differ; None where the topic or the session
+    names the bodies. frame: (...) frame number, or None where the schema has none. parents: S names of the frames
+    that the poses are in, or None where a message has but one.
     """
 
-    time: np.ndarray
-    names: list[str]
+    time: np.ndarray | None
+    names: list[str] | np.ndarray | None
     positions: np.ndarray
     orientations: np.ndarray | None
-    frame: np.ndarray | None
+    frame: np.ndarray | None = None
+    parents: list[str] | None = None
 
 
 class Joints(NamedTuple):
-    """time: (...) ns. names: K. positions: (..., K) m."""
+    """positions: (..., K) m. time: (...) ns, names: K; None where the recorder's clock and the session tell."""
 
-    time: np.ndarray
-    names: list[str]
+    time: np.ndarray | None
+    names: list[str] | None
     positions: np.ndarray
 
 
 POSES: dict[str, Callable[..., Poses]] = {}
 JOINTS: dict[str, Callable[..., Joints]] = {}
+TOPIC_PER_BODY: set[str] = set()  # schemas of one pose, which the topic names
 
 
-def poses(schema: str):
-    """Register the decorated function as the reader of a pose schema."""
-    return lambda function: POSES.setdefault(schema, function)
+def poses(*schemas: str, topic_per_body: bool = False):
+    """Register the decorated function as the reader of pose schemas."""
+    TOPIC_PER_BODY.update(schemas if topic_per_body else ())
+    return lambda function: POSES.update(dict.fromkeys(schemas, function)) or function
 
 
-def joints(schema: str):
-    """Register the decorated function as the reader of a joint schema."""
-    return lambda function: JOINTS.setdefault(schema, function)
+def joints(*schemas: str):
+    """Register the decorated function as the reader of joint schemas."""
+    return lambda function: JOINTS.update(dict.fromkeys(schemas, function)) or function
 
 
 @poses("mocap4r2_msgs/RigidBodies")
 def rigid_bodies(message) -> Poses:
     bodies = message.rigidbodies
     return Poses(
-        stamp(message.header),
+        moment(message.header.stamp),
         [body.rigid_body_name for body in bodies],
-        vectors(message, [body.pose.position for body in bodies]),
-        quaternions(message, [body.pose.orientation for body in bodies]),
+        vectors([body.pose.position for body in bodies]),
+        quaternions([body.pose.orientation for body in bodies]),
         np.asarray(message.frame_number),
     )
 
@@ -60,39 +67,126 @@ def rigid_bodies(message) -> Poses:
 @poses("interfaces/TrunkRigidBodies")
 def trunk_rigid_bodies(message) -> Poses:
     return Poses(
-        stamp(message.header),
+        moment(message.header.stamp),
         message.rigid_body_names,
-        vectors(message, message.positions),
-        quaternions(message, message.orientations) if message.orientations else None,
+        vectors(message.positions),
+        quaternions(message.orientations) if message.orientations else None,
         np.asarray(message.frame_number),
     )
 
 
+@poses("motion_capture_tracking_interfaces/NamedPoseArray")
+def named_pose_array(message) -> Poses:
+    named = message.poses
+    return Poses(
+        moment(message.header.stamp),
+        [body.name for body in named],
+        vectors([body.pose.position for body in named]),
+        quaternions([body.pose.orientation for body in named]),
+    )
+
+
+@poses("geometry_msgs/PoseStamped", topic_per_body=True)
+def pose_stamped(message) -> Poses:
+    return _unnamed(moment(message.header.stamp)[..., None], [message.pose])
+
+
+@poses("foxglove.PoseInFrame", "foxglove_msgs/PoseInFrame", topic_per_body=True)
+def pose_in_frame(message) -> Poses:
+    return _unnamed(moment(message.timestamp)[..., None], [message.pose])
+
+
+@poses("geometry_msgs/PoseArray")
+def pose_array(message) -> Poses:
+    return _unnamed(moment(message.header.stamp), message.poses)
+
+
+@poses("foxglove.PosesInFrame", "foxglove_msgs/PosesInFrame")
+def poses_in_frame(message) -> Poses:
+    return _unnamed(moment(message.timestamp), message.poses)
+
+
+@poses("foxglove.FrameTransforms", "foxglove_msgs/FrameTransforms")
+def frame_transforms(message) -> Poses:
+    return _transforms([(t.timestamp, t.parent_frame_id, t.child_frame_id, t) for t in message.transforms])
+
+
+@poses("foxglove.FrameTransform", "foxglove_msgs/FrameTransform")
+def frame_transform(message) -> Poses:
+    return _transforms([(message.timestamp, message.parent_frame_id, message.child_frame_id, message)])
+
+
+@poses("tf2_msgs/TFMessage")
+def tf_message(message) -> Poses:
+    return _transforms(
+        [(t.header.stamp, t.header.frame_id, t.child_frame_id, t.transform) for t in message.transforms]
+    )
+
+
+@poses("mocap4r2_msgs/Markers")
+def markers(message) -> Poses:
+    """Markers have no orientation; one without a name goes by its index."""
+    names = [marker.marker_name for marker in message.markers]
+    if not all(names):
+        indices = [np.asarray(marker.marker_index).astype(str) for marker in message.markers]
+        pairs = zip(names, indices, strict=True)
+        names = np.stack([np.full(index.shape, name) if name else index for name, index in pairs], axis=-1)
+    positions = vectors([marker.translation for marker in message.markers])
+    return Poses(moment(message.header.stamp), names, positions, None, np.asarray(message.frame_number))
+
+
 @joints("sensor_msgs/JointState")
 def joint_state(message) -> Joints:
-    return Joints(stamp(message.header), message.name, np.asarray(message.position, dtype=float))
+    return Joints(moment(message.header.stamp), message.name, np.asarray(message.position, dtype=float))
 
 
-def stamp(header) -> np.ndarray:
-    """std_msgs/Header to ns since the epoch, (...)."""
-    return np.asarray(header.stamp.sec, np.int64) * 1_000_000_000 + np.asarray(
-        header.stamp.nanosec, np.int64
+@joints("std_msgs/Float64MultiArray", "std_msgs/Float32MultiArray")
+def float_array(message) -> Joints:
+    return Joints(None, None, np.asarray(message.data, dtype=float))
+
+
+def moment(time) -> np.ndarray:
+    """A ROS 2 (sec, nanosec), Foxglove (sec, nsec) or protobuf (seconds, nanos) time to ns, (...)."""
+    for whole, rest in (("sec", "nanosec"), ("sec", "nsec"), ("seconds", "nanos")):
+        if hasattr(time, rest):
+            seconds, nanoseconds = np.asarray(getattr(time, whole)), np.asarray(getattr(time, rest))
+            if seconds.dtype.kind not in "iu" or nanoseconds.dtype.kind not in "iu":
+                raise TypeError("a time of whole numbers expected")
+            return seconds.astype(np.int64) * 1_000_000_000 + nanoseconds.astype(np.int64)
+    raise AttributeError("no time of a known form")
+
+
+def vectors(points: list) -> np.ndarray:
+    """Points (x, y, z) to (..., S, 3)."""
+    return _stack(points, "xyz")
+
+
+def quaternions(rotations: list) -> np.ndarray:
+    """Quaternions (x, y, z, w) to (..., S, 4), w first."""
+    return _stack(rotations, "wxyz")
+
+
+def _unnamed(time: np.ndarray, bodies) -> Poses:
+    """geometry_msgs/Pose, or foxglove.Pose, list."""
+    return Poses(
+        time, None, vectors([b.position for b in bodies]), quaternions([b.orientation for b in bodies])
     )
 
 
-def vectors(message, points: list) -> np.ndarray:
-    """geometry_msgs/Point list to (..., S, 3)."""
-    return _stack(message, points, "xyz")
+def _transforms(items: list) -> Poses:
+    """(time, parent, child, transform) of each body."""
+    return Poses(
+        np.stack([moment(time) for time, *_ in items], axis=-1) if items else np.empty(0, np.int64),
+        [child for _, _, child, _ in items],
+        vectors([transform.translation for *_, transform in items]),
+        quaternions([transform.rotation for *_, transform in items]),
+        parents=[parent for _, parent, _, _ in items],
+    )
 
 
-def quaternions(message, rotations: list) -> np.ndarray:
-    """geometry_msgs/Quaternion list to (..., S, 4), w first."""
-    return _stack(message, rotations, "wxyz")
-
-
-def _stack(message, items: list, axes: str) -> np.ndarray:
+def _stack(items: list, axes: str) -> np.ndarray:
+    """Columns of numbers side by side; a batch of messages without any body is (0, len(axes)) whatever its size."""
     if not items:
-        return np.empty((*np.shape(message.header.stamp.sec), 0, len(axes)))
-    return np.stack(
-        [np.stack([getattr(item, axis) for axis in axes], axis=-1) for item in items], axis=-2
-    )
+        return np.empty((0, len(axes)))
+    rows = [np.stack([getattr(item, axis) for axis in axes], axis=-1) for item in items]
+    return np.stack(rows, axis=-2).astype(float, copy=False)

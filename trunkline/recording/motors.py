@@ -16,6 +16,7 @@ def read_motors(
     source: Source,
     session: Session,
     epoch: int,
+    logged: int,
     time: np.ndarray,
     limits: Limits,
     where: str,
@@ -23,7 +24,7 @@ def read_motors(
 ) -> tuple[tuple[str, ...], list[np.ndarray]]:
     """K tendon names, and [command time, commands (Tc, K), tendon time, tendon positions (Tm, K)], s and m.
 
-    Args: epoch: ns, of the trial's first frame; time (T,) s from there.
+    Args: epoch, logged: ns, the stamp of the trial's first frame and when the recorder had it; time (T,) s from there.
 
     Raises:
         InputError: the tendons of a topic are not those of session.yaml, or of the other topic.
@@ -32,15 +33,16 @@ def read_motors(
     tendons = next((stream.names for stream in streams if stream is not None), ())
     if session.tendons is not None:
         tendons = tuple(session.tendons.values())
+    recorder = _by_recorder(source, session)
     arrays = []
     for stream, role in zip(streams, ROLES, strict=True):
         if stream is None or not len(stream.stamps):
             arrays += [np.empty(0), np.empty((0, len(tendons)))]
             continue
         columns = _columns(stream, session.tendons, tendons, f"{where}: {role} topic")
-        stamps = _stamps(stream, session.clock)
-        if stamps is not stream.stamps and session.clock != "log":
-            findings.repairs.append(f"{role} messages without stamps dated by the recorder's clock")
+        stamps = _stamps(stream, recorder, epoch - logged)
+        if recorder and session.clock != "log":
+            findings.repairs.append(f"{role} messages dated by the recorder's clock, as not all have stamps")
         rows = in_order(stamps, limits.disorder, f"{where}: {role} topic", findings)
         seconds = (stamps[rows] - epoch) * 1e-9
         pulls = stream.positions[rows][:, columns]
@@ -58,6 +60,7 @@ def check_curl(
     joint_topics: tuple[str, ...],
     motors: list[np.ndarray],
     epoch: int,
+    logged: int,
     time: np.ndarray,
     limits: Limits,
     where: str,
@@ -74,10 +77,11 @@ def check_curl(
             raise InputError(f"{where}: topics.{key}: found {name!r}, which no log has, expected one of: {others}")
     if any(pulls.size for pulls in motors[1::2]):
         return
+    recorder = _by_recorder(source, session)
     found = [
         f"no {role} topic"
         if stream is None
-        else f"{len(stream.stamps)} messages on {stream.topic}{_distance(stream, session.clock, epoch, time)}"
+        else f"{len(stream.stamps)} messages on {stream.topic}{_distance(stream, recorder, epoch, logged, time)}"
         for stream, role in zip((source.commands, source.tendon_positions), ROLES, strict=True)
     ]
     expected = f"expected commands or tendon positions within {limits.clock_offset:g} s of the poses"
@@ -89,9 +93,15 @@ def check_curl(
     raise InputError(f"{where}: found {' and '.join(found)}{topics}, {expected}")
 
 
-def _stamps(stream: JointStream, clock: str) -> np.ndarray:
-    """When each message was sent, ns: by its header, or by the recorder where that is meant or all there is."""
-    return stream.log_times if clock == "log" or not stream.stamps.any() else stream.stamps
+def _by_recorder(source: Source, session: Session) -> bool:
+    """Whether the recorder's clock dates commands and positions: where that is meant, or one of them has no other."""
+    streams = [stream for stream in (source.commands, source.tendon_positions) if stream is not None]
+    return session.clock == "log" or any(not s.timed or not s.stamps.any() for s in streams if len(s.stamps))
+
+
+def _stamps(stream: JointStream, recorder: bool, shift: int) -> np.ndarray:
+    """When each message was sent, ns: by its header, or by the recorder, whose clock is `shift` ns behind."""
+    return stream.log_times + shift if recorder else stream.stamps
 
 
 def _columns(stream: JointStream, mapped: dict[str, str] | None, tendons: tuple[str, ...], where: str) -> list[int]:
@@ -110,11 +120,11 @@ def _columns(stream: JointStream, mapped: dict[str, str] | None, tendons: tuple[
     return columns
 
 
-def _distance(stream: JointStream, clock: str, epoch: int, time: np.ndarray) -> str:
+def _distance(stream: JointStream, recorder: bool, epoch: int, logged: int, time: np.ndarray) -> str:
     """How far the stream's nearest message is from the trial, in words; nothing where it has none."""
     if not len(stream.stamps):
         return ""
-    seconds = (_stamps(stream, clock) - epoch) * 1e-9
+    seconds = (_stamps(stream, recorder, epoch - logged) - epoch) * 1e-9
     apart = np.maximum(np.maximum(-seconds, seconds - time[-1]), 0)
     nearest = int(apart.argmin())
     if apart[nearest] == 0:

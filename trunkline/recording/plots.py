@@ -71,16 +71,27 @@ def quality_figure(
 
     words.axis("off")
     lines = [f"refused {name}: {reason}" for name, reason in refused.items()]
-    lines += [f"{q.take.name}: {repair}" for q in qualities for repair in q.findings.repairs]
+    lines += _by_sentence(qualities)
     wrapped = [part for line in lines for part in textwrap.wrap(line, 78)] or ["nothing"]
     more = [f"… and {len(wrapped) - 14} lines more in quality.json"] if len(wrapped) > 14 else []
-    words.set_title("Repaired and refused")
+    words.set_title("Refused, repaired, and to be checked")
     words.text(0, 1, "\n".join(wrapped[:14] + more), va="top", fontsize=8, transform=words.transAxes)
     for panel in (jitter, clock):
         panel.set_xlim(-1, len(qualities))
         panel.xaxis.get_major_locator().set_params(integer=True)
     jitter.legend(handles=[Patch(color=color, label=name) for name, color in COLORS.items()], ncols=3)
     return figure
+
+
+def _by_sentence(qualities: list[Quality]) -> list[str]:
+    """What was repaired and what looks wrong, once for all trials of which it is said."""
+    said: dict[str, list[str]] = {}
+    for quality in qualities:
+        for sentence in [f"check {text}" for text in quality.findings.warnings] + quality.findings.repairs:
+            said.setdefault(sentence, []).append(quality.take.name)
+    every = len(qualities)
+    who = ["all trials" if len(names) == every > 1 else ", ".join(names) for names in said.values()]
+    return [f"{names}: {sentence}" for names, sentence in zip(who, said, strict=True)]
 
 
 def _coverage(axes, qualities: list[Quality]) -> None:

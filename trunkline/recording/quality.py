@@ -112,5 +112,15 @@ def _trial(quality: Quality) -> dict:
                 "unexplained": findings.offset.ratio,
             }
         ),
+        "stamps_over_log_times": (
+            None
+            if findings.logged is None
+            else {
+                "drift_ppm": 1e6 * (findings.logged.rate - 1),
+                "jitter_ms": 1e3 * findings.logged.jitter,
+                "worst_ms": 1e3 * findings.logged.worst,
+            }
+        ),
         "repairs": findings.repairs,
+        "warnings": findings.warnings,
     }

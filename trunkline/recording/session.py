@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
 from yaml import YAMLError
 
 from trunkline.errors import InputError
@@ -22,8 +22,12 @@ class Entry(BaseModel):
 
 
 class Frame(Entry):
-    """The motion-capture frame: which way is up in it, and the unit of its positions."""
+    """The motion-capture frame: which way is up in it, and the unit of its positions.
 
+    name: the parent frame of the poses, for logs of transforms between several frames.
+    """
+
+    name: str | None = None
     up: Vector
     unit: Literal["m", "mm"] = "m"
 
@@ -52,9 +56,9 @@ class FixedBase(Entry):
 
 
 class Topics(Entry):
-    """Topic names; what is left out is found by its schema."""
+    """Topic names; what is left out is found by its schema. poses: one topic, or body to topic."""
 
-    poses: str | None = None
+    poses: str | dict[str, str] | None = None
     commands: str | None = None
     tendon_positions: str | None = None
 
@@ -82,6 +86,7 @@ class TrialEntry(Entry):
 class Session(Entry):
     """base: the body that marks the mount, or its pose. segments, tendons: name in the log to name in the model.
 
+    bodies: names of the poses, in order, where messages hold them without. A list of tendons does the same for numbers.
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
     """
@@ -91,8 +96,14 @@ class Session(Entry):
     segments: dict[str, str] | None = Field(default=None, min_length=1)
     tendons: dict[str, str] | None = Field(default=None, min_length=1)
     topics: Topics = Topics()
+    bodies: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"
     trials: list[TrialEntry] = Field(min_length=1)
+
+    @field_validator("tendons", mode="before")
+    @classmethod
+    def _by_place(cls, names):
+        return {str(place): name for place, name in enumerate(names, 1)} if isinstance(names, list) else names
 
     @model_validator(mode="after")
     def _one_to_one(self):

@@ -1,19 +1,25 @@
-"""One log, decoded: which topic holds the poses and which the tendons."""
+"""One log, decoded: which topics hold the poses and which the tendons."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 from trunkline.errors import InputError
 from trunkline.recording.cdr import short_name
 from trunkline.recording.log import Log, Topic, read_log
-from trunkline.recording.messages import JOINTS, POSES
-from trunkline.recording.session import Topics
+from trunkline.recording.messages import JOINTS, POSES, TOPIC_PER_BODY
+from trunkline.recording.session import Session
 from trunkline.recording.streams import JointStream, PoseStream, joint_stream, pose_stream
+
+COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "position")
 
 
 @dataclass
 class Source:
-    """One log, decoded. log: without its messages, which are decoded. joint_topics: all whose schema is in `JOINTS`."""
+    """One log, decoded. log: without its messages, which are decoded. pose_topic: for people to read.
+
+    joint_topics: all whose schema is in `JOINTS`.
+    """
 
     log: Log
     pose_topic: str
@@ -23,45 +29,111 @@ class Source:
     joint_topics: tuple[str, ...]
 
 
-def open_log(path: Path, topics: Topics) -> Source:
+def open_log(path: Path, session: Session) -> Source:
     """Read and decode a log.
 
     Raises:
         InputError: naming the file and the topic, where the poses are missing or the topics are not clear.
     """
     log = read_log(path)
-    poses = _choose(log, topics.poses, POSES, "pose")
-    if poses is None:
+    topics = pose_topics(log, session.topics.poses)
+    if not topics:
         found = ", ".join(f"{t.name} ({t.schema})" for t in log.topics.values()) or "no readable message"
-        named = "" if topics.poses is None else f"{topics.poses!r} of session.yaml with "
+        wanted = session.topics.poses
+        named = "" if wanted is None else f"{wanted!r} of session.yaml with "
         damage = f"; the log is damaged: {'; '.join(log.damage)}" if log.damage else ""
         raise InputError(f"{path}: no pose topic, found {found}{damage}, expected {named}one of {', '.join(POSES)}")
-    joints = [
-        None if topic is None else joint_stream(topic)
-        for topic in (
-            _choose(log, topics.commands, JOINTS, "command", wanted=("command", "cmd", "target")),
-            _choose(log, topics.tendon_positions, JOINTS, "tendon position", wanted=("state", "position")),
-        )
-    ]
-    stream = pose_stream(poses)
-    if not len(stream.stamps):
-        raise InputError(f"{path}: {poses.name}: no message fits its schema {poses.schema}")
+    name = ", ".join(topic.name for topic in topics.values())
+    where = f"{path}: {name}"
+    poses = _understood(where, pose_stream, topics, session.bodies, session.frame.name)
+    if poses.unnamed is not None:
+        found = f"found {poses.unnamed} poses without names"
+        raise InputError(f"{where}: {found}, expected `bodies` in session.yaml to name them, in order")
+    if not len(poses.stamps):
+        schema = next(iter(topics.values())).schema
+        names = f" with {len(session.bodies)} `bodies`, as in session.yaml" if session.bodies else ""
+        raise InputError(f"{where}: no message fits its schema {schema}{names}")
+    if len(poses.parents) > 1 and session.frame.name is None:
+        found = f"found poses in the frames {', '.join(poses.parents)}"
+        raise InputError(f"{where}: {found}, expected one, or its name in session.yaml: frame.name")
+    joints = []
+    for wanted, role, words in (
+        (session.topics.commands, "command", COMMAND_WORDS),
+        (session.topics.tendon_positions, "tendon position", POSITION_WORDS),
+    ):
+        topic = choose(log, wanted, JOINTS, role, words)
+        stream = topic and _understood(f"{path}: {topic.name}", joint_stream, topic)
+        if stream is not None and stream.unnamed is not None and session.tendons is None:
+            found = f"found {stream.unnamed} numbers without names"
+            raise InputError(
+                f"{path}: {topic.name}: {found}, expected `tendons` in session.yaml to name them, in order"
+            )
+        joints.append(stream)
     joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
-    return Source(log, poses.name, stream, *joints, joint_topics)
+    return Source(log, name, poses, *joints, joint_topics)
 
 
-def _choose(log: Log, name: str | None, registry: dict, role: str, wanted: tuple[str, ...] = ("",)) -> Topic | None:
-    """The topic that the session names, or the only one whose schema fits and whose name tells its role."""
-    fitting = [topic for topic in log.topics.values() if short_name(topic.schema) in registry]
+def pose_topics(log: Log, wanted: str | dict[str, str] | None) -> dict[str | None, Topic]:
+    """The topic of all poses under None, or each body's topic under its name; empty where the log has none."""
+    if isinstance(wanted, dict):
+        chosen = {body: choose(log, name, POSES, "pose") for body, name in wanted.items()}
+        return {body: topic for body, topic in chosen.items() if topic is not None}
+    if wanted is None:
+        single = [topic for topic in _best(log, POSES) if short_name(topic.schema) in TOPIC_PER_BODY]
+        if single:
+            return dict(zip(_names_in(single), single, strict=True))
+    topic = choose(log, wanted, POSES, "pose")
+    if topic is not None and short_name(topic.schema) in TOPIC_PER_BODY:
+        return {topic.name.strip("/"): topic}
+    return {} if topic is None else {None: topic}
+
+
+def choose(
+    log: Log, name: str | None, registry: dict, role: str, wanted: tuple[str, ...] = ("",)
+) -> Topic | None:
+    """The topic that the session names, or the only one whose schema fits best and whose name tells its role."""
     if name is not None:
         topic = log.topics.get(name)
-        if topic is not None and topic not in fitting:
+        if topic is not None and short_name(topic.schema) not in registry:
             expected = ", ".join(registry)
             raise InputError(f"{log.path}: {name}: found {topic.schema}, expected a {role} schema: {expected}")
         return topic
-    told = [topic for topic in fitting if any(word in topic.name for word in wanted)]
+    told = _best(log, registry, wanted)
     if len(told) > 1:
         found = ", ".join(topic.name for topic in told)
         raise InputError(f"{log.path}: {role} topic: found {found}, expected one, or its name in session.yaml: topics")
     return told[0] if told else None
+
+
+def _best(log: Log, registry: dict, words: tuple[str, ...] = ("",)) -> list[Topic]:
+    """The topics with one of `words` in their names whose schema is registered first; not what never moves."""
+    told = [
+        topic
+        for topic in log.topics.values()
+        if short_name(topic.schema) in registry
+        and any(word in topic.name for word in words)
+        and not topic.name.endswith("tf_static")
+    ]
+    rank = list(registry).index
+    first = min((rank(short_name(topic.schema)) for topic in told), default=None)
+    return [topic for topic in told if rank(short_name(topic.schema)) == first]
+
+
+def _names_in(topics: list[Topic]) -> list[str]:
+    """What tells topics apart: `/mocap/base/pose` and `/mocap/tip/pose` are base and tip."""
+    paths = [topic.name.strip("/").split("/") for topic in topics]
+    if len(paths) == 1:
+        return ["/".join(paths[0])]
+    shortest = min(map(len, paths))
+    before = next((i for i in range(shortest) if len({p[i] for p in paths}) > 1), shortest)
+    behind = next((i for i in range(shortest - before) if len({p[-1 - i] for p in paths}) > 1), 0)
+    return ["/".join(path[before : len(path) - behind]) or "/".join(path) for path in paths]
+
+
+def _understood(where: str, read: Callable, *arguments):
+    """What `read` returns; that a topic cannot be read at all becomes the user's business."""
+    try:
+        return read(*arguments)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from error

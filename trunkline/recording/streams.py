@@ -1,20 +1,24 @@
 """A topic's messages as arrays: all poses, or all joint positions, of a log."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.recording.cdr import decode, parse_definition, short_name
+from trunkline.recording.cdr import short_name
+from trunkline.recording.encodings import decode
 from trunkline.recording.log import Topic
-from trunkline.recording.messages import JOINTS, POSES
+from trunkline.recording.messages import JOINTS, POSES, Poses
 
 
 @dataclass
 class PoseStream:
-    """T messages, B bodies. stamps, log_times: (T,) ns, of the header and the recorder. frames: (T,) or None.
+    """T frames, B bodies. stamps, log_times: (T,) ns, of the header and the recorder. frames: (T,) or None.
 
-    present: (T, B) whether a body is in a message. positions: (T, B, 3) in the log's unit, quaternions:
-    (T, B, 4) wxyz or None; NaN where absent. undecodable: messages that do not fit their schema.
+    present: (T, B) whether a body is in a frame. positions: (T, B, 3) in the log's unit, quaternions:
+    (T, B, 4) wxyz or None; NaN where absent. undecodable: messages that do not fit their schema, or that hold
+    another number of poses than there are names. unnamed: poses in a message that nobody names, else None.
+    parents: names of the frames that the poses are in, where messages say it for each.
     """
 
     stamps: np.ndarray
@@ -25,11 +29,16 @@ class PoseStream:
     positions: np.ndarray
     quaternions: np.ndarray | None
     undecodable: int
+    unnamed: int | None = None
+    parents: tuple[str, ...] = ()
 
 
 @dataclass
 class JointStream:
-    """T messages, K joints. stamps, log_times: (T,) ns. positions: (T, K) m, NaN where absent."""
+    """T messages, K joints. stamps, log_times: (T,) ns. positions: (T, K) m, NaN where absent.
+
+    timed: whether the messages have stamps; without, stamps are the log times. unnamed: as for poses.
+    """
 
     topic: str
     stamps: np.ndarray
@@ -37,68 +46,256 @@ class JointStream:
     names: tuple[str, ...]
     positions: np.ndarray
     undecodable: int
+    timed: bool = True
+    unnamed: int | None = None
 
 
-def pose_stream(topic: Topic) -> PoseStream:
-    """All messages of a topic whose schema is in `POSES`."""
-    batches, kept = _read(topic, POSES[short_name(topic.schema)])
-    names = _union(batches)
-    positions = np.full((len(topic.messages), len(names), 3), np.nan)
-    quaternions = np.full((len(topic.messages), len(names), 4), np.nan)
-    present = np.zeros(positions.shape[:2], bool)
-    stamps = np.zeros(len(topic.messages), np.int64)
-    frames = np.zeros(len(topic.messages), np.int64)
-    oriented, numbered = False, True
-    for rows, poses in batches:
-        columns = [names.index(name) for name in poses.names]
-        stamps[rows] = poses.time
-        present[np.ix_(rows, columns)] = True
-        positions[np.ix_(rows, columns)] = poses.positions
-        if poses.orientations is not None:
-            quaternions[np.ix_(rows, columns)] = poses.orientations
-            oriented = True
-        if poses.frame is not None:
-            frames[rows] = poses.frame
-        numbered &= poses.frame is not None
+@dataclass
+class Batch:
+    """n messages of the same bodies. rows: (n,) in their topic. time: (n,) ns, or (n, S) where each body has its own.
+
+    positions (n, S, 3), orientations (n, S, 4) or None, frame (n,) or None.
+    """
+
+    rows: np.ndarray
+    names: list[str]
+    time: np.ndarray
+    positions: np.ndarray
+    orientations: np.ndarray | None
+    frame: np.ndarray | None
+    parents: list[str] | None
+
+
+# what readers raise where a message is not as expected
+READING = (AttributeError, TypeError, ValueError, IndexError, OverflowError)
+FRAMES_OPEN = 16  # frames back to which a body's late sample may still belong
+
+
+def pose_stream(
+    topics: dict[str | None, Topic], bodies: Sequence[str] | None = None, parent: str | None = None
+) -> PoseStream:
+    """All messages of topics whose schema is in `POSES`.
+
+    Args:
+        topics: one under None, or by the name of the body that each holds.
+        bodies: names of the poses in a message that names none.
+        parent: of poses in several frames, only those in this one count.
+
+    Raises:
+        ValueError: the messages cannot be read at all.
+    """
+    unnamed, read = None, []
+    for name, topic in topics.items():
+        batches = list(_read_poses(topic))
+        given = bodies if name is None else [name]
+        if given is None and any(poses.names is None for _, poses in batches):
+            unnamed = max(poses.positions.shape[-2] for _, poses in batches)
+            given = [str(number + 1) for number in range(unnamed)]
+        read.append((topic, [part for batch in batches for part in _batches(*batch, topic, given)]))
+    parents = {frame: None for _, batches in read for batch in batches for frame in batch.parents or ()}
+    kept = sum(len(batch.rows) for _, batches in read for batch in batches)
+    if parent is not None:
+        for _, batches in read:
+            batches[:] = [_within(batch, parent) for batch in batches]
+    own_times = any(batch.time.ndim == 2 for _, batches in read for batch in batches)
+    stream = _gather(read) if own_times or len(read) > 1 else _by_message(*read[0])
+    stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - kept
+    stream.unnamed, stream.parents = unnamed, tuple(parents)
+    return stream
+
+
+def joint_stream(topic: Topic) -> JointStream:
+    """All messages of a topic whose schema is in `JOINTS`; numbers without names go by their place, from 1.
+
+    Raises:
+        ValueError: the messages cannot be read at all.
+    """
+    reader, batches, unnamed, timed = JOINTS[short_name(topic.schema)], [], None, True
+    for rows, message in decode(topic):
+        try:
+            joints = reader(message)
+            positions = joints.positions.reshape(rows.size, joints.positions.shape[-1])
+        except READING:
+            continue
+        names = joints.names
+        if names is None:
+            unnamed = max(unnamed or 0, positions.shape[1])
+            names = [str(number + 1) for number in range(positions.shape[1])]
+        timed &= joints.time is not None
+        if len(names) == positions.shape[1]:
+            batches.append((np.atleast_1d(rows), list(names), positions, joints.time))
+    names = _union([(rows, names) for rows, names, *_ in batches])
+    positions = np.full((len(topic.messages), len(names)), np.nan)
+    stamps, kept = topic.log_times.copy(), np.zeros(len(topic.messages), bool)
+    for rows, some, values, time in batches:
+        kept[rows] = True
+        positions[np.ix_(rows, [names.index(name) for name in some])] = values
+        if timed:
+            stamps[rows] = time
+    return JointStream(
+        topic.name,
+        stamps[kept],
+        topic.log_times[kept],
+        names,
+        positions[kept],
+        len(topic.messages) - int(kept.sum()),
+        timed,
+        unnamed,
+    )
+
+
+def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, Poses]]:
+    reader = POSES[short_name(topic.schema)]
+    for rows, message in decode(topic):
+        try:
+            poses = reader(message)
+            names = poses.names
+            named = names if names is None or isinstance(names, np.ndarray) else [str(name) for name in names]
+        except READING:
+            continue
+        yield rows, poses._replace(names=named)
+
+
+def _batches(rows: np.ndarray, poses: Poses, topic: Topic, given: Sequence[str] | None) -> Iterator[Batch]:
+    """What a reader returned, with the messages as first axis: a batch a set of names, none if they do not fit."""
+    count, size = rows.size, poses.positions.shape[-2]
+    time = topic.log_times[rows] if poses.time is None else poses.time
+    own_times = poses.parents is not None or np.ndim(time) > rows.ndim
+    time = np.broadcast_to(time, (count, size) if own_times else (count,))
+    positions = np.broadcast_to(poses.positions, (count, size, 3))
+    orientations = None if poses.orientations is None else np.broadcast_to(poses.orientations, (count, size, 4))
+    frame = None if poses.frame is None else np.broadcast_to(poses.frame, (count,))
+    rows, names = np.atleast_1d(rows), poses.names if poses.names is not None else given
+    if isinstance(names, np.ndarray):
+        sets, which = np.unique(names.reshape(count, size), axis=0, return_inverse=True)
+        parts = [(list(map(str, some)), np.flatnonzero(which.ravel() == i)) for i, some in enumerate(sets)]
+    else:
+        parts = [(list(names or ()), slice(None))]
+    for some, part in parts:
+        if len(some) == size == len(set(some)):
+            yield Batch(
+                rows[part],
+                some,
+                time[part],
+                positions[part],
+                None if orientations is None else orientations[part],
+                None if frame is None else frame[part],
+                poses.parents,
+            )
+
+
+def _within(batch: Batch, parent: str) -> Batch:
+    """The bodies of a batch whose poses are in the frame `parent`; all, where the messages do not say."""
+    if batch.parents is None:
+        return batch
+    inside = [i for i, frame in enumerate(batch.parents) if frame == parent]
+    return Batch(
+        batch.rows,
+        [batch.names[i] for i in inside],
+        batch.time[:, inside],
+        batch.positions[:, inside],
+        None if batch.orientations is None else batch.orientations[:, inside],
+        batch.frame,
+        None,
+    )
+
+
+def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
+    """A frame a message."""
+    names, count = _union([(batch.rows, batch.names) for batch in batches]), len(topic.messages)
+    positions = np.full((count, len(names), 3), np.nan)
+    quaternions = np.full((count, len(names), 4), np.nan)
+    present, kept = np.zeros((count, len(names)), bool), np.zeros(count, bool)
+    stamps, frames = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    for batch in batches:
+        columns = np.ix_(batch.rows, [names.index(name) for name in batch.names])
+        stamps[batch.rows], kept[batch.rows] = batch.time, True
+        present[columns], positions[columns] = True, batch.positions
+        if batch.orientations is not None:
+            quaternions[columns] = batch.orientations
+        if batch.frame is not None:
+            frames[batch.rows] = batch.frame
+    oriented = any(batch.orientations is not None for batch in batches)
     return PoseStream(
         stamps[kept],
         topic.log_times[kept],
-        frames[kept] if numbered else None,
+        frames[kept] if all(batch.frame is not None for batch in batches) else None,
         names,
         present[kept],
         positions[kept],
         quaternions[kept] if oriented else None,
-        len(topic.messages) - int(kept.sum()),
+        0,
     )
 
 
-def joint_stream(topic: Topic) -> JointStream:
-    """All messages of a topic whose schema is in `JOINTS`."""
-    batches, kept = _read(topic, JOINTS[short_name(topic.schema)])
-    names = _union(batches)
-    positions = np.full((len(topic.messages), len(names)), np.nan)
-    stamps = np.zeros(len(topic.messages), np.int64)
-    for rows, joints in batches:
-        stamps[rows] = joints.time
-        positions[np.ix_(rows, [names.index(name) for name in joints.names])] = joints.positions
-    undecodable = len(topic.messages) - int(kept.sum())
-    return JointStream(topic.name, stamps[kept], topic.log_times[kept], names, positions[kept], undecodable)
+def _gather(read: list[tuple[Topic, list[Batch]]]) -> PoseStream:
+    """Frames from bodies that have times of their own: samples at most half a frame's interval apart belong together.
+
+    Where no message is stamped, the log times tell what belongs together. Frames are in the order in which their
+    first sample was logged, so that a clock that runs back shows.
+    """
+    names = _union([(topic.log_times[batch.rows], batch.names) for topic, batches in read for batch in batches])
+    index = {name: i for i, name in enumerate(names)}
+    stamps, logged, body, positions, quaternions = [], [], [], [], []
+    for topic, batches in read:
+        for batch in batches:
+            shape = (len(batch.rows), len(batch.names))
+            time = batch.time if batch.time.ndim == 2 else batch.time[:, None]
+            stamps.append(np.broadcast_to(time, shape).ravel())
+            logged.append(np.repeat(topic.log_times[batch.rows], shape[1]))
+            body.append(np.tile([index[name] for name in batch.names], shape[0]).astype(int))
+            positions.append(batch.positions.reshape(-1, 3))
+            turned = np.full((*shape, 4), np.nan) if batch.orientations is None else batch.orientations
+            quaternions.append(turned.reshape(-1, 4))
+    if not stamps:
+        empty = np.empty(0, np.int64)
+        return PoseStream(empty, empty, None, (), np.empty((0, 0), bool), np.empty((0, 0, 3)), None, 0)
+    stamps, logged, body = np.concatenate(stamps), np.concatenate(logged), np.concatenate(body)
+    order = np.argsort(logged, kind="stable")
+    stamps, logged, body = stamps[order], logged[order], body[order]
+    clock = stamps if stamps.any() else logged
+    frame, first = _frames(clock, body)
+    oriented = np.concatenate(quaternions)[order]
+    stream = PoseStream(
+        stamps[first],
+        logged[first],
+        None,
+        names,
+        np.zeros((len(first), len(names)), bool),
+        np.full((len(first), len(names), 3), np.nan),
+        np.full((len(first), len(names), 4), np.nan) if np.isfinite(oriented).any() else None,
+        0,
+    )
+    stream.present[frame, body] = True
+    stream.positions[frame, body] = np.concatenate(positions)[order]
+    if stream.quaternions is not None:
+        stream.quaternions[frame, body] = oriented
+    return stream
 
 
-def _read(topic: Topic, reader) -> tuple[list, np.ndarray]:
-    """(rows, what `reader` makes of them) for each batch, and which messages (N,) could be read."""
-    definitions = parse_definition(topic.schema, topic.definition)
-    batches = [(rows, reader(message)) for rows, message in decode(topic.messages, topic.schema, definitions)]
-    kept = np.zeros(len(topic.messages), bool)
-    for rows, _ in batches:
-        kept[rows] = True
-    return batches, kept
+def _frames(clock: np.ndarray, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Each sample's frame (M,), and the index of each frame's first sample."""
+    steps = np.concatenate([np.diff(np.sort(clock[body == i])) for i in np.unique(body)])
+    steps = steps[steps > 0]
+    apart = 0.5 * float(np.median(steps)) if len(steps) else 0.0
+    frame, first, taken = np.empty(len(clock), int), [], []
+    for sample, (time, who) in enumerate(zip(clock.tolist(), body.tolist(), strict=True)):
+        for place in range(len(first) - 1, max(-1, len(first) - 1 - FRAMES_OPEN), -1):
+            if abs(time - clock[first[place]]) <= apart and who not in taken[place]:
+                break
+        else:
+            place = len(first)
+            first.append(sample)
+            taken.append(set())
+        frame[sample] = place
+        taken[place].add(who)
+    return frame, np.array(first)
 
 
-def _union(batches: list) -> tuple[str, ...]:
-    """All names, in the order of their first appearance."""
+def _union(batches: list[tuple[np.ndarray, list[str]]]) -> tuple[str, ...]:
+    """All names, in the order of their first appearance: by row, then by place."""
     first = {}
-    for rows, sample in batches:
-        for place, name in enumerate(sample.names):
-            first[name] = min(first.get(name, (len(rows) + rows[0], place)), (int(rows[0]), place))
+    for rows, names in batches:
+        for place, name in enumerate(names):
+            first[name] = min(first.get(name, (rows[0], place)), (rows[0], place))
     return tuple(sorted(first, key=first.get))

@@ -1,0 +1,137 @@
+"""Poses per second from bytes to arrays, beside the plain `mcap` and `rosbags` readers. `python -m benchmarks.decode`
+
+One log of `mocap4r2_msgs/msg/RigidBodies`, read from the disk each time; what the three make of it is compared.
+"""
+
+import argparse
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from mcap_ros2.writer import Writer
+from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from trunkline.recording.definitions import RIGID_BODIES
+from trunkline.recording.log import read_log
+from trunkline.recording.streams import pose_stream
+
+SCHEMA, BODIES, RATE = "mocap4r2_msgs/msg/RigidBodies", 19, 120
+START = 1_760_000_000_000_000_000  # ns
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--frames", type=int, default=6000)
+    parser.add_argument("--hidden", type=float, default=0.005, help="share of samples that are occluded")
+    parser.add_argument("--rounds", type=int, default=3, help="the best of which counts")
+    parser.add_argument("--fast-only", action="store_true", help="leave the slow readers out")
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.mcap"
+        poses = write(path, arguments.frames, arguments.hidden)
+        print(f"{arguments.frames} frames of {BODIES} bodies, {poses} poses, {path.stat().st_size / 1e6:.1f} MB")
+        readers = {"trunkline": fast, "mcap with mcap_ros2": plain_mcap, "rosbags": plain_rosbags}
+        reference = None
+        for name, reader in readers.items():
+            if arguments.fast_only and reference is not None:
+                break
+            seconds, found = timed(reader, path, arguments.rounds if reader is fast else 1)
+            reference = found if reference is None else reference
+            np.testing.assert_array_equal(found, reference)
+            print(f"{name:20} {seconds:7.3f} s  {poses / seconds:10.0f} poses/s")
+
+
+def write(path: Path, frames: int, hidden: float) -> int:
+    """Write the log; the number of poses in it."""
+    rng = np.random.default_rng(0)
+    positions, quaternions = rng.normal(size=(frames, BODIES, 3)), rng.normal(size=(frames, BODIES, 4))
+    seen = rng.random((frames, BODIES)) >= hidden
+    with open(path, "wb") as file, Writer(file, chunk_size=2**20) as writer:
+        schema = writer.register_msgdef(SCHEMA, RIGID_BODIES)
+        for frame in range(frames):
+            stamp = START + frame * 1_000_000_000 // RATE
+            content = {
+                "header": {
+                    "stamp": dict(zip(("sec", "nanosec"), divmod(stamp, 10**9), strict=True)),
+                    "frame_id": "mocap",
+                },
+                "frame_number": frame,
+                "rigidbodies": [
+                    {
+                        "rigid_body_name": f"unit_{body:02d}",
+                        "pose": {
+                            "position": dict(zip("xyz", positions[frame, body].tolist(), strict=True)),
+                            "orientation": dict(zip("wxyz", quaternions[frame, body].tolist(), strict=True)),
+                        },
+                    }
+                    for body in np.flatnonzero(seen[frame])
+                ],
+            }
+            writer.write_message("/rigid_bodies", schema, content, stamp, stamp, frame)
+    return int(seen.sum())
+
+
+def timed(reader: Callable[[Path], np.ndarray], path: Path, rounds: int) -> tuple[float, np.ndarray]:
+    """(s of the best round, what was read)"""
+    best, found = np.inf, None
+    for _ in range(rounds):
+        started = time.perf_counter()
+        found = reader(path)
+        best = min(best, time.perf_counter() - started)
+    return best, found
+
+
+def fast(path: Path) -> np.ndarray:
+    """(frames, bodies, 7): x, y, z, w, x, y, z; NaN where hidden. As the others."""
+    stream = pose_stream({None: read_log(path).topics["/rigid_bodies"]})
+    order = np.argsort(stream.names)
+    return np.concatenate([stream.positions, stream.quaternions], axis=-1)[:, order]
+
+
+def plain_mcap(path: Path) -> np.ndarray:
+    with open(path, "rb") as file:
+        reader = make_reader(file, decoder_factories=[DecoderFactory()])
+        return _arrange(content for *_, content in reader.iter_decoded_messages())
+
+
+def plain_rosbags(path: Path) -> np.ndarray:
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    store.register(_types(RIGID_BODIES))
+    reader = McapReader(path)
+    reader.open()
+    try:
+        messages = reader.messages(reader.connections)
+        return _arrange(store.deserialize_cdr(data, SCHEMA) for _, _, data in messages)
+    finally:
+        reader.close()
+
+
+def _types(definition: str) -> dict:
+    """The package's own types; the others come with rosbags."""
+    types = {}
+    parts = definition.split("=" * 80 + "\n")
+    for name, text in [(SCHEMA, parts[0])] + [part.removeprefix("MSG: ").split("\n", 1) for part in parts[1:]]:
+        if "mocap4r2" in name:
+            full = name if "/msg/" in name else name.replace("/", "/msg/")
+            types |= get_types_from_msg(text, full)
+    return types
+
+
+def _arrange(messages) -> np.ndarray:
+    frames = []
+    for message in messages:
+        row = np.full((BODIES, 7), np.nan)
+        for body in message.rigidbodies:
+            p, q = body.pose.position, body.pose.orientation
+            row[int(body.rigid_body_name[5:])] = p.x, p.y, p.z, q.w, q.x, q.y, q.z
+        frames.append(row)
+    return np.array(frames)
+
+
+if __name__ == "__main__":
+    main()

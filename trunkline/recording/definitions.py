@@ -1,0 +1,51 @@
+"""ROS 2 definitions of the messages that logs are written in, as the recorder of ROS 2 puts them into a log."""
+
+SEPARATOR = "=" * 80 + "\n"
+HEADER = f"""{SEPARATOR}MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{SEPARATOR}MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+POINT = f"""{SEPARATOR}MSG: geometry_msgs/Point
+float64 x
+float64 y
+float64 z
+"""
+MARKER = f"""{SEPARATOR}MSG: mocap4r2_msgs/Marker
+int8 USE_NAME=0
+int8 USE_INDEX=1
+int8 USE_BOTH=2
+int8 id_type
+int32 marker_index
+string marker_name
+geometry_msgs/Point translation
+"""
+# mocap4r2_msgs of the MOCAP4ROS2 project
+RIGID_BODIES = f"""std_msgs/Header header
+uint32 frame_number
+mocap4r2_msgs/RigidBody[] rigidbodies
+{HEADER}{SEPARATOR}MSG: mocap4r2_msgs/RigidBody
+string rigid_body_name
+mocap4r2_msgs/Marker[] markers
+geometry_msgs/Pose pose
+{MARKER}{SEPARATOR}MSG: geometry_msgs/Pose
+geometry_msgs/Point position
+geometry_msgs/Quaternion orientation
+{POINT}{SEPARATOR}MSG: geometry_msgs/Quaternion
+float64 x 0
+float64 y 0
+float64 z 0
+float64 w 1
+"""
+MARKERS = f"""std_msgs/Header header
+uint32 frame_number
+mocap4r2_msgs/Marker[] markers
+{HEADER}{MARKER}{POINT}"""
+JOINT_STATE = f"""std_msgs/Header header
+string[] name
+float64[] position
+float64[] velocity
+float64[] effort
+{HEADER}"""

@@ -1,0 +1,101 @@
+"""What a log holds, before anybody says what it is: topics, rates, bodies, gaps."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.recording.cdr import short_name
+from trunkline.recording.log import Log, Topic, read_log
+from trunkline.recording.messages import JOINTS, POSES
+from trunkline.recording.source import COMMAND_WORDS, POSITION_WORDS, choose, pose_topics
+from trunkline.recording.streams import JointStream, PoseStream, joint_stream, pose_stream
+
+GAP = 1.5  # median intervals between frames that make a gap
+
+
+@dataclass
+class Survey:
+    """A log and what could be read in it. notes: why something could not. pose_topics: as in `source`."""
+
+    log: Log
+    notes: list[str] = field(default_factory=list)
+    pose_topics: dict[str | None, Topic] = field(default_factory=dict)
+    poses: PoseStream | None = None
+    command_topic: str | None = None
+    commands: JointStream | None = None
+    position_topic: str | None = None
+    tendon_positions: JointStream | None = None
+
+
+def survey(path: Path) -> Survey:
+    """Look through a log.
+
+    Raises:
+        InputError: it cannot be read at all.
+    """
+    found = Survey(read_log(path))
+    try:
+        found.pose_topics = pose_topics(found.log, None)
+        if found.pose_topics:
+            found.poses = pose_stream(found.pose_topics)
+    except (InputError, ValueError) as error:
+        found.notes.append(f"poses: {error}")
+    for role, words in (("command", COMMAND_WORDS), ("position", POSITION_WORDS)):
+        try:
+            topic = choose(found.log, None, JOINTS, role, words)
+            if topic is not None:
+                stream = joint_stream(topic)
+                setattr(found, f"{role}_topic", topic.name)
+                setattr(found, "commands" if role == "command" else "tendon_positions", stream)
+        except (InputError, ValueError) as error:
+            found.notes.append(f"{role}: {error}")
+    return found
+
+
+def describe(found: Survey) -> list[str]:
+    """Lines for people to read."""
+    log = found.log
+    lines = [f"{log.path}"] + [f"  damaged: {damage}" for damage in log.damage]
+    width = max((len(name) for name in log.topics), default=0)
+    for topic in sorted(log.topics.values(), key=lambda topic: topic.name):
+        schema = short_name(topic.schema)
+        use = "poses" if schema in POSES else "joints" if schema in JOINTS else "not read"
+        lines.append(
+            f"  {topic.name:{width}}  {topic.schema or 'no schema'} ({topic.encoding}), {use}: "
+            f"{len(topic.messages)} messages{_pace(topic.log_times)}"
+        )
+    lines += [f"  {note}" for note in found.notes]
+    if found.poses is not None and len(found.poses.stamps):
+        lines += _bodies(found.poses)
+    return lines
+
+
+def _pace(times: np.ndarray) -> str:
+    """How long and how often; not by the median step, which late deliveries shorten."""
+    seconds = (times[-1] - times[0]) * 1e-9
+    return f" in {seconds:.2f} s, {(len(times) - 1) / seconds:.1f} Hz" if seconds > 0 else ""
+
+
+def _bodies(poses: PoseStream) -> list[str]:
+    """One line a body: how often it is seen, and its gaps."""
+    clock = poses.stamps if poses.stamps.any() else poses.log_times
+    order = np.argsort(clock, kind="stable")
+    time = (clock[order] - clock[order[0]]) * 1e-9
+    interval = np.median(np.diff(time)) if len(time) > 1 else np.inf
+    missing = int(np.sum(np.maximum(np.round(np.diff(time) / interval) - 1, 0))) if interval > 0 else 0
+    oriented = "with" if poses.quaternions is not None else "without"
+    numbers = "" if poses.frames is None else ", with frame numbers"
+    lines = [
+        f"  {len(time)} frames of {len(poses.names)} bodies, {oriented} orientations{numbers}; "
+        f"{missing} frames missing in between; {poses.undecodable} messages unreadable"
+    ]
+    width = max(map(len, poses.names), default=0)
+    for index, name in enumerate(poses.names):
+        seen = time[poses.present[order, index]]
+        gaps = np.diff(seen)
+        gaps = gaps[gaps > GAP * interval]
+        longest = f", {len(gaps)} gaps, the longest {1e3 * gaps.max():.0f} ms" if len(gaps) else ""
+        lines.append(f"    {name:{width}}  seen in {100 * len(seen) / len(time):.1f} %{longest}")
+    return lines

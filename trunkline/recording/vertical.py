@@ -1,0 +1,69 @@
+"""Whether the declared vertical can be right: by the tilts that the experimenter aimed at, or by how the arm hangs."""
+
+import numpy as np
+
+from trunkline.recording.base_frame import average_base
+from trunkline.recording.take import Take
+
+AXES = np.concatenate([np.eye(3), -np.eye(3)])
+OFF = np.radians(15)  # a misfit beyond aiming a tilt by hand
+FITS = np.radians(5)
+SPREAD = 20.0  # degrees between levels, so that not every direction on a cone fits
+HANGS, LIES = np.radians(30), np.radians(60)  # from the vertical: an arm that hangs, and one that does not
+
+
+def check_vertical(takes: list[Take], measured_base: bool) -> tuple[np.ndarray | None, str | None]:
+    """(the vertical (3,) to take instead, or None; what to tell, or None).
+
+    It is replaced only where static trials at several tilts fit exactly one other axis of the frame.
+
+    Args:
+        measured_base: whether a body marks the mount; otherwise its orientation follows from the vertical itself.
+    """
+    static = [take for take in takes if take.experiment == "static_tilt" and take.level is not None]
+    if not static or not measured_base:
+        return None, _check_hanging(takes)
+    up = takes[0].up
+    levels = np.radians([take.level for take in static])
+    z = np.array([average_base(t.base_positions, t.base_quaternions).rotation.apply([0, 0, 1]) for t in static])
+    off = _misfit(z, up, levels)
+    if off <= OFF:
+        return None, None
+    misfits = np.array([_misfit(z, axis, levels) for axis in AXES])
+    best, second = np.argsort(misfits)[:2]
+    found = f"up: the tilts of {len(static)} static trials are {np.degrees(off):.0f}° off their levels with {_show(up)}"
+    if misfits[best] < FITS and misfits[second] > OFF and np.ptp(np.degrees(levels)) >= SPREAD:
+        return AXES[best], f"{found}, {np.degrees(misfits[best]):.1f}° with {_show(AXES[best])}, which was taken"
+    return None, f"{found}, and no other axis fits: check the levels, `frame.up` and `base` in session.yaml"
+
+
+def _misfit(z: np.ndarray, up: np.ndarray, levels: np.ndarray) -> float:
+    """Median difference, rad, between levels (N,) and the angles of the base's z axes (N, 3) from `up`."""
+    return float(np.median(np.abs(np.arccos(np.clip(z @ up, -1, 1)) - levels)))
+
+
+def _check_hanging(takes: list[Take]) -> str | None:
+    """After a release an arm hangs more or less; told where all releases come to rest along another axis."""
+    hanging = [_hang(take) for take in takes if take.experiment == "release"]
+    if not hanging:
+        return None
+    down, up = np.array(hanging), takes[0].up
+    angle = np.median(np.arccos(np.clip(-down @ up, -1, 1)))
+    others = [np.median(np.arccos(np.clip(-down @ axis, -1, 1))) for axis in AXES]
+    best = int(np.argmin(others))
+    if angle < LIES or others[best] > HANGS:
+        return None
+    found = f"released arms come to rest {np.degrees(angle):.0f}° from hanging with {_show(up)}"
+    return f"up: {found}, {np.degrees(others[best]):.0f}° with {_show(AXES[best])}: check `frame.up` in session.yaml"
+
+
+def _hang(take: Take) -> np.ndarray:
+    """The direction (3,) from the base to the farthest segment, over the last fifth of a take."""
+    ends = slice(-max(1, len(take.time) // 5), None)
+    middle = np.nanmedian(take.positions[ends], axis=0) - np.nanmedian(take.base_positions[ends], axis=0)
+    distance = np.where(np.isfinite(middle[:, 0]), np.linalg.norm(middle, axis=1), 0)
+    return middle[np.argmax(distance)] / max(distance.max(), 1e-12)
+
+
+def _show(axis: np.ndarray) -> str:
+    return "[" + ", ".join(f"{value:g}" for value in np.round(axis, 3) + 0.0) + "]"
