@@ -10,7 +10,8 @@ Config = IdentificationSettings
 
 
 def main(config: Config) -> None:
-    run("identify_control", config, Path("artifacts/identify_damping/arm.xml"), report_cad=True)
+    earlier = ("identify_stiffness", "identify_damping")
+    run("identify_control", config, Path("artifacts/identify_damping/arm.xml"), whole=earlier)
 
 
 if __name__ == "__main__":

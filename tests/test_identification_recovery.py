@@ -7,19 +7,20 @@ from tests.matched_plant import curl, release, segments_of, small_model, tilt
 from trunkline.arm.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.certainty import certainty, weakest_in_words
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Coarse, Fine, identify
+from trunkline.identification.identify import Method, identify
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import DIVERGED_LOSS, Bounds, Problem
+from trunkline.identification.search import LeastSquares, Linearisation
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
 
 
-def identified(trials, model, parameters, per_joint=(), fine="none", coarse_frames=437):
+def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3)):  # noqa: B008
     experiments = [prepare(trial, model, 437) for trial in trials]
     bounds = {name: Bounds(*span) for name, span in parameters.items()}
     return identify(
         "test", model, experiments, segments_of(model), bounds, per_joint, "positions", WEIGHTS,
-        Coarse(8, 6, 1e-3, 1.0, coarse_frames, 8), Fine(fine, 0.1, 8, 4, 30, 1e-9), seed=3,
+        Method(optimizer, 1.0, 437, 99, 8, 1e-9, LeastSquares(0, 1, 30, 1e-9), 0.1, seed=3),
     )  # fmt: skip
 
 
@@ -45,7 +46,7 @@ def test_per_joint_factors_come_back():
     set_fields(truth, candidate_fields(model, {}, {"stiffness": factors[None]}))
     trials = [tilt(truth, angle) for angle in (30, 60, 90)]
     span = PARAMETERS["stiffness"].read(model)
-    found = identified(trials, model, {"stiffness": (0.99 * span, 1.01 * span)}, ("stiffness",), "least_squares")
+    found = identified(trials, model, {"stiffness": (0.99 * span, 1.01 * span)}, ("stiffness",))
     stiffness = found.models["identified"].jnt_stiffness / model.jnt_stiffness
     np.testing.assert_allclose(stiffness[::2][:3], factors[:3], atol=0.02)  # beyond, gravity bends too little
 
@@ -105,7 +106,7 @@ def test_certainty_of_a_straight_line():
     design = np.stack([x, np.ones_like(x)], axis=1)
     residual = rng.normal(0, 0.5, len(x))
     residual -= design @ np.linalg.lstsq(design, residual, rcond=None)[0]
-    found = certainty(list(residual[:, None]), list(design[:, None]))
+    found = certainty(Linearisation(np.zeros(2), list(residual[:, None]), list(design[:, None])))
     expected = 0.5 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
     np.testing.assert_allclose(found.standard_error, expected, rtol=0.12)
     assert found.condition == pytest.approx(1, abs=0.01)

@@ -12,11 +12,13 @@ from trunkline.arm.parameters import PARAMETERS, candidate_fields, save_model, s
 from trunkline.errors import InputError
 from trunkline.identification.run import run
 from trunkline.identification.settings import (
-    CoarseSettings,
-    FineSettings,
+    DifferentialEvolutionSettings,
     IdentificationSettings,
+    LeastSquaresSettings,
     Loss,
+    PolishSettings,
     Range,
+    RoughSettings,
 )
 from trunkline.recording.trial import write_trials
 
@@ -26,17 +28,17 @@ LOSS = Loss(
 )  # fmt: skip
 
 
-def settings(experiments, reported, parameters, per_joint=(), **coarse) -> IdentificationSettings:
-    numbers = {"population": 8, "generations": 4, "tolerance": 1e-3, "step_factor": 1.0, "frames": 437,
-               "polish_iterations": 8}  # fmt: skip
-    return IdentificationSettings(
-        seed=1, frames=437, experiments=experiments, reported=reported, loss=LOSS,
-        parameters={name: Range(low=low, high=high) for name, (low, high) in parameters.items()},
-        per_joint=list(per_joint), coarse=CoarseSettings(**numbers | coarse),
-        fine=FineSettings(
-            method="least_squares", range=0.1, population=8, generations=3, iterations=3, tolerance=1e-2
-        ),
-    )  # fmt: skip
+def settings(experiments, reported, parameters, per_joint=(), iterations=8, **changed) -> IdentificationSettings:
+    return IdentificationSettings(**{
+        "seed": 1, "frames": 437, "command_delay": 0.0, "experiments": experiments, "reported": reported, "loss": LOSS,
+        "parameters": {name: Range(low=low, high=high) for name, (low, high) in parameters.items()},
+        "optimizer": LeastSquaresSettings(method="least_squares", starts=4, descents=1, iterations=4, tolerance=1e-3),
+        "rough": RoughSettings(step_factor=1.0, frames=437, trials=99),
+        "polish": PolishSettings(iterations=iterations, tolerance=1e-8),
+        "per_joint": list(per_joint), "per_joint_range": 0.1,
+        "fine": LeastSquaresSettings(method="least_squares", starts=0, descents=1, iterations=3, tolerance=1e-2),
+        "cross_validation_folds": 0,
+    } | changed)  # fmt: skip
 
 
 def truth_of(model: mujoco.MjModel, **scales: float) -> mujoco.MjModel:
@@ -98,9 +100,13 @@ def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
     write([*trials, curl(truth, 50, "validate", frames=110), release(truth, 0.2, "validate", frames=30)])
     ranges = {name: (0.2 * value, 5 * value) for name, value in
               {n: PARAMETERS[n].read(truth) for n in ("kp", "kv", "force_range", "time_constant")}.items()}  # fmt: skip
-    config = settings(["curl"], ["release", "curl"], ranges, population=12, generations=10, polish_iterations=25,
-                      tolerance=1e-8)
-    run("identify_control", config, root / "artifacts/build_mjcf/arm.xml", report_cad=True)
+    evolution = DifferentialEvolutionSettings(
+        method="differential_evolution", population=6, population_per_parameter=2, generations=12, tolerance=1e-2
+    )
+    config = settings(["curl"], ["release", "curl"], ranges, iterations=25, optimizer=evolution)
+    (root / "artifacts/identify_damping").mkdir()
+    (root / "artifacts/identify_damping/parameters.json").write_text('{"parameters": {}}')
+    run("identify_control", config, root / "artifacts/build_mjcf/arm.xml", whole=("identify_damping",))
     metrics = metrics_of(root, "identify_control")
     assert metrics["cad"]["validate"]["e_internal_mm"] == metrics["initial"]["validate"]["e_internal_mm"]
     assert set(metrics["identified"]["validate"]["by_experiment"]) == {"release", "curl"}

@@ -12,7 +12,7 @@ from dvc.repo import Repo
 from omegaconf import OmegaConf
 from stub_pipeline import StubPipeline
 
-from trunkline.config import group_options
+from trunkline.config import SHARED, group_options
 from trunkline.pipeline import lock
 
 ROOT = Path(__file__).parents[1]
@@ -45,7 +45,7 @@ def test_one_name_everywhere():
     assert list(written) == STAGES
     assert list(OmegaConf.load(ROOT / "params.yaml")) == STAGES
     assert sorted(file.stem for file in (ROOT / "stages").glob("*.py")) == sorted(STAGES)
-    assert sorted(folder.name for folder in (ROOT / "conf").iterdir()) == sorted(STAGES)
+    assert sorted(folder.name for folder in (ROOT / "conf").iterdir()) == sorted([*STAGES, SHARED])
     for name, stage in written.items():
         assert stage["cmd"] == f"python -m stages.{name}"
         assert stage["desc"]
@@ -55,9 +55,9 @@ def test_one_name_everywhere():
 def test_a_stage_lists_its_settings(stages, name):
     params = {_relative(dep): dep.params for dep in stages[name].deps if hasattr(dep, "params")}
     section = OmegaConf.to_container(OmegaConf.load(ROOT / "params.yaml"))[name] or {}
-    groups = [group for group in group_options(ROOT / "conf" / name)]
+    groups = group_options(ROOT / "conf" / name)
     expected = {"params.yaml": [name], f"conf/{name}/config.yaml": []}
-    expected |= {f"conf/{name}/{group}/{section[group]}.yaml": [] for group in groups}
+    expected |= {options[section[group]].relative_to(ROOT).as_posix(): [] for group, options in groups.items()}
     assert params == expected
 
 

@@ -2,8 +2,8 @@
 
 ``conf/<stage>/config.yaml`` and its groups hold structure, variants and untuned values; ``params.yaml``
 holds, per stage, the values people tune. A key is set in one place only: it is absent from conf, or ``???``,
-if it is tuned in params.yaml. A group (a subfolder of ``conf/<stage>``, named in its config.yaml's defaults
-list) is chosen in params.yaml by its name: ``arm: spiral``.
+if it is tuned in params.yaml. A group (a subfolder of ``conf/<stage>``, or of ``conf/shared`` if several stages
+use it, named in config.yaml's defaults list) is chosen in params.yaml by its name: ``arm: spiral``.
 """
 
 import difflib
@@ -24,6 +24,7 @@ from trunkline.errors import InputError
 
 Schema = TypeVar("Schema")
 
+SHARED = "shared"  # folder beside those of the stages, of groups that several of them use
 UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
 
 
@@ -92,7 +93,10 @@ def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[
     chosen = _choices(folder, section, where)
     try:
         with initialize_config_dir(version_base="1.3", config_dir=str(folder.resolve())):
-            config = compose("config", overrides=[f"{group}={option}" for group, option in chosen.items()])
+            overrides = [f"{group}={option}" for group, option in chosen.items()]
+            if (folder.parent / SHARED).is_dir():
+                overrides.append(f'hydra.searchpath=["file://{(folder.parent / SHARED).resolve()}"]')
+            config = compose("config", overrides=overrides)
         OmegaConf.set_struct(config, False)
         values = {key: value for key, value in section.items() if key not in chosen}
         return _plain(OmegaConf.merge(config, values))
@@ -100,13 +104,14 @@ def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[
         raise InputError(f"{folder}: {error}") from error
 
 
-def group_options(folder: Path) -> dict[str, list[str]]:
-    """Config groups in ``folder``: name of the group to the names of its options."""
-    return {
-        group.name: sorted(option.stem for option in group.glob("*.yaml"))
-        for group in sorted(folder.iterdir())
-        if group.is_dir()
-    }
+def group_options(folder: Path) -> dict[str, dict[str, Path]]:
+    """The config groups that ``folder / "config.yaml"`` names, each with its options and their files."""
+    found = {}
+    for group in _defaults(folder):
+        own = folder / group
+        files = (own if own.is_dir() else folder.parent / SHARED / group).glob("*.yaml")
+        found[group] = {file.stem: file for file in sorted(files)}
+    return found
 
 
 def _read_section(path: Path, stage: str) -> dict[str, Any]:
@@ -121,17 +126,21 @@ def _read_section(path: Path, stage: str) -> dict[str, Any]:
 
 def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str]:
     """The option that ``section`` names for each group of the defaults list in ``folder / config.yaml``."""
-    chosen = {}
-    defaults = OmegaConf.to_container(_load(folder / "config.yaml")).get("defaults", [])
-    for entry in defaults:
-        for group, default in entry.items() if isinstance(entry, dict) else ():
-            options, found = group_options(folder).get(group, []), section.get(group, default)
-            if found not in options:
-                state = "missing" if found in ("???", None) else f"found {found!r}"
-                expected = ", ".join(options) + _nearest(str(found), options)
-                raise InputError(f"{where}.{group}: {state}, expected one of {expected}")
-            chosen[group] = found
+    chosen, defaults = {}, _defaults(folder)
+    for group, options in group_options(folder).items():
+        found = section.get(group, defaults[group])
+        if found not in list(options):
+            state = "missing" if found in ("???", None) else f"found {found!r}"
+            expected = ", ".join(options) + _nearest(str(found), list(options))
+            raise InputError(f"{where}.{group}: {state}, expected one of {expected}")
+        chosen[group] = found
     return chosen
+
+
+def _defaults(folder: Path) -> dict[str, str]:
+    """Each group of the defaults list with the option that it names, often ???."""
+    entries = OmegaConf.to_container(_load(folder / "config.yaml")).get("defaults", [])
+    return {group: option for entry in entries if isinstance(entry, dict) for group, option in entry.items()}
 
 
 def _load(path: Path) -> DictConfig:

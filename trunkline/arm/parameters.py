@@ -86,6 +86,11 @@ PARAMETERS: dict[str, Parameter] = {
     "tendon_friction": Parameter(
         "N", ("tendon_frictionloss",), lambda m: float(m.tendon_frictionloss[0]), _set("tendon_frictionloss", ()),
     ),
+    # the smallest speed at which a regularised friction yields falls with it: a slow one lets a hook creep straight
+    "friction_time": Parameter(
+        "s", ("tendon_solref_fri",), lambda m: float(m.tendon_solref_fri[0, 0]),
+        _set("tendon_solref_fri", (slice(None), 0)),
+    ),
     "kp": Parameter(
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
     ),
@@ -154,7 +159,9 @@ def save_model(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
         joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
         joint.frictionloss = model.dof_frictionloss[dof]
     for tendon in spec.tendons:
-        tendon.frictionloss = model.tendon_frictionloss[model.tendon(tendon.name).id]
+        index = model.tendon(tendon.name).id
+        tendon.frictionloss = model.tendon_frictionloss[index]
+        tendon.solref_friction = model.tendon_solref_fri[index]
     for actuator in spec.actuators:
         index = model.actuator(actuator.name).id
         actuator.gainprm[:] = model.actuator_gainprm[index]

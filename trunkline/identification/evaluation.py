@@ -21,27 +21,29 @@ STRUCTURE = "jnt_stiffness"  # any field: a population of one is the model itsel
 
 @dataclass
 class Replay:
-    """One model's simulation of every experiment, in their order: segment positions (T, S, 3), m."""
+    """One model's simulation of every experiment, in their order.
+
+    positions: of the segments, m. Each (T, S, 3). length: of the model's straight arm, from the mount to the tip, m.
+    """
 
     positions: list[np.ndarray]
+    length: float
 
 
-def replay(model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...]) -> Replay:
-    """Simulate `experiments` with `model` as it is, its time step fitted to divide a frame evenly."""
+def replay(
+    model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], step_factor: float = 1.0
+) -> Replay:
+    """Simulate `experiments` with `model` as it is, its time step (times a factor) fitted to divide a frame evenly."""
     fields = {STRUCTURE: np.array(getattr(model, STRUCTURE))[None]}
-    simulated = Population(model, experiments, segments).simulate(fields)
-    return Replay([positions[0] for positions in simulated.positions])
-
-
-def arm_length(model: mujoco.MjModel) -> float:
-    """Length of the straight arm, from the mount to the tip, m."""
+    simulated = Population(model, experiments, segments, step_factor).simulate(fields)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    return float(np.linalg.norm(data.site("tip").xpos - data.site("base_center").xpos))
+    length = float(np.linalg.norm(data.site("tip").xpos - data.site("base_center").xpos))
+    return Replay([positions[0] for positions in simulated.positions], length)
 
 
 def scores(
-    replayed: Replay, experiments: list[Experiment], loss: str, weights: LossWeights, length: float
+    replayed: Replay, experiments: list[Experiment], loss: str, weights: LossWeights
 ) -> dict[str, dict[str, float]]:
     """Per split the loss and the errors, each the mean over trials; `by_experiment` splits them further.
 
@@ -50,7 +52,7 @@ def scores(
     table: dict[str, dict] = {}
     for split in ("identify", "validate"):
         rows = [
-            (e.kind, _score(p, e, loss, weights, length))
+            (e.kind, _score(p, e, loss, weights, replayed.length))
             for p, e in zip(replayed.positions, experiments, strict=True)
             if e.split == split
         ]

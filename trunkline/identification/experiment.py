@@ -50,8 +50,11 @@ class Experiment:
         return len(self.positions)
 
 
-def prepare(trial: Trial, model: mujoco.MjModel, frames: int) -> Experiment:
+def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: float = 0.0) -> Experiment:
     """Set up one trial: from its detected start, for at most `frames` frames.
+
+    Args:
+        command_delay: s from a logged command to the motor that acts on it.
 
     Raises:
         InputError: if a tracked segment or a commanded tendon is not in the model, or too little was measured.
@@ -73,6 +76,10 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int) -> Experiment:
         None if trial.quaternions is None else trial.quaternions[seen],
     )
     lengths = commanded_lengths(trial, model)
+    if command_delay:
+        lengths = np.stack(
+            [np.interp(trial.time - command_delay, trial.time, column) for column in lengths.T], axis=1
+        )
     return Experiment(
         name=trial.name,
         kind=trial.experiment,

@@ -1,52 +1,40 @@
-"""One function for the three stages: they differ in their experiments, their parameters and their loss."""
+"""One function for the three stages: they differ in their experiments and in their parameters."""
 
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from trunkline.arm.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.certainty import Certainty, certainty
+from trunkline.arm.parameters import candidate_fields, set_fields
+from trunkline.identification.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds, Problem
-from trunkline.identification.search import Convergence, Found, evolve, jacobian, polish
+from trunkline.identification.search import Convergence, Found, Optimizer, descend, linearise, search
 from trunkline.progress import progress
 
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
 
 
 @dataclass
-class Coarse:
-    """Search for one scalar per parameter, by differential evolution and a least-squares polish of its result.
+class Method:
+    """How a stage searches.
 
-    population: candidates a generation. generations: at most. tolerance: relative spread of the losses at the end.
-    step_factor: how much coarser than the model's own time step. frames: of every trial, from its start.
-    polish_iterations: 0 for none.
+    optimizer: of the scalars, roughly: with a time step `rough_step_factor` times the model's own, over the first
+        `rough_frames` of `rough_trials` trials.
+    polish_iterations, polish_tolerance: of the least squares that follows, on whole trials at the model's own step.
+    fine: optimizer of the factors of every joint, within `per_joint_range` of 1.
     """
 
-    population: int
-    generations: int
-    tolerance: float
-    step_factor: float
-    frames: int
+    optimizer: Optimizer
+    rough_step_factor: float
+    rough_frames: int
+    rough_trials: int
     polish_iterations: int
-
-
-@dataclass
-class Fine:
-    """Search for factors of every joint around the coarse result.
-
-    method: "least_squares", "differential_evolution" or "none". range: how far a factor may be from 1.
-    population, generations: of differential evolution. iterations: of least squares. tolerance: of either.
-    """
-
-    method: str
-    range: float
-    population: int
-    generations: int
-    iterations: int
-    tolerance: float
+    polish_tolerance: float
+    fine: Optimizer
+    per_joint_range: float
+    seed: int
 
 
 @dataclass
@@ -55,7 +43,8 @@ class Identification:
 
     models: "initial", "coarse" and "identified", each a compiled model.
     values: identified scalars. factors: per-joint factors (units,) by parameter, empty if there are none.
-    certainty: of the scalars, in ln(value), before joints got factors.
+    certainty: of the scalars, in ln(value), before joints got factors. bootstrap: their 95 % intervals by
+        resampling trials, lowest and highest ln(value), shape (2, P).
     factor_certainty: of all factors, given the scalars; None without factors.
     at_bound: names of what ended on a bound. converged: which searches stopped for that reason.
     """
@@ -64,6 +53,7 @@ class Identification:
     values: dict[str, float]
     factors: dict[str, np.ndarray]
     certainty: Certainty
+    bootstrap: np.ndarray
     factor_certainty: Certainty | None
     at_bound: list[str]
     converged: dict[str, bool]
@@ -82,9 +72,7 @@ def identify(
     per_joint: tuple[str, ...],
     loss: str,
     weights: LossWeights,
-    coarse: Coarse,
-    fine: Fine,
-    seed: int,
+    method: Method,
 ) -> Identification:
     """Fit the parameters to the `identify` split among `experiments`; the others are never looked at.
 
@@ -92,53 +80,54 @@ def identify(
         label: shown with the progress.
         model: the model that the stage begins with.
         parameters: scalars of the whole arm and their ranges.
-        per_joint: those of them that then get a factor for each joint.
+        per_joint: what then gets a factor for each joint, "stiffness" or "damping".
         loss: "distances" (the paper's) or "positions".
     """
     seen = [e for e in experiments if e.split == "identify"]
-    short = [_shortened(e, coarse.frames) for e in seen]
-    rough = Problem(model, short, segments, parameters, loss, weights, coarse.step_factor)
-    low, high = rough.bounds(0.0)
-    start = np.log(np.clip([PARAMETERS[p].read(model) for p in parameters], np.exp(low), np.exp(high)))
-    with progress(coarse.generations, f"{label} coarse", "generations") as bar:
-        found = evolve(
-            rough, low, high, start, coarse.population, coarse.generations, coarse.tolerance, seed,
-            lambda best: bar.update(1, best_loss=best, **rough.effort()),
-        )  # fmt: skip
-    searches = {"coarse": found}
+    short = [_shortened(e, method.rough_frames) for e in _few(seen, method.rough_trials)]
+    rough = Problem(model, short, segments, parameters, loss, weights, method.rough_step_factor)
     exact = Problem(model, seen, segments, parameters, loss, weights)
-    if coarse.polish_iterations:
-        found = _polish(exact, low, high, found.vector, coarse.polish_iterations, coarse.tolerance, f"{label} polish")
-        searches["polish"] = found
-    scalars = found.vector
-    values = dict(zip(parameters, np.exp(scalars).tolist(), strict=True))
-    coarse_model = _with(model, values, {})
-    scalar_certainty = certainty(*(found.linearisation or jacobian(exact, scalars, high)))
+    searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}
+    searches["polish"] = found = _polish(exact, searches["coarse"].vector, method, f"{label} polish")
+    values = dict(zip(parameters, np.exp(found.vector).tolist(), strict=True))
+    coarse = with_parameters(model, values)
+    at_bound = _at_bound(parameters, found.vector, *exact.bounds())
+    linear = linearise(exact, found.vector)
     problems = [rough, exact]
 
     factors: dict[str, np.ndarray] = {}
     factor_certainty = None
-    if per_joint and fine.method != "none":
-        joints = Problem(coarse_model, seen, segments, {}, loss, weights, per_joint=per_joint)
-        searches["per_joint"] = found = _fine(joints, fine, seed, label)
-        highest = joints.bounds(fine.range)[1]
-        factor_certainty = certainty(*(found.linearisation or jacobian(joints, found.vector, highest)))
+    if per_joint:
+        joints = Problem(
+            coarse, seen, segments, {}, loss, weights, per_joint=per_joint, per_joint_range=method.per_joint_range
+        )
+        searches["per_joint"] = found = _search(joints, method.fine, method.seed, f"{label} per joint")
+        factor_certainty = certainty(linearise(joints, found.vector))
         factors = dict(zip(per_joint, found.vector.reshape(len(per_joint), -1), strict=True))
+        at_bound += _factors_at_bound(factors, method.per_joint_range)
         problems.append(joints)
 
     return Identification(
-        models={"initial": model, "coarse": coarse_model, "identified": _with(coarse_model, {}, factors)},
+        models={"initial": model, "coarse": coarse, "identified": with_parameters(coarse, {}, factors)},
         values=values,
         factors=factors,
-        certainty=scalar_certainty,
+        certainty=certainty(linear),
+        bootstrap=bootstrap(linear, method.seed),
         factor_certainty=factor_certainty,
-        at_bound=_at_bound(parameters, scalars, low, high) + _factors_at_bound(factors, fine.range),
+        at_bound=at_bound,
         converged={name: search.converged for name, search in searches.items()},
         convergence={name: search.convergence for name, search in searches.items()},
         evaluations=sum(p.evaluations for p in problems),
         diverged=sum(p.diverged for p in problems),
         steps=sum(p.steps for p in problems),
     )
+
+
+def _few(experiments: list[Experiment], count: int) -> list[Experiment]:
+    """`count` of them, from the one that swings out least to the one that swings out most, evenly between."""
+    order = np.argsort([np.linalg.norm(e.positions[..., :2], axis=-1).max() for e in experiments], kind="stable")
+    places = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
+    return [experiments[i] for i in order[places]]
 
 
 def _shortened(experiment: Experiment, frames: int) -> Experiment:
@@ -149,29 +138,24 @@ def _shortened(experiment: Experiment, frames: int) -> Experiment:
     )
 
 
-def _polish(problem: Problem, low, high, start, iterations: int, tolerance: float, label: str) -> Found:
-    with progress(iterations, label, "iterations") as bar:
-        return polish(
-            problem, low, high, start, iterations, tolerance,
+def _search(problem: Problem, optimizer: Optimizer, seed: int, label: str) -> Found:
+    with progress(optimizer.steps(), label, "iterations") as bar:
+        return search(problem, optimizer, seed, lambda best: bar.update(1, best_loss=best, **problem.effort()))
+
+
+def _polish(problem: Problem, start: np.ndarray, method: Method, label: str) -> Found:
+    with progress(method.polish_iterations, label, "iterations") as bar:
+        return descend(
+            problem, start, method.polish_iterations, method.polish_tolerance,
             lambda best: bar.update(1, best_loss=best, **problem.effort()),
         )  # fmt: skip
 
 
-def _fine(problem: Problem, fine: Fine, seed: int, label: str) -> Found:
-    """Factors of every joint, started from 1."""
-    low, high = problem.bounds(fine.range)
-    start = np.ones(len(low))
-    if fine.method == "least_squares":
-        return _polish(problem, low, high, start, fine.iterations, fine.tolerance, f"{label} per joint")
-    with progress(fine.generations, f"{label} per joint", "generations") as bar:
-        return evolve(
-            problem, low, high, start, fine.population, fine.generations, fine.tolerance, seed,
-            lambda best: bar.update(1, best_loss=best, **problem.effort()),
-        )  # fmt: skip
-
-
-def _with(model: mujoco.MjModel, values: dict[str, float], factors: dict[str, np.ndarray]) -> mujoco.MjModel:
-    """A copy of `model` with these parameters."""
+def with_parameters(
+    model: mujoco.MjModel, values: dict[str, float], factors: dict[str, np.ndarray] | None = None
+) -> mujoco.MjModel:
+    """A copy of `model` with these scalars and these factors of its units."""
+    factors = factors or {}
     changed = model.__copy__()
     if values or factors:
         fields = candidate_fields(

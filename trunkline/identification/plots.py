@@ -14,6 +14,7 @@ from trunkline.identification.loss import distances
 from trunkline.plots import IDENTIFIED, INITIAL, MEASURED
 
 ERROR_CUTOFF = 6.0  # Hz, of the low-pass over error curves, as the paper filters its figure
+DOUBTFUL = "#999999"
 SHOWN_SEGMENTS = 5
 NARROWEST = 60.0  # mm, of an axis: noise shall not look like motion
 COLORS = {"CAD": INITIAL, "initial": INITIAL, "identified": IDENTIFIED}
@@ -171,16 +172,19 @@ def shape_figure(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def parameter_figure(identification: Identification, bounds, units: dict[str, str]) -> Figure:
-    """Each scalar with its 95 % interval within its range, and the per-joint factors."""
+def parameter_figure(
+    identification: Identification, bounds, units: dict[str, str], undetermined: list[bool]
+) -> Figure:
+    """Each scalar with its 95 % interval within its range, grey if that is open or a bound, and per-joint factors."""
     panels = 1 + bool(identification.factors)
     figure, axes = plt.subplots(1, panels, figsize=(5.5 * panels, 3.2), squeeze=False)
     for row, (name, value) in enumerate(identification.values.items()):
         low, high = np.log(bounds[name].low), np.log(bounds[name].high)
         place = (np.log(value) - low) / (high - low)
         width = identification.certainty.half_width[row] / (high - low)
-        axes[0, 0].errorbar(place, row, xerr=width, fmt="o", color=IDENTIFIED, capsize=4)
-        axes[0, 0].annotate(f"{value:.4g} {units[name]}", (place, row), xytext=(0, 8),
+        doubt = "not determined" if undetermined[row] else "on a bound" if name in identification.at_bound else ""
+        axes[0, 0].errorbar(place, row, xerr=width, fmt="o", color=DOUBTFUL if doubt else IDENTIFIED, capsize=4)
+        axes[0, 0].annotate(f"{value:.4g} {units[name]} {doubt}".strip(), (place, row), xytext=(0, 8),
                             textcoords="offset points", ha="center", fontsize=9)
     axes[0, 0].set(xlim=(0, 1), ylim=(-0.6, len(identification.values) - 0.2), xlabel="place in its range (log scale)",
                    yticks=range(len(identification.values)), yticklabels=list(identification.values),

@@ -11,11 +11,11 @@ from trunkline.arm.parameters import Fields
 from trunkline.identification.experiment import Experiment
 from trunkline.threads import thread_count
 
-RELAXATION = 0.2  # s, damping over stiffness while a static shape settles: quick, without swinging
+RELAXATION = 0.4  # s, damping over stiffness while a static shape settles: quick, without swinging
 SETTLE_STEP = 0.002  # s
 SETTLE_CHUNK = 100  # steps between looks at whether a shape rests
 SETTLE_TIME = 10.0  # s, the most; a shape that does not rest by then counts as diverged
-REST_SPEED = 1e-4  # rad/s of the fastest hinge; with the relaxation above some 1e-5 rad are left then
+REST_SPEED = 2e-5  # rad/s of the fastest hinge; with the relaxation above some 1e-5 rad are left then
 
 
 @dataclass
@@ -23,7 +23,7 @@ class Simulated:
     """Segment positions of every trial, in the order of the experiments.
 
     positions: per trial (C, T, S, 3), m; not finite from where a candidate diverged.
-    diverged: which candidates left the physics in any trial. Shape (C,).
+    diverged: which candidates left the physics in any trial, or made MuJoCo warn. Shape (C,).
     steps: simulation steps taken.
     """
 
@@ -112,6 +112,7 @@ class Population:
             moving = moving[~(np.abs(speed[moving]).max(axis=1) < REST_SPEED)]
         shapes = seen[:, None, self._sites()]
         shapes[moving] = np.nan
+        shapes[batch.warning.any(axis=(1, 2))] = np.nan
         results = [shapes[t * count : (t + 1) * count] for t in range(len(experiments))]
         return results, steps
 
@@ -138,4 +139,7 @@ class Population:
             timestep[:] = frame_step / substeps
             for t in range(running):
                 results[t][:, frame] = seen[t * count : (t + 1) * count, sites]
+        warned = batch.warning.any(axis=(1, 2)).reshape(len(experiments), count)
+        for result, which in zip(results, warned, strict=True):
+            result[which] = np.nan
         return results, steps

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.arm.parameters import candidate_fields, unit_of_hinge
+from trunkline.arm.parameters import PARAMETERS, candidate_fields, unit_of_hinge
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
 from trunkline.identification.population import Population
@@ -16,7 +16,7 @@ DIVERGED_LOSS = 1e3  # finite, and with sensible weights far above the loss of a
 
 @dataclass
 class Bounds:
-    """Range of a parameter in its own unit; both ends positive: it is searched on a logarithmic scale."""
+    """Range of a parameter in its own unit, 0 < low < high: it is searched on a logarithmic scale."""
 
     low: float
     high: float
@@ -27,7 +27,8 @@ class Problem:
     """Minimise the mean loss over `experiments` of a model whose parameters are free within bounds.
 
     A candidate is a vector z: first the scalars of `parameters` (natural logarithm), then, if `per_joint` names
-    them, the factors of every unit. Counts evaluations (one candidate on all trials), divergences and steps.
+    them, the factors of every unit, within `per_joint_range` of 1. `step_factor` is how much coarser than the model's
+    own time step to simulate. Counts evaluations (one candidate on all trials), divergences and steps.
     """
 
     model: mujoco.MjModel
@@ -38,6 +39,7 @@ class Problem:
     weights: LossWeights
     step_factor: float = 1.0
     per_joint: tuple[str, ...] = ()
+    per_joint_range: float = 0.0
     evaluations: int = 0
     diverged: int = 0
     steps: int = 0
@@ -80,15 +82,23 @@ class Problem:
         """Loss of each candidate (C, P) → (C,)."""
         return sum(loss_of(block) for block in self.residuals(vectors))
 
-    def bounds(self, per_joint_range: float) -> tuple[np.ndarray, np.ndarray]:
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest vector z."""
         low = [np.log(b.low) for b in self.parameters.values()]
         high = [np.log(b.high) for b in self.parameters.values()]
         joints = len(self.per_joint) * self.units
         return (
-            np.array(low + [1 - per_joint_range] * joints),
-            np.array(high + [1 + per_joint_range] * joints),
+            np.array(low + [1 - self.per_joint_range] * joints),
+            np.array(high + [1 + self.per_joint_range] * joints),
         )
+
+    def start(self) -> np.ndarray:
+        """The vector z of the model itself, within bounds; a parameter that it lacks (0) starts mid-range."""
+        low, high = self.bounds()
+        values = np.array([PARAMETERS[name].read(self.model) for name in self.parameters])
+        middle = 0.5 * (low + high)
+        scalars = np.where(values > 0, np.log(np.where(values > 0, values, 1.0)), middle[: len(values)])
+        return np.clip(np.append(scalars, np.ones(len(low) - len(values))), low, high)
 
     def effort(self) -> dict[str, float]:
         """What a progress bar shows: evaluations so far, and the simulator's speed."""

@@ -1,5 +1,7 @@
 """The edge of the three identification stages: read model and trials, identify, write model, numbers, figures."""
 
+import json
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -9,11 +11,13 @@ from trunkline.arm.parameters import PARAMETERS, save_model
 from trunkline.errors import InputError
 from trunkline.identification import plots
 from trunkline.identification.certainty import weakest_in_words
-from trunkline.identification.evaluation import arm_length, replay, scores
+from trunkline.identification.cross_validation import cross_validate
+from trunkline.identification.evaluation import Replay, replay, scores
 from trunkline.identification.experiment import Experiment, prepare
-from trunkline.identification.identify import Coarse, Fine, Identification, identify
-from trunkline.identification.loss import LossWeights
+from trunkline.identification.identify import Identification, Method, identify, with_parameters
+from trunkline.identification.loss import LossWeights, internal_error
 from trunkline.identification.problem import Bounds
+from trunkline.identification.search import DifferentialEvolution, LeastSquares, Optimizer
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.plots import save_figure
 from trunkline.recording.trial import read_trials
@@ -23,12 +27,13 @@ TRIALS = Path("data/processed/filter")
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 
 
-def run(stage: str, config: IdentificationSettings, model_path: Path, report_cad: bool = False) -> None:
+def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tuple[str, ...] = ()) -> None:
     """Identify and write `artifacts/<stage>/`.
 
     Args:
         model_path: MJCF that the stage begins with.
-        report_cad: also score the untouched initial model on the same trials.
+        whole: earlier stages whose scalars, with this stage's, make the whole arm: the CAD model and the one with all
+            scalars and no joint's own factor are then scored on the same trials too.
     """
     spec = read_spec(model_path)
     model = spec.compile()
@@ -36,37 +41,99 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, report_cad
     fitted = [e for e in experiments if e.kind in config.experiments]
     weights = LossWeights(**{k: v for k, v in vars(config.loss).items() if k != "kind"})
     bounds = {name: Bounds(r.low, r.high) for name, r in config.parameters.items()}
-    result = identify(
-        stage, model, fitted, segments, bounds, tuple(config.per_joint), config.loss.kind, weights,
-        Coarse(**vars(config.coarse)), Fine(**vars(config.fine)), config.seed,
-    )  # fmt: skip
+    method = method_of(config)
+    problem = (fitted, segments, bounds, tuple(config.per_joint), config.loss.kind, weights, method)
+    result = identify(stage, model, *problem)
     identified = save_model(spec, result.models["identified"])
     # score what is written, not what was in memory: MJCF keeps six digits
     models = result.models | {"identified": mujoco.MjModel.from_xml_string(identified)}
-    if report_cad:
+    if whole:
         models["cad"] = read_spec(CAD_MODEL).compile()
+        models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
     replays = {name: replay(m, experiments, segments) for name, m in models.items()}
-    length = arm_length(model)
-    metrics = {
-        name: scores(replayed, experiments, config.loss.kind, weights, length) for name, replayed in replays.items()
-    }
+    metrics = {name: scores(r, experiments, config.loss.kind, weights) for name, r in replays.items()}
     metrics |= {
         "evaluations": result.evaluations,
         "diverged": result.diverged,
         "at_bound": len(result.at_bound),
+        "undetermined": sum(undetermined(result, bounds)),
         "converged": result.converged,
         "start_fit": _start_fit(experiments),
+        "halved_step": _halved_step(models["identified"], experiments, segments, replays["identified"], metrics),
     }
-    if result.factors:
+    if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
+    if config.cross_validation_folds:
+        metrics["cross_validation"] = cross_validate(stage, result, *problem, config.cross_validation_folds)
     for name in result.at_bound:
         print(f"{stage}: {name} ended on a bound of its range")
+    for name, vague in zip(result.values, undetermined(result, bounds), strict=True):
+        if vague:
+            print(f"{stage}: {name} is not determined: its 95 % interval spans its range")
     artifacts = Path("artifacts") / stage
     with output_folder(artifacts) as folder:
         (folder / "arm.xml").write_text(identified)
         write_json(folder / "parameters.json", parameter_table(result, bounds))
         write_json(folder / "metrics.json", metrics)
         write_plots(folder, result, bounds, experiments, segments, replays)
+
+
+def method_of(config: IdentificationSettings) -> Method:
+    """The settings' part that says how to search."""
+    return Method(
+        optimizer=_optimizer(config.optimizer),
+        rough_step_factor=config.rough.step_factor,
+        rough_frames=config.rough.frames,
+        rough_trials=config.rough.trials,
+        polish_iterations=config.polish.iterations,
+        polish_tolerance=config.polish.tolerance,
+        fine=_optimizer(config.fine),
+        per_joint_range=config.per_joint_range,
+        seed=config.seed,
+    )
+
+
+def _optimizer(config) -> Optimizer:
+    kind = {"least_squares": LeastSquares, "differential_evolution": DifferentialEvolution}[config.method]
+    return kind(**{key: value for key, value in vars(config).items() if key != "method"})
+
+
+def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
+    """Scalars that earlier stages identified, without any joint's own factor."""
+    values = {}
+    for stage in stages:
+        path = Path("artifacts") / stage / "parameters.json"
+        if not path.is_file():
+            raise InputError(f"{path}: no such file, expected the parameters of an earlier stage")
+        values |= {name: row["value"] for name, row in json.loads(path.read_text())["parameters"].items()}
+    return values
+
+
+def undetermined(result: Identification, bounds: dict[str, Bounds]) -> list[bool]:
+    """Which scalars the data leave open: a 95 % interval as wide as the range that was searched."""
+    return [
+        bool(result.certainty.half_width[i] > 0.5 * np.log(bounds[name].high / bounds[name].low))
+        for i, name in enumerate(result.values)
+    ]
+
+
+def _halved_step(model, experiments, segments, replayed: Replay, metrics: dict) -> dict[str, float]:
+    """By which share of itself half the time step moves E_internal, per split.
+
+    The measured E_internal hardly changes if errors of the step hide beside others, hence also the largest distance
+    between the two simulations of any segment, in mm.
+    """
+    halved = replay(model, experiments, segments, step_factor=0.5)
+    change = {}
+    for split in ("identify", "validate"):
+        before = metrics["identified"][split]["e_internal_mm"]
+        chosen = [(p, e) for p, e in zip(halved.positions, experiments, strict=True) if e.split == split]
+        after = np.mean([internal_error(p, e.positions, e.measured) for p, e in chosen]) * 1e3
+        change[split] = abs(float(after) - before) / before
+    furthest = max(
+        np.linalg.norm(a - b, axis=-1).max() for a, b in zip(halved.positions, replayed.positions, strict=True)
+    )
+    return change | {"max_mm": float(furthest) * 1e3}
 
 
 def _start_fit(experiments: list[Experiment]) -> dict[str, float]:
@@ -109,7 +176,7 @@ def read_experiments(
                 f"trial {trial.name}: found {len(trial.segments)} segments, expected the {len(segments)} of "
                 f"{trials[0].name}"
             )
-    return [prepare(trial, model, config.frames) for trial in trials], segments
+    return [prepare(trial, model, config.frames, config.command_delay) for trial in trials], segments
 
 
 def _gain(metrics: dict) -> dict[str, float]:
@@ -124,19 +191,21 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
     """parameters.json: values, 95 % intervals, correlations, factors, and what the data leave open.
 
     A value is the scalar of the scaling law; the model's joint i has that times α^{3(i-1)} times its factor.
-    Intervals are given what earlier stages found, and those of factors given the scalars.
+    Intervals are given what earlier stages found, and those of factors given the scalars; they end where the range
+    does. `bootstrap_95` cross-checks `interval_95` by resampling trials.
     """
     names, certainty = list(result.values), result.certainty
-    initial = result.models["initial"]
+    initial, vague = result.models["initial"], undetermined(result, bounds)
     scalars = {
         name: {
             "value": value,
             "unit": PARAMETERS[name].unit,
             "initial": PARAMETERS[name].read(initial),
-            "interval_95": [value * float(np.exp(sign * certainty.half_width[i])) for sign in (-1, 1)],
+            "interval_95": _within(bounds[name], np.log(value) + certainty.half_width[i] * np.array([-1, 1])),
+            "bootstrap_95": _within(bounds[name], result.bootstrap[:, i]),
             "range": [bounds[name].low, bounds[name].high],
             "at_bound": name in result.at_bound,
-            "undetermined": bool(certainty.half_width[i] > 0.5 * np.log(bounds[name].high / bounds[name].low)),
+            "undetermined": vague[i],
         }
         for i, (name, value) in enumerate(result.values.items())
     }
@@ -148,6 +217,11 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
         "per_joint": _factor_table(result),
         "at_bound": result.at_bound,
     }
+
+
+def _within(bounds: Bounds, interval: np.ndarray) -> list[float]:
+    """An interval of ln(value) as values, its ends no further out than those of the range searched."""
+    return np.exp(np.clip(interval, np.log(bounds.low), np.log(bounds.high))).tolist()
 
 
 def _factor_table(result: Identification) -> dict:
@@ -168,7 +242,7 @@ def write_plots(folder: Path, result: Identification, bounds, experiments, segme
     plots.convergence_table(result).to_csv(folder / "convergence.csv", index=False, float_format="%.6g")
     save_figure(plots.convergence_figure(result), folder / "convergence.png")
     units = {name: PARAMETERS[name].unit for name in result.values}
-    save_figure(plots.parameter_figure(result, bounds, units), folder / "parameters.png")
+    save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
     static = [i for i, e in enumerate(experiments) if e.frames == 1 and e.split == "validate"]
     moving = [i for i, e in enumerate(experiments) if e.frames > 1 and e.split == "validate"]
     if static:
@@ -188,5 +262,5 @@ def write_plots(folder: Path, result: Identification, bounds, experiments, segme
         save_figure(plots.path_figure(experiments[widest], widest, shown), folder / "paths.png")
 
 
-def _select(replays: dict, indices: list[int]) -> dict:
-    return {name: type(r)([r.positions[i] for i in indices]) for name, r in replays.items()}
+def _select(replays: dict[str, Replay], indices: list[int]) -> dict[str, Replay]:
+    return {name: replace(r, positions=[r.positions[i] for i in indices]) for name, r in replays.items()}

@@ -5,11 +5,50 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import differential_evolution, least_squares
+from scipy.stats import qmc
 
 from trunkline.identification.problem import Problem
 
 DIFFERENCE = 1e-3  # step of a forward difference, in ln(value) or in a factor
+STEP_TOLERANCE = 1e-5  # of ln(value) or a factor, relative: a smaller step of least squares is no step
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
+
+
+@dataclass
+class LeastSquares:
+    """Descents from the best of a few starts, by scipy's trust region (Branch, Coleman, Li 1999).
+
+    starts: of a Latin hypercube, besides the given one. descents: from how many of the best. iterations: of each, at
+    most. tolerance: relative decrease of the loss at the end.
+    """
+
+    starts: int
+    descents: int
+    iterations: int
+    tolerance: float
+
+    def steps(self) -> int:
+        return self.descents * self.iterations
+
+
+@dataclass
+class DifferentialEvolution:
+    """best1bin, a whole generation per batch (Storn, Price 1997; scipy, deferred updating).
+
+    population, population_per_parameter: candidates a generation, P parameters: the first plus P times the second.
+    generations: at most. tolerance: standard deviation of the losses over their mean at the end.
+    """
+
+    population: int
+    population_per_parameter: int
+    generations: int
+    tolerance: float
+
+    def steps(self) -> int:
+        return self.generations
+
+
+Optimizer = LeastSquares | DifferentialEvolution
 
 
 @dataclass
@@ -21,39 +60,92 @@ class Convergence:
 
 
 @dataclass
+class Linearisation:
+    """Residuals (R,) and their derivatives (R, P) per trial, around a vector."""
+
+    vector: np.ndarray
+    residuals: list[np.ndarray]
+    jacobians: list[np.ndarray]
+
+
+@dataclass
 class Found:
     """Result of a search.
 
-    vector: the best candidate z. converged: stopped for that reason, not because its time was up.
-    linearisation: of least squares, residuals (R,) and Jacobians (R, P) per trial at the last iterate.
+    vector: the best candidate z. loss: its. converged: stopped for that reason, not because its time was up.
     """
 
     vector: np.ndarray
+    loss: float
     convergence: Convergence
     converged: bool
-    linearisation: tuple[list[np.ndarray], list[np.ndarray]] | None = None
 
 
-def evolve(
-    problem: Problem,
-    low: np.ndarray,
-    high: np.ndarray,
-    start: np.ndarray | None,
-    population: int,
-    generations: int,
-    tolerance: float,
-    seed: int,
-    report: Report,
+def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) -> Found:
+    """The minimum within bounds, from the problem's own start or with it among the first candidates."""
+    rng = np.random.default_rng(seed)
+    if isinstance(optimizer, DifferentialEvolution):
+        return _evolve(problem, optimizer, rng, report)
+    starts = problem.start()[None]
+    if optimizer.starts:
+        starts = np.concatenate([starts, _latin_hypercube(rng, optimizer.starts, *problem.bounds())])
+        starts = starts[np.argsort(problem.losses(starts), kind="stable")]
+    descents = [
+        descend(problem, z, optimizer.iterations, optimizer.tolerance, report) for z in starts[: optimizer.descents]
+    ]
+    return min(descents, key=lambda found: found.loss)
+
+
+def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report) -> Found:
+    """Least squares on the loss's residuals. A step and the Jacobian that it will need are one batch."""
+    convergence = Convergence()
+    known: dict[bytes, Linearisation] = {}
+    low, high = problem.bounds()
+
+    def linear(vector: np.ndarray) -> Linearisation:
+        key = vector.tobytes()
+        if key not in known:
+            while len(known) > 1:  # the iterate and the step tried from it
+                known.pop(next(iter(known)))
+            known[key] = linearise(problem, vector)
+        return known[key]
+
+    def residuals(vector: np.ndarray) -> np.ndarray:
+        return np.concatenate(linear(vector).residuals)
+
+    def derivatives(vector: np.ndarray) -> np.ndarray:
+        found = linear(vector)
+        loss = 0.5 * sum(float(block @ block) for block in found.residuals)
+        convergence.best.append(loss)
+        convergence.mean.append(loss)
+        report(loss)
+        return np.concatenate(found.jacobians)
+
+    inside = np.clip(start, low + 1e-9, high - 1e-9)
+    result = least_squares(
+        residuals, inside, derivatives, bounds=(low, high), max_nfev=iterations, ftol=tolerance, xtol=STEP_TOLERANCE
+    )
+    if result.cost != convergence.best[-1]:
+        convergence.best.append(float(result.cost))
+        convergence.mean.append(float(result.cost))
+    return Found(result.x, float(result.cost), convergence, result.status > 0)
+
+
+def linearise(problem: Problem, vector: np.ndarray) -> Linearisation:
+    """Derivatives of all residuals by differences towards the inside of the bounds, all columns in one batch."""
+    high = problem.bounds()[1]
+    steps = np.where(vector + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
+    candidates = np.concatenate([vector[None], vector + np.diag(steps)])
+    blocks = problem.residuals(candidates)
+    columns = [((block[1:] - block[0]) / steps[:, None]).T for block in blocks]
+    return Linearisation(vector, [block[0] for block in blocks], columns)
+
+
+def _evolve(
+    problem: Problem, optimizer: DifferentialEvolution, rng: np.random.Generator, report: Report
 ) -> Found:
-    """Differential evolution, best1bin, a whole generation per batch (scipy, deferred updating).
-
-    Args:
-        low, high: bounds (P,).
-        start: a candidate to include in the first generation, or None.
-        population: candidates per generation.
-        tolerance: stop when the standard deviation of the losses falls below this share of their mean.
-    """
     convergence, last = Convergence(), []
+    low, high = problem.bounds()
 
     def losses(columns: np.ndarray) -> np.ndarray:
         values = problem.losses(np.ascontiguousarray(columns.T))
@@ -65,17 +157,15 @@ def evolve(
         convergence.mean.append(float(last[0].mean()))
         report(convergence.best[-1])
 
-    rng = np.random.default_rng(seed)
-    first = _latin_hypercube(rng, population, low, high)
-    if start is not None:
-        first[0] = np.clip(start, low, high)
+    first = _latin_hypercube(rng, optimizer.population + optimizer.population_per_parameter * len(low), low, high)
+    first[0] = problem.start()
     result = differential_evolution(
         losses,
         list(zip(low, high, strict=True)),
         strategy="best1bin",
         init=first,
-        maxiter=generations,
-        tol=tolerance,
+        maxiter=optimizer.generations,
+        tol=optimizer.tolerance,
         mutation=(0.4, 0.9),
         recombination=0.9,
         rng=rng,
@@ -84,54 +174,9 @@ def evolve(
         vectorized=True,
         callback=note,
     )
-    return Found(result.x, convergence, bool(result.success))
-
-
-def polish(
-    problem: Problem,
-    low: np.ndarray,
-    high: np.ndarray,
-    start: np.ndarray,
-    iterations: int,
-    tolerance: float,
-    report: Report,
-) -> Found:
-    """Least squares on the same residuals by scipy's trust region; all columns of a Jacobian in one batch."""
-    convergence, last = Convergence(), None
-
-    def residuals(vector: np.ndarray) -> np.ndarray:
-        return np.concatenate([block[0] for block in problem.residuals(vector[None])])
-
-    def derivatives(vector: np.ndarray) -> np.ndarray:
-        nonlocal last
-        blocks, columns = last = jacobian(problem, vector, high)
-        loss = 0.5 * sum(float(block @ block) for block in blocks)
-        convergence.best.append(loss)
-        convergence.mean.append(loss)
-        report(loss)
-        return np.concatenate(columns)
-
-    inside = np.clip(start, low + 1e-9, high - 1e-9)
-    result = least_squares(
-        residuals, inside, derivatives, bounds=(low, high), max_nfev=iterations, ftol=tolerance, xtol=1e-5
-    )
-    convergence.best.append(float(result.cost))
-    convergence.mean.append(float(result.cost))
-    return Found(result.x, convergence, result.status > 0, last)
-
-
-def jacobian(
-    problem: Problem, vector: np.ndarray, high: np.ndarray
-) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Residuals (R,) and their derivatives (R, P) per trial, by differences towards the inside, in one batch."""
-    steps = np.where(vector + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
-    candidates = np.concatenate([vector[None], vector + np.diag(steps)])
-    blocks = problem.residuals(candidates)
-    columns = [((block[1:] - block[0]) / steps[:, None]).T for block in blocks]
-    return [block[0] for block in blocks], columns
+    return Found(result.x, float(result.fun), convergence, bool(result.success))
 
 
 def _latin_hypercube(rng: np.random.Generator, count: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """One candidate in each of `count` slices of every axis. Shape (count, P)."""
-    slices = np.stack([rng.permutation(count) for _ in low], axis=1)
-    return low + (slices + rng.random(slices.shape)) / count * (high - low)
+    """`count` candidates, one in each of as many slices of every axis. Shape (count, P)."""
+    return low + qmc.LatinHypercube(len(low), rng=rng).random(count) * (high - low)

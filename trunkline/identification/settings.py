@@ -1,14 +1,15 @@
 """Settings that the three identification stages share, and what they make of them."""
 
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from trunkline.config import settings
 
 ParameterName = Literal[
-    "stiffness", "damping", "tendon_friction", "joint_friction", "hardening", "kp", "kv", "force_range", "time_constant"
-]
+    "stiffness", "hardening", "joint_friction", "damping", "tendon_friction", "friction_time",
+    "kp", "kv", "force_range", "time_constant",
+]  # fmt: skip
 
 
 @settings
@@ -33,21 +34,35 @@ class Loss:
 
 
 @settings
-class CoarseSettings:
-    population: int = Field(ge=5)
-    generations: PositiveInt
+class LeastSquaresSettings:
+    method: Literal["least_squares"]
+    starts: NonNegativeInt
+    descents: PositiveInt
+    iterations: PositiveInt
     tolerance: PositiveFloat
-    step_factor: float = Field(ge=1, le=4)
-    frames: PositiveInt
-    polish_iterations: NonNegativeInt
 
 
 @settings
-class FineSettings:
-    method: Literal["least_squares", "differential_evolution", "none"]
-    range: float = Field(gt=0, lt=1)
+class DifferentialEvolutionSettings:
+    method: Literal["differential_evolution"]
     population: int = Field(ge=5)
+    population_per_parameter: NonNegativeInt
     generations: PositiveInt
+    tolerance: PositiveFloat
+
+
+Optimizer = Annotated[LeastSquaresSettings | DifferentialEvolutionSettings, Field(discriminator="method")]
+
+
+@settings
+class RoughSettings:
+    step_factor: float = Field(ge=1, le=4)
+    frames: PositiveInt
+    trials: PositiveInt
+
+
+@settings
+class PolishSettings:
     iterations: PositiveInt
     tolerance: PositiveFloat
 
@@ -56,17 +71,21 @@ class FineSettings:
 class IdentificationSettings:
     seed: NonNegativeInt
     frames: PositiveInt
+    command_delay: float = Field(ge=0, le=1)
     experiments: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
     reported: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
     loss: Loss
     parameters: dict[ParameterName, Range] = Field(min_length=1)
+    optimizer: Optimizer
+    rough: RoughSettings
+    polish: PolishSettings
     per_joint: list[Literal["stiffness", "damping"]]
-    coarse: CoarseSettings
-    fine: FineSettings
+    per_joint_range: float = Field(gt=0, lt=1)
+    fine: Optimizer
+    cross_validation_folds: NonNegativeInt
 
     def __post_init__(self):
         if not set(self.experiments) <= set(self.reported):
             raise ValueError(f"reported: found {self.reported}, expected at least {self.experiments}")
-        missing = set(self.per_joint) - set(self.parameters)
-        if missing:
-            raise ValueError(f"per_joint: found {sorted(missing)[0]!r}, expected one of {sorted(self.parameters)}")
+        if self.cross_validation_folds == 1:
+            raise ValueError("cross_validation_folds: found 1, expected 0 (none) or at least 2")
