@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, PositiveFloat
 
+from trunkline.bundle.linearize import compile_with
+from trunkline.bundle.manifest import Manifest
 from trunkline.bundle.package import read_tarball, write_tarball
 from trunkline.bundle.plots import roundtrip_figure
 from trunkline.bundle.roundtrip import curl, deviation, simulate
@@ -65,18 +67,17 @@ def main(config: Config) -> None:
         write_tarball(tarball, files)
         packed = read_tarball(tarball)
         (out / "manifest.json").write_bytes(packed[MANIFEST])
-        calibrated = mujoco.MjModel.from_xml_string(sources.mjcf)
-        bundled = mujoco.MjModel.from_xml_string(packed[MODEL].decode())
+        models = read_models(sources.mjcf, packed)
         write_json(
             out / "metrics.json",
             {
                 "rule_violations": len(violations),
-                "roundtrip_max_deviation_mm": compare(calibrated, bundled, trajectory)[0],
+                "roundtrip_max_deviation_mm": compare(models["calibrated"], models["packed"], trajectory)[0],
                 "files": len(packed),
                 "bytes": tarball.stat().st_size,
             },
         )
-        write_roundtrip(out, calibrated, packed[MODEL].decode(), trajectory)
+        write_roundtrip(out, models, trajectory)
 
 
 def read_sources(version: str) -> Sources:
@@ -99,13 +100,20 @@ def read_sources(version: str) -> Sources:
     )
 
 
-def write_roundtrip(out: Path, calibrated: mujoco.MjModel, mjcf: str, trajectory: Trajectory) -> None:
-    """The curl at the last gravity angle: calibrated model, packed model, and what Unity keeps of it."""
-    models = {
-        "calibrated": calibrated,
-        "packed": mujoco.MjModel.from_xml_string(mjcf),
-        "imported": mujoco.MjModel.from_xml_string(as_imported(mjcf)),
+def read_models(calibrated: str, packed: dict[str, bytes]) -> dict[str, mujoco.MjModel]:
+    """Calibrated, packed and as Unity imports it; the latter two with the manifest's springs and dampers restored."""
+    mjcf = packed[MODEL].decode()
+    described = Manifest.model_validate_json(packed[MANIFEST]).model
+    return {
+        "calibrated": mujoco.MjModel.from_xml_string(calibrated),
+        "packed": compile_with(mjcf, described.springs, described.dampers),
+        "imported": compile_with(as_imported(mjcf), described.springs, described.dampers),
     }
+
+
+def write_roundtrip(out: Path, models: dict[str, mujoco.MjModel], trajectory: Trajectory) -> None:
+    """The curl at the last gravity angle."""
+    calibrated = models["calibrated"]
     controls = curl(calibrated, trajectory.duration, trajectory.pull)
     motions = {name: simulate(model, controls, trajectory.tilts[-1]) for name, model in models.items()}
     tips = {name: motion.positions[:, -1] for name, motion in motions.items()}

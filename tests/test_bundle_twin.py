@@ -15,9 +15,10 @@ import onnx
 import pytest
 import trimesh
 from onnx import TensorProto, helper
-from small_arm import small_mjcf, small_spec
+from small_arm import small_mjcf
 
-from trunkline.bundle.manifest import Manifest
+from trunkline.bundle.linearize import JointLaw, compile_with
+from trunkline.bundle.manifest import Manifest, Model
 from trunkline.bundle.package import read_tarball, write_tarball
 from trunkline.bundle.roundtrip import curl, simulate
 from trunkline.bundle.twin import MANIFEST, MODEL, NETWORK, Label, Sources, Trajectory, assemble, compare
@@ -145,18 +146,57 @@ def test_a_grid_is_found_again_at_its_place(files):
         assert texture[z, y, x] == pytest.approx(np.linalg.norm(place) - 0.3, abs=1e-3)
 
 
-def test_polynomial_springs_become_lines_and_the_manifest_says_what_it_costs(sources):
-    spec = small_spec()
+def harden(mjcf: str) -> str:
+    """The model with springs and dampers that stiffen."""
+    spec = mujoco.MjSpec.from_string(mjcf)
     for joint in spec.joints:
         joint.stiffness = [joint.stiffness[0], 0, 4 * joint.stiffness[0]]
+        joint.damping = [joint.damping[0], 0, joint.damping[0] / 30]
     spec.compile()
-    sources.mjcf = spec.to_xml()
+    return spec.to_xml()
+
+
+def test_springs_that_stiffen_are_restored_from_the_manifest(sources):
+    sources.mjcf = harden(sources.mjcf)
     files, violations = assemble(LABEL, sources, TRAJECTORY)
     assert violations == []
     model = Manifest.model_validate_json(files[MANIFEST]).model
-    assert [change.element for change in model.changes] == [joint.name for joint in spec.joints]
-    calibrated, packed = (mujoco.MjModel.from_xml_string(t) for t in (sources.mjcf, files[MODEL].decode()))
-    assert model.changes_max_deviation_mm == compare(calibrated, packed, TRAJECTORY)[0] > 0.1
+    calibrated, mjcf = mujoco.MjModel.from_xml_string(sources.mjcf), files[MODEL].decode()
+    linear = mujoco.MjModel.from_xml_string(mjcf)
+    assert compare(calibrated, compile_with(mjcf, model.springs, model.dampers), TRAJECTORY) == (0.0, 0)
+    assert model.import_max_deviation_mm < 0.01
+    assert model.changes_max_deviation_mm == compare(calibrated, linear, TRAJECTORY)[0] > 1
+    for laws, first, higher in (
+        (model.springs, calibrated.jnt_stiffness, calibrated.jnt_stiffnesspoly),
+        (model.dampers, calibrated.dof_damping, calibrated.dof_dampingpoly),
+    ):
+        assert [law.joint for law in laws] == model.names.joints
+        assert [law.coefficients for law in laws] == [(a, *rest) for a, rest in zip(first, higher, strict=True)]
+
+
+def test_a_linear_model_is_packed_as_it_is(files, sources):
+    model = Manifest.model_validate_json(files[MANIFEST]).model
+    assert (model.springs, model.dampers, model.changes_max_deviation_mm) == ([], [], 0)
+    assert files[MODEL].decode() == sources.mjcf
+
+
+def test_the_component_for_unity_reads_what_the_manifest_holds(files):
+    script = files["Runtime/CalibratedSprings.cs"].decode()
+    classes = re.findall(r"\[Serializable\]\s+public class (\w+) \{(.*?)\}", script, re.DOTALL)
+    read = {name: set(re.findall(r"public [\w[\]]+ (\w+);", body)) for name, body in classes}
+    assert read == {
+        "Manifest": {"model"},
+        "Model": {"springs", "dampers"},
+        "JointLaw": {"joint", "coefficients"},
+    }
+    for block in (Manifest, Model):
+        assert read[block.__name__] <= set(block.model_fields)
+    assert read["JointLaw"] <= set(JointLaw.__dataclass_fields__)
+    assert "public class CalibratedSprings : MonoBehaviour" in script  # Unity goes by the file's name
+    assembly = json.loads(files["Runtime/Trunkline.asmdef"])
+    assert assembly["references"] == ["Mujoco.Runtime"]
+    assert assembly["allowUnsafeCode"]
+    assert [version["define"] for version in assembly["versionDefines"]] == assembly["defineConstraints"]
 
 
 def test_what_unity_would_compile_loses_nothing_but_digits(files, sources):
@@ -224,7 +264,10 @@ def run(project: Path) -> subprocess.CompletedProcess:
     return subprocess.run(command, cwd=project, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
 
 
-def test_the_stage_writes_package_manifest_and_metrics(project):
+@pytest.mark.parametrize("change", [str, harden])
+def test_the_stage_writes_package_manifest_and_metrics(project, change):
+    arm = project / "artifacts/identify_control/arm.xml"
+    arm.write_text(change(arm.read_text()))
     done = run(project)
     assert done.returncode == 0, done.stderr
     out = project / "artifacts/package_unity"

@@ -6,7 +6,7 @@ from typing import Literal
 import mujoco
 from pydantic import BaseModel, ConfigDict, Field
 
-from trunkline.bundle.linearize import Linearization
+from trunkline.bundle.linearize import JointLaw
 from trunkline.bundle.unity_frame import unity_position
 
 
@@ -58,14 +58,16 @@ class Model(_Block):
     names: Names
     rest_lengths: dict[str, float] = Field(description="path length of each tendon, arm straight, m")
     control: str = "each actuator's control is the path length of its tendon in m; it pulls and never pushes"
-    changes: list[Linearization] = Field(
-        description="what the importer cannot read, and what stands in for it"
+    springs: list[JointLaw] = Field(
+        description="of hinges, polynomials that the importer cannot read: CalibratedSprings.cs restores them"
     )
+    dampers: list[JointLaw] = Field(description="likewise")
     changes_max_deviation_mm: float = Field(
-        ge=0, description="with those changes, against the calibrated model"
+        ge=0, description="with the lines that stand in for them in the file, against the calibrated model"
     )
     import_max_deviation_mm: float = Field(
-        ge=0, description="what the importer keeps, in 32-bit floats, against the calibrated model"
+        ge=0,
+        description="what the importer keeps, in 32-bit floats, springs and dampers restored, against the same",
     )
 
 
@@ -123,7 +125,7 @@ def names_of(model: mujoco.MjModel) -> Names:
 
 
 def describe_model(model: mujoco.MjModel, file: str, **measured) -> Model:
-    """The model's block; `measured` are its changes and deviations."""
+    """The model's block; `measured` are its springs, dampers and deviations."""
     return Model(
         file=file,
         time_step=model.opt.timestep,

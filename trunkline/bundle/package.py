@@ -24,6 +24,7 @@ def package_json(name: str, version: str, display_name: str, unity: str, descrip
         "displayName": display_name,
         "unity": unity,
         "description": description,
+        "dependencies": {"com.unity.modules.jsonserialize": "1.0.0"},  # JsonUtility; org.mujoco is in no registry
         "keywords": ["mujoco", "soft robot", "digital twin"],
         "hideInEditor": False,
     }

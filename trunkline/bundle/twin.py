@@ -6,7 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from trunkline.bundle.linearize import linearize_joints
+from trunkline.bundle.linearize import compile_with, linearize_joints
 from trunkline.bundle.manifest import Manifest, Versions, describe_model, hashes
 from trunkline.bundle.network import describe_network
 from trunkline.bundle.package import package_json, with_metas
@@ -18,6 +18,7 @@ from trunkline.bundle.unity_rules import Violation, lint_mjcf
 MODEL = "Runtime/Model/arm.xml"
 NETWORK = "Runtime/Network/ik.onnx"
 MANIFEST = "Runtime/manifest.json"
+SCRIPTS = [Path(__file__).parent / "unity" / name for name in ("CalibratedSprings.cs", "Trunkline.asmdef")]
 
 
 @dataclass
@@ -63,13 +64,13 @@ def assemble(
     """All files of the package by path, and the rules that it breaks."""
     calibrated = mujoco.MjModel.from_xml_string(sources.mjcf)
     spec = mujoco.MjSpec.from_string(sources.mjcf)
-    changes = linearize_joints(spec, *movement(calibrated, trajectory))
+    springs, dampers = linearize_joints(spec, *movement(calibrated, trajectory))
     spec.compile()
     mjcf = spec.to_xml()
     violations = lint_mjcf(mjcf)
 
     bundled = mujoco.MjModel.from_xml_string(mjcf)
-    imported = mujoco.MjModel.from_xml_string(as_imported(mjcf))
+    imported = compile_with(as_imported(mjcf), springs, dampers)
     import_deviation_mm, complaints = compare(calibrated, imported, trajectory)
     if complaints:  # MjScene.CheckForPhysicsException
         violations.append(
@@ -89,6 +90,7 @@ def assemble(
         MODEL: mjcf.encode(),
         NETWORK: network,
     }
+    files |= {f"Runtime/{path.name}": path.read_bytes() for path in SCRIPTS}
     files = with_metas(label.name, files | meshes | grids | {MANIFEST: b""})
     manifest = Manifest(
         name=label.name,
@@ -98,8 +100,9 @@ def assemble(
         model=describe_model(
             bundled,
             MODEL,
-            changes=changes,
-            changes_max_deviation_mm=compare(calibrated, bundled, trajectory)[0] if changes else 0.0,
+            springs=springs,
+            dampers=dampers,
+            changes_max_deviation_mm=compare(calibrated, bundled, trajectory)[0] if springs or dampers else 0.0,
             import_max_deviation_mm=import_deviation_mm,
         ),
         network=network_block,
