@@ -1,7 +1,7 @@
 """Two ways to the minimum: differential evolution (the paper's) and least squares, both a batch at a time."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import differential_evolution, least_squares
@@ -10,6 +10,10 @@ from scipy.stats import qmc
 from trunkline.identification.problem import Problem
 
 DIFFERENCE = 1e-3  # step of a forward difference, in ln(value) or in a factor
+PLATEAU_SCAN = 24  # values over the range of a parameter that does not matter, and
+PLATEAU_STARTS = 3  # from how many of the nearest that do matter to search again
+PLATEAU_ITERATIONS, PLATEAU_TOLERANCE = 6, 1e-3  # of each
+PLATEAU_LEVEL = 1e-6  # relative change of the loss that matters
 STEP_TOLERANCE = 1e-5  # of ln(value) or a factor, relative: a smaller step of least squares is no step
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
 
@@ -85,14 +89,38 @@ def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) ->
     """The minimum within bounds, from the problem's own start or with it among the first candidates."""
     rng = np.random.default_rng(seed)
     if isinstance(optimizer, DifferentialEvolution):
-        return _evolve(problem, optimizer, rng, report)
-    starts = problem.start()[None]
-    if optimizer.starts:
-        starts = np.concatenate([starts, _latin_hypercube(rng, optimizer.starts, *problem.bounds())])
-        starts = starts[np.argsort(problem.losses(starts), kind="stable")]
-    descents = [
-        descend(problem, z, optimizer.iterations, optimizer.tolerance, report) for z in starts[: optimizer.descents]
-    ]
+        found = _evolve(problem, optimizer, rng, report)
+    else:
+        starts = problem.start()[None]
+        if optimizer.starts:
+            starts = np.concatenate([starts, _latin_hypercube(rng, optimizer.starts, *problem.bounds())])
+            starts = starts[np.argsort(problem.losses(starts), kind="stable")]
+        found = _best_descent(problem, starts[: optimizer.descents], optimizer.iterations, optimizer.tolerance, report)
+    return _leave_plateaus(problem, found, report) if problem.parameters else found
+
+
+def _leave_plateaus(problem: Problem, found: Found, report: Report) -> Found:
+    """Search again from where parameters begin to matter that do not matter at the minimum found.
+
+    A force range that no pull reaches is one: the loss is flat above the largest tension, so nothing leads from
+    there to a smaller minimum below.
+    """
+    low, high = problem.bounds()
+    columns = np.concatenate(linearise(problem, found.vector).jacobians)
+    for index in np.flatnonzero(~columns.any(axis=0)):
+        scan = np.repeat(found.vector[None], PLATEAU_SCAN, axis=0)
+        scan[:, index] = np.linspace(low[index], high[index], PLATEAU_SCAN)
+        matters = np.flatnonzero(np.abs(problem.losses(scan) / found.loss - 1) > PLATEAU_LEVEL)
+        nearest = matters[np.argsort(np.abs(scan[matters, index] - found.vector[index]))][:PLATEAU_STARTS]
+        if len(nearest):
+            again = _best_descent(problem, scan[nearest], PLATEAU_ITERATIONS, PLATEAU_TOLERANCE, report)
+            if again.loss < found.loss:
+                found = replace(found, vector=again.vector, loss=again.loss)
+    return found
+
+
+def _best_descent(problem: Problem, starts, iterations: int, tolerance: float, report: Report) -> Found:
+    descents = [descend(problem, start, iterations, tolerance, report) for start in starts]
     return min(descents, key=lambda found: found.loss)
 
 
