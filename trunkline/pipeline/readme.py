@@ -16,6 +16,9 @@ from trunkline.pipeline.gate import Limit, lookup, read_limits
 
 PICTURE = Path("artifacts/identify_control/distances.png")  # copied to docs/: Git holds no artifacts
 
+# E_internal of the paper's arm before and after, over 437 frames
+PAPER = {"cad": "89.8 mm (17 %)", "identified": "15.8 mm (3 %)"}
+
 # stage: [(what it is, dotted key in metrics.json, unit)]
 RESULTS = {
     "identify_stiffness": [
@@ -82,6 +85,24 @@ def results_table(root: Path) -> str:
     return "\n".join(lines)
 
 
+def identification_table(root: Path) -> str:
+    """E_internal and mean position error of releases and curls, from the CAD model to the identified one."""
+    path = root / "artifacts" / "identify_control" / "metrics.json"
+    metrics = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    lines = [
+        "| model | E_internal, identify | validate | position error, identify | validate | E_internal, paper |",
+        "|---|---:|---:|---:|---:|---:|",
+    ]
+    for model, words in (("cad", "CAD"), ("coarse", "one scalar each"), ("identified", "and per-joint factors")):
+        cells = []
+        for error in ("e_internal", "e_position"):
+            for split in ("identify", "validate"):
+                millimetres, share = (lookup(metrics, f"{model}.{split}.{error}_{unit}") for unit in ("mm", "pct"))
+                cells.append(f"{_number(millimetres)} mm ({_number(share)} %)")
+        lines.append(f"| {words} | {' | '.join(cells)} | {PAPER.get(model, '')} |")
+    return "\n".join(lines)
+
+
 def _bound(limit: Limit | None) -> str:
     if limit is None:
         return ""
@@ -116,7 +137,12 @@ def with_blocks(text: str, blocks: dict[str, str]) -> str:
 def generate(root: Path) -> str:
     """README.md with its generated blocks as they should be."""
     text = (root / "README.md").read_text(encoding="utf-8")
-    return with_blocks(text, {"pipeline": pipeline_graph(root), "results": results_table(root)})
+    blocks = {
+        "pipeline": pipeline_graph(root),
+        "identification": identification_table(root),
+        "results": results_table(root),
+    }
+    return with_blocks(text, blocks)
 
 
 def main(root: Path = Path(".")) -> int:
