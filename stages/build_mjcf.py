@@ -1,15 +1,17 @@
 """Build the initial arm from geometry and material alone."""
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
-from trunkline.arm.material import unit_properties
+from trunkline.arm.geometry import ChainGeometry
+from trunkline.arm.material import UnitProperties, unit_properties
 from trunkline.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.arm.plots import arm_figure
 from trunkline.arm.spiral import spiral_chain
+from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.config import settings
 from trunkline.plots import save_figure
 from trunkline.stage import output_folder, run_stage, write_json
@@ -24,16 +26,43 @@ class Spiral:
     base_width: PositiveFloat
     tip_width: PositiveFloat
     units: PositiveInt
-    core_ratio: float = Field(gt=0, lt=1)
-    tendons: int = Field(ge=0, le=12)
-    hole_ratio: float = Field(gt=0, le=1)
-
-
-@settings
-class Material:
     modulus: PositiveFloat
     density: PositiveFloat
     damping_ratio: PositiveFloat
+    core_ratio: float = Field(gt=0, lt=1)
+    tendons: int = Field(ge=0, le=12)
+    hole_ratio: float = Field(gt=0, le=1)
+    tip_load: NonNegativeFloat
+    segments: dict[str, PositiveFloat]
+
+
+@settings
+class Uniform:
+    kind: Literal["uniform"]
+    length: PositiveFloat
+    width: PositiveFloat
+    units: PositiveInt
+    unit_masses: list[PositiveFloat]
+    bending_stiffness: PositiveFloat | None = None
+    joint_stiffness: PositiveFloat | None = None
+    damping_ratio: PositiveFloat
+    joint_range_deg: float = Field(gt=0, le=180)
+    tendons: int = Field(ge=0, le=12)
+    hole_ratio: float = Field(gt=0, le=1)
+    tip_load: NonNegativeFloat
+    segments: dict[str, PositiveFloat]
+
+    def __post_init__(self):
+        if (self.bending_stiffness is None) == (self.joint_stiffness is None):
+            found = "neither" if self.joint_stiffness is None else "both"
+            raise ValueError(f"found {found}, expected either bending_stiffness (EI) or joint_stiffness (K)")
+        if len(self.unit_masses) not in (1, self.units):
+            raise ValueError(f"unit_masses: found {len(self.unit_masses)}, expected one for all units, or "
+                             f"one for each of the {self.units}")
+        far = next((name for name, distance in self.segments.items() if distance > self.length), None)
+        if far is not None:
+            raise ValueError(f"segments.{far}: found {self.segments[far]} m, expected at most the length of "
+                             f"{self.length} m")
 
 
 @settings
@@ -56,17 +85,26 @@ class SolverSettings:
 
 @settings
 class Config:
-    arm: Spiral
-    material: Material
+    arm: Annotated[Spiral | Uniform, Field(discriminator="kind")]
     actuation: Actuation
     solver: SolverSettings
 
 
-def main(config: Config) -> None:
-    arm, material, actuation = config.arm, config.material, config.actuation
+def spiral(arm: Spiral) -> tuple[ChainGeometry, UnitProperties]:
     chain = spiral_chain(arm.length, arm.base_width, arm.tip_width, arm.units)
-    properties = unit_properties(chain, material.modulus, material.density, arm.core_ratio, material.damping_ratio)
-    mass = float(properties.masses.sum())
+    return chain, unit_properties(chain, arm.modulus, arm.density, arm.core_ratio, arm.damping_ratio)
+
+
+def uniform(arm: Uniform) -> tuple[ChainGeometry, UnitProperties]:
+    chain = uniform_chain(arm.length, arm.width, arm.units, np.radians(arm.joint_range_deg))
+    stiffness = arm.joint_stiffness or arm.bending_stiffness / chain.lengths[0]
+    return chain, uniform_properties(chain, arm.unit_masses, stiffness, arm.damping_ratio)
+
+
+def main(config: Config) -> None:
+    arm, actuation = config.arm, config.actuation
+    chain, properties = spiral(arm) if isinstance(arm, Spiral) else uniform(arm)
+    mass = float(properties.masses.sum()) + arm.tip_load
     tendons = Tendons(
         count=arm.tendons,
         radius_ratio=arm.hole_ratio,
@@ -76,7 +114,7 @@ def main(config: Config) -> None:
         max_force=actuation.max_force,
         time_constant=actuation.time_constant,
     )
-    spec = build_spec(chain, properties, tendons, Solver(**vars(config.solver)))
+    spec = build_spec(chain, properties, tendons, Solver(**vars(config.solver)), arm.tip_load, arm.segments)
     model = spec.compile()
     with output_folder(ARTIFACTS) as folder:
         (folder / "arm.xml").write_text(spec.to_xml())

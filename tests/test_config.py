@@ -134,12 +134,14 @@ def test_a_stage_checks_the_settings_of_all(whole_project):
 
 
 @pytest.mark.parametrize("stage", STAGES)
-def test_every_variant_composes(stage):
+def test_every_variant_composes(stage, tmp_path):
     schema, section = _schema(stage), _section(stage)
     for group, options in group_options(ROOT / "conf" / stage).items():
         for option in options:
             composed = compose_settings(ROOT / "conf" / stage, section | {group: option}, stage)
             assert set(composed) == {field.name for field in fields(schema)}, f"{stage} with {group}={option}"
+            OmegaConf.save(OmegaConf.create({stage: section | {group: option}}), tmp_path / "params.yaml")
+            load_config(schema, stage, tmp_path)
 
 
 @pytest.mark.parametrize("stage", STAGES)

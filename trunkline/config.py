@@ -26,6 +26,7 @@ Schema = TypeVar("Schema")
 
 SHARED = "shared"  # folder beside those of the stages, of groups that several of them use
 UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
+PROJECT = Path(__file__).parents[1]
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
@@ -44,12 +45,12 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
     Args:
         schema: a class decorated with ``@settings``.
         stage: name of the stage, of its section in params.yaml and of its folder under ``conf/``.
-        root: the folder that holds ``params.yaml`` and ``conf/``.
+        root: the folder that holds ``params.yaml``, and ``conf/`` unless it is the project's.
 
     Raises:
         InputError: one line that names file and key, what was found and what was expected.
     """
-    params, folder = Path(root) / "params.yaml", Path(root) / "conf" / stage
+    params, folder = Path(root) / "params.yaml", own_or_project(Path(root), "conf") / stage
     section = _read_section(params, stage)
     composed = compose_settings(folder, section, f"{params}: {stage}")
     # JSON mode: strict about numbers and strings, yet lists may fill tuples and mappings dataclasses.
@@ -60,14 +61,14 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
         problems = sorted(error.errors(), key=_rank)
         first, more = problems[0], len(problems) - 1
         tuned = first["type"] == "missing" or (first["loc"] and first["loc"][0] in section)
-        key = ".".join(str(part) for part in (stage, *first["loc"]) if part != "[key]")  # pydantic's mark
+        key = ".".join([stage, *_path(first, composed)])
         where = f"{params if tuned else folder}: {key}"
         text = f"{where}: {_describe(first, adapter)}" + (f" (and {more} more)" if more else "")
         raise InputError(text) from error
 
 
 def check_settings(root: str | Path = ".") -> list[str]:
-    """Validate the settings of every stage under ``root / "stages"``, and return their names.
+    """Validate the settings of every stage in ``root / "dvc.yaml"``, and return their names.
 
     Raises:
         InputError: for the first bad value in any section, or a section of no stage in dvc.yaml.
@@ -77,7 +78,7 @@ def check_settings(root: str | Path = ".") -> list[str]:
     for section in _load(params):
         if section not in stages:
             raise InputError(f"{params}: {section}: no such stage{_nearest(section, stages)}")
-    files = sorted((root / "stages").glob("*.py"))
+    files = [file for file in sorted(own_or_project(root, "stages").glob("*.py")) if file.stem in stages]
     for file in files:
         load_config(runpy.run_path(str(file), run_name=file.stem)["Config"], file.stem, root)
     return [file.stem for file in files]
@@ -112,6 +113,11 @@ def group_options(folder: Path) -> dict[str, dict[str, Path]]:
         files = (own if own.is_dir() else folder.parent / SHARED / group).glob("*.yaml")
         found[group] = {file.stem: file for file in sorted(files)}
     return found
+
+
+def own_or_project(root: Path, name: str) -> Path:
+    """``root / name``; the project's where ``root`` is another pipeline of the same stages."""
+    return root / name if (root / name).is_dir() else PROJECT / name
 
 
 def _read_section(path: Path, stage: str) -> dict[str, Any]:
@@ -167,6 +173,21 @@ def _without_missing(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _without_missing(item) for key, item in value.items() if item != "???"}
     return value
+
+
+def _path(problem: Any, composed: dict[str, Any]) -> list[str]:
+    """Where pydantic found a problem as a path of keys: without its mark for keys and its choices among classes."""
+    path, value = [], composed
+    for place, part in enumerate(problem["loc"]):
+        last = place == len(problem["loc"]) - 1
+        if isinstance(value, dict):
+            known = part in value or (last and problem["type"] == "missing")
+        else:
+            known = isinstance(value, list) and isinstance(part, int)
+        if known:
+            path.append(str(part))
+            value = None if last else value[part]
+    return path
 
 
 def _rank(problem: Any) -> int:

@@ -43,8 +43,7 @@ def unit_properties(
     """CAD values of every unit.
 
     K = EI/L of the elastic core (paper eq. 2), a round rod of `core_ratio` times the unit's width; on a
-    spiral that is K_0 α^{3(i-1)} (paper eq. 3). Damping is D = 2ζ √(K m) ℓ (paper eq. 4, with the first unit's
-    length ℓ as the lever that makes it N m s/rad), which scales with α³ too.
+    spiral that is K_0 α^{3(i-1)} (paper eq. 3). Damping scales with α³ too.
 
     Args:
         modulus: Young's modulus E, Pa.
@@ -61,5 +60,10 @@ def unit_properties(
         transverse_inertia=masses * (radius**2 / 4 + chain.lengths**2 / 12),
         axial_inertia=masses * radius**2 / 2,
         stiffness=stiffness,
-        damping=2 * damping_ratio * np.sqrt(stiffness * masses) * chain.lengths[0],
+        damping=joint_damping(stiffness, masses, chain.lengths[0], damping_ratio),
     )
+
+
+def joint_damping(stiffness: np.ndarray, masses: np.ndarray, length: float, damping_ratio: float) -> np.ndarray:
+    """D = 2ζ √(K m) ℓ (paper eq. 4, with the first unit's length ℓ as the lever that makes it N m s/rad)."""
+    return 2 * damping_ratio * np.sqrt(stiffness * masses) * length

@@ -1,7 +1,8 @@
 """Geometry and unit properties to a MuJoCo model: a pseudo-rigid chain, two hinges a joint, pulling tendons.
 
-Names: bodies `base`, `unit_01`…; hinges `unit_01_x`, `unit_01_y`; sites `unit_01_center` (the tracked frame),
-`unit_01_tendon_1`…, `base_center`, `tip`; tendons `tendon_1`…; actuators `tendon_1_position`….
+Names: bodies `base`, `unit_01`…, `tip_load`; hinges `unit_01_x`, `unit_01_y`; sites `unit_01_center` (the tracked
+frame), `unit_01_tendon_1`…, `base_center`, `tip`; tendons `tendon_1`…; actuators `tendon_1_position`…. Segments
+that an arm tracks elsewhere than in its units' centres have their own names: site `<segment>_center`.
 """
 
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from trunkline.frames import STANDARD_GRAVITY
 
 TENDON_RGBA = (0.15, 0.15, 0.15, 1)
 UNIT_RGBA = (0.93, 0.55, 0.2, 1)
+LOAD_RGBA = (0.4, 0.4, 0.45, 1)
 
 
 @dataclass
@@ -63,8 +65,20 @@ def unit_name(index: int) -> str:
     return f"unit_{index + 1:02d}"
 
 
-def build_spec(chain: ChainGeometry, properties: UnitProperties, tendons: Tendons, solver: Solver) -> mujoco.MjSpec:
-    """The arm hanging straight down from its mount, in SI units. Compile it with `.compile()`."""
+def build_spec(
+    chain: ChainGeometry,
+    properties: UnitProperties,
+    tendons: Tendons,
+    solver: Solver,
+    tip_load: float = 0.0,
+    segments: dict[str, float] | None = None,
+) -> mujoco.MjSpec:
+    """The arm hanging straight down from its mount, in SI units. Compile it with `.compile()`.
+
+    Args:
+        tip_load: kg that hangs at the tip.
+        segments: name of a tracked point to its distance from the mount along the straight arm, m.
+    """
     spec = mujoco.MjSpec()
     spec.modelname = "arm"
     spec.compiler.degree = False
@@ -73,18 +87,36 @@ def build_spec(chain: ChainGeometry, properties: UnitProperties, tendons: Tendon
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, -STANDARD_GRAVITY]
     cables = [_add_cable(spec, index, tendons, solver) for index in range(tendons.count)]
+    hole_radii = tendons.radius_ratio * chain.widths / 2
 
     body = spec.worldbody.add_body(name="base")
     body.explicitinertial, body.mass, body.inertia = True, 1.0, [1e-3] * 3  # fixed: never felt
     _add_geom(body, "base", chain.widths[0] / 2, 0.005, (0, 0, 0.005))
     body.add_site(name="base_center")
-    _add_holes(body, "base", tendons.radius_ratio * chain.widths[0] / 2, 0.0, cables)
+    _add_holes(body, "base", hole_radii[0], 0.0, cables)
+    units = []
     for index in range(chain.units):
         body = _add_unit(body, index, chain, properties, solver)
-        center = -chain.lengths[index] / 2
-        _add_holes(body, unit_name(index), tendons.radius_ratio * chain.widths[index] / 2, center, cables)
+        _add_holes(body, unit_name(index), hole_radii[index], -chain.lengths[index] / 2, cables)
+        units.append(body)
+    for name, distance in (segments or {}).items():
+        unit = chain.unit_at(distance)
+        units[unit].add_site(name=f"{name}_center", pos=[0, 0, chain.lengths[:unit].sum() - distance])
     body.add_site(name="tip", pos=[0, 0, -chain.lengths[-1]])
+    if tip_load:
+        _add_load(body, tip_load, chain)
     return spec
+
+
+def _add_load(parent, mass: float, chain: ChainGeometry) -> None:
+    """A ball at the tip, half as wide as the arm there."""
+    radius = chain.widths[-1] / 4
+    body = parent.add_body(name="tip_load", pos=[0, 0, -chain.lengths[-1]])
+    body.explicitinertial, body.mass, body.ipos, body.inertia = True, mass, [0, 0, 0], [0.4 * mass * radius**2] * 3
+    body.add_geom(
+        name="tip_load_geom", type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[radius, 0, 0], contype=0, conaffinity=0, mass=0,
+        rgba=LOAD_RGBA,
+    )  # fmt: skip
 
 
 def _add_unit(parent, index: int, chain: ChainGeometry, properties: UnitProperties, solver: Solver):
@@ -107,7 +139,7 @@ def _add_unit(parent, index: int, chain: ChainGeometry, properties: UnitProperti
             solref_limit=solver.limit_solref,
             solimp_limit=solver.limit_solimp,
         )
-    rim_gap = chain.widths[index] / 2 * chain.joint_range[index]
+    rim_gap = min(chain.widths[index] / 2 * chain.joint_range[index], length)
     _add_geom(body, name, chain.widths[index] / 2, (length - 0.5 * rim_gap) / 2, (0, 0, -length / 2))
     body.add_site(name=f"{name}_center", pos=[0, 0, -length / 2])
     return body

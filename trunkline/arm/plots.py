@@ -15,6 +15,7 @@ def arm_figure(model: mujoco.MjModel) -> Figure:
     figure, (side, units) = plt.subplots(1, 2, figsize=(9, 4.5), width_ratios=[1, 2])
     for geom in range(model.ngeom):
         radius, half = model.geom_size[geom][:2]
+        half = half or radius  # a ball
         x, z = data.geom_xpos[geom][[0, 2]]
         corners = np.array([[-radius, -half], [radius, -half], [radius, half], [-radius, half]])
         side.fill(*(corners + [x, z]).T * 1000, facecolor="#f3d9bd", edgecolor="#8a5a2b", linewidth=0.6)
@@ -24,12 +25,14 @@ def arm_figure(model: mujoco.MjModel) -> Figure:
         side.plot(sites[:, 0] * 1000, sites[:, 2] * 1000, color="#333333", linewidth=0.8)
     side.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Side view")
     side.grid(False)
-    numbers = np.arange(1, model.nbody - 1)
-    first_hinge = model.body_jntadr[2:]
-    units.semilogy(numbers, model.body_mass[2:] * 1000, "o-", color=IDENTIFIED, label="mass (g)")
+    jointed = np.flatnonzero(model.body_jntnum)
+    numbers = np.arange(1, len(jointed) + 1)
+    first_hinge = model.body_jntadr[jointed]
+    units.semilogy(numbers, model.body_mass[jointed] * 1000, "o-", color=IDENTIFIED, label="mass (g)")
     units.semilogy(
         numbers, model.jnt_stiffness[first_hinge], "s-", color=INITIAL, label="stiffness of its joint (N m/rad)"
     )
-    units.set(xlabel="unit, from the base", title=f"{len(numbers)} units, {model.body_mass[2:].sum():.2f} kg")
+    moving = model.body_mass[jointed[0]:].sum()
+    units.set(xlabel="unit, from the base", title=f"{len(numbers)} units, {moving:.2f} kg")
     units.legend()
     return figure

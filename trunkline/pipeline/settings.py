@@ -4,7 +4,7 @@ import hashlib
 import sys
 from pathlib import Path
 
-from trunkline.config import check_settings
+from trunkline.config import check_settings, own_or_project
 from trunkline.errors import InputError
 
 
@@ -13,18 +13,19 @@ def check_once(root: Path = Path(".")) -> None:
 
     Every stage calls this first, so that a typo in the last section shows before the first stage works. To check
     is to import every stage, which takes seconds; hence the note of what has passed, in DVC's temporary folder.
-    Outside of the project (no dvc.yaml) there is nothing to check.
+    Outside of a pipeline (no dvc.yaml) there is nothing to check.
 
     Raises:
         InputError: for the first mistake in any section.
     """
     if not (root / "dvc.yaml").is_file():
         return
-    files = [root / "params.yaml", root / "dvc.yaml", *root.glob("conf/**/*.yaml"), *root.glob("stages/*.py")]
+    conf, stages = own_or_project(root, "conf"), own_or_project(root, "stages")
+    files = [root / "params.yaml", root / "dvc.yaml", *conf.glob("**/*.yaml"), *stages.glob("*.py")]
     digest = hashlib.sha256()
     for file in sorted(file for file in files if file.is_file()):
         digest.update(str(file).encode() + b"\0" + file.read_bytes() + b"\0")
-    passed = root / ".dvc" / "tmp" / "settings.sha256"
+    passed = stages.parent / ".dvc" / "tmp" / f"settings.{root.resolve().name}.sha256"
     if passed.is_file() and passed.read_text() == digest.hexdigest():
         return
     check_settings(root)
