@@ -19,8 +19,10 @@ from trunkline.recording.clock import (
     fit_frames,
 )
 from trunkline.recording.frozen import frozen
+from trunkline.recording.lost import find_lost, put_back
 from trunkline.recording.motors import check_curl, read_motors
 from trunkline.recording.session import FixedBase, Session, TrialEntry
+from trunkline.recording.smoothing import noise_level
 from trunkline.recording.source import Source, open_log
 from trunkline.recording.streams import PoseStream
 from trunkline.recording.swaps import find_swaps, usual_distances
@@ -186,6 +188,7 @@ def _take(
     )
     if arm.distances is not None:
         _untangle(base_positions, positions, quaternions, arm.distances, segments, findings)
+    time = _with_lost_time(time, positions, bool(source.joint_topics), findings)
     logged = poses.log_times[rows[0]]
     tendons, motors = read_motors(source, session, epoch, logged, time, limits, where, findings)
     if trial.experiment == "curl":
@@ -253,6 +256,22 @@ def _untangle(
                 values[np.ix_(swap.frames, pair)] = values[np.ix_(swap.frames, pair[::-1])]
         count, (one, other) = int(swap.frames.sum()), (names[place] for place in pair)
         findings.repairs.append(f"{one!r} and {other!r} were taken for each other in {count} frames, put right")
+
+
+def _with_lost_time(time: np.ndarray, positions: np.ndarray, motors: bool, findings: Findings) -> np.ndarray:
+    """Time (T,) with what even stamps hide put back, unless motors are dated by a clock that would not move along."""
+    noise = float(np.median(noise_level(positions.reshape(len(time), -1))))
+    lost = find_lost(time, positions, noise)
+    if not lost:
+        return time
+    count, at = sum(place.frames for place in lost), ", ".join(f"{time[place.after]:.2f}" for place in lost)
+    frames = "frame" if count == 1 else "frames"
+    told = f"{count} {frames} lost at {at} s, though the stamps go on evenly: all bodies jump ahead on their ways"
+    if motors:
+        findings.warnings.append(f"{told}; left so, as the motors have a clock of their own")
+        return time
+    findings.repairs.append(f"{told}; their time put back")
+    return put_back(time, lost)
 
 
 def _good_samples(

@@ -1,0 +1,70 @@
+"""Frames that a recorder lost without saying so: stamps go on evenly, and the arm jumps ahead on its way."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SIDE = 3  # frames before and after a jump whose motion a parabola describes
+MOST = 9  # frames, one more than are looked for at one place; by then an arm has gone round a bend
+GAIN = 3.0  # how much better the parabola fits with the frames put back
+LEAST, NOISES = 3e-4, 5.0  # m, and times the noise, of a body's misfit without them: below, it tells nothing
+EVEN = 0.01  # share of a frame by which stamps differ that were counted and not measured
+
+
+@dataclass
+class Lost:
+    """`frames` are missing after frame `after`."""
+
+    after: int
+    frames: int
+
+
+def find_lost(time: np.ndarray, positions: np.ndarray, noise: float) -> list[Lost]:
+    """Where even stamps hide a loss.
+
+    Around every step a parabola is fitted to three frames before and three after it, once as stamped and once with
+    1 to `MOST` frames put in between. Points that jump together along their ways, each by the same multiple of its own
+    step, all fit with the right number; after an outlier, a swap or a knock they do not.
+
+    Args:
+        time: (T,) s. positions: (T, S, 3) m, NaN where not seen. noise: m, of a coordinate.
+    """
+    steps = np.diff(time)
+    step = np.median(steps) if len(steps) else 0.0
+    even = np.abs(steps - step) < EVEN * step
+    window = np.arange(1 - SIDE, SIDE + 1)
+    found = []
+    fits = [_misfit(np.where(window > 0, window + lost, window)) for lost in range(MOST + 1)]
+    shift = np.zeros(len(time), dtype=int)  # frames put in before each frame
+    for after in range(SIDE - 1, len(time) - SIDE):
+        rows = after + window
+        if not even[rows[0] : rows[-1]].all() or shift[rows[0]] != shift[after]:
+            continue
+        points = positions[rows]
+        points = points[:, np.isfinite(points).all(axis=(0, 2))]
+        left = np.array([np.einsum("ab,bsi->asi", fit, points) for fit in fits])
+        bodies = np.sqrt(np.mean(np.square(left), axis=(1, 3)))  # (MOST + 1, S)
+        jumped = bodies[0] > max(LEAST, NOISES * noise)
+        if not jumped.any():
+            continue
+        misfits = np.sqrt(np.mean(np.square(bodies), axis=1))
+        best = int(np.argmin(misfits))
+        together = bodies[best, jumped] < bodies[0, jumped] / 2
+        if 0 < best < MOST and together.all() and misfits[0] > GAIN * misfits[best]:
+            found.append(Lost(after, best))
+            shift[after + 1 :] += best
+    return found
+
+
+def _misfit(frames: np.ndarray) -> np.ndarray:
+    """(6, 6): what a parabola through samples at these frames leaves of them."""
+    powers = np.vander(frames.astype(float), 3)
+    return np.eye(len(frames)) - powers @ np.linalg.pinv(powers)
+
+
+def put_back(time: np.ndarray, lost: list[Lost]) -> np.ndarray:
+    """`time` (T,) with every later frame moved by the time of those that are missing before it."""
+    step, moved = np.median(np.diff(time)), time.copy()
+    for place in lost:
+        moved[place.after + 1 :] += place.frames * step
+    return moved
