@@ -317,9 +317,9 @@ def by_sysid(case: Case, budget: float, **options) -> Search:
 def hanging_arm(units: int) -> mujoco.MjModel:
     """The initial model, with another number of units."""
     config = load_config(ArmConfig, "build_mjcf")
-    arm, material, actuation = config.arm, config.material, config.actuation
+    arm, actuation = config.arm, config.actuation
     chain = spiral_chain(arm.length, arm.base_width, arm.tip_width, units)
-    properties = unit_properties(chain, material.modulus, material.density, arm.core_ratio, material.damping_ratio)
+    properties = unit_properties(chain, arm.modulus, arm.density, arm.core_ratio, arm.damping_ratio)
     drive = actuation.kp, 2 * np.sqrt(actuation.kp * properties.masses.sum()), actuation.max_force
     tendons = Tendons(arm.tendons, arm.hole_ratio, actuation.friction, *drive, actuation.time_constant)
     return build_spec(chain, properties, tendons, Solver(**vars(config.solver))).compile()
@@ -337,6 +337,7 @@ def bent_release(model: mujoco.MjModel, frames: int, frame_step: float) -> tuple
         split="identify",
         gravity=gravity_in_base(0.0),
         start=start,
+        velocity=np.zeros(model.nv),
         lead=frame_step,
         controls=np.tile(model.tendon_length0 + SLACK, (frames, 1)),
         positions=positions,

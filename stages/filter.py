@@ -1,6 +1,7 @@
 """Filter every trial: gaps, outliers, noise; one clock, the base frame, and when each trial begins."""
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from pydantic import Field, PositiveFloat
@@ -28,6 +29,7 @@ class Config:
     order: int = Field(ge=1, le=10)
     longest_bridge: float = Field(ge=0)
     outlier_deviations: PositiveFloat
+    release: Literal["onset", "free"]
 
     def __post_init__(self):
         if self.cutoff >= self.rate / 2:
@@ -38,7 +40,7 @@ class Config:
 
 def main(config: Config) -> None:
     chosen = Filter(
-        config.rate, config.cutoff, config.order, config.longest_bridge, config.outlier_deviations
+        config.rate, config.cutoff, config.order, config.longest_bridge, config.outlier_deviations, config.release
     )
     takes = read_takes(INGEST)
     trials, findings = [], []

@@ -48,6 +48,19 @@ def test_pose_fit_leaves_out_what_was_not_seen():
     assert fit.residuals[seen].max() < 1e-3
 
 
+@pytest.mark.parametrize("in_motion", [True, False])
+def test_an_arm_that_moves_already_starts_with_its_velocity(in_motion):
+    model = small_model()
+    trial = release(model, 0.25, frames=90)
+    trial.start, trial.in_motion = float(trial.time[20]), in_motion
+    experiment = prepare(trial, model, 437)
+    itself = {"jnt_stiffness": model.jnt_stiffness[None]}
+    simulated = Population(model, [experiment], segments_of(model)).simulate(itself)
+    error = position_error(simulated.positions[0][0], experiment.positions, experiment.measured)
+    assert len(experiment.positions) == 69
+    assert (error < 1e-3) if in_motion else (error > 4e-3)
+
+
 def test_a_population_of_the_truth_replays_the_truth():
     model = small_model()
     trials = [tilt(model, 60), release(model, 0.25, frames=60), curl(model, 40, frames=90)]

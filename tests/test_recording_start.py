@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from trunkline.recording.smoothing import low_pass
-from trunkline.recording.start import cycle_time, release_time
+from trunkline.recording.start import cycle_time, free_time, release_time
 
 RATE = 120.0
 
@@ -28,6 +28,25 @@ def ring_down(release: float, noise: float, seed: int, hand: float = 0.0, durati
 def test_release_is_found_to_a_frame(release, hand, seed):
     time, positions = ring_down(release, 3e-4, seed, hand)
     assert release_time(time, positions) == pytest.approx(release, abs=1.5 / RATE if hand else 0.7 / RATE)
+
+
+@pytest.mark.parametrize("gentle", [0.0, 0.1, 0.2])
+def test_the_arm_is_free_when_the_hand_has_gone(gentle):
+    """x'' = -ω² x - c x' + hand, whose force fades within `gentle` s from 0.5 s on; two segments follow."""
+    fine, omega, damping = np.arange(0, 3, 1e-4), 8.2, 3.0
+    hand = 0.2 * omega**2 * np.clip(1 - (fine - 0.5) / max(gentle, 1e-9), 0, 1)
+    hand[fine < 0.5] = 0.2 * omega**2
+    x, v, path = 0.2, 0.0, []
+    for force in hand:
+        v += 1e-4 * (force - omega**2 * x - damping * v)
+        x += 1e-4 * v
+        path.append(x)
+    time = np.arange(0, 2.9, 1 / RATE)
+    positions = np.interp(time, fine, path)[:, None, None] * np.array([0.2, 0.6, 1.0])[:, None] * [1.0, 0, 0]
+    positions += np.random.default_rng(0).normal(scale=1e-5, size=positions.shape)
+    positions = low_pass(positions.reshape(len(time), -1), RATE, 20.0, 4).reshape(positions.shape)
+    begin = release_time(time, positions)
+    assert free_time(time, positions, begin) == pytest.approx(0.5 + gentle, abs=0.035)
 
 
 def test_an_arm_that_swings_from_the_first_frame_was_released_before():

@@ -13,6 +13,7 @@ SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend take
 
 
 QUIET_FRAMES = 3  # before the start: there the low-pass has not yet smeared the motion into the hold
+REACH = 2  # frames to either side for the velocity at the start; the low-pass leaves nothing finer
 LOOK_BACK = 30  # frames in which to look for a start pose that enough cameras saw
 SEEN_SHARE = 0.6  # of the segments that must be measured in the frame of the start pose
 
@@ -24,7 +25,8 @@ class Experiment:
     Attributes:
         name, kind, split: as in the trial; kind is its experiment.
         gravity: m/s², base frame. Shape (3,).
-        start: joint angles from which it starts, at rest. Shape (nq,).
+        start: joint angles from which it starts. Shape (nq,).
+        velocity: with which it starts, rad/s; 0 unless the trial's arm moves then. Shape (nv,).
         lead: s from the start to the first frame.
         controls: commanded tendon lengths, m, held from one frame to the next: row 0 from the start to the first
             frame, row t from frame t - 1 to frame t. Shape (T, nu).
@@ -38,6 +40,7 @@ class Experiment:
     split: str
     gravity: np.ndarray
     start: np.ndarray
+    velocity: np.ndarray
     lead: float
     controls: np.ndarray
     positions: np.ndarray
@@ -64,17 +67,14 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 else 0.0
     # the frame at the start or just before it; the pose there is that of the arm still held
     held = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
+    seen = _start_frame(trial, held if trial.in_motion else max(held - QUIET_FRAMES, 0))
+    if trial.in_motion:
+        held = seen  # pose and velocity hold there
     window = slice(0, 1) if static else slice(held + 1, held + 1 + frames)
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
-    seen = _start_frame(trial, held)
-    fit = fit_pose(
-        model,
-        trial.segments,
-        np.where(trial.measured[seen][:, None], trial.positions[seen], np.nan),
-        None if trial.quaternions is None else trial.quaternions[seen],
-    )
+    fit = _fit_frame(trial, model, seen)
     lengths = commanded_lengths(trial, model)
     if command_delay:
         lengths = np.stack(
@@ -86,7 +86,8 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         split=trial.split,
         gravity=trial.gravity,
         start=fit.qpos,
-        lead=0.0 if static else max(float(trial.time[held + 1] - max(trial.start, trial.time[held])), 1e-4),
+        velocity=_velocity(trial, model, seen) if trial.in_motion else np.zeros(model.nv),
+        lead=0.0 if static else _lead(trial, held),
         controls=lengths[:1] if static else 0.5 * (lengths[:-1] + lengths[1:])[held : held + len(positions)],
         positions=positions,
         measured=measured,
@@ -95,9 +96,30 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     )
 
 
-def _start_frame(trial: Trial, held: int) -> int:
-    """The last frame, a few before `held`, in which enough segments were measured."""
-    latest = max(held - QUIET_FRAMES, 0)
+def _lead(trial: Trial, held: int) -> float:
+    """Time to simulate until the first frame: from the start, or from the frame whose velocity is known, s."""
+    begin = trial.time[held] if trial.in_motion else max(trial.start, trial.time[held])
+    return max(float(trial.time[held + 1] - begin), 1e-4)
+
+
+def _fit_frame(trial: Trial, model: mujoco.MjModel, frame: int) -> PoseFit:
+    return fit_pose(
+        model,
+        trial.segments,
+        np.where(trial.measured[frame][:, None], trial.positions[frame], np.nan),
+        None if trial.quaternions is None else trial.quaternions[frame],
+    )
+
+
+def _velocity(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
+    """Joint velocities at a frame, rad/s, from the poses a few frames before and after it. Shape (nv,)."""
+    before, after = max(frame - REACH, 0), min(frame + REACH, len(trial.time) - 1)
+    turned = _fit_frame(trial, model, after).qpos - _fit_frame(trial, model, before).qpos
+    return turned / (trial.time[after] - trial.time[before])
+
+
+def _start_frame(trial: Trial, latest: int) -> int:
+    """The last frame up to `latest` in which enough segments were measured."""
     for frame in range(latest, max(latest - LOOK_BACK, -1), -1):
         if trial.measured[frame].mean() >= SEEN_SHARE:
             return frame

@@ -71,7 +71,7 @@ class Population:
         return Simulated(positions, diverged, steps)
 
     def _batch(self, kind: str, experiments: list[Experiment], fields: Fields, count: int) -> Batch:
-        """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start and at rest."""
+        """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start."""
         key = (kind, count)
         if key not in self._batches:
             model = copy.copy(self._model)
@@ -83,6 +83,7 @@ class Population:
             batch.expand(name)[:] = np.tile(values, (len(experiments),) + (1,) * (values.ndim - 1))
         batch.expand("opt.gravity")[:] = np.repeat([e.gravity for e in experiments], count, axis=0)
         batch.bind("qpos")[:] = np.repeat([e.start for e in experiments], count, axis=0)
+        batch.bind("qvel")[:] = np.repeat([e.velocity for e in experiments], count, axis=0)
         return batch
 
     def _sites(self) -> list[int]:

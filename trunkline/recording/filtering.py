@@ -9,7 +9,7 @@ from trunkline.errors import InputError
 from trunkline.frames import make_continuous, tilt_of_gravity
 from trunkline.recording.base_frame import average_base, gravity_from_up, to_base_frame
 from trunkline.recording.smoothing import bridged, fill_gaps, low_pass, outliers, resample
-from trunkline.recording.start import cycle_time, release_time
+from trunkline.recording.start import cycle_time, free_time, release_time
 from trunkline.recording.take import Take
 from trunkline.recording.trial import Trial
 
@@ -20,6 +20,7 @@ class Filter:
 
     longest_bridge: s, longer gaps are filled and marked as not measured.
     deviations: see `smoothing.outliers`.
+    release: where a release starts: at its "onset", or once the arm is "free" and moves already, see `start`.
     """
 
     rate: float
@@ -27,6 +28,7 @@ class Filter:
     order: int
     longest_bridge: float
     deviations: float
+    release: str = "onset"
 
 
 @dataclass
@@ -124,6 +126,8 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
         trial = average_static(trial)
     elif take.experiment == "release":
         trial.start = release_time(grid, trial.positions)
+        if settings.release == "free":
+            trial.start, trial.in_motion = free_time(grid, trial.positions, trial.start), True
     else:
         trial.start = cycle_time(grid, commands)
     findings = Findings(

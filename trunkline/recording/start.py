@@ -25,6 +25,22 @@ def release_time(time: np.ndarray, positions: np.ndarray) -> float:
     return float(end) if begin is None else begin
 
 
+def free_time(time: np.ndarray, positions: np.ndarray, begin: float) -> float:
+    """When a hand that lets go gently is gone, s: it moves along from `begin` on, the arm pulling ever harder.
+
+    An arm that is let go at once accelerates most at once. Where its acceleration still grows, something holds it; so
+    it is free from the largest acceleration of its farthest travelling segment before that one's top speed.
+
+    Args:
+        time (T,) s, uniform. positions (T, S, 3) m, filtered. begin: s, when the arm began to move.
+    """
+    tip = positions[:, np.argmax(np.ptp(positions, axis=0).max(axis=-1))]
+    velocity = np.gradient(tip, time, axis=0)
+    speed, pull = (np.linalg.norm(v, axis=1) for v in (velocity, np.gradient(velocity, time, axis=0)))
+    swings = np.flatnonzero((time >= begin) & (np.arange(len(time)) <= np.argmax(speed)))
+    return float(time[swings[np.argmax(pull[swings])]]) if len(swings) else begin
+
+
 def onset(
     time: np.ndarray,
     moved: np.ndarray,

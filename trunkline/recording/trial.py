@@ -30,6 +30,7 @@ class Trial:
     measured: (T, S) False where a sample was bridged over a gap too long to trust.
     commands, tendon_positions: (T, K) m of pull from the straight arm's path length, on the same clock.
     start: s, the detected release, or the beginning of the curl cycle; 0 for a static tilt.
+    in_motion: whether the arm moves at `start` already.
     """
 
     name: str
@@ -46,6 +47,7 @@ class Trial:
     commands: np.ndarray
     tendon_positions: np.ndarray
     start: float
+    in_motion: bool = False
 
 
 def write_trials(folder: Path, trials: list[Trial]) -> None:
@@ -59,6 +61,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "level": trial.level,
             "gravity": list(map(float, trial.gravity)),
             "start": float(trial.start),
+            "in_motion": trial.in_motion,
             "frames": len(trial.time),
             "segments": list(trial.segments),
             "tendons": list(trial.tendons),
@@ -74,6 +77,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "level": pa.float64(),
             "gravity": pa.list_(pa.float64()),
             "start": pa.float64(),
+            "in_motion": pa.bool_(),
             "frames": pa.int64(),
             "segments": pa.list_(pa.string()),
             "tendons": pa.list_(pa.string()),
@@ -123,6 +127,7 @@ def read_trials(folder: Path) -> list[Trial]:
                 commands=command["command"].reshape(command_shape),
                 tendon_positions=command["position"].reshape(command_shape),
                 start=row["start"],
+                in_motion=row["in_motion"],
             )
         )
     return trials
