@@ -14,7 +14,7 @@ from dvc.repo import Repo
 from omegaconf import OmegaConf
 
 ROOT = Path(__file__).parents[1]
-RESULTS = ("artifacts/", "dvc.lock", "demo/dvc.lock", ".dvc/")
+RESULTS = ("artifacts/", "dvc.lock", "demo/dvc.lock", ".dvc/", "examples/")
 
 STUB = '''
 import hashlib, json, pathlib

@@ -3,6 +3,7 @@
 import ast
 import json
 import os
+import re
 import subprocess
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from dvc.repo import Repo
 from omegaconf import OmegaConf
 from stub_pipeline import StubPipeline
 
-from trunkline.config import SHARED, group_options
+from trunkline.config import SHARED, check_settings, group_options
 from trunkline.pipeline import lock
 
 ROOT = Path(__file__).parents[1]
@@ -20,6 +21,12 @@ STAGES = [
     "ingest", "filter", "build_mjcf", "identify_stiffness", "identify_damping", "identify_control",
     "fk_dataset", "train_ik", "reachability", "package_unity",
 ]  # fmt: skip
+
+EXAMPLES = sorted(
+    f"{file.parent.relative_to(ROOT)}/dvc.yaml:{stage}"
+    for file in ROOT.glob("examples/*/dvc.yaml")
+    for stage in yaml.safe_load(file.read_text())["stages"]
+)
 
 # What surrounds every stage (load, show, refuse, write) and never changes a number: no reason to run again.
 INERT = {f"trunkline/{name}.py" for name in ("config", "errors", "plots", "progress", "stage", "threads")}
@@ -51,17 +58,36 @@ def test_one_name_everywhere():
         assert stage["desc"]
 
 
-@pytest.mark.parametrize("name", STAGES)
-def test_a_stage_lists_its_settings(stages, name):
-    params = {_relative(dep): dep.params for dep in stages[name].deps if hasattr(dep, "params")}
-    section = OmegaConf.to_container(OmegaConf.load(ROOT / "params.yaml"))[name] or {}
+@pytest.mark.parametrize("address", [*STAGES, *EXAMPLES])
+def test_a_stage_lists_its_settings(stages, address):
+    folder, name = _folder_and_name(address)
+    params = {_relative(dep): dep.params for dep in stages[address].deps if hasattr(dep, "params")}
+    section = OmegaConf.to_container(OmegaConf.load(ROOT / folder / "params.yaml"))[name] or {}
     groups = group_options(ROOT / "conf" / name)
-    expected = {"params.yaml": [name], f"conf/{name}/config.yaml": []}
+    expected = {f"{folder}params.yaml": [name], f"conf/{name}/config.yaml": []}
     expected |= {options[section[group]].relative_to(ROOT).as_posix(): [] for group, options in groups.items()}
     assert params == expected
 
 
-@pytest.mark.parametrize("name", [*STAGES, "demo/dvc.yaml:record"])
+@pytest.mark.parametrize("address", EXAMPLES)
+def test_an_example_is_the_pipeline_s_own_stages(stages, address):
+    """The same module, read, written and shown the same; beside its data no input that the other has not."""
+    folder, name = _folder_and_name(address)
+    example, stage = stages[address], stages[name]
+    assert (example.cmd, example.desc) == (stage.cmd, stage.desc)
+    for mine, others in ((example.outs, stage.outs), (example.deps, stage.deps)):
+        found, expected = ({_relative(entry).removeprefix(folder) for entry in entries} for entries in (mine, others))
+        chosen = {entry for entry in found | expected if entry.startswith(("data/raw/", "conf/"))}
+        assert found - chosen == expected - chosen
+
+
+@pytest.mark.parametrize("address", [stage for stage in EXAMPLES if not stage.endswith(":ingest")])
+def test_an_example_s_settings_are_checked(address):
+    folder, _ = _folder_and_name(address)
+    assert check_settings(ROOT / folder) == sorted(s.partition(":")[2] for s in EXAMPLES if s.startswith(folder))
+
+
+@pytest.mark.parametrize("name", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record"])
 def test_a_stage_depends_on_the_code_it_imports_and_no_other(stages, name):
     deps = {dep for dep in map(_relative, stages[name].deps) if dep.startswith(("stages", "trunkline", "demo"))}
     deps = {dep for dep in deps if not dep.endswith(".yaml")}
@@ -78,15 +104,17 @@ def test_what_a_stage_reads_another_writes_whole(repo):
         for dep in map(_relative, stage.deps):
             nested = [out for out in outs if out.startswith(f"{dep}/") or dep.startswith(f"{out}/")]
             assert not nested, f"{stage.addressing}: {dep} beside {nested}"
-            data = dep.startswith(("data/", "artifacts/"))
+            data = dep.startswith(("data/", "artifacts/", "examples/")) and "/raw/" not in f"{dep}/"
+            data = data and not dep.endswith(".yaml")
             assert not data or dep in outs, f"{stage.addressing}: nothing writes {dep}"
 
 
 def test_git_holds_numbers_and_the_cache_holds_the_rest(repo):
     for out in repo.index.outs:
         path = _relative(out)
-        assert path == "data/raw/demo" or path.split("/")[0] in ("artifacts", "data"), path
-        in_git = path.startswith("artifacts/") and path.endswith((".json", ".csv"))
+        below = re.sub(r"^examples/\w+/", "", path)
+        assert path == "data/raw/demo" or below.split("/")[0] in ("artifacts", "data"), path
+        in_git = below.startswith("artifacts/") and path.endswith((".json", ".csv"))
         assert out.use_cache != in_git, path
         ignored = subprocess.run(["git", "check-ignore", "-q", path], cwd=ROOT, check=False).returncode == 0
         assert ignored != in_git, path
@@ -211,6 +239,12 @@ def test_lock_whose_stages_disagree_is_refused(clone):
     (clone / "dvc.lock").write_text(yaml.safe_dump(locked))
     expected = "identify_stiffness: read another artifacts/build_mjcf/arm.xml than build_mjcf wrote"
     assert expected in lock.mismatches(clone)
+
+
+def _folder_and_name(address: str) -> tuple[str, str]:
+    """("examples/x/", "filter") of examples/x/dvc.yaml:filter, ("", "filter") of filter."""
+    file, _, name = address.rpartition(":")
+    return file.removesuffix("dvc.yaml"), name
 
 
 def _relative(entry) -> str:

@@ -1,4 +1,4 @@
-"""``python -m trunkline.pipeline.gate``: do the metrics keep within tests/limits.yaml?
+"""``python -m trunkline.pipeline.gate``: do the metrics keep within tests/limits.yaml, and an example's within its own?
 
 Each metric has an absolute bound and, where it makes sense, an allowed regression against the value committed
 before. The earlier value is HEAD's, or, where the file is as in HEAD (a fresh clone, CI), the one before the
@@ -173,17 +173,22 @@ def _git(root: Path, name: str, *arguments: str) -> str:
 
 
 def main(root: Path = Path(".")) -> int:
-    try:
-        limits = read_limits(root / "tests" / "limits.yaml")
-    except InputError as error:
-        print(f"gate: error: {error}", file=sys.stderr)
-        return 1
-    problems = failures(limits, root)
-    for problem in problems:
-        print(f"gate: FAIL {problem}")
-    count = sum(len(keys) for keys in limits.values())
-    print(f"gate: {count} metrics in {len(limits)} stages, {len(problems)} problems")
-    return 1 if problems else 0
+    files = [root / "tests" / "limits.yaml", *sorted(root.glob("examples/*/limits.yaml"))]
+    count, stages, found = 0, 0, 0
+    for file in files:
+        try:
+            limits = read_limits(file)
+        except InputError as error:
+            print(f"gate: error: {error}", file=sys.stderr)
+            return 1
+        example = file.parent.name if file.parent.name != "tests" else ""
+        problems = failures(limits, file.parent if example else root)
+        for problem in problems:
+            print(f"gate: FAIL {example}{': ' * bool(example)}{problem}")
+        count, stages = count + sum(len(keys) for keys in limits.values()), stages + len(limits)
+        found += len(problems)
+    print(f"gate: {count} metrics in {stages} stages, {found} problems")
+    return 1 if found else 0
 
 
 if __name__ == "__main__":

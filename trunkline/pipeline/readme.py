@@ -59,10 +59,11 @@ RESULTS = {
 def pipeline_graph(root: Path) -> str:
     """The stages of dvc.yaml as a mermaid flowchart; edges that follow from others are left out."""
     with Repo(str(root)) as repo:
-        stages = {stage.addressing: stage for stage in repo.index.stages}
+        stages = {s.addressing: s for s in repo.index.stages if not s.addressing.startswith("examples/")}
+        edges = [(above.addressing, stage.addressing) for stage, above in repo.index.graph.edges]
         graph = networkx.DiGraph()
         graph.add_nodes_from(stages)
-        graph.add_edges_from((above.addressing, stage.addressing) for stage, above in repo.index.graph.edges)
+        graph.add_edges_from(edge for edge in edges if edge[0] in stages)
     reduced = networkx.transitive_reduction(graph)
     order = list(networkx.lexicographical_topological_sort(reduced, key=list(stages).index))
     names = {address: address.removesuffix(".yaml").rpartition(":")[2] for address in order}

@@ -49,3 +49,15 @@ float64[] position
 float64[] velocity
 float64[] effort
 {HEADER}"""
+# interfaces of the ASL Trunk robot, StanfordASL/trunk-stack
+TRUNK_RIGID_BODIES = f"""std_msgs/Header header
+uint32 frame_number
+string[] rigid_body_names
+geometry_msgs/Point[] positions
+geometry_msgs/Quaternion[] orientations
+{HEADER}{POINT}{SEPARATOR}MSG: geometry_msgs/Quaternion
+float64 x
+float64 y
+float64 z
+float64 w
+"""

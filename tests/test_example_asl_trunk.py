@@ -1,0 +1,108 @@
+"""The example on real recordings: its session from logs or from the public CSV, and what the stages make of it."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from examples.asl_trunk.session import COLUMNS, SESSION, make_session, read_csv
+from trunkline.errors import InputError
+from trunkline.recording.checks import Limits
+from trunkline.recording.intake import take_in
+from trunkline.recording.session import read_session
+
+SHARED = Path(__file__).parents[2] / "shared" / "data" / "asl_trunk"
+LIMITS = Limits(0.5, 0.3, 0.1, 1.0)
+
+
+def rows(trajectories: int = 13, frames: int = 90) -> str:
+    """A CSV like the public one: `trajectories` swings of three discs."""
+    lines, time = [",".join(COLUMNS)], np.arange(frames) / 100
+    for number in range(trajectories):
+        for swing in 0.1 * np.cos(8 * time + number):
+            discs = [(0.1 + share * swing, -0.107 * disc, 0.105) for disc, share in ((1, 0.2), (2, 0.5), (3, 1.0))]
+            lines.append(",".join([str(number), *(repr(float(value)) for disc in discs for value in disc)]))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.fixture
+def public(tmp_path):
+    path = tmp_path / "observations_manual_decay_200g.csv"
+    path.write_text(rows())
+    return path
+
+
+def test_the_public_csv_becomes_a_session_that_ingest_reads(public, tmp_path):
+    folder = tmp_path / "session"
+    assert make_session(public, folder) == 13
+    session = read_session(folder)
+    assert [trial.split for trial in session.trials] == ["identify"] * 9 + ["validate"] * 4
+    positions = read_csv(public)
+    for number, (_, take, found) in enumerate(take_in(folder, session, LIMITS)):
+        assert (take.segments, take.tendons, take.quaternions) == (("1", "2", "3"), (), None)
+        np.testing.assert_array_equal(take.positions, positions[number][: len(take.time)])  # to the last bit
+        np.testing.assert_allclose(np.diff(take.time), 0.01)
+        assert not found.repairs
+
+
+def test_a_folder_of_logs_is_taken_as_it_is(public, tmp_path):
+    make_session(public, tmp_path / "first")
+    assert make_session(tmp_path / "first", tmp_path / "second") == 13
+    for log in (tmp_path / "first").iterdir():
+        assert (tmp_path / "second" / log.name).read_bytes() == log.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda text: text.replace("x1", "a1"), "row 1: found ID, a1"),
+        (lambda text: text.replace("\n0,", "\n0,x", 1), "row 2: could not convert"),
+        (lambda text: text.replace("\n0,", "\n0,1.0,", 1), "row 2: found 10 coordinates, expected 9"),
+        (lambda text: "", "row 1: found nothing"),
+    ],
+)
+def test_another_csv_is_refused(public, tmp_path, change, message):
+    public.write_text(change(public.read_text()))
+    with pytest.raises(InputError, match=message):
+        make_session(public, tmp_path / "session")
+    assert not (tmp_path / "session").exists()
+
+
+def test_a_source_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(InputError, match=r"found no release_200g_\*.mcap"):
+        make_session(tmp_path, tmp_path / "session")
+    with pytest.raises(InputError, match="No such file"):
+        make_session(tmp_path / "nothing.csv", tmp_path / "session")
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """The real recordings, from ../shared or from where the session was made."""
+    source = next((folder for folder in (SHARED, SESSION) if any(folder.glob("*.mcap"))), None)
+    if source is None:
+        pytest.skip("needs the recordings in ../shared/data/asl_trunk or examples/asl_trunk/data/raw/asl_trunk")
+    folder = tmp_path_factory.mktemp("asl") / "session"
+    make_session(source, folder)
+    return folder
+
+
+def test_the_csv_gives_the_very_logs_that_are_shared(recorded, tmp_path):
+    session = read_session(recorded)
+    lines = [",".join(COLUMNS)]
+    for number, log in enumerate(sorted(recorded.glob("*.mcap"))):
+        session.trials = [type(session.trials[0])(file=log.name, experiment="release", split="identify")]
+        [(_, take, _)] = take_in(recorded, session, LIMITS)
+        lines += [",".join([str(number), *map(repr, frame)]) for frame in take.positions.reshape(-1, 9).tolist()]
+    (tmp_path / "public.csv").write_text("\n".join(lines) + "\n")
+    make_session(tmp_path / "public.csv", tmp_path / "session")
+    for log in recorded.glob("*.mcap"):
+        assert (tmp_path / "session" / log.name).read_bytes() == log.read_bytes()
+
+
+def test_frames_that_the_recorder_lost_are_found_in_two_logs_of_thirteen(recorded):
+    repairs = {take.name: found.repairs for _, take, found in take_in(recorded, read_session(recorded), LIMITS)}
+    assert len(repairs) == 13
+    told = {name: said for name, said in repairs.items() if said}
+    assert set(told) == {"release_200g_09", "release_200g_10"}
+    assert told["release_200g_09"][0].startswith("21 frames lost at 1.31, 1.35, 1.39, 1.46, 1.49, 1.54 s")
+    assert told["release_200g_10"][0].startswith("1 frame lost at 1.13 s")
