@@ -158,6 +158,7 @@ def save_model(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
         joint.stiffness = [model.jnt_stiffness[index], *model.jnt_stiffnesspoly[index]]
         joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
         joint.frictionloss = model.dof_frictionloss[dof]
+        joint.springref = model.qpos_spring[model.jnt_qposadr[index]]
     for tendon in spec.tendons:
         index = model.tendon(tendon.name).id
         tendon.frictionloss = model.tendon_frictionloss[index]
