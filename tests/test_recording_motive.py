@@ -70,6 +70,17 @@ def test_an_export_becomes_a_session_that_is_ingested(tmp_path, measured, unit, 
     assert np.isnan(take.positions).any()
 
 
+def test_decimal_commas_between_semicolons(tmp_path, measured):
+    path = write(tmp_path / "release_1.csv", measured)
+    text = path.read_text(encoding="utf-8-sig")
+    (tmp_path / "german.csv").write_text(text.replace(",", ";").replace(".", ","), encoding="utf-8-sig")
+    expected, found = read_export(path), read_export(tmp_path / "german.csv")
+    assert found.names == expected.names
+    assert found.start == expected.start
+    np.testing.assert_array_equal(found.positions, expected.positions)
+    np.testing.assert_array_equal(found.time, expected.time)
+
+
 def test_markers_alone_become_positions_alone(tmp_path, measured):
     path = write(tmp_path / "swing.csv", measured, "Meters", rotation="", kind="Marker")
     assert main(["--session", str(tmp_path / "session"), str(path)]) == 0

@@ -1,8 +1,9 @@
 """OptiTrack Motive's CSV export as MCAP logs: `python -m trunkline.recording.motive --session data/raw/NAME CSV…`
 
-Header rows are found by what they hold, as versions of Motive differ in their number. Quaternions are x, y, z, w;
-an occluded body has empty cells; up is +y. Rigid bodies become `mocap4r2_msgs/msg/RigidBodies`, and where an export
-has none, its markers become `mocap4r2_msgs/msg/Markers`. A session.yaml is proposed unless there is one.
+Header rows are found by what they hold, as versions of Motive differ in their number. Cells end at commas, or at
+semicolons where numbers have decimal commas. Quaternions are x, y, z, w; an occluded body has empty cells; up is +y.
+Rigid bodies become `mocap4r2_msgs/msg/RigidBodies`, and where an export has none, its markers become
+`mocap4r2_msgs/msg/Markers`. A session.yaml is proposed unless there is one.
 """
 
 import argparse
@@ -48,7 +49,7 @@ def read_export(path: Path) -> Export:
         InputError: naming the file and what is missing, or the row that cannot be read.
     """
     try:
-        rows = list(csv.reader(Path(path).read_text(encoding="utf-8-sig").splitlines()))
+        rows = _rows(Path(path).read_text(encoding="utf-8-sig").splitlines())
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise InputError(f"{path}: {error}, expected a CSV export of Motive") from error
     first = next((i for i, row in enumerate(rows) if len(row) > 2 and row[0].strip() == "Frame"), None)
@@ -84,6 +85,13 @@ def read_export(path: Path) -> Export:
     positions[hidden] = np.nan
     frames = numbers[:, 0].astype(int)
     return Export(_start(about), frames, numbers[:, 1], names, scale * positions, quaternions)
+
+
+def _rows(lines: list[str]) -> list[list[str]]:
+    """Cells row by row, numbers with decimal points."""
+    if not lines or lines[0].count(";") <= lines[0].count(","):
+        return list(csv.reader(lines))
+    return [[cell.replace(",", ".") for cell in row] for row in csv.reader(lines, delimiter=";")]
 
 
 def write_log(path: Path, export: Export) -> None:

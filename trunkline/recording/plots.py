@@ -15,6 +15,7 @@ from trunkline.recording.take import Take
 from trunkline.recording.trial import Trial
 
 BIN = 1 / 30  # s, of the coverage picture
+LEAST_JITTER = 0.1  # ms, of the axis: less is none
 UNSEEN, PARTLY, SEEN = INITIAL, VALIDATE, "#d7e3ea"
 COLORS = {"static_tilt": MEASURED, "release": IDENTIFIED, "curl": VALIDATE}
 
@@ -35,7 +36,7 @@ def quality_figure(
         title=f"Gaps: {len(lengths)}",
         xlabel="length (ms)",
         ylabel="count",
-        yscale="log" if len(lengths) else "linear",
+        yscale="log" if len(lengths) > 100 else "linear",
     )
 
     segments = qualities[0].take.segments
@@ -53,10 +54,11 @@ def quality_figure(
     rates = [1 / quality.interval for quality in qualities]
     title = f"Frame stamps: {np.median(rates):.1f} Hz, {sum(q.dropped for q in qualities)} frames dropped"
     jitter.set(title=title, xlabel="trial", ylabel="jitter (ms)")
-    jitter.margins(y=0.3)
+    jitter.set_ylim(0, max(1.4 * np.nanmax([0, *jitters]), LEAST_JITTER))
 
-    clock.axhline(1e3 * offset, color=MEASURED, lw=1)
     fits = [(i, q.findings.offset) for i, q in enumerate(qualities) if q.findings.offset is not None]
+    clock.axhline(1e3 * offset, color=MEASURED, lw=1)
+    clock.set_visible(any(len(quality.take.tendons) for quality in qualities))
     for label, fill, value in (
         ("by the whole motion", "none", lambda fit: fit.offset),
         ("by the first motion", VALIDATE, lambda fit: np.nan if fit.onset is None else fit.onset),
@@ -79,7 +81,8 @@ def quality_figure(
     for panel in (jitter, clock):
         panel.set_xlim(-1, len(qualities))
         panel.xaxis.get_major_locator().set_params(integer=True)
-    jitter.legend(handles=[Patch(color=color, label=name) for name, color in COLORS.items()], ncols=3)
+    kinds = {quality.take.experiment for quality in qualities}
+    jitter.legend(handles=[Patch(color=COLORS[name], label=name) for name in COLORS if name in kinds], ncols=3)
     return figure
 
 
@@ -102,7 +105,8 @@ def _coverage(axes, qualities: list[Quality]) -> None:
         take = quality.take
         place = (take.time / BIN).astype(int)
         frames = np.bincount(place, minlength=bins)
-        band = np.full((len(take.segments) + 2, bins), np.nan)
+        apart = 1 + len(take.segments) // 10  # empty rows to the next band
+        band = np.full((len(take.segments) + apart, bins), np.nan)
         for index in range(len(take.segments)):
             good = np.isfinite(take.positions[:, index, 0])
             share = np.bincount(place, weights=good, minlength=bins) / np.maximum(frames, 1)
