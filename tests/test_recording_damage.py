@@ -49,24 +49,29 @@ def edit(folder, old, new):
 
 
 @pytest.mark.parametrize("frames", [slice(60, 110), slice(60, 61), slice(200, None), slice(0, 250)])
-@pytest.mark.parametrize("pair", [(1, 2), (2, 3), (3, 4)])
-def test_segments_taken_for_each_other_are_put_right(tmp_path, frames, pair):
+@pytest.mark.parametrize("bodies", [(1, 2), (2, 3), (3, 4), (1, 2, 3)])
+def test_bodies_taken_for_each_other_are_put_right(tmp_path, frames, bodies):
+    """Each label on the next one's pose: pairs, the base among them, and rounds of three."""
+
     def swap(m):
         for values in (m.positions, m.quaternions):
-            values[frames, pair[0]], values[frames, pair[1]] = (
-                values[frames, pair[1]].copy(),
-                values[frames, pair[0]].copy(),
-            )
+            values[frames, list(bodies)] = values[frames, [*bodies[1:], bodies[0]]]
 
     right, _ = session(tmp_path / "right")
     takes, findings = session(tmp_path / "wrong", swap)
-    names = [SEGMENTS[body - 1] for body in pair]
-    assert f"'{names[0]}' and '{names[1]}' were taken for each other in" in " ".join(findings[0].repairs)
+    names = " and ".join(repr(("base", *SEGMENTS)[body]) for body in bodies)
+    assert f"{names} were taken for each other in" in " ".join(findings[0].repairs)
     assert findings[1].repairs == findings[2].repairs == []
     # a body beside a hidden one may lack the neighbours that would tell
     same = np.isclose(takes[0].positions, right[0].positions, equal_nan=True).all(axis=(1, 2))
     assert same.mean() > 0.97
     np.testing.assert_array_equal(takes[0].quaternions[same], right[0].quaternions[same])
+    np.testing.assert_array_equal(takes[0].base_positions[same], right[0].base_positions[same])
+    np.testing.assert_array_equal(takes[0].base_quaternions[same], right[0].base_quaternions[same])
+
+
+def test_a_segment_taken_for_the_base_is_put_right(tmp_path):
+    test_bodies_taken_for_each_other_are_put_right(tmp_path, slice(60, 110), (0, 1))
 
 
 @pytest.mark.parametrize("truth", [release_truth(), static_truth(60.0), curl_truth(100.0)])

@@ -37,11 +37,13 @@ NORM_TOLERANCE = 0.01  # of a quaternion's length; float32 rounding is far below
 @dataclass
 class Arm:
     """What all logs together say. scale: m per unit of their positions. distances: between the base and the segments,
-    see `usual_distances`; None where there is too little to compare. note: on the unit, where it is not the declared.
+    see `usual_distances`; None where there is too little to compare. marked_base: whether a body marks the mount.
+    note: on the unit, where it is not the declared.
     """
 
     scale: float
     distances: np.ndarray | None
+    marked_base: bool
     note: str | None
 
 
@@ -121,12 +123,12 @@ def _arm(session: Session, sources: list[Source], segments: dict[str, str]) -> A
         apart = np.median([extent(positions) for positions in logs])
         note = f"unit: bodies {apart:.4g} apart are no arm in {session.frame.unit}, as declared; taken as {found}"
     if not logs or len(needed) < 3:
-        return Arm(scale, None, note)
+        return Arm(scale, None, not fixed, note)
     logs = [scale * positions for positions in logs]
     if fixed:
         mount = np.array(session.base.position)
         logs = [np.insert(positions, 0, mount, axis=1) for positions in logs]
-    return Arm(scale, usual_distances(logs), note)
+    return Arm(scale, usual_distances(logs), not fixed, note)
 
 
 def _take(
@@ -187,7 +189,8 @@ def _take(
         session, positions, quaternions, f"{where}: {source.pose_topic}"
     )
     if arm.distances is not None:
-        _untangle(base_positions, positions, quaternions, arm.distances, segments, findings)
+        names = [needed[0] if arm.marked_base else "base", *segments]
+        _untangle((base_positions, base_quaternions), positions, quaternions, arm, names, findings)
     time = _with_lost_time(time, positions, bool(source.joint_topics), findings)
     logged = poses.log_times[rows[0]]
     tendons, motors = read_motors(source, session, epoch, logged, time, limits, where, findings)
@@ -240,22 +243,26 @@ def _log_fit(poses: PoseStream) -> FrameFit | None:
 
 
 def _untangle(
-    base: np.ndarray,
+    base: tuple[np.ndarray, np.ndarray],
     positions: np.ndarray,
     quaternions: np.ndarray | None,
-    distances: np.ndarray,
-    segments: dict[str, str],
+    arm: Arm,
+    names: list[str],
     findings: Findings,
 ) -> None:
-    """Give labels that changed places back, in `positions` and `quaternions`."""
-    names = list(segments)
-    for swap in find_swaps(np.insert(positions, 0, base, axis=1), distances):
-        pair = [swap.first - 1, swap.second - 1]
-        for values in (positions, quaternions):
+    """Give labels that changed places back, in the poses of the base (where a body marks it) and of the segments."""
+    bodies = np.insert(positions, 0, base[0], axis=1)
+    turns = None if quaternions is None else np.insert(quaternions, 0, base[1], axis=1)
+    for swap in find_swaps(bodies, arm.distances, arm.marked_base):
+        wrong, right = list(swap.bodies), [*swap.bodies[1:], swap.bodies[0]]
+        for values in (bodies, turns):
             if values is not None:
-                values[np.ix_(swap.frames, pair)] = values[np.ix_(swap.frames, pair[::-1])]
-        count, (one, other) = int(swap.frames.sum()), (names[place] for place in pair)
-        findings.repairs.append(f"{one!r} and {other!r} were taken for each other in {count} frames, put right")
+                values[np.ix_(swap.frames, right)] = values[np.ix_(swap.frames, wrong)]
+        count, who = int(swap.frames.sum()), " and ".join(repr(names[body]) for body in swap.bodies)
+        findings.repairs.append(f"{who} were taken for each other in {count} frames, put right")
+    base[0][:], positions[:] = bodies[:, 0], bodies[:, 1:]
+    if turns is not None:
+        base[1][:], quaternions[:] = turns[:, 0], turns[:, 1:]
 
 
 def _with_lost_time(time: np.ndarray, positions: np.ndarray, motors: bool, findings: Findings) -> np.ndarray:

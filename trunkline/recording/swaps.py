@@ -19,10 +19,9 @@ SAMPLE = 200  # frames of a log that tell the usual distances
 
 @dataclass
 class Swap:
-    """first, second: bodies by index. frames: (T,) in which they are exchanged."""
+    """bodies: by index, each label on the next one's pose, the last on the first's. frames: (T,) in which they are."""
 
-    first: int
-    second: int
+    bodies: tuple[int, ...]
     frames: np.ndarray
 
 
@@ -43,45 +42,69 @@ def usual_distances(logs: list[np.ndarray]) -> np.ndarray:
     return distances
 
 
-def find_swaps(positions: np.ndarray, usual: np.ndarray) -> list[Swap]:
-    """Exchanged pairs among the bodies of (T, B, 3) m, but for the first, the base; usual: distances (B, B) m."""
-    found, count = [], positions.shape[1]
-    nearness = np.where(np.isfinite(usual), usual, np.inf)
-    for first in range(1, count):
-        order = [other for other in np.argsort(nearness[first], kind="stable") if other not in (0, first)]
-        for second in order[:NEIGHBOURS]:
-            if np.isfinite(usual[first, second]) and not any({s.first, s.second} == {first, second} for s in found):
-                frames = _exchanged(positions, usual, first, second, nearness)
-                if frames.any():
-                    found.append(Swap(first, second, frames))
-    return found
+def find_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = True) -> list[Swap]:
+    """Labels that changed places, two or three at a time, among the bodies of (T, B, 3) m, the base first.
 
-
-def _exchanged(
-    positions: np.ndarray, usual: np.ndarray, first: int, second: int, nearness: np.ndarray
-) -> np.ndarray:
-    """(T,) frames in which the labels of two bodies fit their neighbours only when exchanged.
-
-    Where only one of the two is seen, an outlier may look like it, and it has to last.
+    Args:
+        usual: distances (B, B) m.
+        marked_base: whether a body marks the base, whose label may then be exchanged as well.
     """
-    others = [b for b in np.argsort(nearness[first] + nearness[second], kind="stable") if b not in (first, second)]
-    others = [b for b in others if np.isfinite(usual[first, b] + usual[second, b])][:REFERENCES]
+    candidates = _candidates(usual, marked_base)
+    if not candidates:
+        return []
+    flags = [_exchanged(positions, usual, bodies) for bodies in candidates]
+    misfits = np.full((len(candidates), len(positions)), np.inf)  # what is left where several would do
+    for place, (bodies, flagged) in enumerate(zip(candidates, flags, strict=True)):
+        misfits[place, flagged] = _misfit(positions[flagged], usual, bodies)
+    best = np.where(np.isfinite(misfits).any(axis=0), np.argmin(misfits, axis=0), -1)
+    return [Swap(bodies, best == place) for place, bodies in enumerate(candidates) if (best == place).any()]
+
+
+def _candidates(usual: np.ndarray, marked_base: bool) -> list[tuple[int, ...]]:
+    """Pairs of near bodies, then rounds of three near ones, either way."""
+    nearness = np.where(np.isfinite(usual), usual, np.inf)
+    bodies = range(0 if marked_base else 1, len(usual))
+    order = np.argsort(nearness, axis=1, kind="stable").tolist()
+    near = {first: [other for other in order[first] if other in bodies and other != first] for first in bodies}
+    near = {first: others[:NEIGHBOURS] for first, others in near.items()}
+    pairs = {tuple(sorted((a, b))) for a in bodies for b in near[a] if np.isfinite(usual[a, b])}
+    rounds = {tuple(sorted((a, b, c))) for a, b in pairs for c in near[a] + near[b] if c not in (a, b)}
+    return sorted(pairs) + sorted(order for a, b, c in rounds for order in ((a, b, c), (a, c, b)))
+
+
+def _misfit(positions: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -> np.ndarray:
+    """Mean misfit (T,) m of all distances, each of the labels `bodies` taken for the next."""
+    order = np.arange(len(usual))
+    order[[*bodies[1:], bodies[0]]] = bodies
+    righted = positions[:, order]
+    first, second = np.triu_indices(len(usual), 1)
+    off = np.abs(np.linalg.norm(righted[:, first] - righted[:, second], axis=-1) - usual[first, second])
+    return np.nanmean(off, axis=1)
+
+
+def _exchanged(positions: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -> np.ndarray:
+    """(T,) frames in which the labels `bodies` fit their neighbours only when each is taken for the next.
+
+    Where but one of them is seen, an outlier may look like it, and it has to last.
+    """
+    nearness = np.where(np.isfinite(usual), usual, np.inf)[list(bodies)].sum(axis=0)
+    others = [b for b in np.argsort(nearness, kind="stable").tolist() if b not in bodies]
+    others = [b for b in others if np.isfinite(usual[list(bodies), b]).all()][:REFERENCES]
     if len(others) < 2:
         return np.zeros(len(positions), bool)
-    own, other = usual[first, others], usual[second, others]
-    to_first = np.linalg.norm(positions[:, [first]] - positions[:, others], axis=-1)
-    to_second = np.linalg.norm(positions[:, [second]] - positions[:, others], axis=-1)
-    saw_first, saw_second = np.isfinite(to_first), np.isfinite(to_second)
-    kept, exchanged = np.zeros(len(positions)), np.zeros(len(positions))
-    contrast, terms = np.zeros(len(positions)), saw_first.sum(axis=1) + saw_second.sum(axis=1)
-    for seen, found, labelled, opposite in ((saw_first, to_first, own, other), (saw_second, to_second, other, own)):
-        kept += np.sum(np.where(seen, abs(found - labelled), 0), axis=1)
-        exchanged += np.sum(np.where(seen, abs(found - opposite), 0), axis=1)
+    kept, exchanged, contrast, terms, both = (np.zeros(len(positions)) for _ in range(5))
+    for label, pose in zip(bodies, (*bodies[1:], bodies[0]), strict=True):
+        own, other = usual[label, others], usual[pose, others]
+        found = np.linalg.norm(positions[:, [label]] - positions[:, others], axis=-1)
+        seen = np.isfinite(found)
+        kept += np.sum(np.where(seen, abs(found - own), 0), axis=1)
+        exchanged += np.sum(np.where(seen, abs(found - other), 0), axis=1)
         contrast += np.sum(np.where(seen, abs(own - other), 0), axis=1)
+        terms += seen.sum(axis=1)
+        both += seen.any(axis=1)
     told = (terms >= 3) & (contrast > LEAST_CONTRAST * terms)
     flagged = told & (kept > 0.5 * contrast) & (exchanged < CLEAR * kept)
-    both = saw_first.any(axis=1) & saw_second.any(axis=1)
-    return flagged & (both | _lasting(flagged))
+    return flagged & ((both == len(bodies)) | _lasting(flagged))
 
 
 def _lasting(flags: np.ndarray) -> np.ndarray:
