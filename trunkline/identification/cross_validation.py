@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from trunkline.arm.rest import RestShape
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Identification, Method, identify
@@ -23,6 +24,7 @@ def cross_validate(
     weights: LossWeights,
     method: Method,
     folds: int,
+    rest: RestShape | None = None,
 ) -> dict[str, dict[str, float]]:
     """Errors on trials of the `identify` split that the fit did not see, before and after per-joint tuning.
 
@@ -43,7 +45,7 @@ def cross_validate(
         kept = [e for i, e in enumerate(seen) if i % folds != fold]
         found = identify(
             f"{label} fold {fold + 1} of {folds}", result.models["coarse"], kept, segments, parameters, per_joint,
-            loss, weights, near,
+            loss, weights, near, rest,
         )  # fmt: skip
         for name, table in rows.items():
             model = found.models[name]

@@ -76,7 +76,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
     fit = _fit_frame(trial, model, seen)
     lengths = commanded_lengths(trial, model)
-    if command_delay:
+    if command_delay and model.nu:
         lengths = np.stack(
             [np.interp(trial.time - command_delay, trial.time, column) for column in lengths.T], axis=1
         )

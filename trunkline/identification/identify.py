@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from trunkline.arm.parameters import candidate_fields, set_fields
+from trunkline.arm.rest import RestShape, spring_references
 from trunkline.identification.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import LossWeights
@@ -73,6 +74,7 @@ def identify(
     loss: str,
     weights: LossWeights,
     method: Method,
+    rest: RestShape | None = None,
 ) -> Identification:
     """Fit the parameters to the `identify` split among `experiments`; the others are never looked at.
 
@@ -82,15 +84,16 @@ def identify(
         parameters: scalars of the whole arm and their ranges.
         per_joint: what then gets a factor for each joint, "stiffness" or "damping".
         loss: "distances" (the paper's) or "positions".
+        rest: the shape in which the arm hangs, whatever its stiffness; None where it is as the model says.
     """
     seen = [e for e in experiments if e.split == "identify"]
     short = [_shortened(e, method.rough_frames) for e in _few(seen, method.rough_trials)]
-    rough = Problem(model, short, segments, parameters, loss, weights, method.rough_step_factor)
-    exact = Problem(model, seen, segments, parameters, loss, weights)
+    rough = Problem(model, short, segments, parameters, loss, weights, method.rough_step_factor, rest=rest)
+    exact = Problem(model, seen, segments, parameters, loss, weights, rest=rest)
     searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}
     searches["polish"] = found = _polish(exact, searches["coarse"].vector, method, f"{label} polish")
     values = dict(zip(parameters, np.exp(found.vector).tolist(), strict=True))
-    coarse = with_parameters(model, values)
+    coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
     linear = linearise(exact, found.vector)
     problems = [rough, exact]
@@ -99,8 +102,9 @@ def identify(
     factor_certainty = None
     if per_joint:
         joints = Problem(
-            coarse, seen, segments, {}, loss, weights, per_joint=per_joint, per_joint_range=method.per_joint_range
-        )
+            coarse, seen, segments, {}, loss, weights, per_joint=per_joint, per_joint_range=method.per_joint_range,
+            rest=rest,
+        )  # fmt: skip
         searches["per_joint"] = found = _search(joints, method.fine, method.seed, f"{label} per joint")
         factor_certainty = certainty(linearise(joints, found.vector))
         factors = dict(zip(per_joint, found.vector.reshape(len(per_joint), -1), strict=True))
@@ -108,7 +112,7 @@ def identify(
         problems.append(joints)
 
     return Identification(
-        models={"initial": model, "coarse": coarse, "identified": with_parameters(coarse, {}, factors)},
+        models={"initial": model, "coarse": coarse, "identified": with_parameters(coarse, {}, factors, rest)},
         values=values,
         factors=factors,
         certainty=certainty(linear),
@@ -152,9 +156,12 @@ def _polish(problem: Problem, start: np.ndarray, method: Method, label: str) -> 
 
 
 def with_parameters(
-    model: mujoco.MjModel, values: dict[str, float], factors: dict[str, np.ndarray] | None = None
+    model: mujoco.MjModel,
+    values: dict[str, float],
+    factors: dict[str, np.ndarray] | None = None,
+    rest: RestShape | None = None,
 ) -> mujoco.MjModel:
-    """A copy of `model` with these scalars and these factors of its units."""
+    """A copy of `model` with these scalars and these factors of its units, which hangs in the shape `rest`."""
     factors = factors or {}
     changed = model.__copy__()
     if values or factors:
@@ -164,6 +171,8 @@ def with_parameters(
             {name: factor[None] for name, factor in factors.items()},
         )
         set_fields(changed, fields)
+    if rest is not None:
+        set_fields(changed, {"qpos_spring": spring_references({}, changed, rest)})
     return changed
 
 

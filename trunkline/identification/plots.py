@@ -145,12 +145,12 @@ def path_figure(experiment: Experiment, index: int, replays: dict[str, Replay]) 
 
 
 def shape_table(experiments: list[Experiment], replays: dict[str, Replay], segments) -> pd.DataFrame:
-    """Static shapes in the plane of the tilt: columns trial, tilt_deg, source, segment, x_mm, z_mm."""
+    """Last shapes in the plane of the tilt: columns trial, tilt_deg, source, segment, x_mm, z_mm."""
     rows = []
     for index, experiment in enumerate(experiments):
         sources = {"measured": experiment.positions} | {m: r.positions[index] for m, r in replays.items()}
         for source, positions in sources.items():
-            for segment, (x, _, z) in zip(segments, positions[0] * 1e3, strict=True):
+            for segment, (x, _, z) in zip(segments, positions[-1] * 1e3, strict=True):
                 rows.append((experiment.name, np.degrees(tilt_of_gravity(experiment.gravity)), source, segment, x, z))
     return pd.DataFrame(rows, columns=["trial", "tilt_deg", "source", "segment", "x_mm", "z_mm"])
 
@@ -168,7 +168,7 @@ def shape_figure(table: pd.DataFrame) -> Figure:
     for source, style in (("measured", "o"), ("initial", "-"), ("identified", "-")):  # no CAD beside statics
         axis.plot([], [], style, color=COLORS.get(source, MEASURED), label=source)
     axis.legend(loc="upper right")
-    axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Static shapes per tilt, validate split")
+    axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Shapes at rest, validate split")
     return figure
 
 

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from trunkline.arm.parameters import PARAMETERS, candidate_fields, unit_of_hinge
+from trunkline.arm.rest import RestShape, spring_references
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
 from trunkline.identification.population import Population
@@ -28,7 +29,8 @@ class Problem:
 
     A candidate is a vector z: first the scalars of `parameters` (natural logarithm), then, if `per_joint` names
     them, the factors of every unit, within `per_joint_range` of 1. `step_factor` is how much coarser than the model's
-    own time step to simulate. Counts evaluations (one candidate on all trials), divergences and steps.
+    own time step to simulate. With `rest`, every candidate hangs in that shape. Counts evaluations (one candidate on
+    all trials), divergences and steps.
     """
 
     model: mujoco.MjModel
@@ -40,6 +42,7 @@ class Problem:
     step_factor: float = 1.0
     per_joint: tuple[str, ...] = ()
     per_joint_range: float = 0.0
+    rest: RestShape | None = None
     evaluations: int = 0
     diverged: int = 0
     steps: int = 0
@@ -54,9 +57,12 @@ class Problem:
         scalars = len(self.parameters)
         values = {name: np.exp(vectors[:, i]) for i, name in enumerate(self.parameters)}
         blocks = vectors[:, scalars:].reshape(len(vectors), len(self.per_joint), self.units)
-        return candidate_fields(
+        fields = candidate_fields(
             self.model, values, {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
         )
+        if self.rest is not None:
+            fields["qpos_spring"] = spring_references(fields, self.model, self.rest)
+        return fields
 
     def residuals(self, vectors: np.ndarray) -> list[np.ndarray]:
         """Residuals per trial, weighted so that the sum of ½ r² over all of them is the loss. Each (C, R)."""

@@ -17,6 +17,7 @@ from trunkline.identification.experiment import Experiment, prepare
 from trunkline.identification.identify import Identification, Method, identify, with_parameters
 from trunkline.identification.loss import LossWeights, internal_error
 from trunkline.identification.problem import Bounds
+from trunkline.identification.resting import resting_shape
 from trunkline.identification.search import DifferentialEvolution, LeastSquares, Optimizer
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.plots import save_figure
@@ -43,7 +44,10 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     bounds = {name: Bounds(r.low, r.high) for name, r in config.parameters.items()}
     method = method_of(config)
     problem = (fitted, segments, bounds, tuple(config.per_joint), config.loss.kind, weights, method)
-    result = identify(stage, model, *problem)
+    rest = resting_shape(model, fitted, segments) if config.rest_shape == "measured" else None
+    if "stiffness" in bounds and "static_tilt" not in config.experiments:
+        print(f"{stage}: without static tilts, stiffness comes from the shape at rest and the ring-down of releases")
+    result = identify(stage, model, *problem, rest)
     identified = save_model(spec, result.models["identified"])
     # score what is written, not what was in memory: MJCF keeps six digits
     models = result.models | {"identified": mujoco.MjModel.from_xml_string(identified)}
@@ -64,7 +68,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
-        metrics["cross_validation"] = cross_validate(stage, result, *problem, config.cross_validation_folds)
+        metrics["cross_validation"] = cross_validate(stage, result, *problem, config.cross_validation_folds, rest)
     for name in result.at_bound:
         print(f"{stage}: {name} ended on a bound of its range")
     for name, vague in zip(result.values, undetermined(result, bounds), strict=True):
@@ -243,14 +247,13 @@ def write_plots(folder: Path, result: Identification, bounds, experiments, segme
     save_figure(plots.convergence_figure(result), folder / "convergence.png")
     units = {name: PARAMETERS[name].unit for name in result.values}
     save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
-    static = [i for i, e in enumerate(experiments) if e.frames == 1 and e.split == "validate"]
-    moving = [i for i, e in enumerate(experiments) if e.frames > 1 and e.split == "validate"]
-    if static:
-        chosen = [experiments[i] for i in static]
-        table = plots.shape_table(chosen, _select(shown, static), segments)
+    validate = [i for i, e in enumerate(experiments) if e.split == "validate"]
+    moving = [i for i in validate if experiments[i].frames > 1]
+    if "stiffness" in result.values:  # shapes at rest: static ones, or how releases end
+        table = plots.shape_table([experiments[i] for i in validate], _select(shown, validate), segments)
         table.to_csv(folder / "shapes.csv", index=False, float_format="%.6g")
         save_figure(plots.shape_figure(table), folder / "shapes.png")
-    if moving:
+    elif moving:
         curves = plots.error_curves([experiments[i] for i in moving], _select(shown, moving))
         curves.to_csv(folder / "errors.csv", index=False, float_format="%.6g")
         save_figure(plots.error_figure(curves), folder / "errors.png")
