@@ -7,6 +7,7 @@ import pandas as pd
 from pydantic import Field
 
 from trunkline.config import settings
+from trunkline.errors import Skipped
 from trunkline.kinematics.chain import load_model, read_chain
 from trunkline.kinematics.dataset import Density, friction_band, mujoco_deviation, sample_table, split
 from trunkline.kinematics.plots import density_figure, deviation_figure
@@ -36,6 +37,8 @@ class Config:
 
 def main(config: Config) -> None:
     model = load_model(MODEL)
+    if not model.ntendon:
+        raise Skipped(f"{MODEL}: the arm has no tendons, and so no kinematics from their lengths")
     chain = read_chain(model)
     rng = np.random.default_rng(config.seed)
     angles = np.radians(sorted(config.angles_deg))

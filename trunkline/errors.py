@@ -1,4 +1,4 @@
-"""The one exception for mistakes that a user can make and mend."""
+"""The exceptions that end a stage in one line: a user's mistake, and nothing to do."""
 
 
 class InputError(Exception):
@@ -10,3 +10,7 @@ class InputError(Exception):
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
+
+
+class Skipped(Exception):
+    """A stage that has nothing to do for this arm; the message, one line, says why. It writes nothing."""

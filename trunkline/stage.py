@@ -15,7 +15,7 @@ from typing import TypeVar
 from threadpoolctl import threadpool_limits
 
 from trunkline.config import load_config
-from trunkline.errors import InputError
+from trunkline.errors import InputError, Skipped
 from trunkline.pipeline.settings import check_once
 
 Config = TypeVar("Config")
@@ -25,6 +25,8 @@ def run_stage(
     name: str, schema: type[Config], main: Callable[[Config], None], root: str | Path = "."
 ) -> None:
     """Call ``main`` with the stage's settings; a user's mistake ends in one line and exit code 1.
+
+    A stage that has nothing to do ends in one line too, without outputs.
 
     ``root`` holds the stage's ``params.yaml`` and ``conf/``. Meanwhile BLAS keeps to one thread, as its sums, and
     so the results, otherwise depend on how many cores there are; ``TRUNKLINE_THREADS`` is for what does not.
@@ -39,6 +41,9 @@ def run_stage(
         sys.stdout.flush()
         print(f"error: {error}", file=sys.stderr)
         sys.exit(1)
+    except Skipped as reason:
+        print(f"{name}: skipped: {reason}")
+        return
     peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # Linux counts in KiB
     print(f"{name}: done in {time.monotonic() - started:.1f} s, peak memory {peak_mib:.0f} MiB")
 

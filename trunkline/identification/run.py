@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from trunkline.arm.parameters import PARAMETERS, save_model
-from trunkline.errors import InputError
+from trunkline.errors import InputError, Skipped
 from trunkline.identification import plots
 from trunkline.identification.certainty import weakest_in_words
 from trunkline.identification.cross_validation import cross_validate
@@ -38,6 +38,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     """
     spec = read_spec(model_path)
     model = spec.compile()
+    if not model.ntendon and config.experiments == ["curl"]:
+        raise Skipped(f"{model_path}: the arm has no tendons, so there are no curls to learn from")
     experiments, segments = read_experiments(config, model)
     fitted = [e for e in experiments if e.kind in config.experiments]
     weights = LossWeights(**{k: v for k, v in vars(config.loss).items() if k != "kind"})
