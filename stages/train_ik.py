@@ -23,7 +23,8 @@ from trunkline.kinematics.dataset import (
 from trunkline.kinematics.network import INPUTS, InverseKinematics, Training, train
 from trunkline.kinematics.network_plots import error_map_figure, learning_figure, tip_error_figure
 from trunkline.kinematics.onnx import OPSET, to_onnx
-from trunkline.kinematics.score import TipErrors, tip_errors
+from trunkline.kinematics.polish import polish
+from trunkline.kinematics.score import TipErrors, beyond_range, outside_targets, tip_errors
 from trunkline.kinematics.tip_loss import tip_loss
 from trunkline.plots import save_figure
 from trunkline.progress import progress
@@ -42,6 +43,12 @@ class Unseen:
 
 
 @settings
+class Polish:
+    targets: int = Field(ge=1)
+    steps: PositiveInt
+
+
+@settings
 class Config:
     width: PositiveInt
     epochs: PositiveInt
@@ -50,6 +57,8 @@ class Config:
     learning_rate: PositiveFloat
     lever: float = Field(ge=0)
     unseen: Unseen
+    polish: Polish
+    outside: int = Field(ge=1)
 
 
 def main(config: Config) -> None:
@@ -66,12 +75,15 @@ def main(config: Config) -> None:
     errors, difference = {}, 0.0
     for name, targets in (("held out", held_out), ("unseen angles", unseen)):
         inputs = targets[INPUTS].to_numpy()
-        lengths = runtime.run(None, {"pose": inputs.astype(np.float32)})[0]
+        lengths = answers(runtime, inputs)
         with torch.no_grad():
             torch_lengths = network(torch.tensor(inputs, dtype=torch.float32)).numpy()
         difference = max(difference, float(np.abs(lengths - torch_lengths).max()))
         print(f"train_ik: forward kinematics of {len(inputs)} answers, {name}", flush=True)
         errors[name] = tip_errors(chain, inputs, lengths.astype(float))
+    errors["polished"] = polished(chain, held_out, runtime, config)
+    far = answers(runtime, outside_targets(config.outside, chain.length, np.random.default_rng(config.seed)))
+    known = table.loc[table["split"] == "train", length_columns(chain.tendons)].to_numpy()
 
     with output_folder(ARTIFACTS) as folder:
         onnx.save(exported, str(folder / "ik.onnx"))
@@ -88,11 +100,27 @@ def main(config: Config) -> None:
             errors["held out"].metrics(chain.length)
             | {
                 "unseen_angles": errors["unseen angles"].metrics(chain.length),
+                "polished": errors["polished"].metrics(chain.length),
+                "outside": {"targets": len(far), "beyond_range_m": beyond_range(far, known)},
                 "onnx_max_abs_diff_m": difference,
                 "opset": OPSET,
                 "parameters": sum(p.numel() for p in network.parameters()),
             },
         )
+
+
+def answers(runtime: onnxruntime.InferenceSession, inputs: np.ndarray) -> np.ndarray:
+    """Lengths (N, K), m, that the exported network gives for `inputs` (N, 8)."""
+    return runtime.run(None, {"pose": inputs.astype(np.float32)})[0]
+
+
+def polished(chain: Chain, held_out: pd.DataFrame, runtime, config: Config) -> TipErrors:
+    """Errors of some held-out targets after Gauss-Newton steps from the network's answers."""
+    count = min(config.polish.targets, len(held_out))
+    inputs = held_out[INPUTS].sample(count, random_state=config.seed).to_numpy()
+    print(f"train_ik: up to {config.polish.steps} Gauss-Newton steps for {count} answers", flush=True)
+    found = polish(chain, inputs, answers(runtime, inputs).astype(float), config.polish.steps)
+    return TipErrors(found.position_error, found.orientation_error)
 
 
 def read_table(path: Path, tendons: int) -> pd.DataFrame:

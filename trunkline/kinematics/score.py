@@ -1,4 +1,4 @@
-"""What the network is worth: the tip error after forward kinematics of the lengths it predicts."""
+"""What the network is worth: the tip error after forward kinematics of the lengths it predicts, and far-off targets."""
 
 from dataclasses import dataclass
 
@@ -37,6 +37,7 @@ class TipErrors:
                 "max": position.max() * 1e3,
             },
             "within_1pct": np.mean(position <= 0.01 * length),
+            "within_0p1pct": np.mean(position <= 0.001 * length),
             "orientation_error_deg": {
                 "median": np.degrees(np.median(orientation)),
                 "p95": np.degrees(np.quantile(orientation, 0.95)),
@@ -54,3 +55,20 @@ def tip_errors(chain: Chain, inputs: np.ndarray, lengths: np.ndarray) -> TipErro
     orientation = 2 * np.arccos(np.clip(overlap, 0, 1))
     position[~found.converged], orientation[~found.converged] = np.nan, np.nan
     return TipErrors(position, orientation)
+
+
+def outside_targets(count: int, length: float, rng: np.random.Generator) -> np.ndarray:
+    """Poses that have nothing to do with the arm: any orientation, any gravity angle up to π, positions in a box
+    of four arm `length`s (m) around the base. Shape (count, 8)."""
+    quaternions = rng.normal(size=(count, 4))
+    return np.column_stack([
+        rng.uniform(0, np.pi, count),
+        rng.uniform(-2 * length, 2 * length, (count, 3)),
+        quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True),
+    ])
+
+
+def beyond_range(lengths: np.ndarray, known: np.ndarray) -> float:
+    """How far any of `lengths` (N, K) lies beyond the shortest and longest of `known` (M, K), m; zero if none does."""
+    low, high = known.min(axis=0), known.max(axis=0)
+    return float(max(0.0, (low - lengths).max(), (lengths - high).max()))

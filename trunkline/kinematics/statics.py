@@ -103,23 +103,27 @@ def _solve(chain, tensions, lengths, gravity, slope, ceiling, cables) -> Equilib
         raise ValueError(f"found {tendons} tendons, expected {chain.tendons}")
     gravity = np.ascontiguousarray(np.broadcast_to(np.asarray(gravity, float), (paths, 3)))
     ceiling = np.ascontiguousarray(np.broadcast_to(np.asarray(ceiling, float), (tendons,)))
-    count, nq = paths * steps, 2 * chain.units
-    out = Equilibrium(
-        qpos=np.zeros((count, nq)),
-        position=np.zeros((count, 3)),
-        quaternion=np.zeros((count, 4)),
-        lengths=np.zeros((count, tendons)),
-        tensions=np.zeros((count, tendons)),
-        residual=np.zeros(count),
-        iterations=np.zeros(count, np.int64),
-        converged=np.zeros(count, np.bool_),
-        snapped=np.zeros(count, np.bool_),
-    )
+    out = empty_equilibria(paths * steps, chain)
     numba.set_num_threads(min(thread_count(), numba.config.NUMBA_NUM_THREADS))
     _solve_paths(
         chain, tensions, lengths, gravity, np.ascontiguousarray(slope, float), ceiling, cables, *vars(out).values()
     )
     return out
+
+
+def empty_equilibria(count: int, chain: Chain) -> Equilibrium:
+    """Room for `count` equilibria, for a kernel to fill."""
+    return Equilibrium(
+        qpos=np.zeros((count, 2 * chain.units)),
+        position=np.zeros((count, 3)),
+        quaternion=np.zeros((count, 4)),
+        lengths=np.zeros((count, chain.tendons)),
+        tensions=np.zeros((count, chain.tendons)),
+        residual=np.zeros(count),
+        iterations=np.zeros(count, np.int64),
+        converged=np.zeros(count, np.bool_),
+        snapped=np.zeros(count, np.bool_),
+    )
 
 
 @njit(cache=True, parallel=True)
@@ -168,12 +172,12 @@ def _solve_path(
         iterations[step] = total
         converged[step] = good
         snapped[step] = jumped
-        _tip_pose(chain, work.state, position[step], quaternion[step])
+        tip_pose(chain, work.state, position[step], quaternion[step])
         total = 0
 
 
 @njit(cache=True)
-def _tip_pose(chain, state, position, quaternion):
+def tip_pose(chain, state, position, quaternion):
     """Fill the tip's position (3,) and quaternion (4,), w first and not negative, from the last unit's rotation."""
     r = state.rotation[-1]
     for k in range(3):

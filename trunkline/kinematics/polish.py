@@ -1,0 +1,128 @@
+"""Tendon lengths made exact: Gauss-Newton on the forward kinematics, from the lengths that the network gives.
+
+With r the pose that is missing (position in m, turn in rad times a lever) and P = ∂(pose)/∂T, C = ∂l/∂T at the
+equilibrium, a step is
+
+    min |r - P δT|²   over  0 ≤ T + δT ≤ F, no more than two tendons taut,     l ← l + C δT.
+
+Tensions say which tendons are taut, lengths are what is commanded and what the tip follows most evenly; so the
+step is found in the first and taken in the second. Two taut tendons are as many as the data set has.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from trunkline.frames import gravity_in_base, rotation_from_wxyz
+from trunkline.kinematics.chain import Chain
+from trunkline.kinematics.restart import restart
+from trunkline.kinematics.sensitivity import sensitivity
+from trunkline.kinematics.statics import Equilibrium, forward
+
+SPARE = 2e-3  # m that slack tendons get beyond the path foreseen, so that none pulls where the tip turns out elsewhere
+NEGLIGIBLE = 1e-6  # m, pose error below which no further step is taken
+
+
+@dataclass
+class Polished:
+    """N answers.
+
+    Attributes:
+        lengths: path length of each tendon at the equilibrium found, m. Shape (N, K).
+        position_error: of the tip at that equilibrium, m. Shape (N,).
+        orientation_error: rad. Shape (N,).
+        steps: Gauss-Newton steps taken. Shape (N,).
+        converged: whether an equilibrium was found at all; errors are infinite where not. Shape (N,).
+    """
+
+    lengths: np.ndarray
+    position_error: np.ndarray
+    orientation_error: np.ndarray
+    steps: np.ndarray
+    converged: np.ndarray
+
+
+def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 3, lever: float = 0.02) -> Polished:
+    """Lengths that bring the tip nearer to its targets, never further from them.
+
+    Args:
+        targets: θ_G in rad, tip position in m and quaternion (w first) in the base frame. Shape (N, 8).
+        lengths: first answers, m, for instance the network's. Shape (N, K).
+        steps: most Gauss-Newton steps for each target.
+        lever: m; a turn of the tip by 1 rad counts as this much distance.
+    """
+    gravity = gravity_in_base(targets[:, 0])
+    best = forward(chain, lengths, gravity)
+    error = _missing_pose(best, targets, lever)
+    size = np.where(best.converged, np.linalg.norm(error, axis=1), np.inf)
+    taken = np.zeros(len(targets), int)
+    going = best.converged & (size > NEGLIGIBLE)
+    for _ in range(steps):
+        rows = np.flatnonzero(going)
+        if not len(rows):
+            break
+        tensions, commands = _step(chain, best[rows], error[rows], gravity[rows], lever)
+        found = restart(chain, best.qpos[rows], tensions, commands, gravity[rows])
+        missing = _missing_pose(found, targets[rows], lever)
+        better = found.converged & (np.linalg.norm(missing, axis=1) < size[rows])
+        at = rows[better]
+        for name, values in vars(best).items():
+            values[at] = vars(found)[name][better]
+        error[at], size[at] = missing[better], np.linalg.norm(missing[better], axis=1)
+        taken[rows] += 1
+        going[rows] = better & (size[rows] > NEGLIGIBLE)
+    return Polished(
+        lengths=np.where(best.converged[:, None], best.lengths, lengths),
+        position_error=np.where(best.converged, np.linalg.norm(error[:, :3], axis=1), np.inf),
+        orientation_error=np.where(best.converged, np.linalg.norm(error[:, 3:], axis=1) / lever, np.inf),
+        steps=taken,
+        converged=best.converged,
+    )
+
+
+def _missing_pose(found: Equilibrium, targets: np.ndarray, lever: float) -> np.ndarray:
+    """Position and turn from the tip to its target, m. Shape (N, 6)."""
+    quaternion = np.where(found.converged[:, None], found.quaternion, [1.0, 0, 0, 0])
+    turn = (rotation_from_wxyz(targets[:, 4:]) * rotation_from_wxyz(quaternion).inv()).as_rotvec()
+    return np.concatenate([targets[:, 1:4] - found.position, lever * turn], axis=1)
+
+
+def _step(chain, here: Equilibrium, error, gravity, lever) -> tuple[np.ndarray, np.ndarray]:
+    """Tensions (N, K) that the step foresees, and the lengths (N, K) to command."""
+    slopes = sensitivity(chain, here.qpos, here.tensions, gravity)
+    pose = np.concatenate([slopes.tip_by_tension, lever * slopes.turn_by_tension], axis=1)  # (N, 6, K)
+    tensions, least = here.tensions.copy(), np.full(len(error), np.inf)
+    wanted = error + np.einsum("nkt,nt->nk", pose, here.tensions)  # pose missing if nothing pulled, to first order
+    for taut in combinations(range(chain.tendons), min(2, chain.tendons)):
+        trial = np.zeros_like(tensions)
+        trial[:, taut] = _bounded(pose[:, :, taut], wanted, chain.max_tension[list(taut)])
+        left = np.linalg.norm(wanted - np.einsum("nkt,nt->nk", pose, trial), axis=1)
+        nearer = left < least
+        tensions[nearer], least[nearer] = trial[nearer], left[nearer]
+    lengths = here.lengths + np.einsum("nst,nt->ns", slopes.length_by_tension, tensions - here.tensions)
+    return tensions, lengths + np.where(tensions > 0, 0.0, SPARE)
+
+
+def _bounded(matrix: np.ndarray, wanted: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """x (N, k), k at most 2, that minimises |wanted - matrix x| with 0 ≤ x ≤ `most`.
+
+    Inside the box if the plain solution is there, else the best on its edges.
+    """
+    square = np.einsum("nki,nkj->nij", matrix, matrix)
+    ridge = 1e-12 * np.trace(square, axis1=1, axis2=2)[:, None, None] + 1e-300
+    right = np.einsum("nki,nk->ni", matrix, wanted)
+    best = np.linalg.solve(square + ridge * np.eye(len(most)), right[:, :, None])[:, :, 0]
+    outside = ((best < 0) | (best > most)).any(axis=1)
+    least = np.where(outside, np.inf, -np.inf)
+    for fixed in range(len(most)):
+        for value in (0.0, most[fixed]):
+            trial = np.empty_like(best)
+            trial[:, fixed] = value
+            for free in set(range(len(most))) - {fixed}:
+                slope = right[:, free] - square[:, free, fixed] * value
+                trial[:, free] = np.clip(slope / (square[:, free, free] + 1e-300), 0, most[free])
+            cost = np.einsum("ni,nij,nj->n", trial, square, trial) - 2 * np.einsum("ni,ni->n", trial, right)
+            nearer = cost < least
+            best[nearer], least[nearer] = trial[nearer], cost[nearer]
+    return best
