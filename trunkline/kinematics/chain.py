@@ -28,6 +28,7 @@ class Chain(NamedTuple):
         center: centre of mass from the unit's joint, m. Shape (n, 3).
         stiffness: a, b, c of the elastic torque -(a x + b x² + c x³), x the angle from `rest`. Shape (n, 2, 3).
         rest: spring references, rad. Shape (n, 2).
+        torque: constant torques, N m; zero as read, dry friction where its band is sought. Shape (n, 2).
         limit: lower and upper angle at which a limit starts to push, rad (infinite if none). Shape (n, 2, 2).
         limit_gain: k / dof_invweight0, N m/rad: see `energy.limit_spring`. Shape (n, 2).
         limit_impedance: solimp. Shape (n, 2, 5).
@@ -48,6 +49,7 @@ class Chain(NamedTuple):
     center: np.ndarray
     stiffness: np.ndarray
     rest: np.ndarray
+    torque: np.ndarray
     limit: np.ndarray
     limit_gain: np.ndarray
     limit_impedance: np.ndarray
@@ -128,6 +130,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         center=(center - data.xpos[base]) @ to_base.T - anchors,
         stiffness=np.concatenate([model.jnt_stiffness[joints][..., None], model.jnt_stiffnesspoly[joints]], axis=2),
         rest=model.qpos_spring[joints],
+        torque=np.zeros((len(units), 2)),
         limit=_limits(model, joints),
         limit_gain=_limit_gains(model, joints),
         limit_impedance=_limit_impedances(model, joints),

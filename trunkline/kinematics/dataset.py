@@ -9,6 +9,7 @@ import pandas as pd
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.chain import Chain
+from trunkline.kinematics.hysteresis import friction_band, model_friction
 from trunkline.kinematics.sampling import Candidates, crowding, sample_angle, thin
 from trunkline.kinematics.sensitivity import sensitivity
 from trunkline.kinematics.settle import settle
@@ -120,7 +121,8 @@ def mujoco_deviation(
     """Distance of `count` random samples' tips from those of MuJoCo settled to rest under the same actuators.
 
     Returns:
-        Columns theta_g (rad), largest tension (N), deviation_mm, rested.
+        Columns theta_g (rad), largest_tension (N), deviation_mm, rested, and friction_band_mm: how far apart friction,
+        which is off in the comparison, may hold the tip (NaN where the ends of its band were not found).
 
     Raises:
         InputError: if there are fewer samples.
@@ -132,7 +134,9 @@ def mujoco_deviation(
     lengths = rows[length_columns(chain.tendons)].to_numpy()
     by_actuator = model.actuator_trnid[:, 0]
     commands = lengths - tensions / chain.gain  # f = kp (l - command), and no pull where they are equal
-    settled = settle(model, commands[:, by_actuator], gravity_in_base(rows["theta_g"].to_numpy()))
+    gravity = gravity_in_base(rows["theta_g"].to_numpy())
+    settled = settle(model, commands[:, by_actuator], gravity)
+    band = friction_band(chain, tensions, gravity, *model_friction(model))
     deviation = np.linalg.norm(settled.position - rows[["x", "y", "z"]].to_numpy(), axis=1)
     return pd.DataFrame(
         {
@@ -140,15 +144,6 @@ def mujoco_deviation(
             "largest_tension": tensions.max(axis=1),
             "deviation_mm": deviation * 1e3,
             "rested": settled.rested,
+            "friction_band_mm": band.width * 1e3,
         }
     )
-
-
-def friction_band(table: pd.DataFrame, tendon_friction: np.ndarray) -> np.ndarray:
-    """How far friction of the tendons may hold each tip from its equilibrium, to first order, m. Shape (N,).
-
-    At rest each tendon's friction adds anything between -f and f to its tension: the largest |∂tip/∂T s| over signs.
-    """
-    slopes = tip_by_tension(table, len(tendon_friction)) * tendon_friction
-    signs = np.array(np.meshgrid(*[[-1, 1]] * len(tendon_friction))).reshape(len(tendon_friction), -1)
-    return np.linalg.norm(slopes @ signs, axis=1).max(axis=1)

@@ -2,9 +2,9 @@
 
     E(q) = Σ_j U_j(q_j) + Σ_j P_j(q_j) - Σ_i m_i g·x_i(q) + Σ_t Φ_t(l_t(q))
 
-U: elastic joints, P: joint limits, x_i: centres of mass, l_t: tendon path lengths. A tendon's energy has the tension
-Φ' = clip(λ + ρ (l - L), 0, F): a fixed tension (ρ = 0), a position actuator (λ = 0, ρ = kp, L its command) and the
-augmented Lagrangian of a cable of length L (ρ a penalty) are all of this form.
+U: elastic joints and constant torques, P: joint limits, x_i: centres of mass, l_t: tendon path lengths. A tendon's
+energy has the tension Φ' = clip(λ + ρ (l - L), 0, F): a fixed tension (ρ = 0, never clipped), a position actuator
+(λ = 0, ρ = kp, L its command) and the augmented Lagrangian of a cable of length L (ρ a penalty) are all of this form.
 """
 
 from typing import NamedTuple
@@ -246,8 +246,8 @@ def evaluate(chain, q, gravity, pull, state):
             j = 2 * i + h
             x = q[j] - chain.rest[i, h]
             a, b, c = chain.stiffness[i, h, 0], chain.stiffness[i, h, 1], chain.stiffness[i, h, 2]
-            energy += x * x * (a / 2 + x * (b / 3 + x * c / 4))
-            torque = x * (a + x * (b + x * c))
+            energy += x * (x * (a / 2 + x * (b / 3 + x * c / 4)) - chain.torque[i, h])
+            torque = x * (a + x * (b + x * c)) - chain.torque[i, h]
             if q[j] < chain.limit[i, h, 0]:
                 depth = chain.limit[i, h, 0] - q[j]
                 energy += limit_energy(chain.limit_gain[i, h], chain.limit_impedance[i, h], depth)

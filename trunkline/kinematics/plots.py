@@ -8,12 +8,24 @@ from trunkline.kinematics.dataset import Density
 from trunkline.plots import IDENTIFIED, INITIAL, VALIDATE, plt
 
 SLICE = 0.008  # m, half thickness of the slices shown
+GOAL_MM = 0.02  # median distance of the statics from MuJoCo at rest
 
 
 def density_figure(densities: list[Density]) -> Figure:
-    """Tips in the plane of tilt before and after thinning, and how many share a cell, at up to four gravity angles."""
+    """Tips in the plane of tilt before and after thinning, and how many share a cell, at up to four gravity angles;
+    below, at every gravity angle how uneven they are."""
     shown = [densities[i] for i in np.unique(np.linspace(0, len(densities) - 1, 4).round().astype(int))]
-    figure, axes = plt.subplots(3, len(shown), figsize=(3.1 * len(shown), 9), squeeze=False)
+    figure = plt.figure(figsize=(3.1 * len(shown), 11.5))
+    grid = figure.add_gridspec(4, len(shown))
+    axes = np.array([[figure.add_subplot(grid[row, column]) for column in range(len(shown))] for row in range(3)])
+    every = figure.add_subplot(grid[3, :])
+    angles = [np.degrees(d.tilt) for d in densities]
+    for values, color, label in zip(
+        np.array([d.unevenness() for d in densities]).T, (INITIAL, IDENTIFIED), ("before", "after"), strict=True
+    ):
+        every.plot(angles, values, "o-", markersize=4, color=color, label=label)
+    every.set(ylim=(0, None), xlabel="gravity angle θ_G (°)", ylabel="tips a cell: standard\ndeviation over mean")
+    every.legend()
     points = np.concatenate([d.before for d in shown])[:, [0, 2]] * 1e3
     low, high = points.min(axis=0) - 15, points.max(axis=0) + 15
     for column, density in zip(axes.T, shown, strict=True):
@@ -43,19 +55,20 @@ def _per_cell(tips: np.ndarray, edge: float = 0.02) -> np.ndarray:
 
 
 def deviation_figure(deviation: pd.DataFrame) -> Figure:
-    """Distance between each sample's tip and MuJoCo's at rest."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.6), sharey=True)
+    """Distance between each sample's tip and MuJoCo's at rest without friction, and the band that friction opens."""
+    figure, axes = plt.subplots(1, 2, figsize=(9, 4.2), sharey=True)
     floor = np.maximum(deviation["deviation_mm"], 1e-9)
-    left.scatter(np.degrees(deviation["theta_g"]), floor, s=9, color=IDENTIFIED, linewidths=0)
-    right.scatter(deviation["largest_tension"], floor, s=9, color=IDENTIFIED, linewidths=0)
-    for ax, label in ((left, "gravity angle θ_G (°)"), (right, "largest tension (N)")):
-        ax.axhline(0.1, color=VALIDATE, linestyle="--")
+    angle, tension = np.degrees(deviation["theta_g"]), deviation["largest_tension"]
+    for ax, x, label in zip(axes, (angle, tension), ("gravity angle θ_G (°)", "largest tension (N)"), strict=True):
+        ax.scatter(x, floor, s=9, color=IDENTIFIED, linewidths=0, label="FK to MuJoCo at rest, friction off")
+        ax.scatter(x, deviation["friction_band_mm"], s=9, color=INITIAL, linewidths=0, label="band of dry friction")
+        ax.axhline(GOAL_MM, color=VALIDATE, linestyle="--", label=f"goal for the median, {GOAL_MM:g} mm")
         ax.set(yscale="log", xlabel=label)
-    place = left.get_yaxis_transform()
-    left.text(0.02, 0.12, "goal for the median: 0.1 mm", color=VALIDATE, fontsize=8, transform=place)
-    left.set_ylabel("tip deviation (mm)")
+    axes[0].set_ylabel("distance of tips (mm)")
+    axes[0].legend(loc="upper center", bbox_to_anchor=(1.05, -0.2), ncols=3, markerscale=2)
+    values, band = deviation["deviation_mm"], deviation["friction_band_mm"]
     figure.suptitle(
-        f"Statics against MuJoCo settled to rest, friction off: {len(deviation)} samples, "
-        f"median {deviation['deviation_mm'].median():.2g} mm, max {deviation['deviation_mm'].max():.2g} mm"
+        f"Statics against MuJoCo, {len(deviation)} samples: median {values.median():.2g} mm, "
+        f"max {values.max():.2g} mm; friction: median {band.median():.2g} mm, max {band.max():.2g} mm"
     )
     return figure

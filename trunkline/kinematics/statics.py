@@ -69,7 +69,7 @@ def equilibrium_paths(chain: Chain, tensions: np.ndarray, gravity: np.ndarray) -
         gravity: Shape (3,) or (P, 3).
     """
     tensions = np.ascontiguousarray(tensions, float)
-    return _solve(chain, tensions, np.zeros_like(tensions), gravity, np.zeros(chain.tendons), np.inf, False)
+    return solve_paths(chain, tensions, np.zeros_like(tensions), gravity, np.zeros(chain.tendons), np.inf, False)
 
 
 def actuated(chain: Chain, commands: np.ndarray, gravity: np.ndarray) -> Equilibrium:
@@ -80,7 +80,7 @@ def actuated(chain: Chain, commands: np.ndarray, gravity: np.ndarray) -> Equilib
         gravity: Shape (3,) or (B, 3).
     """
     commands = np.ascontiguousarray(commands, float)[:, None, :]
-    return _solve(chain, np.zeros_like(commands), commands, gravity, chain.gain, chain.max_tension, False)
+    return solve_paths(chain, np.zeros_like(commands), commands, gravity, chain.gain, chain.max_tension, False)
 
 
 def forward(chain: Chain, lengths: np.ndarray, gravity: np.ndarray) -> Equilibrium:
@@ -94,10 +94,10 @@ def forward(chain: Chain, lengths: np.ndarray, gravity: np.ndarray) -> Equilibri
         gravity: Shape (3,) or (B, 3).
     """
     lengths = np.ascontiguousarray(lengths, float)[:, None, :]
-    return _solve(chain, np.zeros_like(lengths), lengths, gravity, np.full(chain.tendons, PENALTY), np.inf, True)
+    return solve_paths(chain, np.zeros_like(lengths), lengths, gravity, np.full(chain.tendons, PENALTY), np.inf, True)
 
 
-def _solve(chain, tensions, lengths, gravity, slope, ceiling, cables) -> Equilibrium:
+def solve_paths(chain, tensions, lengths, gravity, slope, ceiling, cables) -> Equilibrium:
     paths, steps, tendons = tensions.shape
     if tendons != chain.tendons:
         raise ValueError(f"found {tendons} tendons, expected {chain.tendons}")

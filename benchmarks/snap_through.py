@@ -1,0 +1,123 @@
+"""Can the same tendon lengths hold the arm in two shapes? Equilibria sought from many first guesses.
+
+    python -m benchmarks.snap_through [arm.xml] [--figure docs/snap_through.png]
+
+Lengths are those of random equilibria at random gravity angles from 0 to 120°, with one tendon slack, as the data set
+has them, and the same with that tendon drawn in by some millimetres more, so that all three pull against each other.
+First guesses are shapes of other equilibria, and random bends of both halves of the arm.
+"""
+
+import argparse
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from trunkline.frames import gravity_in_base
+from trunkline.kinematics.chain import Chain, load_model, read_chain
+from trunkline.kinematics.restart import restart
+from trunkline.kinematics.sampling import pull_directions
+from trunkline.kinematics.statics import equilibrium
+from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, plt, save_figure
+from trunkline.progress import progress
+
+DRAWN_IN_MM = (0.0, 1.0, 2.0, 5.0, 10.0)  # of the slack tendon
+APART = 1e-3  # m; equilibria whose tips are nearer than this count as one
+LARGEST_ANGLE = np.radians(120)
+
+
+class Found(NamedTuple):
+    """Of N targets: whether it has an equilibrium within the motors' force (N,), how many (N,), and how far their
+    tips are apart, m (N,)."""
+
+    solved: np.ndarray
+    count: np.ndarray
+    apart: np.ndarray
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("model", type=Path, nargs="?", default=Path("artifacts/identify_control/arm.xml"))
+    parser.add_argument("--targets", type=int, default=300)
+    parser.add_argument("--guesses", type=int, default=24)
+    parser.add_argument("--figure", type=Path)
+    arguments = parser.parse_args()
+    chain = read_chain(load_model(arguments.model))
+    rng = np.random.default_rng(0)
+    tensions, gravity = random_loads(chain, arguments.targets, rng)
+    rest = equilibrium(chain, tensions, gravity)
+    results = {}
+    for drawn in DRAWN_IN_MM:
+        lengths = rest.lengths - 1e-3 * drawn * (tensions == 0)
+        found = search(chain, lengths, gravity, rest.qpos, arguments.guesses, rng)
+        several = found.count[found.solved] > 1
+        apart = 1e3 * found.apart[found.solved][several]
+        results[drawn] = found
+        spread = f"{np.median(apart):.0f} mm apart (median), {apart.max():.0f} mm at most" if several.any() else "-"
+        print(f"slack tendon drawn in by {drawn:2.0f} mm: {found.solved.mean():6.1%} within the motors' force, "
+              f"of these {several.mean():6.2%} with more than one equilibrium, tips {spread}", flush=True)
+    if arguments.figure:
+        save_figure(figure(results), arguments.figure)
+
+
+def random_loads(chain: Chain, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Tensions (count, K) with a slack tendon, N, and gravity (count, 3)."""
+    around = pull_directions(chain, rng.uniform(0, 2 * np.pi, count))
+    return around * rng.uniform(0.02, 1, (count, 1)) ** 2, gravity_in_base(rng.uniform(0, LARGEST_ANGLE, count))
+
+
+def search(chain: Chain, lengths, gravity, known, guesses: int, rng: np.random.Generator) -> Found:
+    """Stable equilibria of `lengths` (N, K), m, under `gravity` (N, 3), from `known` (N, nq) and `guesses` shapes."""
+    count = len(lengths)
+    tips, good = np.empty((guesses + 1, count, 3)), np.empty((guesses + 1, count), bool)
+    with progress(guesses + 1, "snap_through", "guesses") as bar:
+        for guess in range(guesses + 1):
+            qpos = known if guess == 0 else first_guesses(chain, count, rng, random_bend=guess % 2 == 0)
+            found = restart(chain, qpos, np.zeros_like(lengths), lengths, gravity)
+            tips[guess] = found.position
+            good[guess] = found.converged & (found.tensions <= chain.max_tension * (1 + 1e-6)).all(axis=1)
+            bar.update(1)
+    counts, apart = np.zeros(count, int), np.zeros(count)
+    for row in range(count):
+        different: list[np.ndarray] = []
+        for tip in tips[good[:, row], row]:
+            if all(np.linalg.norm(tip - other) > APART for other in different):
+                different.append(tip)
+        counts[row] = len(different)
+        if different:
+            apart[row] = np.linalg.norm(np.array(different)[:, None] - different, axis=2).max()
+    return Found(good.any(axis=0), counts, apart)
+
+
+def first_guesses(chain: Chain, count: int, rng: np.random.Generator, random_bend: bool) -> np.ndarray:
+    """Joint angles (count, nq): each half of the arm bent evenly some way, or equilibria under other loads."""
+    if not random_bend:
+        return equilibrium(chain, *random_loads(chain, count, rng)).qpos
+    halves = rng.uniform(-0.5, 0.5, (count, 2, 2))
+    return np.repeat(halves, [chain.units // 2, chain.units - chain.units // 2], axis=1).reshape(count, -1)
+
+
+def figure(results: dict[float, Found]):
+    """Share of lengths with several equilibria, and how far apart these are, over how far the tendon is drawn in."""
+    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
+    drawn = list(results)
+    places = np.arange(len(drawn))
+    shares = [100 * (found.count[found.solved] > 1).mean() for found in results.values()]
+    bars = left.bar(places, shares, color=[IDENTIFIED if d == 0 else INITIAL for d in drawn], width=0.6)
+    left.bar_label(bars, [f"{share:.1f} %" for share in shares], padding=2, fontsize=9)
+    left.set(ylabel="lengths with more than one equilibrium (%)", ylim=(0, 1.15 * max([*shares, 1])))
+    for place, found in zip(places, results.values(), strict=True):
+        apart = 1e3 * found.apart[found.solved & (found.count > 1)]
+        right.scatter(np.full(len(apart), place), apart, s=12, color=MEASURED, alpha=0.5, linewidths=0)
+    right.set(yscale="log", ylim=(0.8, 2e3), ylabel="their tips apart (mm)")
+    labels = ["one slack\n(data set)" if d == 0 else f"{d:.0f} mm\nshorter" for d in drawn]
+    for ax in (left, right):
+        ax.set_xticks(places, labels)
+        ax.set_xlabel("third tendon")
+        ax.set_xlim(-0.6, len(drawn) - 0.4)
+    figure.suptitle("Snap-through: the same tendon lengths, several shapes")
+    return figure
+
+
+if __name__ == "__main__":
+    main()

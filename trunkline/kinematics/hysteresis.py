@@ -1,0 +1,86 @@
+"""What dry friction adds to the statics: rest is a band of poses, its ends those reached by pulling and by letting go.
+
+Quasi-statically, on the way to a sample in the direction in which its tensions grow in proportion, every tendon and
+every joint slides; friction then is at its full value against the way of each (Coulomb). On the way back it is the
+other way round. So the ends of the band are equilibria with the motors' commands of the sample and, with dl and dq
+the changes on the way in, friction of tendons as tensions ±f sign(dl) and of joints as torques ∓c sign(dq).
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from trunkline.kinematics.chain import Chain
+from trunkline.kinematics.statics import Equilibrium, equilibrium_paths, solve_paths
+from trunkline.kinematics.supported import unit_bodies
+
+BACK = 0.98  # share of the tensions from which the direction of the way in is taken
+
+
+@dataclass
+class Band:
+    """Tips at the band's ends, m, NaN where no equilibrium was found.
+
+    Attributes:
+        loaded: where the tip rests after pulling. Shape (N, 3).
+        unloaded: where it rests after letting go. Shape (N, 3).
+    """
+
+    loaded: np.ndarray
+    unloaded: np.ndarray
+
+    @property
+    def width(self) -> np.ndarray:
+        """Distance between the ends, m. Shape (N,)."""
+        return np.linalg.norm(self.loaded - self.unloaded, axis=1)
+
+
+def model_friction(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Dry friction of the tendons, N, shape (K,), and of the units' joints, N m, shape (n, 2)."""
+    joints = model.body_jntadr[unit_bodies(model)][:, None] + np.arange(2)
+    return model.tendon_frictionloss.copy(), model.dof_frictionloss[model.jnt_dofadr[joints]]
+
+
+def friction_band(
+    chain: Chain, tensions: np.ndarray, gravity: np.ndarray, tendon_friction: np.ndarray, joint_friction: np.ndarray
+) -> Band:
+    """Both ends of the band for N samples, their position actuators' commands held.
+
+    Args:
+        tensions: of the samples at rest without friction, N. Shape (N, K).
+        gravity: m/s². Shape (N, 3).
+        tendon_friction: N. Shape (K,).
+        joint_friction: N m. Shape (n, 2).
+    """
+    way = equilibrium_paths(chain, tensions[:, None] * np.array([BACK, 1.0])[:, None], gravity)
+    before, here = way[0::2], way[1::2]
+    commands = here.lengths - tensions / chain.gain
+    slides = np.sign(here.lengths - before.lengths), np.sign(here.qpos - before.qpos).reshape(-1, chain.units, 2)
+    ends = []
+    for side in (1, -1):
+        found = np.full((len(tensions), 3), np.nan)
+        for row, (command, dl, dq) in enumerate(zip(commands, *slides, strict=True)):
+            rubbing = with_friction(chain._replace(torque=-side * joint_friction * dq))
+            end = _held(rubbing, command, side * tendon_friction * dl, gravity[row])
+            if way.converged[2 * row + 1] and end.converged[0]:
+                found[row] = end.position[0]
+        ends.append(found)
+    return Band(*ends)
+
+
+def with_friction(chain: Chain) -> Chain:
+    """The chain with every tendon twice: the second one carries the friction, which does not end where it is slack."""
+    twice = {name: np.concatenate([getattr(chain, name)] * 2, axis=1) for name in ("hole_in", "hole_out", "crosses")}
+    twice |= {name: np.tile(getattr(chain, name), 2) for name in ("fixed_length", "gain", "max_tension")}
+    return chain._replace(**twice)
+
+
+def _held(chain: Chain, command: np.ndarray, friction: np.ndarray, gravity: np.ndarray) -> Equilibrium:
+    """Equilibrium under actuators that hold `command` (K,), m, and constant tensions `friction` (K,), N."""
+    tendons = len(command)
+    tensions = np.concatenate([np.zeros(tendons), friction])[None, None]
+    lengths = np.concatenate([command, np.zeros(tendons)])[None, None]
+    slope = np.concatenate([chain.gain[:tendons], np.zeros(tendons)])
+    ceiling = np.concatenate([chain.max_tension[:tendons], np.full(tendons, np.inf)])
+    return solve_paths(chain, tensions, lengths, gravity, slope, ceiling, cables=False)
