@@ -1,6 +1,5 @@
 """Map the reach of the rigid arm, of the soft arm per gravity angle, and of both together."""
 
-import re
 from pathlib import Path
 
 import numpy as np
@@ -9,26 +8,19 @@ from pydantic import Field, PositiveInt
 
 from trunkline.config import settings
 from trunkline.errors import InputError
+from trunkline.kinematics.chain import Chain, load_model, read_chain
 from trunkline.plots import save_figure
 from trunkline.progress import progress
-from trunkline.reachability.maps import (
-    Check,
-    HybridSettings,
-    LabelSettings,
-    Maps,
-    RigidSettings,
-    SpotCheckSettings,
-    blend_angles,
-    build_maps,
-    check_maps,
-)
+from trunkline.reachability.checks import Check, LabelSettings, SpotCheckSettings, check_maps
+from trunkline.reachability.maps import HybridSettings, Maps, RigidSettings, blend_angles, build_maps
 from trunkline.reachability.mesh import write_obj
 from trunkline.reachability.panda_mjcf import panda_spec
 from trunkline.reachability.plots import heldout_figure, maps_figure, slices_figure
 from trunkline.reachability.soft_map import SoftShape
-from trunkline.reachability.tips import TipSamples
+from trunkline.reachability.tips import ArmTips, Tips
 from trunkline.stage import output_folder, run_stage, write_json
 
+MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
 ARTIFACTS = Path("artifacts/reachability")
 
@@ -61,6 +53,8 @@ class Soft:
     smoothing: float = Field(ge=0, le=5)
     smallest: PositiveInt
     angle_step_deg: float = Field(ge=0.5, le=180)
+    directions: int = Field(ge=8)
+    steps: int = Field(ge=8)
 
 
 @settings
@@ -88,13 +82,15 @@ class Config:
 
 
 def main(config: Config) -> None:
-    samples = read_samples(SAMPLES)
+    chain = read_chain(load_model(MODEL))
+    tips_at = read_tips(SAMPLES, chain, config)
     shape = SoftShape(config.soft.tolerance, config.soft.closing, config.soft.smoothing, config.soft.smallest)
     step = np.radians(config.soft.angle_step_deg)
-    fields = len(blend_angles(samples.angles, step))
-    with progress(fields + len(samples.angles) + 2, "reachability", "parts") as bar:
+    fields = len(blend_angles(tips_at.angles, step))
+    with progress(2 * fields + 4, "reachability", "parts") as bar:
         maps = build_maps(
-            samples,
+            tips_at,
+            tips_at.angles,
             RigidSettings(**vars(config.rigid)),
             shape,
             HybridSettings(**vars(config.hybrid)),
@@ -106,11 +102,10 @@ def main(config: Config) -> None:
         )
         check = check_maps(
             maps,
-            samples,
+            chain,
+            tips_at,
             LabelSettings(**vars(config.labels)),
             SpotCheckSettings(**vars(config.spot_check)),
-            shape,
-            step=step,
             seed=config.seed,
             done=lambda part: bar.update(1, done=part),
         )
@@ -121,32 +116,37 @@ def main(config: Config) -> None:
         for name, mesh in maps.meshes().items():
             write_obj(folder / "meshes" / f"{name}.obj", mesh, f"Reachable set: {name}")
         (folder / "panda.xml").write_text(panda_spec(config.rigid.mount_offset).to_xml())
-        heldout = pd.DataFrame({"angle_deg": np.degrees(samples.angles[1:-1]).round(6), "iou": check.heldout})
+        heldout = pd.DataFrame(check.heldout).rename(columns={"angle": "angle_deg"})
+        heldout["angle_deg"] = np.degrees(heldout["angle_deg"]).round(6)
         heldout.to_csv(folder / "heldout.csv", index=False, float_format="%.6g")
-        save_figure(maps_figure(maps, samples), folder / "maps.png")
-        save_figure(slices_figure(maps, samples, check), folder / "slices.png")
-        save_figure(heldout_figure(heldout), folder / "heldout.png")
+        tips = [sample.positions for sample in tips_at.samples]
+        save_figure(maps_figure(maps, tips), folder / "maps.png")
+        save_figure(slices_figure(maps, tips, check), folder / "slices.png")
+        save_figure(heldout_figure(heldout, config.spot_check.outside), folder / "heldout.png")
         write_json(folder / "metrics.json", metrics(maps, check))
 
 
-def read_samples(path: Path) -> TipSamples:
-    """Tips and tensions by gravity angle, from the data set of forward kinematics."""
+def read_tips(path: Path, chain: Chain, config: Config) -> ArmTips:
+    """Tips and lengths by gravity angle, from the data set of forward kinematics."""
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the samples of the fk_dataset stage (run `dvc repro`)")
     table = pd.read_parquet(path)
-    tensions = sorted(name for name in table if re.fullmatch(r"f\d+", name))
-    missing = {"theta_g", "x", "y", "z"} - set(table)
-    if missing or not tensions:
-        raise InputError(f"{path}: found no column {', '.join(sorted(missing) or ['f1'])}, expected tips and tensions")
+    lengths = [f"l{t + 1}" for t in range(chain.tendons)]
+    missing = [name for name in ("theta_g", "x", "y", "z", *lengths) if name not in table]
+    if missing:
+        raise InputError(f"{path}: found no column {', '.join(missing)}, expected tips and tendon lengths")
     groups = [group for _, group in table.groupby(table["theta_g"].round(9))]
-    if len(groups) < 3:
-        raise InputError(f"{path}: found {len(groups)} gravity angles, expected at least 3 to check blending")
+    if len(groups) < 2:
+        raise InputError(f"{path}: found {len(groups)} gravity angles, expected at least 2 to blend between")
     if table["theta_g"].abs().min() > 1e-6:
         raise InputError(f"{path}: found no gravity angle of 0, expected one: the hybrid map hangs straight down")
-    return TipSamples(
+    return ArmTips(
+        chain=chain,
         angles=np.array([group["theta_g"].iloc[0] for group in groups]),
-        tips=[group[["x", "y", "z"]].to_numpy(float) for group in groups],
-        tensions=[group[tensions].to_numpy(float) for group in groups],
+        samples=[Tips(group[["x", "y", "z"]].to_numpy(float), group[lengths].to_numpy(float)) for group in groups],
+        directions=config.soft.directions,
+        steps=config.soft.steps,
+        seed=config.seed,
     )
 
 
@@ -155,18 +155,24 @@ def metrics(maps: Maps, check: Check) -> dict:
     soft = maps.soft.meshes
     return {
         "rigid": check.rigid._asdict() | {
-            "watertight": maps.rigid.mesh.is_closed(), "triangles": len(maps.rigid.mesh.faces),
+            "watertight": maps.rigid.mesh.is_closed(),
+            "triangles": len(maps.rigid.mesh.faces),
+            "moved_voxels": check.moved["rigid"],
         },
         "soft": {
-            "heldout_iou_min": min(check.heldout),
+            "heldout_iou_min": min(one.iou for one in check.heldout),
+            "heldout_reachable_min": min(one.reachable for one in check.heldout),
+            "heldout_beyond_max": max(one.beyond for one in check.heldout),
             "watertight": all(mesh.is_closed() for mesh in soft),
             "triangles": max(len(mesh.faces) for mesh in soft),
+            "moved_voxels": check.moved["soft"],
         },
         "hybrid": {
             "found_inside": check.found_inside,
             "found_outside": check.found_outside,
             "watertight": maps.hybrid.mesh.is_closed(),
             "triangles": len(maps.hybrid.mesh.faces),
+            "moved_voxels": check.moved["hybrid"],
         },
     }
 

@@ -48,6 +48,10 @@ def grids() -> dict[str, np.ndarray]:
     spacing = [axis[1] - axis[0] for axis in axes]
     return {
         "soft_030": distance,
+        "soft_035": distance - 0.04,
+        "soft_angles": np.radians([30.0, 35.0]),
+        "soft_threshold": np.array(0.0),
+        "soft_tolerance": np.array(0.02),
         "rigid": distance + 0.1,
         "origin": np.full(3, -0.5),
         "spacing": np.array(spacing),
@@ -144,6 +148,45 @@ def test_a_grid_is_found_again_at_its_place(files):
     for x, y, z in ((0, 0, 0), (4, 8, 6), (2, 3, 5)):
         place = np.array(grid.origin) + np.array(grid.spacing) * (x, y, z)
         assert texture[z, y, x] == pytest.approx(np.linalg.norm(place) - 0.3, abs=1e-3)
+
+
+def headset_signal(files: dict[str, bytes], base: np.ndarray, angle: float) -> float:
+    """How far a point of the arm's base frame is out of reach, m, from the package's files and manifest alone."""
+    manifest = json.loads(files[MANIFEST])
+    reach = manifest["reach"]
+    upper = int(np.clip(np.searchsorted(reach["angles"], angle), 1, len(reach["angles"]) - 1))
+    weight = (angle - reach["angles"][upper - 1]) / (reach["angles"][upper] - reach["angles"][upper - 1])
+    signal = 0.0
+    for name, share in ((reach["grids"][upper - 1], 1 - weight), (reach["grids"][upper], weight)):
+        grid = manifest["grids"][name]
+        texture = np.frombuffer(files[grid["file"]], "<f2").reshape(grid["shape"][::-1]).astype(float)  # z, y, x
+        place = (base[[0, 2, 1]] - grid["origin"]) / grid["spacing"]
+        first = np.floor(place).astype(int)
+        part = place - first
+        for corner in np.ndindex(2, 2, 2):
+            x, y, z = first + corner
+            signal += share * texture[z, y, x] * np.prod(np.where(corner, part, 1 - part))
+    return signal
+
+
+def test_the_headset_tells_what_is_out_of_reach(files):
+    """Balls of radius 0.3 m at 30° and 0.34 m at 35°: of 0.32 m half-way between."""
+    reach = Manifest.model_validate_json(files[MANIFEST]).reach
+    assert reach.grids == ["soft_030", "soft_035"]
+    assert (reach.threshold, reach.tolerance) == (0.0, 0.02)
+    direction = np.array([0.48, 0.6, -0.64])
+    for angle_deg, radius in ((30.0, 0.3), (32.5, 0.32), (35.0, 0.34)):
+        for gap in (-0.05, 0.05):
+            signal = headset_signal(files, (radius + gap) * direction, np.radians(angle_deg))
+            assert signal == pytest.approx(gap, abs=0.04)  # the grid is coarse
+            assert (signal > reach.threshold) == (gap > 0)
+
+
+@pytest.mark.parametrize("missing", ["soft_angles", "soft_threshold", "soft_tolerance"])
+def test_maps_that_do_not_say_what_is_out_of_reach_are_one_line(sources, missing):
+    np.savez(sources.grids, **{name: values for name, values in grids().items() if name != missing})
+    with pytest.raises(InputError, match=f"grids.npz: found no {missing}, expected"):
+        assemble(LABEL, sources, TRAJECTORY)
 
 
 def harden(mjcf: str) -> str:

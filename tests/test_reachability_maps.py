@@ -4,18 +4,21 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from tests.bent_chain import stump
 from trunkline.errors import InputError
+from trunkline.kinematics.chain import read_chain
 from trunkline.reachability.downward import sample_downward
 from trunkline.reachability.grid import Lattice, overlap
-from trunkline.reachability.hybrid_check import draw_inside_and_outside, find_poses, tip_position
+from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, tip_position, verified
 from trunkline.reachability.hybrid_map import minkowski_field, swept_cells
 from trunkline.reachability.labels import agreement, beyond_links, draw_points, label
 from trunkline.reachability.maps import RigidSettings, angle_name, build_rigid, build_soft
 from trunkline.reachability.mesh import contains
 from trunkline.reachability.panda import Q_MAX, forward
+from trunkline.reachability.reach_signal import held_out, packed, points_beyond, reach_signal
 from trunkline.reachability.rigid_map import profile, rigid_field
-from trunkline.reachability.soft_map import SoftShape, heldout_overlap, soft_field, soft_lattice
-from trunkline.reachability.tips import TipInterpolator, TipSamples
+from trunkline.reachability.soft_map import SoftShape, soft_field, soft_lattice
+from trunkline.reachability.tips import ArmTips, Tips
 
 OFFSET = 0.05  # m
 LENGTH = 0.5  # m, of the arm of constant curvature below
@@ -34,24 +37,20 @@ def rigid():
     return build_rigid(settings, 8000, seed=0)
 
 
-def curved_arm(angles_deg, count, seed=0):
-    """Tips of an arm of constant curvature under three tendons, swinging two thirds of the gravity angle."""
-    samples = TipSamples(np.radians(angles_deg), [], [])
+def curved_tips(angle, count=4000, seed=0):
+    """Tips of an arm of constant curvature under three tendons, swinging two thirds of the gravity angle (rad)."""
     rng = np.random.default_rng(seed)
     directions = 2 * np.pi * np.arange(3) / 3
-    for angle in samples.angles:
-        tensions = rng.uniform(0, 4, size=(count, 3))
-        tensions[np.arange(count), rng.integers(0, 3, count)] = 0.0
-        bend = tensions @ np.column_stack([np.cos(directions), np.sin(directions)])
-        turn = np.maximum(np.linalg.norm(bend, axis=1), 1e-9)
-        side, down = LENGTH * (1 - np.cos(turn)) / turn, LENGTH * np.sin(turn) / turn
-        tips = np.column_stack([bend / turn[:, None] * side[:, None], -down])
-        swing = 2 / 3 * angle * down / LENGTH
-        x = np.cos(swing) * tips[:, 0] - np.sin(swing) * tips[:, 2]
-        z = np.sin(swing) * tips[:, 0] + np.cos(swing) * tips[:, 2]
-        samples.tips.append(np.column_stack([x, tips[:, 1], z]))
-        samples.tensions.append(tensions)
-    return samples
+    tensions = rng.uniform(0, 4, size=(count, 3))
+    tensions[np.arange(count), rng.integers(0, 3, count)] = 0.0
+    bend = tensions @ np.column_stack([np.cos(directions), np.sin(directions)])
+    turn = np.maximum(np.linalg.norm(bend, axis=1), 1e-9)
+    side, down = LENGTH * (1 - np.cos(turn)) / turn, LENGTH * np.sin(turn) / turn
+    tips = np.column_stack([bend / turn[:, None] * side[:, None], -down])
+    swing = 2 / 3 * angle * down / LENGTH
+    x = np.cos(swing) * tips[:, 0] - np.sin(swing) * tips[:, 2]
+    z = np.sin(swing) * tips[:, 0] + np.cos(swing) * tips[:, 2]
+    return Tips(np.column_stack([x, tips[:, 1], z]), tensions)
 
 
 def ball_field(radius, spacing, center=(0.0, 0.0, 0.0)):
@@ -136,26 +135,26 @@ def test_agreement_counts():
         agreement(np.ones(2, bool), np.ones(2, bool))
 
 
-def test_tips_at_a_sampled_angle_are_the_samples():
-    samples = curved_arm([0, 20, 40, 60], 500)
-    assert TipInterpolator(samples, 0.01).tips(samples.angles[2]) is samples.tips[2]
+@pytest.fixture(scope="module")
+def arm():
+    return read_chain(stump())
 
 
-def test_tips_between_angles_are_where_the_arm_would_put_them():
-    """The tip of every tension vector, at an angle left out."""
-    samples = curved_arm([0, 20, 40, 60], 2000)
-    found = TipInterpolator(samples.without(1), 0.01).tips(samples.angles[1])
-    truth = curved_arm([20], 100_000, seed=5).tips[0]
-    gap, _ = cKDTree(truth).query(found)
-    assert len(found) > 3000
-    assert np.quantile(gap, 0.95) < 0.01  # neighbours in truth are some 4 mm apart
+def test_tips_are_the_samples_where_there_are_some_and_equilibria_elsewhere(arm):
+    sampled = Tips(np.zeros((5, 3)), np.zeros((5, 3)))
+    tips_at = ArmTips(arm, np.array([0.0, 1.0]), [sampled, sampled], directions=12, steps=8, seed=0)
+    assert tips_at(1.0) is sampled
+    fresh = tips_at(0.4)
+    np.testing.assert_array_equal(fresh.positions, tips_at(0.4).positions)
+    assert len(fresh.positions) > 100
+    reach = np.linalg.norm(fresh.positions, axis=1)
+    assert 0.5 * arm.length < reach.max() < 1.1 * arm.length
 
 
 def test_soft_field_of_one_tip_is_a_ball():
     tips = np.array([[0.0, 0.0, -0.3]])
-    samples = TipSamples(np.zeros(1), [tips], [np.zeros((1, 3))])
     shape = SoftShape(tolerance=0.05, closing=0.02, smoothing=0.3, smallest=1)
-    lattice = soft_lattice(samples, shape, 0.01)
+    lattice = soft_lattice([tips], shape, 0.01)
     field = soft_field(tips, lattice, shape)
     grid = np.stack(np.meshgrid(*lattice.axes(), indexing="ij"), axis=-1)
     true = np.linalg.norm(grid - tips[0], axis=-1) - 0.05
@@ -164,26 +163,58 @@ def test_soft_field_of_one_tip_is_a_ball():
 
 
 def test_soft_maps_are_closed_and_share_a_lattice():
-    samples, heard = curved_arm([0, 30, 60], 2000), []
-    maps = build_soft(samples, SHAPE, 0.015, np.radians(10), 8000, heard.append)
+    sampled, heard = np.radians([0, 30, 60]), []
+    maps = build_soft(curved_tips, sampled, SHAPE, 0.015, np.radians(10), 8000, heard.append)
     assert heard == [f"soft_{angle:03}" for angle in range(0, 61, 10)]
     np.testing.assert_allclose(np.degrees(maps.angles), [0, 10, 20, 30, 40, 50, 60], atol=1e-9)
     assert maps.fields.shape == (7, *maps.lattice.shape)
     assert len(maps.meshes) == 3
     assert all(mesh.is_closed() and len(mesh.faces) <= 8000 for mesh in maps.meshes)
-    for tips, angle in zip(samples.tips, samples.angles, strict=True):
-        inside = maps.lattice.sample(maps.at(angle), tips) < 0
+    for angle in sampled:
+        inside = maps.lattice.sample(maps.at(angle), curved_tips(angle).positions) < 0
         assert inside.mean() > 0.99  # but for tips that no other is near: specks
 
 
-def test_blend_overlaps_an_angle_left_out():
-    samples = curved_arm([0, 30, 60, 90, 120], 4000)
-    lattice = soft_lattice(samples, SHAPE, 0.015)
-    own = [soft_field(tips, lattice, SHAPE) for tips in samples.tips]
-    plain = overlap((own[1] + own[3]) / 2, own[2])  # what a headset would get from so coarse a set of angles
-    blended = heldout_overlap(samples, 2, own[2], np.radians(5), lattice, SHAPE)
-    assert blended > 0.85
-    assert blended > plain + 0.08
+@pytest.fixture(scope="module")
+def soft():
+    dense = lambda angle: curved_tips(angle, 20_000)  # noqa: E731
+    return build_soft(dense, np.radians([0, 10, 20]), SHAPE, 0.012, np.radians(5), 8000, lambda _: None)
+
+
+@pytest.mark.parametrize("angle_deg", [2.5, 17.5])
+def test_signal_knows_tips_and_points_beyond_reach_between_the_grids(soft, angle_deg):
+    tips = curved_tips(np.radians(angle_deg), 20_000, seed=5).positions
+    found = held_out(packed(soft.fields), soft.angles, soft.lattice, SHAPE, tips, np.radians(angle_deg),
+                     beyond=0.03, count=1000, seed=0)
+    assert found.iou > 0.93
+    assert found.reachable > 0.995
+    assert found.beyond < 0.02
+
+
+def test_signal_is_the_distance_outside(soft):
+    tips = curved_tips(soft.angles[2], 20_000, seed=6).positions
+    points = points_beyond(tips, 0.06, 500, np.random.default_rng(0))
+    signal = reach_signal(packed(soft.fields), soft.angles, soft.lattice, points, soft.angles[2])
+    assert np.median(np.abs(signal - (0.06 - SHAPE.tolerance))) < 0.006
+    far = reach_signal(packed(soft.fields), soft.angles, soft.lattice, np.array([[9.0, 9.0, 9.0]]), 0.1)
+    assert far[0] > 0
+
+
+def test_points_beyond_are_as_far_as_asked():
+    tips = curved_tips(0.0).positions
+    points = points_beyond(tips, 0.03, 300, np.random.default_rng(0))
+    distance, _ = cKDTree(tips).query(points)
+    assert len(points) == 300
+    assert distance.min() >= 0.03
+    assert distance.max() <= 0.033
+
+
+def test_coarse_angles_would_not_do(soft):
+    """What the fine step is for: grids 80° apart, blended half-way."""
+    low, own, high = (
+        soft_field(curved_tips(np.radians(deg), 20_000).positions, soft.lattice, SHAPE) for deg in (-30, 10, 50)
+    )
+    assert overlap((low + high) / 2, own) < 0.8
 
 
 def test_names_of_angles():
@@ -225,7 +256,7 @@ def test_hybrid_of_two_balls_is_the_ball_of_both_radii():
 
 
 def test_points_of_the_hybrid_map_are_reached_and_points_beside_it_are_not(rigid):
-    tips = curved_arm([0], 4000).tips[0]
+    tips = curved_tips(0.0).positions
     cells, cells_lattice = swept_cells(tips, 0.02)
     field, lattice = minkowski_field(rigid.field, rigid.lattice, cells, cells_lattice, smoothing=0.7, smallest=60)
     inside, outside = draw_inside_and_outside(field, lattice, 0.03, 40, seed=0)
@@ -238,3 +269,17 @@ def test_points_of_the_hybrid_map_are_reached_and_points_beside_it_are_not(rigid
     reached = tip_position(mount, rotation, tips[reach.tip[reach.found]])
     assert np.linalg.norm(reached - inside[reach.found], axis=1).max() < 1e-3
     assert find_poses(outside, tips, rigid.field, rigid.lattice, **where).found.mean() <= 0.03
+
+
+def test_a_pose_is_verified_by_joint_angles_and_tendon_lengths_alone(arm):
+    source = ArmTips(arm, np.zeros(0), [], directions=12, steps=8, seed=0)
+    tips = source(0.0)
+    q = sample_downward(5, seed=3, mount_offset=OFFSET)[:5]
+    mount, rotation = forward(q, OFFSET)
+    index = np.array([40, 50, 60, 70, 80])
+    points = tip_position(mount, rotation, tips.positions[index])
+    reach = Reach(np.array([1, 1, 1, 1, 0], bool), q, index, np.zeros(5))
+    assert list(verified(points, reach, tips.lengths, arm, OFFSET)) == [True] * 4 + [False]
+    assert not verified(points + [0, 0, 0.005], reach, tips.lengths, arm, OFFSET).any()
+    q[:, 5] += 0.1  # no longer straight down: gravity pulls another way
+    assert not verified(points, reach, tips.lengths, arm, OFFSET).any()

@@ -110,8 +110,12 @@ def test_downward_poses_are_the_ones_that_rejection_finds():
     assert np.quantile(gaps, 0.9) < 0.2
 
 
-def test_sampling_is_reproducible():
-    np.testing.assert_array_equal(sample_downward(1000, seed=4), sample_downward(1000, seed=4))
+def test_sampling_is_reproducible_at_any_thread_count(monkeypatch):
+    samples = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("TRUNKLINE_THREADS", threads)
+        samples.append(sample_downward(20_000, seed=4))
+    np.testing.assert_array_equal(*samples)
 
 
 def test_inverse_kinematics_reaches_what_forward_kinematics_made():

@@ -94,6 +94,18 @@ class Grid(_Block):
     meaning: str = "signed distance to the surface of the reachable set, m, negative inside"
 
 
+class Reach(_Block):
+    frame: str = "base of the soft arm"
+    angles: list[float] = Field(min_length=1, description="gravity angles of the soft grids, rad, ascending")
+    grids: list[str] = Field(min_length=1, description="their names in `grids`, in the same order")
+    threshold: float = Field(description="m; a signal above it means out of reach")
+    tolerance: float = Field(gt=0, description="m; how near a reachable tip counts as within reach")
+    signal: str = (
+        "trilinear between the points of the two grids beside the gravity angle, linear between their angles; m, about"
+        " how far outside; also out of reach: points off the grid and gravity angles beyond the first and last"
+    )
+
+
 class Mesh(_Block):
     file: str
     frame: str
@@ -109,6 +121,7 @@ class Manifest(_Block):
     network: Network
     meshes: dict[str, Mesh]
     grids: dict[str, Grid]
+    reach: Reach
     metrics: dict[str, dict] = Field(description="metrics.json of every stage before this one")
     sha256: dict[str, str] = Field(description="of every other file in the package, by its path in it")
 

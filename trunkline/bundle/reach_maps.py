@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from trunkline.bundle.manifest import Grid, Mesh
+from trunkline.bundle.manifest import Grid, Mesh, Reach
 from trunkline.bundle.unity_frame import unity_obj, unity_position, unity_volume
 from trunkline.errors import InputError
 
@@ -59,6 +59,28 @@ def convert_grids(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str,
     if not blocks:
         raise InputError(f"{source}: found no grid of three dimensions, expected one for each map")
     return files, blocks
+
+
+def describe_reach(arrays: dict[str, np.ndarray], source: str) -> Reach:
+    """How a headset tells from the soft grids what is out of reach.
+
+    Args:
+        arrays: maps named `soft_<angle>` in the order of `soft_angles`, rad; `soft_threshold` and `soft_tolerance`, m.
+        source: the file they are from, for messages.
+    """
+    for key in ("soft_angles", "soft_threshold", "soft_tolerance"):
+        if key not in arrays:
+            raise InputError(f"{source}: found no {key}, expected it beside the soft maps")
+    names = sorted(name for name, values in arrays.items() if name.startswith("soft_") and values.ndim == 3)
+    angles = np.asarray(arrays["soft_angles"], float).tolist()
+    if len(names) != len(angles):
+        raise InputError(f"{source}: found {len(names)} soft maps and {len(angles)} soft_angles, expected as many")
+    return Reach(
+        angles=angles,
+        grids=names,
+        threshold=float(arrays["soft_threshold"]),
+        tolerance=float(arrays["soft_tolerance"]),
+    )
 
 
 def _lattice(arrays: dict[str, np.ndarray], name: str, key: str, source: str) -> np.ndarray:

@@ -10,7 +10,7 @@ from trunkline.bundle.linearize import compile_with, linearize_joints
 from trunkline.bundle.manifest import Manifest, Versions, describe_model, hashes
 from trunkline.bundle.network import describe_network
 from trunkline.bundle.package import package_json, with_metas
-from trunkline.bundle.reach_maps import convert_grids, convert_meshes
+from trunkline.bundle.reach_maps import convert_grids, convert_meshes, describe_reach
 from trunkline.bundle.roundtrip import curl, deviation, simulate
 from trunkline.bundle.unity_importer import as_imported
 from trunkline.bundle.unity_rules import Violation, lint_mjcf
@@ -82,6 +82,7 @@ def assemble(
     meshes, mesh_blocks = convert_meshes(sources.meshes)
     with np.load(sources.grids) as arrays:
         grids, grid_blocks = convert_grids(dict(arrays), str(sources.grids))
+        reach = describe_reach(dict(arrays), str(sources.grids))
 
     files = sources.texts | {
         "package.json": package_json(
@@ -108,6 +109,7 @@ def assemble(
         network=network_block,
         meshes=mesh_blocks,
         grids=grid_blocks,
+        reach=reach,
         metrics=sources.metrics,
         sha256=hashes({path: data for path, data in files.items() if path != MANIFEST}),
     )

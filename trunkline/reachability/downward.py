@@ -8,12 +8,15 @@ frame 4, the wrist has two solutions (s = +1 and -1):
 and q7 is free. Every sample points down exactly; only the limits of q5 and q6 (and collisions) reject any.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from trunkline.reachability.collision import CHUNK, clearance
 from trunkline.reachability.panda import Q_MAX, Q_MIN, joint_frames, within_limits
+from trunkline.threads import thread_count
 
 # Borders of the workspace lie where the arm is stretched in its plane or a joint stands at its limit: a
 # share of the draws goes there, or thin tips of the workspace would stay empty.
@@ -30,14 +33,18 @@ def sample_downward(count: int, seed: int, mount_offset: float = 0.0, avoid_coll
         mount_offset: from the flange to the mount, in m; matters for collisions only.
         avoid_collisions: leave out poses in which the arm touches itself.
     """
-    sequence = qmc.Sobol(6, seed=seed)
+    def solve(draws: NDArray) -> NDArray:
+        poses = _solve(draws)
+        return poses[clearance(poses, mount_offset) > 0.0] if avoid_collisions else poses
+
+    sequence, threads = qmc.Sobol(6, seed=seed), thread_count()
     found, total = [], 0
-    while total < count:
-        poses = _solve(sequence.random(CHUNK))
-        if avoid_collisions:
-            poses = poses[clearance(poses, mount_offset) > 0.0]
-        found.append(poses)
-        total += len(poses)
+    with ThreadPoolExecutor(threads) as pool:
+        while total < count:
+            for poses in pool.map(solve, [sequence.random(CHUNK) for _ in range(threads)]):
+                if total < count:  # whatever the number of threads, the same draws count
+                    found.append(poses)
+                    total += len(poses)
     return np.concatenate(found)
 
 

@@ -1,4 +1,4 @@
-"""Spot check of the hybrid map: for a point, a rigid pose and tendon tensions that bring the soft tip there.
+"""Spot check of the hybrid map: for a point, a rigid pose and tendon lengths that bring the soft tip there.
 
 The soft arm's base frame is the mount's turned by half a turn about x, so that its z axis points up while the
 end effector points down. With the tip at c in that frame and the base turned by yaw about the vertical, the
@@ -10,14 +10,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunkline.frames import STANDARD_GRAVITY
+from trunkline.kinematics.chain import Chain
+from trunkline.kinematics.statics import forward as soft_forward
 from trunkline.reachability.grid import Lattice
 from trunkline.reachability.inverse import solve
 from trunkline.reachability.labels import beyond_links
+from trunkline.reachability.panda import forward
 
 COARSE_YAWS, FINE_YAWS = 24, 72
 COARSE_TIPS = 600
 TRIES = 4  # pairs per point that go to inverse kinematics
 STARTS = 40
+CLOSE = 1e-3  # m, how near its point a tip must come out when a pose is verified
+FORCE_ROUNDING = 1e-3  # share by which a tension may exceed the motors' force
 DEEP = -0.01  # m; a pair whose mount lies this deep needs no finer search
 
 
@@ -75,6 +81,29 @@ def find_poses(
         reach.found[at], reach.q[at] = True, result.q[result.success]
         reach.tip[at], reach.yaw[at] = tip[at, attempt], yaw[at, attempt]
     return reach
+
+
+def verified(points: NDArray, reach: Reach, lengths: NDArray, chain: Chain, mount_offset: float) -> NDArray:
+    """Whether joint angles and tendon lengths alone bring the tip to each of ``points`` (N, 3). Shape (N,).
+
+    The Panda's joint angles say where the mount is and how gravity pulls on the soft arm; the statics say where the
+    tip then rests under the lengths.
+
+    Args:
+        lengths: of the soft samples, (M, K) in m.
+    """
+    good = np.zeros(len(points), bool)
+    rows = np.flatnonzero(reach.found)
+    if not len(rows):
+        return good
+    mount, rotation = forward(reach.q[rows], mount_offset)
+    base = rotation * np.array([1.0, -1.0, -1.0])  # axes of the soft arm's base frame, in columns
+    gravity = -STANDARD_GRAVITY * base[:, 2]
+    rest = soft_forward(chain, lengths[reach.tip[rows]], gravity)
+    tip = mount + np.einsum("nij,nj->ni", base, rest.position)
+    pulled = (rest.tensions <= (1 + FORCE_ROUNDING) * chain.max_tension).all(axis=1)
+    good[rows] = rest.converged & pulled & (np.linalg.norm(tip - points[rows], axis=1) <= CLOSE)
+    return good
 
 
 def draw_inside_and_outside(

@@ -15,7 +15,7 @@ from trunkline.reachability.grid import Lattice
 # Lattice points at exactly the level make marching cubes emit degenerate triangles and open edges.
 LEVEL = 1e-3  # voxels outside zero
 FIRST_TOLERANCE = 0.1  # voxels
-TOLERANCE_GROWTH = 1.3
+TOLERANCE_GROWTH = 1.12
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,7 @@ def surface(field: NDArray, lattice: Lattice, most_triangles: int, settings: str
     if not (field < 0).any():
         raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and an empty map, "
                          f"expected less, or a smaller {settings}.smallest")
-    # The border counts as outside, so that a set that leaves the lattice is closed there.
-    padded = np.pad(np.asarray(field, dtype=np.float32), 1, constant_values=lattice.spacing)
-    level = LEVEL * lattice.spacing
-    vertices, faces, _, _ = marching_cubes(padded, level, spacing=(lattice.spacing,) * 3)
-    vertices = vertices + (lattice.origin - lattice.spacing)
+    vertices, faces = unsimplified(field, lattice)
     solid = manifold3d.Manifold(manifold3d.Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
     tolerance = FIRST_TOLERANCE * lattice.spacing
     simple = solid.simplify(tolerance)
@@ -66,6 +62,14 @@ def surface(field: NDArray, lattice: Lattice, most_triangles: int, settings: str
                          f"triangles, expected 1 to reachability.most_triangles, {most_triangles}")
     mesh = simple.to_mesh()
     return Surface(np.asarray(mesh.vert_properties[:, :3], float), np.asarray(mesh.tri_verts, int), tolerance)
+
+
+def unsimplified(field: NDArray, lattice: Lattice) -> tuple[NDArray, NDArray]:
+    """Vertices (V, 3) in m and faces (F, 3) of the zero level of ``field``, as marching cubes leaves them."""
+    # The border counts as outside, so that a set that leaves the lattice is closed there.
+    padded = np.pad(np.asarray(field, dtype=np.float32), 1, constant_values=lattice.spacing)
+    vertices, faces, _, _ = marching_cubes(padded, LEVEL * lattice.spacing, spacing=(lattice.spacing,) * 3)
+    return vertices + (lattice.origin - lattice.spacing), faces
 
 
 def contains(shape: Surface, points: NDArray) -> NDArray:

@@ -9,11 +9,11 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import NDArray
 
 from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE
+from trunkline.reachability.checks import Check
 from trunkline.reachability.inverse import solve
-from trunkline.reachability.maps import Check, Maps
+from trunkline.reachability.maps import Maps
 from trunkline.reachability.mesh import Surface
 from trunkline.reachability.panda import DH_A, FLANGE, joint_frames
-from trunkline.reachability.tips import TipSamples
 
 SUN = np.array([0.35, -0.75, 0.55])  # towards the light
 POSE = (0.45, 0.0, 0.55)  # m, where the drawn Panda holds the mount
@@ -21,14 +21,19 @@ RIGID, SOFT, HYBRID = IDENTIFIED, INITIAL, VALIDATE
 WIDEST_SHOWN = 1.0  # m, of the label points: those in the corners of their box say little
 GRAVITY_ARROW = 0.7  # of the arm's length
 SLICES = 5  # gravity angles in the slice of the soft maps
+GOAL_IOU = 0.95
 SHOWN_DEG = (0.0, 60.0, 120.0)  # gravity angles of the paper's figure
 
 
-def maps_figure(maps: Maps, samples: TipSamples) -> Figure:
-    """The paper's figure: (a) rigid, (b) soft along gravity, (c) soft at three angles, (d) hybrid on the robot."""
+def maps_figure(maps: Maps, tips: list[NDArray]) -> Figure:
+    """The paper's figure: (a) rigid, (b) soft along gravity, (c) soft at three angles, (d) hybrid on the robot.
+
+    Args:
+        tips: of the soft arm (N, 3), m, at each of the ``maps.soft.mesh_angles``, the first of which is 0.
+    """
     figure = plt.figure(figsize=(12, 11))
     arm = panda_line(maps.mount_offset, maps.self_collision)
-    length = float(np.linalg.norm(samples.tips[0], axis=1).max())
+    length = float(np.linalg.norm(tips[0], axis=1).max())
     mount = np.array(POSE)
 
     a = _space(figure, 221, "(a) Panda, end effector straight down")
@@ -63,7 +68,7 @@ def maps_figure(maps: Maps, samples: TipSamples) -> Figure:
     return figure
 
 
-def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
+def slices_figure(maps: Maps, tips: list[NDArray], check: Check) -> Figure:
     """Slices through y = 0 with what they were checked against: labels, tips; and the hybrid around the rigid map."""
     figure, (rigid, soft, hybrid) = plt.subplots(1, 3, figsize=(14, 5.7))
     _fill_slice(rigid, maps.rigid, RIGID)
@@ -77,16 +82,15 @@ def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
     rigid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8, markerscale=1.5)
     rigid.set(title=f"Rigid: {100 * check.rigid.accuracy:.1f} % of labels agree", xlabel="±radius (m)", ylabel="z (m)")
 
-    shown = np.unique(np.linspace(0, len(samples.angles) - 1, SLICES).round().astype(int))
+    shown = np.unique(np.linspace(0, len(tips) - 1, SLICES).round().astype(int))
     colors = plt.get_cmap("viridis")(np.linspace(0, 0.9, len(shown)))
     x, y, z = maps.soft.lattice.axes()
     middle = int(np.abs(y).argmin())
     for index, color in zip(shown, colors, strict=True):
-        angle = samples.angles[index]
+        angle = maps.soft.mesh_angles[index]
         soft.contour(x, z, maps.soft.at(angle)[:, middle].T, levels=[0.0], colors=[color], linewidths=1.4)
-        tips = samples.tips[index]
-        near = np.abs(tips[:, 1]) < maps.soft.lattice.spacing / 2
-        soft.scatter(tips[near, 0], tips[near, 2], s=2, color=color, label=f"{np.degrees(angle):.0f}°")
+        near = tips[index][np.abs(tips[index][:, 1]) < maps.soft.lattice.spacing / 2]
+        soft.scatter(near[:, 0], near[:, 2], s=2, color=color, label=f"{np.degrees(angle):.0f}°")
     soft.plot(0, 0, "k^", markersize=8)
     soft.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=5, fontsize=8, markerscale=4,
                 title="lines: maps, dots: tips, at gravity angle")
@@ -109,14 +113,25 @@ def slices_figure(maps: Maps, samples: TipSamples, check: Check) -> Figure:
     return figure
 
 
-def heldout_figure(heldout: pd.DataFrame) -> Figure:
-    """Overlap of blended and own map at each gravity angle left out; columns ``angle_deg``, ``iou``."""
-    figure, axes = plt.subplots(figsize=(6, 3.6))
-    names = [f"{angle:.0f}°" for angle in heldout["angle_deg"]]
-    bars = axes.bar(names, heldout["iou"], color=IDENTIFIED, width=0.6)
-    axes.bar_label(bars, fmt="%.3f", padding=2, fontsize=9)
-    axes.set(ylim=(0, 1.05), xlabel="gravity angle left out", ylabel="IoU",
-             title="Soft map from the other angles, against its own")
+def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
+    """The soft maps at gravity angles without a grid.
+
+    Args:
+        heldout: columns ``angle_deg``, ``iou``, ``reachable``, ``beyond``.
+        beyond: m, how far from every tip the points beyond reach are.
+    """
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6))
+    left.plot(heldout["angle_deg"], heldout["iou"], "o-", color=IDENTIFIED, markersize=4)
+    left.axhline(GOAL_IOU, color=VALIDATE, linestyle="--", label=f"goal, {GOAL_IOU:g}")
+    left.set(ylim=(0.9, 1), ylabel="IoU", title="Blended map against the angle's own")
+    for name, color, label in (
+        ("reachable", IDENTIFIED, "tips"), ("beyond", INITIAL, f"points {1e3 * beyond:.0f} mm from every tip")
+    ):
+        right.plot(heldout["angle_deg"], 100 * heldout[name], "o-", color=color, markersize=4, label=label)
+    right.set(ylim=(-3, 103), ylabel="called reachable (%)", title="The signal that a headset shows")
+    for ax in (left, right):
+        ax.set_xlabel("gravity angle, half-way between grids (°)")
+        ax.legend(loc="center right")
     return figure
 
 

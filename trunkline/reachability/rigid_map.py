@@ -16,6 +16,10 @@ from trunkline.errors import InputError
 from trunkline.reachability.grid import Lattice, close_gaps, distance_from_cells, drop_specks, redistance
 from trunkline.reachability.panda import Q_MAX, forward
 
+# Distances from cells go up and down by a part of a cell along a slanting border. Without these steps, the mesh needs
+# half as many triangles for the same accuracy.
+STAIRCASE = 1.0  # cells of the profile, standard deviation of a Gaussian over its distances
+
 
 @dataclass(frozen=True)
 class Profile:
@@ -59,7 +63,8 @@ def profile(q: NDArray, mount_offset: float, spacing: float, closing: float, sma
     cells = np.concatenate([cells[:0:-1], cells])
     cells = drop_specks(close_gaps(cells, closing / spacing), smallest)
     # A cell counts as soon as the set touches it: its border lies half a cell too far out on average.
-    distance = distance_from_cells(cells, spacing)[len(cells) // 2:] + 0.5 * spacing
+    distance = distance_from_cells(cells, spacing) + 0.5 * spacing
+    distance = ndimage.gaussian_filter(distance, STAIRCASE)[len(cells) // 2:]
     lattice = Lattice(np.array([0.0, right.origin[1]]), spacing, distance.shape)
     window = 2 * int(np.ceil(closing / spacing)) + 1
     widest = _per_cell(np.maximum, lattice, plane, azimuth, -np.inf, window)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from trunkline.reachability.grid import Lattice, blend, overlap, redistance, without_specks
-from trunkline.reachability.tips import TipInterpolator, TipSamples
+from trunkline.reachability.grid import Lattice, redistance, without_specks
+from trunkline.reachability.tips import TipSource
 from trunkline.threads import thread_count
 
 
@@ -32,10 +32,11 @@ class SoftShape:
     smallest: int
 
 
-def soft_lattice(samples: TipSamples, shape: SoftShape, spacing: float) -> Lattice:
-    """One lattice for the maps of all angles."""
-    tips = np.concatenate(samples.tips)
-    return Lattice.around(tips.min(axis=0), tips.max(axis=0), spacing, shape.tolerance + shape.closing + 2 * spacing)
+def soft_lattice(tips: list[NDArray], shape: SoftShape, spacing: float) -> Lattice:
+    """One lattice for the maps of all angles, from the tips (N, 3) at each."""
+    every = np.concatenate(tips)
+    margin = shape.tolerance + shape.closing + 2 * spacing
+    return Lattice.around(every.min(axis=0), every.max(axis=0), spacing, margin)
 
 
 def soft_field(tips: NDArray, lattice: Lattice, shape: SoftShape) -> NDArray:
@@ -51,25 +52,13 @@ def soft_field(tips: NDArray, lattice: Lattice, shape: SoftShape) -> NDArray:
 
 
 def soft_fields(
-    samples: TipSamples, angles: NDArray, lattice: Lattice, shape: SoftShape, done: Callable[[float], None]
-) -> NDArray:
-    """Fields (len(angles), ...) at gravity ``angles`` (rad), sampled ones or between them; ``done`` hears of each."""
-    interpolator = TipInterpolator(samples, shape.tolerance / 2)
+    tips_at: TipSource, angles: NDArray, shape: SoftShape, spacing: float, done: Callable[[float], None]
+) -> tuple[NDArray, Lattice]:
+    """Fields (len(angles), ...) at gravity ``angles`` (rad) and the lattice they share; ``done`` hears of each."""
+    tips = [tips_at(angle).positions for angle in angles]
+    lattice = soft_lattice(tips, shape, spacing)
     fields = np.empty((len(angles), *lattice.shape), np.float32)
-    for field, angle in zip(fields, angles, strict=True):
-        field[:] = soft_field(interpolator.tips(angle), lattice, shape)
+    for field, here, angle in zip(fields, tips, angles, strict=True):
+        field[:] = soft_field(here, lattice, shape)
         done(angle)
-    return fields
-
-
-def heldout_overlap(
-    samples: TipSamples, index: int, own: NDArray, step: float, lattice: Lattice, shape: SoftShape
-) -> float:
-    """Overlap (IoU) of ``own``, the field at angle ``index``, with the blend that is made without its samples.
-
-    The blend is the headset's: linear between two fields ``step`` (rad) apart, here at its worst, half-way.
-    """
-    angle = samples.angles[index]
-    beside = angle + step * np.array([-0.5, 0.5])
-    fields = soft_fields(samples.without(index), beside, lattice, shape, lambda _: None)
-    return overlap(blend(fields, beside, angle), own)
+    return fields, lattice

@@ -1,0 +1,136 @@
+"""How good the maps are: by inverse kinematics, at gravity angles without a grid, by finding poses of both arms."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from trunkline.kinematics.chain import Chain
+from trunkline.reachability.grid import Lattice
+from trunkline.reachability.hybrid_check import draw_inside_and_outside, find_poses, verified
+from trunkline.reachability.labels import Agreement, agreement, draw_points, label
+from trunkline.reachability.maps import Maps
+from trunkline.reachability.mesh import Surface, contains, unsimplified
+from trunkline.reachability.mesh_distance import mesh_distance
+from trunkline.reachability.reach_signal import HeldOut, held_out, packed
+from trunkline.reachability.tips import TipSource
+
+
+@dataclass(frozen=True)
+class LabelSettings:
+    """See conf/reachability/config.yaml; margin in m."""
+
+    count: int
+    starts: int
+    starts_in_doubt: int
+    margin: float
+
+
+@dataclass(frozen=True)
+class SpotCheckSettings:
+    """See conf/reachability/config.yaml; outside in m."""
+
+    count: int
+    outside: float
+
+
+@dataclass(frozen=True)
+class Check:
+    """How good the maps are.
+
+    ``rigid``: agreement of the rigid mesh (``claimed``, (N,)) with labels (``reachable``, (N,)) at ``points``
+    (N, 3). ``heldout``: the soft maps half-way between their angles. ``found_inside``, ``found_outside``: shares of
+    points inside the hybrid map and a little outside it for which a pose of both arms was found and verified.
+    ``moved``: by kind of map, how far simplification moved the surface, in voxels, at most.
+    """
+
+    rigid: Agreement
+    points: NDArray
+    claimed: NDArray
+    reachable: NDArray
+    heldout: list[HeldOut]
+    found_inside: float
+    found_outside: float
+    moved: dict[str, float]
+
+
+def check_maps(
+    maps: Maps,
+    chain: Chain,
+    tips_at: TipSource,
+    labels: LabelSettings,
+    spot_check: SpotCheckSettings,
+    *,
+    seed: int,
+    done: Callable[[str], None],
+) -> Check:
+    """Check all maps. ``done`` hears of each check, of the soft one once per angle.
+
+    Args:
+        chain: of the soft arm, by which lengths lead to tips. tips_at: its tips at any gravity angle.
+    """
+    corners = maps.rigid.mesh.vertices
+    points = draw_points(corners.min(axis=0) - labels.margin, corners.max(axis=0) + labels.margin, labels.count, seed)
+    claimed = contains(maps.rigid.mesh, points)
+    reachable = label(
+        points,
+        seed=seed,
+        starts=labels.starts,
+        starts_in_doubt=labels.starts_in_doubt,
+        mount_offset=maps.mount_offset,
+        avoid_collisions=maps.self_collision,
+    )
+    done("labels")
+    heldout = check_soft(maps, tips_at, spot_check, seed, done)
+    shares = check_hybrid(maps, chain, tips_at, spot_check, seed)
+    done("spot check")
+    moved = {
+        "rigid": moved_voxels(maps.rigid.mesh, maps.rigid.field, maps.rigid.lattice),
+        "soft": max(
+            moved_voxels(mesh, maps.soft.at(angle), maps.soft.lattice)
+            for mesh, angle in zip(maps.soft.meshes, maps.soft.mesh_angles, strict=True)
+        ),
+        "hybrid": moved_voxels(maps.hybrid.mesh, maps.hybrid.field, maps.hybrid.lattice),
+    }
+    done("meshes")
+    return Check(agreement(claimed, reachable), points, claimed, reachable, heldout, *shares, moved)
+
+
+def check_soft(maps: Maps, tips_at: TipSource, spot_check: SpotCheckSettings, seed: int, done) -> list[HeldOut]:
+    """What a headset gets half-way between each two angles, where blending is at its worst."""
+    soft, results = maps.soft, []
+    fields = packed(soft.fields)
+    for angle in (soft.angles[1:] + soft.angles[:-1]) / 2:
+        tips = tips_at(angle).positions
+        results.append(held_out(fields, soft.angles, soft.lattice, soft.shape, tips, angle,
+                                beyond=spot_check.outside, count=10 * spot_check.count, seed=seed))
+        done(f"held-out {np.degrees(angle):g}°")
+    return results
+
+
+def check_hybrid(
+    maps: Maps, chain: Chain, tips_at: TipSource, spot_check: SpotCheckSettings, seed: int
+) -> tuple[float, float]:
+    """Shares of points inside the map, and outside it, to which both arms together bring the soft tip."""
+    tips, shares = tips_at(0.0), []
+    for points in draw_inside_and_outside(
+        maps.hybrid.field, maps.hybrid.lattice, spot_check.outside, spot_check.count, seed
+    ):
+        reach = find_poses(
+            points,
+            tips.positions,
+            maps.rigid.field,
+            maps.rigid.lattice,
+            seed=seed,
+            mount_offset=maps.mount_offset,
+            avoid_collisions=maps.self_collision,
+        )
+        shares.append(float(verified(points, reach, tips.lengths, chain, maps.mount_offset).mean()))
+    return tuple(shares)
+
+
+def moved_voxels(mesh: Surface, field: NDArray, lattice: Lattice) -> float:
+    """How far simplification moved the surface of ``field`` at most, in lattice steps."""
+    whole = unsimplified(field, lattice)
+    return mesh_distance((mesh.vertices, mesh.faces), whole, 0.5 * lattice.spacing) / lattice.spacing
