@@ -34,7 +34,7 @@ def main() -> None:
     rigid = build_rigid(settings, 8000, seed=0)
     seconds = time.perf_counter() - started
     print(f"{settings.poses} poses to a mesh of {len(rigid.mesh.faces)} triangles: {seconds:.1f} s, "
-          f"closed: {rigid.mesh.is_closed()}, moved by simplifying: {1e3 * rigid.mesh.tolerance:.1f} mm at most")
+          f"closed: {rigid.mesh.is_closed()}")
 
     q = sample_downward(arguments.targets, 1, settings.mount_offset)[:arguments.targets]
     positions, rotations = forward(q, settings.mount_offset)

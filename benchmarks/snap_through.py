@@ -4,7 +4,8 @@
 
 Lengths are those of random equilibria at random gravity angles from 0 to 120°, with one tendon slack, as the data set
 has them, and the same with that tendon drawn in by some millimetres more, so that all three pull against each other.
-First guesses are shapes of other equilibria, and random bends of both halves of the arm.
+First guesses are shapes of other equilibria, and random bends of both halves of the arm. Then both ventral tendons
+are drawn in alike, as for the paper's grasps, and equilibria are sought in the plane of bending and beside it.
 """
 
 import argparse
@@ -17,13 +18,15 @@ from trunkline.frames import gravity_in_base
 from trunkline.kinematics.chain import Chain, load_model, read_chain
 from trunkline.kinematics.restart import restart
 from trunkline.kinematics.sampling import pull_directions
-from trunkline.kinematics.statics import equilibrium
-from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, plt, save_figure
+from trunkline.kinematics.statics import equilibrium, equilibrium_paths
+from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt, save_figure
 from trunkline.progress import progress
 
 DRAWN_IN_MM = (0.0, 1.0, 2.0, 5.0, 10.0)  # of the slack tendon
 APART = 1e-3  # m; equilibria whose tips are nearer than this count as one
 LARGEST_ANGLE = np.radians(120)
+VENTRAL_DEG = (0, 60, 120)  # gravity angles for the two ventral tendons
+LEAN = (-0.1, -0.02, 0.02, 0.1)  # of one ventral tension over the other, where first guesses beside the plane come from
 
 
 class Found(NamedTuple):
@@ -56,8 +59,14 @@ def main() -> None:
         spread = f"{np.median(apart):.0f} mm apart (median), {apart.max():.0f} mm at most" if several.any() else "-"
         print(f"slack tendon drawn in by {drawn:2.0f} mm: {found.solved.mean():6.1%} within the motors' force, "
               f"of these {several.mean():6.2%} with more than one equilibrium, tips {spread}", flush=True)
+    ventral = {angle: ventral_pull(chain, np.radians(angle)) for angle in VENTRAL_DEG}
+    for angle, (drawn_in, aside) in ventral.items():
+        straight = drawn_in[np.abs(aside) < APART / 2]
+        beside = np.abs(aside) >= APART / 2
+        print(f"both ventral tendons alike, {angle:3d}°: in the plane up to {1e3 * straight.max():.0f} mm drawn in, "
+              f"beside it from {1e3 * drawn_in[beside].min():.0f} mm, by up to {1e3 * np.abs(aside).max():.0f} mm")
     if arguments.figure:
-        save_figure(figure(results), arguments.figure)
+        save_figure(figure(results, ventral), arguments.figure)
 
 
 def random_loads(chain: Chain, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -97,9 +106,36 @@ def first_guesses(chain: Chain, count: int, rng: np.random.Generator, random_ben
     return np.repeat(halves, [chain.units // 2, chain.units - chain.units // 2], axis=1).reshape(count, -1)
 
 
-def figure(results: dict[float, Found]):
-    """Share of lengths with several equilibria, and how far apart these are, over how far the tendon is drawn in."""
-    figure, (left, right) = plt.subplots(1, 2, figsize=(9, 3.8))
+def ventral_pull(chain: Chain, angle: float, steps: int = 80) -> tuple[np.ndarray, np.ndarray]:
+    """Stable equilibria with both ventral tendons at one length: how far it is drawn in, and how far the tip is aside.
+
+    Args:
+        angle: θ_G, rad.
+
+    Returns:
+        Both in m, (E,); drawn in from the straight arm's length.
+    """
+    gravity = gravity_in_base(angle)
+    shares = np.linspace(0, 1, steps) ** 2
+    leans = np.array([0.0, *LEAN])
+    ends = np.column_stack([np.zeros(len(leans)), 1 - np.maximum(leans, 0), 1 + np.minimum(leans, 0)])
+    paths = equilibrium_paths(chain, (ends * chain.max_tension)[:, None] * shares[:, None], gravity)
+    rows = paths.converged
+    both = paths.lengths[rows, 1:].mean(axis=1)
+    lengths = np.column_stack([np.full(len(both), 2 * chain.length), both, both])
+    found = restart(chain, paths.qpos[rows], paths.tensions[rows], lengths, gravity)
+    good = found.converged & (found.tensions <= chain.max_tension * (1 + 1e-6)).all(axis=1)
+    return chain.straight_lengths[1] - both[good], found.position[good, 1]
+
+
+def figure(results: dict[float, Found], ventral: dict[int, tuple[np.ndarray, np.ndarray]]):
+    """Share of lengths with several equilibria, and how far apart these are, over how far the tendon is drawn in;
+    where the tip goes when both ventral tendons are drawn in alike."""
+    figure, (left, right, plane) = plt.subplots(1, 3, figsize=(13, 3.9))
+    for (angle, (drawn_in, aside)), color in zip(ventral.items(), (IDENTIFIED, VALIDATE, INITIAL), strict=True):
+        plane.scatter(1e3 * drawn_in, 1e3 * aside, s=9, color=color, linewidths=0, label=f"θ_G = {angle}°")
+    plane.set(xlabel="both ventral tendons drawn in (mm)", ylabel="tip out of the plane (mm)")
+    plane.legend(loc="upper left", markerscale=2)
     drawn = list(results)
     places = np.arange(len(drawn))
     shares = [100 * (found.count[found.solved] > 1).mean() for found in results.values()]
@@ -109,8 +145,8 @@ def figure(results: dict[float, Found]):
     for place, found in zip(places, results.values(), strict=True):
         apart = 1e3 * found.apart[found.solved & (found.count > 1)]
         right.scatter(np.full(len(apart), place), apart, s=12, color=MEASURED, alpha=0.5, linewidths=0)
-    right.set(yscale="log", ylim=(0.8, 2e3), ylabel="their tips apart (mm)")
-    labels = ["one slack\n(data set)" if d == 0 else f"{d:.0f} mm\nshorter" for d in drawn]
+    right.set(yscale="log", ylim=(0.8, 200), ylabel="their tips apart (mm)")
+    labels = ["slack\n(data set)" if d == 0 else f"{d:.0f} mm\nshorter" for d in drawn]
     for ax in (left, right):
         ax.set_xticks(places, labels)
         ax.set_xlabel("third tendon")

@@ -65,10 +65,10 @@ def deviation_figure(deviation: pd.DataFrame) -> Figure:
         ax.axhline(GOAL_MM, color=VALIDATE, linestyle="--", label=f"goal for the median, {GOAL_MM:g} mm")
         ax.set(yscale="log", xlabel=label)
     axes[0].set_ylabel("distance of tips (mm)")
-    axes[0].legend(loc="upper center", bbox_to_anchor=(1.05, -0.2), ncols=3, markerscale=2)
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, markerscale=2)
     values, band = deviation["deviation_mm"], deviation["friction_band_mm"]
     figure.suptitle(
         f"Statics against MuJoCo, {len(deviation)} samples: median {values.median():.2g} mm, "
-        f"max {values.max():.2g} mm; friction: median {band.median():.2g} mm, max {band.max():.2g} mm"
+        f"max {values.max():.2g} mm\nfriction: median {band.median():.2g} mm, max {band.max():.2g} mm"
     )
     return figure

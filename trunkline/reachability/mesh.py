@@ -11,6 +11,7 @@ from skimage.measure import marching_cubes
 
 from trunkline.errors import InputError
 from trunkline.reachability.grid import Lattice
+from trunkline.reachability.mesh_fit import fit_vertices
 
 # Lattice points at exactly the level make marching cubes emit degenerate triangles and open edges.
 LEVEL = 1e-3  # voxels outside zero
@@ -20,14 +21,10 @@ TOLERANCE_GROWTH = 1.12
 
 @dataclass(frozen=True)
 class Surface:
-    """A closed triangle mesh: ``vertices`` (V, 3) in m, ``faces`` (F, 3), outward by the right-hand rule.
-
-    ``tolerance`` (m) bounds how far simplification moved the surface.
-    """
+    """A closed triangle mesh: ``vertices`` (V, 3) in m, ``faces`` (F, 3), outward by the right-hand rule."""
 
     vertices: NDArray
     faces: NDArray
-    tolerance: float
 
     @property
     def mesh(self) -> trimesh.Trimesh:
@@ -61,7 +58,8 @@ def surface(field: NDArray, lattice: Lattice, most_triangles: int, settings: str
         raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and {simple.num_tri()} "
                          f"triangles, expected 1 to reachability.most_triangles, {most_triangles}")
     mesh = simple.to_mesh()
-    return Surface(np.asarray(mesh.vert_properties[:, :3], float), np.asarray(mesh.tri_verts, int), tolerance)
+    vertices, faces = np.asarray(mesh.vert_properties[:, :3], float), np.asarray(mesh.tri_verts, int)
+    return Surface(fit_vertices(vertices, faces, field, lattice, LEVEL * lattice.spacing), faces)
 
 
 def unsimplified(field: NDArray, lattice: Lattice) -> tuple[NDArray, NDArray]:

@@ -62,7 +62,7 @@ def maps_figure(maps: Maps, tips: list[NDArray]) -> Figure:
     d = _space(figure, 224, "(d) Both: soft tip, soft arm hanging from the Panda")
     _add_surface(d, maps.hybrid.mesh, HYBRID, 0.22)
     soft = maps.soft.meshes[nearest[0]]
-    _add_surface(d, Surface(soft.vertices + mount, soft.faces, soft.tolerance), SOFT, 0.5)
+    _add_surface(d, Surface(soft.vertices + mount, soft.faces), SOFT, 0.5)
     _add_line(d, arm, MEASURED, 4)
     _frame(d, [maps.hybrid.mesh.vertices])
     return figure
@@ -123,15 +123,15 @@ def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6))
     left.plot(heldout["angle_deg"], heldout["iou"], "o-", color=IDENTIFIED, markersize=4)
     left.axhline(GOAL_IOU, color=VALIDATE, linestyle="--", label=f"goal, {GOAL_IOU:g}")
-    left.set(ylim=(0.9, 1), ylabel="IoU", title="Blended map against the angle's own")
+    left.set(ylim=(0.93, 1), ylabel="IoU", title="Blended map against the angle's own")
     for name, color, label in (
         ("reachable", IDENTIFIED, "tips"), ("beyond", INITIAL, f"points {1e3 * beyond:.0f} mm from every tip")
     ):
         right.plot(heldout["angle_deg"], 100 * heldout[name], "o-", color=color, markersize=4, label=label)
     right.set(ylim=(-3, 103), ylabel="called reachable (%)", title="The signal that a headset shows")
-    for ax in (left, right):
+    for ax, place in ((left, "lower right"), (right, "center right")):
         ax.set_xlabel("gravity angle, half-way between grids (°)")
-        ax.legend(loc="center right")
+        ax.legend(loc=place)
     return figure
 
 
