@@ -13,7 +13,7 @@ from trunkline.plots import save_figure
 from trunkline.progress import progress
 from trunkline.reachability.checks import Check, LabelSettings, SpotCheckSettings, check_maps
 from trunkline.reachability.maps import HybridSettings, Maps, RigidSettings, blend_angles, build_maps
-from trunkline.reachability.mesh import write_obj
+from trunkline.reachability.mesh import Surface, write_obj
 from trunkline.reachability.panda_mjcf import panda_spec
 from trunkline.reachability.plots import heldout_figure, maps_figure, slices_figure
 from trunkline.reachability.soft_map import SoftShape
@@ -62,6 +62,12 @@ class Hybrid:
     voxel: float = Field(ge=0.007, le=0.1)
     smoothing: float = Field(ge=0, le=5)
     smallest: PositiveInt
+    tilts_deg: list[float]
+    tilted_poses: int = Field(ge=1000, le=2**22)
+
+    def __post_init__(self) -> None:
+        if any(not 0 < tilt <= 120 for tilt in self.tilts_deg) or len(set(self.tilts_deg)) < len(self.tilts_deg):
+            raise ValueError(f"tilts_deg: found {self.tilts_deg}, expected different angles above 0, up to 120")
 
 
 @settings
@@ -87,13 +93,14 @@ def main(config: Config) -> None:
     shape = SoftShape(config.soft.tolerance, config.soft.closing, config.soft.smoothing, config.soft.smallest)
     step = np.radians(config.soft.angle_step_deg)
     fields = len(blend_angles(tips_at.angles, step))
-    with progress(2 * fields + 4, "reachability", "parts") as bar:
+    hybrid = {name: value for name, value in vars(config.hybrid).items() if name != "tilts_deg"}
+    with progress(2 * fields + 4 + len(config.hybrid.tilts_deg), "reachability", "parts") as bar:
         maps = build_maps(
             tips_at,
             tips_at.angles,
             RigidSettings(**vars(config.rigid)),
             shape,
-            HybridSettings(**vars(config.hybrid)),
+            HybridSettings(**hybrid, tilts=np.radians(config.hybrid.tilts_deg).tolist()),
             soft_voxel=config.soft.voxel,
             step=step,
             most_triangles=config.most_triangles,
@@ -153,12 +160,13 @@ def read_tips(path: Path, chain: Chain, config: Config) -> ArmTips:
 def metrics(maps: Maps, check: Check) -> dict:
     """What SPEC section 11 asks for, and how much it rests on."""
     soft = maps.soft.meshes
-    return {
-        "rigid": check.rigid._asdict() | {
-            "watertight": maps.rigid.mesh.is_closed(),
-            "triangles": len(maps.rigid.mesh.faces),
-            "moved_voxels": check.moved["rigid"],
-        },
+    space = {name: mesh_metrics(one.mesh, check.moved[name]) for name, one in maps.in_space().items()}
+    found = {
+        name: space[name] | {"found_inside": inside, "found_outside": outside}
+        for name, (inside, outside) in check.found.items()
+    }
+    return found | {
+        "rigid": check.rigid._asdict() | space["rigid"],
         "soft": {
             "heldout_iou_min": min(one.iou for one in check.heldout),
             "heldout_reachable_min": min(one.reachable for one in check.heldout),
@@ -167,14 +175,11 @@ def metrics(maps: Maps, check: Check) -> dict:
             "triangles": max(len(mesh.faces) for mesh in soft),
             "moved_voxels": check.moved["soft"],
         },
-        "hybrid": {
-            "found_inside": check.found_inside,
-            "found_outside": check.found_outside,
-            "watertight": maps.hybrid.mesh.is_closed(),
-            "triangles": len(maps.hybrid.mesh.faces),
-            "moved_voxels": check.moved["hybrid"],
-        },
     }
+
+
+def mesh_metrics(mesh: Surface, moved: float) -> dict:
+    return {"watertight": mesh.is_closed(), "triangles": len(mesh.faces), "moved_voxels": moved}
 
 
 if __name__ == "__main__":

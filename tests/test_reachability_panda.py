@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from trunkline.reachability.collision import clearance, segment_distance
-from trunkline.reachability.downward import sample_downward
+from trunkline.reachability.downward import sample_downward, sample_tilted
 from trunkline.reachability.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
 from trunkline.reachability.panda import DH_A, FLANGE, Q_MAX, Q_MIN, forward, jacobian, joint_frames, within_limits
 from trunkline.reachability.panda_mjcf import panda_spec
@@ -94,6 +94,17 @@ def test_downward_poses_point_down_within_limits():
     _, rotations = forward(q)
     assert len(q) >= 20_000
     assert np.abs(rotations[:, :, 2] - [0, 0, -1]).max() < 1e-9
+    assert within_limits(q).all()
+    assert (clearance(q, OFFSET) > 0).all()
+
+
+def test_tilted_poses_point_every_way_around_at_their_tilt():
+    q = sample_tilted(20_000, 0, 0.5, OFFSET, avoid_collisions=True)
+    _, rotations = forward(q)
+    pointing = rotations[:, :, 2]
+    np.testing.assert_allclose(pointing[:, 2], -np.cos(0.5), atol=1e-9)
+    headings = np.histogram(np.arctan2(pointing[:, 1], pointing[:, 0]), bins=12, range=(-np.pi, np.pi))[0]
+    assert headings.min() > 0.7 * headings.mean()
     assert within_limits(q).all()
     assert (clearance(q, OFFSET) > 0).all()
 

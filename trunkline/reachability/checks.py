@@ -1,5 +1,6 @@
 """How good the maps are: by inverse kinematics, at gravity angles without a grid, by finding poses of both arms."""
 
+import functools
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -8,13 +9,14 @@ from numpy.typing import NDArray
 
 from trunkline.kinematics.chain import Chain
 from trunkline.reachability.grid import Lattice
-from trunkline.reachability.hybrid_check import draw_inside_and_outside, find_poses, verified
+from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, verified
 from trunkline.reachability.labels import Agreement, agreement, draw_points, label
-from trunkline.reachability.maps import Maps
+from trunkline.reachability.maps import Map, Maps, angle_name
 from trunkline.reachability.mesh import Surface, contains, unsimplified
 from trunkline.reachability.mesh_distance import mesh_distance
 from trunkline.reachability.reach_signal import HeldOut, held_out, packed
-from trunkline.reachability.tips import TipSource
+from trunkline.reachability.tilted_map import find_tilted
+from trunkline.reachability.tips import Tips, TipSource
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,9 @@ class Check:
     """How good the maps are.
 
     ``rigid``: agreement of the rigid mesh (``claimed``, (N,)) with labels (``reachable``, (N,)) at ``points``
-    (N, 3). ``heldout``: the soft maps half-way between their angles. ``found_inside``, ``found_outside``: shares of
-    points inside the hybrid map and a little outside it for which a pose of both arms was found and verified.
-    ``moved``: by kind of map, how far simplification moved the surface, in voxels, at most.
+    (N, 3). ``heldout``: the soft maps half-way between their angles. ``found``: by name of each hybrid map, the shares
+    of points inside it and a little outside it for which a pose of both arms was found and verified. ``moved``: by name
+    of each map (the soft ones together), how far simplification moved the surface at most, in voxels.
     """
 
     rigid: Agreement
@@ -50,8 +52,7 @@ class Check:
     claimed: NDArray
     reachable: NDArray
     heldout: list[HeldOut]
-    found_inside: float
-    found_outside: float
+    found: dict[str, tuple[float, float]]
     moved: dict[str, float]
 
 
@@ -83,18 +84,15 @@ def check_maps(
     )
     done("labels")
     heldout = check_soft(maps, tips_at, spot_check, seed, done)
-    shares = check_hybrid(maps, chain, tips_at, spot_check, seed)
+    found = check_hybrid(maps, chain, tips_at, spot_check, seed)
     done("spot check")
-    moved = {
-        "rigid": moved_voxels(maps.rigid.mesh, maps.rigid.field, maps.rigid.lattice),
-        "soft": max(
-            moved_voxels(mesh, maps.soft.at(angle), maps.soft.lattice)
-            for mesh, angle in zip(maps.soft.meshes, maps.soft.mesh_angles, strict=True)
-        ),
-        "hybrid": moved_voxels(maps.hybrid.mesh, maps.hybrid.field, maps.hybrid.lattice),
-    }
+    moved = {name: moved_voxels(one.mesh, one.field, one.lattice) for name, one in maps.in_space().items()}
+    moved["soft"] = max(
+        moved_voxels(mesh, maps.soft.at(angle), maps.soft.lattice)
+        for mesh, angle in zip(maps.soft.meshes, maps.soft.mesh_angles, strict=True)
+    )
     done("meshes")
-    return Check(agreement(claimed, reachable), points, claimed, reachable, heldout, *shares, moved)
+    return Check(agreement(claimed, reachable), points, claimed, reachable, heldout, found, moved)
 
 
 def check_soft(maps: Maps, tips_at: TipSource, spot_check: SpotCheckSettings, seed: int, done) -> list[HeldOut]:
@@ -111,23 +109,23 @@ def check_soft(maps: Maps, tips_at: TipSource, spot_check: SpotCheckSettings, se
 
 def check_hybrid(
     maps: Maps, chain: Chain, tips_at: TipSource, spot_check: SpotCheckSettings, seed: int
-) -> tuple[float, float]:
-    """Shares of points inside the map, and outside it, to which both arms together bring the soft tip."""
-    tips, shares = tips_at(0.0), []
-    for points in draw_inside_and_outside(
-        maps.hybrid.field, maps.hybrid.lattice, spot_check.outside, spot_check.count, seed
-    ):
-        reach = find_poses(
-            points,
-            tips.positions,
-            maps.rigid.field,
-            maps.rigid.lattice,
-            seed=seed,
-            mount_offset=maps.mount_offset,
-            avoid_collisions=maps.self_collision,
-        )
-        shares.append(float(verified(points, reach, tips.lengths, chain, maps.mount_offset).mean()))
-    return tuple(shares)
+) -> dict[str, tuple[float, float]]:
+    """By hybrid map, shares of points inside and outside to which both arms together bring the soft tip."""
+    how = {"seed": seed, "mount_offset": maps.mount_offset, "avoid_collisions": maps.self_collision}
+
+    def shares(one: Map, tips: Tips, find: Callable[[NDArray], Reach]) -> tuple[float, float]:
+        sets = draw_inside_and_outside(one.field, one.lattice, spot_check.outside, spot_check.count, seed)
+        return tuple(float(verified(p, find(p), tips.lengths, chain, maps.mount_offset).mean()) for p in sets)
+
+    down, rigid = tips_at(0.0), maps.rigid
+    found = {"hybrid": shares(
+        maps.hybrid, down, lambda points: find_poses(points, down.positions, rigid.field, rigid.lattice, **how)
+    )}  # fmt: skip
+    for one in maps.tilted:
+        tips = tips_at(one.tilt)
+        find = functools.partial(find_tilted, pairs=one.pairs, tips=tips.positions, **how)
+        found[angle_name(one.tilt, "hybrid")] = shares(one, tips, find)
+    return found
 
 
 def moved_voxels(mesh: Surface, field: NDArray, lattice: Lattice) -> float:

@@ -1,11 +1,11 @@
-"""Exact sampling of the Panda's poses whose end effector points straight down.
+"""Exact sampling of the Panda's poses whose end effector points straight down, or a given angle off it.
 
-Draw q1 to q4 freely. With u = R04^T (0, 0, -1), the direction in which the end effector shall point seen from
-frame 4, the wrist has two solutions (s = +1 and -1):
+Draw q1 to q4 freely. With u = R04^T d, d = (0, 0, -1) or tilted from it, the direction in which the end effector shall
+point seen from frame 4, the wrist has two solutions (s = +1 and -1):
 
     q6 = acos(-u_y)  or  2 pi - acos(-u_y),    q5 = atan2(-s u_z, s u_x),
 
-and q7 is free. Every sample points down exactly; only the limits of q5 and q6 (and collisions) reject any.
+and q7 is free. Every sample points there exactly; only the limits of q5 and q6 (and collisions) reject any.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -33,11 +33,20 @@ def sample_downward(count: int, seed: int, mount_offset: float = 0.0, avoid_coll
         mount_offset: from the flange to the mount, in m; matters for collisions only.
         avoid_collisions: leave out poses in which the arm touches itself.
     """
+    return _sample(qmc.Sobol(6, seed=seed), count, 0.0, mount_offset, avoid_collisions)
+
+
+def sample_tilted(count: int, seed: int, tilt: float, mount_offset: float, avoid_collisions: bool) -> NDArray:
+    """As ``sample_downward``, with the end effector ``tilt`` rad off straight down, its headings uniform."""
+    return _sample(qmc.Sobol(7, seed=seed), count, tilt, mount_offset, avoid_collisions)
+
+
+def _sample(sequence: qmc.Sobol, count: int, tilt: float, mount_offset: float, avoid_collisions: bool) -> NDArray:
     def solve(draws: NDArray) -> NDArray:
-        poses = _solve(draws)
+        poses = _solve(draws, tilt)
         return poses[clearance(poses, mount_offset) > 0.0] if avoid_collisions else poses
 
-    sequence, threads = qmc.Sobol(6, seed=seed), thread_count()
+    threads = thread_count()
     found, total = [], 0
     with ThreadPoolExecutor(threads) as pool:
         while total < count:
@@ -48,15 +57,17 @@ def sample_downward(count: int, seed: int, mount_offset: float = 0.0, avoid_coll
     return np.concatenate(found)
 
 
-def _solve(draws: NDArray) -> NDArray:
-    """Poses from uniform ``draws`` (N, 6): four joints, q7, and which border to sit on, if any."""
+def _solve(draws: NDArray, tilt: float) -> NDArray:
+    """Poses from uniform ``draws`` (N, 6 or 7): four joints, q7, which border to sit on, if any, and the heading."""
     free = [0, 1, 2, 3, 6]
     q = np.empty((len(draws), 7))
     q[:, free] = Q_MIN[free] + draws[:, :5] * (Q_MAX - Q_MIN)[free]
     border = (draws[:, 5] / BORDER_SHARE * len(BORDER_VALUES)).astype(int)
     for index, (joint, value) in enumerate(BORDER_VALUES):
         q[border == index, joint] = value
-    q5, q6 = wrist_downward(q[:, :4])
+    heading = 2 * np.pi * draws[:, 6] if draws.shape[1] > 6 else np.zeros(len(draws))
+    level = np.sin(tilt) * np.array([np.cos(heading), np.sin(heading)])
+    q5, q6 = wrist_towards(q[:, :4], np.vstack([level, np.full(len(draws), -np.cos(tilt))]))
     branches = []
     for s in (0, 1):
         branch = q.copy()
@@ -66,9 +77,10 @@ def _solve(draws: NDArray) -> NDArray:
     return poses[within_limits(poses)]
 
 
-def wrist_downward(q: NDArray) -> tuple[NDArray, NDArray]:
-    """Both solutions (q5, q6), each (2, N) in rad, that point the end effector down, given q1..q4 (N, 4)."""
+def wrist_towards(q: NDArray, direction: NDArray) -> tuple[NDArray, NDArray]:
+    """Both solutions (q5, q6), each (2, N) in rad, that point the end effector along ``direction`` (3, N) of the base
+    frame, of unit length, given q1..q4 (N, 4)."""
     frame = joint_frames(q)[-1]
-    ux, uy, uz = -frame.x[2], -frame.y[2], -frame.z[2]
+    ux, uy, uz = ((axis * direction).sum(axis=0) for axis in frame[:3])
     q6 = np.arccos(np.clip(-uy, -1.0, 1.0))
     return np.stack([np.arctan2(-uz, ux), np.arctan2(uz, -ux)]), np.stack([q6, 2 * np.pi - q6])

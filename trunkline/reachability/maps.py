@@ -13,6 +13,7 @@ from trunkline.reachability.mesh import Surface, surface
 from trunkline.reachability.reach_signal import THRESHOLD, packed
 from trunkline.reachability.rigid_map import profile, rigid_field
 from trunkline.reachability.soft_map import SoftShape, soft_fields
+from trunkline.reachability.tilted_map import Pairs, draw_pairs, tilted_field
 from trunkline.reachability.tips import TipSource
 
 
@@ -32,11 +33,13 @@ class RigidSettings:
 
 @dataclass(frozen=True)
 class HybridSettings:
-    """See conf/reachability/config.yaml; voxel in m, smoothing in lattice steps."""
+    """See conf/reachability/config.yaml; voxel in m, smoothing in lattice steps, tilts in rad."""
 
     voxel: float
     smoothing: float
     smallest: int
+    tilts: list[float]
+    tilted_poses: int
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,14 @@ class Map:
     field: NDArray
     lattice: Lattice
     mesh: Surface
+
+
+@dataclass(frozen=True)
+class TiltedMap(Map):
+    """A hybrid map with the end effector ``tilt`` rad off straight down, and the ``pairs`` that sample it."""
+
+    tilt: float
+    pairs: Pairs
 
 
 @dataclass(frozen=True)
@@ -75,13 +86,14 @@ class Maps:
     rigid: Map
     soft: SoftMaps
     hybrid: Map
+    tilted: list[TiltedMap]
     mount_offset: float
     self_collision: bool
 
     def arrays(self) -> dict[str, NDArray]:
         """Grids by name (float16, m), each with ``<name>_origin`` and ``<name>_spacing``; soft ones share theirs."""
         arrays = {}
-        for name, one in (("rigid", self.rigid), ("hybrid", self.hybrid)):
+        for name, one in self.in_space().items():
             arrays |= {name: one.field.astype(np.float16)} | _placement(name, one.lattice)
         names = [angle_name(angle) for angle in self.soft.angles]
         arrays |= dict(zip(names, packed(self.soft.fields), strict=True))
@@ -92,13 +104,18 @@ class Maps:
     def meshes(self) -> dict[str, Surface]:
         """Surfaces by name."""
         soft = {angle_name(a): m for a, m in zip(self.soft.mesh_angles, self.soft.meshes, strict=True)}
-        return {"rigid": self.rigid.mesh, "hybrid": self.hybrid.mesh} | soft
+        return {name: one.mesh for name, one in self.in_space().items()} | soft
+
+    def in_space(self) -> dict[str, Map]:
+        """The maps in the Panda's base frame by name."""
+        tilted = {angle_name(one.tilt, "hybrid"): one for one in self.tilted}
+        return {"rigid": self.rigid, "hybrid": self.hybrid} | tilted
 
 
-def angle_name(angle: float) -> str:
-    """``soft_`` and the angle in degrees, three digits before the point: ``soft_060``, ``soft_007p5``."""
+def angle_name(angle: float, kind: str = "soft") -> str:
+    """``kind`` and the angle in degrees, three digits before the point: ``soft_060``, ``soft_007p5``."""
     text = f"{np.degrees(angle):06.2f}".rstrip("0").rstrip(".")
-    return "soft_" + text.replace(".", "p")
+    return f"{kind}_" + text.replace(".", "p")
 
 
 def build_maps(
@@ -130,7 +147,23 @@ def build_maps(
     )
     hybrid_map = Map(field, lattice, surface(field, lattice, most_triangles, "reachability.hybrid"))
     done("hybrid")
-    return Maps(rigid_map, soft_maps, hybrid_map, rigid.mount_offset, rigid.self_collision)
+    tilted_maps = []
+    for tilt in hybrid.tilts:
+        tilted_maps.append(build_tilted(tips_at, rigid, hybrid, tilt, most_triangles, seed))
+        done(angle_name(tilt, "hybrid"))
+    return Maps(rigid_map, soft_maps, hybrid_map, tilted_maps, rigid.mount_offset, rigid.self_collision)
+
+
+def build_tilted(
+    tips_at: TipSource, rigid: RigidSettings, hybrid: HybridSettings, tilt: float, most_triangles: int, seed: int
+) -> TiltedMap:
+    """The hybrid map with the end effector ``tilt`` rad off straight down."""
+    pairs = draw_pairs(tips_at(tilt).positions, tilt, hybrid.tilted_poses, seed,
+                       mount_offset=rigid.mount_offset, avoid_collisions=rigid.self_collision)
+    field, lattice = tilted_field(
+        pairs, rigid.profile_voxel, rigid.closing, hybrid.voxel, hybrid.smoothing, hybrid.smallest
+    )
+    return TiltedMap(field, lattice, surface(field, lattice, most_triangles, "reachability.hybrid"), tilt, pairs)
 
 
 def build_rigid(rigid: RigidSettings, most_triangles: int, seed: int) -> Map:

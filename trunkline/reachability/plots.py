@@ -102,10 +102,15 @@ def slices_figure(maps: Maps, tips: list[NDArray], check: Check) -> Figure:
     hybrid.contour(x, z, rigid_slice, levels=[0.0], colors=[RIGID], linewidths=1.5)
     hybrid.plot([], [], color=RIGID, label="mount (rigid map)")
     hybrid.plot([], [], color=HYBRID, linewidth=6, alpha=0.6, label="soft tip (hybrid map)")
+    for one, style in zip(maps.tilted, ("--", ":", "-."), strict=False):
+        x, y, z = one.lattice.axes()
+        hybrid.contour(x, z, one.field[:, int(np.abs(y).argmin())].T, levels=[0.0], colors=[INITIAL], linestyles=style)
+        hybrid.plot([], [], style, color=INITIAL, label=f"soft tip, tilted by {np.degrees(one.tilt):.0f}°")
     arm = panda_line(maps.mount_offset, maps.self_collision)
     hybrid.plot(arm[:, 0], arm[:, 2], color=MEASURED, linewidth=3, label="Panda")
     hybrid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8)
-    hybrid.set(title=f"Hybrid: poses found for {100 * check.found_inside:.1f} % inside", xlabel="x (m)", ylabel="z (m)")
+    inside = 100 * check.found["hybrid"][0]
+    hybrid.set(title=f"Hybrid: poses found for {inside:.1f} % inside", xlabel="x (m)", ylabel="z (m)")
     rigid.set_xlim(-WIDEST_SHOWN, WIDEST_SHOWN)
     for axes in (rigid, soft, hybrid):
         axes.set_aspect("equal")

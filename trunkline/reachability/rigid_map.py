@@ -54,7 +54,13 @@ def profile(q: NDArray, mount_offset: float, spacing: float, closing: float, sma
         closing: radius in m of the gaps between samples that are filled.
         smallest: islands and holes of fewer cells than this vanish.
     """
-    radius, height, azimuth = _cylinder(q, mount_offset)
+    return outline(*_cylinder(q, mount_offset), spacing, closing, smallest)
+
+
+def outline(
+    radius: NDArray, height: NDArray, azimuth: NDArray, spacing: float, closing: float, smallest: int
+) -> Profile:
+    """As ``profile``, from points at ``radius`` and ``height`` (N,), m, and ``azimuth`` |phi0| (N,), rad."""
     plane = np.column_stack([radius, height])
     # Cells of r < 0 mirror those of r > 0, so that the axis is no border.
     right = Lattice.around([0.0, height.min()], [radius.max(), height.max()], spacing, closing + 3 * spacing)
@@ -95,14 +101,19 @@ def rigid_field(shape: Profile, spacing: float, smoothing: float) -> tuple[NDArr
     return ndimage.gaussian_filter(field, smoothing) if smoothing else field, lattice
 
 
+def azimuth_from_joint_1(points: NDArray, joint_1: NDArray) -> NDArray:
+    """|phi0| (N,), rad, at which ``points`` (N, 3) would be with q1 = 0 instead of ``joint_1`` (N,), rad."""
+    azimuth = np.arctan2(points[:, 1], points[:, 0]) - joint_1
+    return np.abs((azimuth + np.pi) % (2 * np.pi) - np.pi)
+
+
 def _cylinder(q: NDArray, mount_offset: float) -> tuple[NDArray, NDArray, NDArray]:
     """Radius (m), height (m) and |phi0| (rad), each (N,), of the mount."""
     chunks = []
     for start in range(0, len(q), 1 << 15):
         part = q[start:start + (1 << 15)]
         position, _ = forward(part, mount_offset)
-        azimuth = np.arctan2(position[:, 1], position[:, 0]) - part[:, 0]
-        azimuth = np.abs((azimuth + np.pi) % (2 * np.pi) - np.pi)
+        azimuth = azimuth_from_joint_1(position, part[:, 0])
         chunks.append(np.column_stack([np.hypot(position[:, 0], position[:, 1]), position[:, 2], azimuth]))
     return tuple(np.concatenate(chunks).T)
 

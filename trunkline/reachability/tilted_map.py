@@ -1,0 +1,99 @@
+"""The hybrid map at a tilt: where the soft tip can be while the end effector points a given angle off straight down.
+
+The soft arm's gravity angle then is that tilt, and joint 7 turns the arm so that gravity lies in the plane of tendon 1,
+as in the data set. The tips go with the heading of the tilt, so the map is no sum of two sets. But joint 1 still turns
+everything about the vertical: pairs of a rigid pose and a soft tip give points in (r, z) and azimuth, and these a map
+as in ``rigid_map``.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from trunkline.reachability.downward import sample_tilted
+from trunkline.reachability.grid import Lattice
+from trunkline.reachability.hybrid_check import STARTS, TRIES, Reach
+from trunkline.reachability.inverse import solve
+from trunkline.reachability.panda import Q_MAX, Q_MIN, forward
+from trunkline.reachability.rigid_map import azimuth_from_joint_1, outline, rigid_field
+
+TIPS_PER_POSE = 8
+NEAREST = 200  # pairs whose points are nearest to a target in (r, z), among which poses are looked for
+
+
+class Pairs(NamedTuple):
+    """Rigid poses ``q`` (P, 7) in rad; of N pairs the ``pose`` (N,), the soft ``tip`` (N,) and where it is brought,
+    ``points`` (N, 3) in m."""
+
+    q: NDArray
+    pose: NDArray
+    tip: NDArray
+    points: NDArray
+
+
+def draw_pairs(
+    tips: NDArray, tilt: float, count: int, seed: int, *, mount_offset: float, avoid_collisions: bool
+) -> Pairs:
+    """At least ``count`` rigid poses at ``tilt`` (rad), ``TIPS_PER_POSE`` of the soft ``tips`` (M, 3) at each."""
+    q = sample_tilted(count, seed, tilt, mount_offset, avoid_collisions)
+    mount, rotation = forward(q, mount_offset)
+    base = soft_base(rotation[:, :, 2])
+    index = np.random.default_rng(seed).integers(0, len(tips), (TIPS_PER_POSE, len(q)))
+    points = [mount + np.einsum("nij,nj->ni", base, tips[some]) for some in index]
+    return Pairs(q, np.tile(np.arange(len(q)), TIPS_PER_POSE), index.reshape(-1), np.concatenate(points))
+
+
+def soft_base(pointing: NDArray) -> NDArray:
+    """Axes of the soft arm's base frame, in columns, where the end effector is ``pointing`` (N, 3). Shape (N, 3, 3).
+
+    The base's z points backwards, its y is level, and gravity has a positive x in it.
+    """
+    z = -pointing
+    y = np.column_stack([-z[:, 1], z[:, 0], np.zeros(len(z))])
+    length = np.linalg.norm(y, axis=1, keepdims=True)
+    y = np.where(length > 1e-9, y / np.maximum(length, 1e-9), [0.0, 1.0, 0.0])
+    return np.stack([np.cross(y, z), y, z], axis=2)
+
+
+def tilted_field(
+    pairs: Pairs, profile_voxel: float, closing: float, voxel: float, smoothing: float, smallest: int
+) -> tuple[NDArray, Lattice]:
+    """Signed distance field of the set that ``pairs`` sample, see ``rigid_map.profile`` and ``rigid_field``; m."""
+    azimuth = azimuth_from_joint_1(pairs.points, pairs.q[pairs.pose, 0])
+    radius = np.hypot(pairs.points[:, 0], pairs.points[:, 1])
+    shape = outline(radius, pairs.points[:, 2], azimuth, profile_voxel, closing, smallest)
+    return rigid_field(shape, voxel, smoothing)
+
+
+def find_tilted(
+    points: NDArray, pairs: Pairs, tips: NDArray, *, seed: int, mount_offset: float, avoid_collisions: bool
+) -> Reach:
+    """Rigid pose and soft tip for each of ``points`` (N, 3), as ``hybrid_check.find_poses``, near drawn ``pairs``."""
+    plane = np.column_stack([np.hypot(pairs.points[:, 0], pairs.points[:, 1]), pairs.points[:, 2]])
+    _, near = cKDTree(plane).query(np.column_stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]]), k=NEAREST)
+    turn = np.arctan2(points[:, 1], points[:, 0])[:, None]
+    turn = turn - np.arctan2(pairs.points[near, 1], pairs.points[near, 0])  # (N, NEAREST), of joint 1
+    joint_1 = pairs.q[pairs.pose[near], 0]
+    first = (joint_1 + turn + np.pi) % (2 * np.pi) - np.pi
+    turn = first - joint_1
+    outside = np.maximum(Q_MIN[0] - first, first - Q_MAX[0])
+    order = np.argsort(np.maximum(outside, 0.0), axis=1, kind="stable")[:, :TRIES]
+    count = len(points)
+    reach = Reach(np.zeros(count, bool), np.zeros((count, 7)), np.zeros(count, int), np.zeros(count))
+    for attempt in range(TRIES):
+        left = np.flatnonzero(~reach.found)
+        if not len(left):
+            break
+        chosen = order[left, attempt]
+        pair = near[left, chosen]
+        q = pairs.q[pairs.pose[pair]]
+        q[:, 0] += turn[left, chosen]
+        base = soft_base(forward(q, mount_offset)[1][:, :, 2])
+        mount = points[left] - np.einsum("nij,nj->ni", base, tips[pairs.tip[pair]])
+        result = solve(mount, base * np.array([1.0, -1.0, -1.0]), seed=seed + attempt, starts=STARTS,
+                       mount_offset=mount_offset, avoid_collisions=avoid_collisions)
+        at = left[result.success]
+        reach.found[at], reach.q[at], reach.tip[at] = True, result.q[result.success], pairs.tip[pair[result.success]]
+    return reach
