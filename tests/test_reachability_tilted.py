@@ -52,7 +52,7 @@ def test_joint_1_turns_points_without_changing_their_azimuth(pairs):
 
 
 def test_points_inside_are_reached_at_the_tilt_and_points_outside_are_not(chain, tips, pairs):
-    field, lattice = tilted_field(pairs, 0.008, 0.024, 0.02, 1.0, 30)
+    field, lattice = tilted_field(pairs, 0.02, 1.0, 30)
     inside, outside = draw_inside_and_outside(field, lattice, 0.04, 20, seed=0)
     reach = find_tilted(inside, pairs, tips.positions, seed=0, **HOW)
     assert verified(inside, reach, tips.lengths, chain, OFFSET).mean() >= 0.95

@@ -160,9 +160,7 @@ def build_tilted(
     """The hybrid map with the end effector ``tilt`` rad off straight down."""
     pairs = draw_pairs(tips_at(tilt).positions, tilt, hybrid.tilted_poses, seed,
                        mount_offset=rigid.mount_offset, avoid_collisions=rigid.self_collision)
-    field, lattice = tilted_field(
-        pairs, rigid.profile_voxel, rigid.closing, hybrid.voxel, hybrid.smoothing, hybrid.smallest
-    )
+    field, lattice = tilted_field(pairs, hybrid.voxel, hybrid.smoothing, hybrid.smallest)
     return TiltedMap(field, lattice, surface(field, lattice, most_triangles, "reachability.hybrid"), tilt, pairs)
 
 

@@ -193,7 +193,7 @@ def _frame(axes, vertices: list[NDArray]) -> None:
     every = np.concatenate(vertices)
     lower, upper = every.min(axis=0), every.max(axis=0)
     axes.set(xlim=(lower[0], upper[0]), ylim=(lower[1], upper[1]), zlim=(lower[2], upper[2]))
-    axes.set_box_aspect(upper - lower)
+    axes.set_box_aspect(upper - lower, zoom=0.85)  # room for the labels
 
 
 def _fill_slice(axes, one, color: str) -> None:

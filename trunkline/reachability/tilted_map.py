@@ -57,14 +57,16 @@ def soft_base(pointing: NDArray) -> NDArray:
     return np.stack([np.cross(y, z), y, z], axis=2)
 
 
-def tilted_field(
-    pairs: Pairs, profile_voxel: float, closing: float, voxel: float, smoothing: float, smallest: int
-) -> tuple[NDArray, Lattice]:
-    """Signed distance field of the set that ``pairs`` sample, see ``rigid_map.profile`` and ``rigid_field``; m."""
+def tilted_field(pairs: Pairs, spacing: float, smoothing: float, smallest: int) -> tuple[NDArray, Lattice]:
+    """Signed distance field, m, of the set that ``pairs`` sample, on a lattice of ``spacing`` m.
+
+    Its profile has cells half as wide; gaps in it up to twice ``spacing`` are filled. For ``smoothing`` see
+    ``rigid_map.rigid_field``, for ``smallest`` ``rigid_map.profile``.
+    """
     azimuth = azimuth_from_joint_1(pairs.points, pairs.q[pairs.pose, 0])
     radius = np.hypot(pairs.points[:, 0], pairs.points[:, 1])
-    shape = outline(radius, pairs.points[:, 2], azimuth, profile_voxel, closing, smallest)
-    return rigid_field(shape, voxel, smoothing)
+    shape = outline(radius, pairs.points[:, 2], azimuth, spacing / 2, spacing, smallest)
+    return rigid_field(shape, spacing, smoothing)
 
 
 def find_tilted(

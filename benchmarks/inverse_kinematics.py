@@ -1,0 +1,57 @@
+"""The network's answers one at a time on one thread, as a headset asks, and Gauss-Newton steps from them.
+
+    python -m benchmarks.inverse_kinematics [artifacts/train_ik/ik.onnx]
+
+Targets are fresh equilibria of the calibrated arm at random gravity angles from 0 to 120°.
+"""
+
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import onnxruntime
+
+from trunkline.frames import gravity_in_base
+from trunkline.kinematics.chain import load_model, read_chain
+from trunkline.kinematics.polish import polish
+from trunkline.kinematics.sampling import pull_directions
+from trunkline.kinematics.statics import equilibrium
+
+MODEL = Path("artifacts/identify_control/arm.xml")
+TARGETS, SINGLE = 400, 5000
+
+
+def main(path: Path) -> None:
+    chain = read_chain(load_model(MODEL))
+    rng = np.random.default_rng(0)
+    angles = rng.uniform(0, np.radians(120), TARGETS)
+    tensions = pull_directions(chain, rng.uniform(0, 2 * np.pi, TARGETS)) * rng.uniform(0, 1, (TARGETS, 1)) ** 2
+    rest = equilibrium(chain, tensions, gravity_in_base(angles))
+    targets = np.column_stack([angles, rest.position, rest.quaternion])[rest.converged]
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    network = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    poses, times = targets.astype(np.float32), []
+    for index in range(SINGLE):
+        one = poses[index % len(poses)][None]
+        started = time.perf_counter()
+        network.run(None, {"pose": one})
+        times.append(time.perf_counter() - started)
+    print(f"{path}: median {1e6 * np.median(times):.1f} us an answer, one thread")
+
+    answers = network.run(None, {"pose": poses})[0].astype(float)
+    polish(chain, targets[:2], answers[:2])  # compiles
+    for steps in (0, 1, 2, 3):
+        started = time.perf_counter()
+        found = polish(chain, targets, answers, steps)
+        seconds = (time.perf_counter() - started) / len(targets)
+        error = 1e3 * found.position_error
+        print(f"{steps} Gauss-Newton steps: tip error median {np.median(error):.2g} mm, 95 % below "
+              f"{np.quantile(error, 0.95):.2g} mm, {(found.position_error <= 1e-3 * chain.length).mean():.1%} within 0.1 % of length, "
+              f"{1e3 * seconds:.1f} ms each, the first forward kinematics included")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else "artifacts/train_ik/ik.onnx"))
