@@ -49,7 +49,8 @@ def main(path: Path) -> None:
         seconds = (time.perf_counter() - started) / len(targets)
         error = 1e3 * found.position_error
         print(f"{steps} Gauss-Newton steps: tip error median {np.median(error):.2g} mm, 95 % below "
-              f"{np.quantile(error, 0.95):.2g} mm, {(found.position_error <= 1e-3 * chain.length).mean():.1%} within 0.1 % of length, "
+              f"{np.quantile(error, 0.95):.2g} mm, "
+              f"{(found.position_error <= 1e-3 * chain.length).mean():.1%} within 0.1 % of length, "
               f"{1e3 * seconds:.1f} ms each, the first forward kinematics included")
 
 
