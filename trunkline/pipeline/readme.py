@@ -1,4 +1,4 @@
-"""``python -m trunkline.pipeline.readme``: regenerate the README's graph, table of results and picture.
+"""``python -m trunkline.pipeline.readme``: regenerate the READMEs' graph, tables of results and pictures.
 
 Generated blocks stand between ``<!-- name -->`` and ``<!-- /name -->``.
 """
@@ -12,9 +12,14 @@ from pathlib import Path
 import networkx
 from dvc.repo import Repo
 
-from trunkline.pipeline.gate import Limit, lookup, read_limits
+from trunkline.pipeline.gate import Limit, Limits, lookup, read_limits
 
-PICTURE = Path("artifacts/identify_control/distances.png")  # copied to docs/: Git holds no artifacts
+# where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
+PICTURES = {
+    "artifacts/identify_control/distances.png": "docs/distances.png",
+    "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
+}
+EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README and of its own README
 
 # E_internal of the paper's arm before and after, over 437 frames
 PAPER = {"cad": "89.8 mm (17 %)", "identified": "15.8 mm (3 %)"}
@@ -56,6 +61,17 @@ RESULTS = {
 }
 
 
+EXAMPLE_RESULTS = {
+    "identify_damping": [
+        ("Held-out releases: mean position error", "identified.validate.e_position_mm", "mm"),
+        ("… of the arm's length", "identified.validate.e_position_pct", "%"),
+        ("… E_internal", "identified.validate.e_internal_mm", "mm"),
+        ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
+        ("Releases to identify from: mean position error", "identified.identify.e_position_mm", "mm"),
+    ],
+}
+
+
 def pipeline_graph(root: Path) -> str:
     """The stages of dvc.yaml as a mermaid flowchart; edges that follow from others are left out."""
     with Repo(str(root)) as repo:
@@ -73,11 +89,10 @@ def pipeline_graph(root: Path) -> str:
     return "\n".join([*lines, "```"])
 
 
-def results_table(root: Path) -> str:
+def results_table(root: Path, results: dict[str, list[tuple[str, str, str]]], limits: Limits) -> str:
     """The metrics in the working tree as a Markdown table, beside the gate's bounds."""
-    limits = read_limits(root / "tests" / "limits.yaml")
     lines = ["| measure | found | bound |", "|---|---:|---:|"]
-    for stage, rows in RESULTS.items():
+    for stage, rows in results.items():
         path = root / "artifacts" / stage / "metrics.json"
         metrics = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
         for what, key, unit in rows:
@@ -130,27 +145,31 @@ def with_blocks(text: str, blocks: dict[str, str]) -> str:
     for name, content in blocks.items():
         block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
         if not block.search(text):
-            raise ValueError(f"README.md: expected a block `<!-- {name} -->` … `<!-- /{name} -->`")
+            raise ValueError(f"expected a block `<!-- {name} -->` … `<!-- /{name} -->`")
         text = block.sub(lambda match, content=content: f"{match[1]}{content}\n{match[2]}", text)
     return text
 
 
-def generate(root: Path) -> str:
-    """README.md with its generated blocks as they should be."""
-    text = (root / "README.md").read_text(encoding="utf-8")
-    blocks = {
-        "pipeline": pipeline_graph(root),
-        "identification": identification_table(root),
-        "results": results_table(root),
-    }
-    return with_blocks(text, blocks)
+def generate(root: Path) -> dict[Path, str]:
+    """README.md and the examples' own, with their generated blocks as they should be."""
+    examples = {}
+    for name in EXAMPLES:
+        folder = root / "examples" / name
+        examples[name] = results_table(folder, EXAMPLE_RESULTS, read_limits(folder / "limits.yaml"))
+    results = results_table(root, RESULTS, read_limits(root / "tests" / "limits.yaml"))
+    own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
+    blocks = {root / "README.md": own | examples}
+    blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
+    return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}
 
 
 def main(root: Path = Path(".")) -> int:
-    (root / "README.md").write_text(generate(root), encoding="utf-8")
-    if (root / PICTURE).is_file():
-        (root / "docs").mkdir(exist_ok=True)
-        shutil.copyfile(root / PICTURE, root / "docs" / PICTURE.name)
+    for path, text in generate(root).items():
+        path.write_text(text, encoding="utf-8")
+    for source, target in PICTURES.items():
+        if (root / source).is_file():
+            (root / target).parent.mkdir(exist_ok=True)
+            shutil.copyfile(root / source, root / target)
     return 0
 
 
