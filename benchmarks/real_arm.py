@@ -12,8 +12,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from stages.build_mjcf import Config, uniform
-from trunkline.arm.mjcf import Solver, Tendons, build_spec
+from stages.build_mjcf import Config, initial_spec
 from trunkline.config import load_config
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay, scores
@@ -37,10 +36,7 @@ RANGES = {"stiffness": Bounds(0.3, 30.0), "damping": Bounds(0.01, 5.0)}
 def arm(**changes) -> mujoco.MjModel:
     """The example's initial arm, with other numbers."""
     config = load_config(Config, "build_mjcf", EXAMPLE)
-    drawn = replace(config.arm, **changes)
-    chain, properties = uniform(drawn)
-    solver = Solver(**vars(config.solver))
-    return build_spec(chain, properties, Tendons(0, 1, 0, 1, 1, 1, 1), solver, drawn.tip_load, drawn.segments).compile()
+    return initial_spec(replace(config, arm=replace(config.arm, **changes)))[0].compile()
 
 
 def as_stamped(take: Take) -> Take:

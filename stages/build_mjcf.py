@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Literal
 
+import mujoco
 import numpy as np
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
@@ -101,7 +102,8 @@ def uniform(arm: Uniform) -> tuple[ChainGeometry, UnitProperties]:
     return chain, uniform_properties(chain, arm.unit_masses, stiffness, arm.damping_ratio)
 
 
-def main(config: Config) -> None:
+def initial_spec(config: Config) -> tuple[mujoco.MjSpec, ChainGeometry, UnitProperties]:
+    """The arm from geometry and material alone, and what it is made of."""
     arm, actuation = config.arm, config.actuation
     chain, properties = spiral(arm) if isinstance(arm, Spiral) else uniform(arm)
     mass = float(properties.masses.sum()) + arm.tip_load
@@ -114,7 +116,12 @@ def main(config: Config) -> None:
         max_force=actuation.max_force,
         time_constant=actuation.time_constant,
     )
-    spec = build_spec(chain, properties, tendons, Solver(**vars(config.solver)), arm.tip_load, arm.segments)
+    solver = Solver(**vars(config.solver))
+    return build_spec(chain, properties, tendons, solver, arm.tip_load, arm.segments), chain, properties
+
+
+def main(config: Config) -> None:
+    spec, chain, properties = initial_spec(config)
     model = spec.compile()
     with output_folder(ARTIFACTS) as folder:
         (folder / "arm.xml").write_text(spec.to_xml())
@@ -123,7 +130,7 @@ def main(config: Config) -> None:
             folder / "metrics.json",
             {
                 "length_m": chain.length,
-                "mass_kg": mass,
+                "mass_kg": float(properties.masses.sum()) + config.arm.tip_load,
                 "units": chain.units,
                 "ratio": chain.ratio,
                 "joint_range_deg": np.degrees(chain.joint_range[0]),

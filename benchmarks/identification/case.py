@@ -1,0 +1,145 @@
+"""What the parts of the benchmark search for: the stages' problems, at the size that is asked for."""
+
+import contextlib
+import io
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from benchmarks.identification.timing import Spent, Stopwatch
+from trunkline.arm.parameters import PARAMETERS
+from trunkline.config import load_config
+from trunkline.errors import InputError
+from trunkline.identification.evaluation import replay, scores
+from trunkline.identification.experiment import Experiment
+from trunkline.identification.identify import Method, identify, with_parameters
+from trunkline.identification.loss import LossWeights
+from trunkline.identification.problem import Bounds, Problem
+from trunkline.identification.run import CAD_MODEL, TRIALS, method_of, read_experiments, read_spec, undetermined
+
+# every stage, and the model that it begins with
+STAGES = {
+    "identify_stiffness": CAD_MODEL,
+    "identify_damping": Path("artifacts/identify_stiffness/arm.xml"),
+    "identify_control": Path("artifacts/identify_damping/arm.xml"),
+}
+SAME_LOSS = 1.01  # within 1 % counts as the same
+
+
+@dataclass
+class Size:
+    """How much is run. trials, frames: of each problem, at most. budget: s for each search of a rival.
+
+    seeds: runs against the recipe, whose luck differs. repeats: of each timing. rate_frames, growth_frames: frames
+    simulated there. units: of the arms in `growth`.
+    """
+
+    trials: int = 3
+    frames: int = 437
+    budget: float = 120.0
+    seeds: int = 3
+    repeats: int = 3
+    rate_frames: int = 60
+    growth_frames: int = 40
+    units: tuple[int, ...] = (6, 12, 24, 36)
+
+
+QUICK = Size(trials=2, frames=90, budget=25.0, seeds=1, repeats=2, rate_frames=40, growth_frames=12, units=(6, 12, 24))
+
+
+@dataclass
+class Case:
+    """What one stage searches for, and the trials of the same kinds that it never sees."""
+
+    model: mujoco.MjModel
+    experiments: list[Experiment]
+    unseen: list[Experiment]
+    segments: tuple[str, ...]
+    bounds: dict[str, Bounds]
+    loss: str
+    weights: LossWeights
+    method: Method
+
+    def problem(self) -> Problem:
+        """At the model's own time step, over whole trials."""
+        return Problem(self.model, self.experiments, self.segments, self.bounds, self.loss, self.weights)
+
+    def values(self, vector: np.ndarray) -> str:
+        """A candidate in words."""
+        pairs = zip(self.bounds, np.exp(vector), strict=True)
+        return ", ".join(f"{name} {value:.4g} {PARAMETERS[name].unit}" for name, value in pairs)
+
+    def unseen_errors(self, vector: np.ndarray) -> str:
+        """E_internal and position error of a candidate on the unseen trials, in words."""
+        model = with_parameters(self.model, dict(zip(self.bounds, np.exp(vector).tolist(), strict=True)))
+        replayed = replay(model, self.unseen, self.segments)
+        table = scores(replayed, self.unseen, self.loss, self.weights)["validate"]
+        return f"validate: E_internal {table['e_internal_mm']:.3f} mm, position {table['e_position_mm']:.2f} mm"
+
+
+ReadCase = Callable[[str, Size], Case]
+
+
+@dataclass
+class Identified:
+    """What `identify` found, without factors of joints.
+
+    vector: ln(value) of the scalars. loss: its, over whole trials. undetermined: names of what the data leave open.
+    """
+
+    vector: np.ndarray
+    loss: float
+    spent: Spent
+    undetermined: list[str]
+
+
+def identified(case: Case) -> Identified:
+    clock = Stopwatch()
+    with contextlib.redirect_stdout(io.StringIO()):
+        result = identify(
+            "", case.model, case.experiments, case.segments, case.bounds, (), case.loss, case.weights, case.method
+        )
+    spent = clock.read()
+    vector = np.log([result.values[name] for name in case.bounds])
+    vague = [name for name, is_vague in zip(case.bounds, undetermined(result, case.bounds), strict=True) if is_vague]
+    return Identified(vector, float(case.problem().losses(vector[None])[0]), spent, vague)
+
+
+def read_case(stage: str, size: Size) -> Case:
+    """The stage's problem of the demo session, as `stages/<stage>.py` sets it up, with fewer trials.
+
+    Raises:
+        InputError: if the pipeline has not run so far.
+    """
+    for path in (STAGES[stage], TRIALS / "trials.parquet"):
+        if not path.is_file():
+            raise InputError(f"{path}: no such file, expected what `make demo` writes; run it first")
+    config = load_config(import_module(f"stages.{stage}").Config, stage)
+    model = read_spec(STAGES[stage]).compile()
+    experiments, segments = read_experiments(config, model)
+    chosen = [_shortened(e, size.frames) for e in experiments if e.kind in config.experiments]
+    return Case(
+        model=model,
+        experiments=_spread([e for e in chosen if e.split == "identify"], size.trials),
+        unseen=[e for e in chosen if e.split == "validate"],
+        segments=segments,
+        bounds={name: Bounds(r.low, r.high) for name, r in config.parameters.items()},
+        loss=config.loss.kind,
+        weights=LossWeights(**{k: v for k, v in vars(config.loss).items() if k != "kind"}),
+        method=method_of(config),
+    )
+
+
+def _spread(items: list, count: int) -> list:
+    """At most `count` of `items`, evenly spread from first to last."""
+    return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, count).round().astype(int))]
+
+
+def _shortened(experiment: Experiment, frames: int) -> Experiment:
+    window = slice(0, frames)
+    parts = {name: getattr(experiment, name)[window] for name in ("controls", "positions", "measured")}
+    return replace(experiment, **parts)
