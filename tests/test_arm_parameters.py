@@ -71,6 +71,23 @@ def test_hardening_makes_the_torque_k_times_q_plus_h_q_cubed():
     assert data.qfrc_passive[0] == pytest.approx(3.0 * (0.4 + 0.7 * 0.4**3))
 
 
+def test_a_longer_friction_time_lets_a_hook_creep_straight_sooner():
+    """Friction that holds any hook is regularised: a stuck tendon creeps, the faster the longer its time constant."""
+    left = []  # share of the hook, after some time
+    for friction_time in (0.01, 0.03, 0.1):
+        model = model_with({"tendon_friction": 5.0, "friction_time": friction_time, "damping": 0.05})
+        model.opt.gravity[:] = 0
+        data = mujoco.MjData(model)
+        data.qpos[1::2] = 0.1
+        data.ctrl[:] = data.act[:] = model.tendon_length0 + 0.3  # motors let the tendons go
+        hooks = []  # m of tendon that the bend has taken up
+        for steps in (200, 800):
+            mujoco.mj_step(model, data, steps)
+            hooks.append(np.abs(data.ten_length - model.tendon_length0).max())
+        left.append(hooks[1] / hooks[0])
+    assert 1 > left[0] > 1.1 * left[1] > 2 * left[2] > 0
+
+
 def test_a_saved_model_has_the_parameters():
     spec = small_spec()
     model = spec.compile()

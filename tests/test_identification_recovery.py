@@ -5,12 +5,11 @@ import pytest
 
 from tests.matched_plant import curl, release, segments_of, small_model, tilt
 from trunkline.arm.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.certainty import certainty, weakest_in_words
 from trunkline.identification.experiment import prepare
 from trunkline.identification.identify import Method, identify
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import DIVERGED_LOSS, Bounds, Problem
-from trunkline.identification.search import LeastSquares, Linearisation
+from trunkline.identification.search import LeastSquares
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
 
@@ -97,21 +96,3 @@ def test_divergence_is_a_finite_penalty_and_counted():
     assert losses[1] == pytest.approx(DIVERGED_LOSS)
     assert problem.diverged == 1
     assert problem.evaluations == 2
-
-
-def test_certainty_of_a_straight_line():
-    """Slope and intercept with independent clusters of one residual: the textbook's errors, nearly."""
-    rng = np.random.default_rng(0)
-    x = np.linspace(-1, 1, 400)
-    design = np.stack([x, np.ones_like(x)], axis=1)
-    residual = rng.normal(0, 0.5, len(x))
-    residual -= design @ np.linalg.lstsq(design, residual, rcond=None)[0]
-    found = certainty(Linearisation(np.zeros(2), list(residual[:, None]), list(design[:, None])))
-    expected = 0.5 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-    np.testing.assert_allclose(found.standard_error, expected, rtol=0.12)
-    assert found.condition == pytest.approx(1, abs=0.01)
-
-
-def test_the_weakest_direction_is_named():
-    assert weakest_in_words(["a", "b", "c"], np.array([0.7, -0.7, 0.1])) == "a and b trade off"
-    assert weakest_in_words(["a", "b"], np.array([0.05, 0.99])) == "b is determined least"

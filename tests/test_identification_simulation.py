@@ -7,6 +7,7 @@ import pytest
 from tests.matched_plant import curl, release, segments_of, small_model, tilt
 from trunkline.arm.parameters import candidate_fields
 from trunkline.errors import InputError
+from trunkline.identification.evaluation import replay
 from trunkline.identification.experiment import prepare
 from trunkline.identification.loss import position_error
 from trunkline.identification.population import Population
@@ -142,6 +143,39 @@ def test_divergence_is_seen():
     fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * [1.0, 1e5]})
     simulated = Population(model, experiments, segments_of(model)).simulate(fields)
     assert simulated.diverged.tolist() == [False, True]
+
+
+def test_a_simulation_that_made_mujoco_warn_counts_as_diverged(monkeypatch, tmp_path):
+    """A command that is not a number: MuJoCo warns, puts 0 in its place, and what follows looks like any motion."""
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log there
+    model = small_model()
+    experiments = [prepare(curl(model, 40, frames=10), model, 10), prepare(release(model, 0.2, frames=10), model, 10)]
+    experiments[0].controls[5, 0] = np.nan
+    data = mujoco.MjData(model)
+    data.ctrl[0] = np.nan
+    mujoco.mj_step(model, data, 40)
+    assert np.isfinite(data.site_xpos).all()
+    assert sum(warning.number for warning in data.warning)
+    fields = candidate_fields(model, {"damping": np.array([0.02, 0.03])})
+    simulated = Population(model, experiments, segments_of(model)).simulate(fields)
+    assert simulated.diverged.all()
+    assert not np.isfinite(simulated.positions[0]).any()
+    assert np.isfinite(simulated.positions[1]).all()
+
+
+@pytest.mark.parametrize("lag", [0, 3])
+def test_a_command_delay_shifts_what_drives_a_trial(lag):
+    """Commands logged `lag` frames before the motors act on them: with that delay the plant is replayed exactly."""
+    model, frame = small_model(), 1 / 120
+    trial = curl(model, 40, frames=60)
+    trial.commands = np.concatenate([trial.commands[lag:], trial.commands[-1:].repeat(lag, axis=0)])
+    errors = {}
+    for delay in (0, 3):
+        experiment = prepare(trial, model, 60, command_delay=delay * frame)
+        positions = replay(model, [experiment], segments_of(model)).positions[0]
+        errors[delay] = position_error(positions, experiment.positions, experiment.measured)
+    assert errors[lag] < 1e-9
+    assert errors[3 - lag] > 1e-3
 
 
 def test_trials_of_another_arm_are_refused():

@@ -110,6 +110,9 @@ def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
     metrics = metrics_of(root, "identify_control")
     assert metrics["cad"]["validate"]["e_internal_mm"] == metrics["initial"]["validate"]["e_internal_mm"]
     assert set(metrics["identified"]["validate"]["by_experiment"]) == {"release", "curl"}
+    halved = metrics["halved_step"]
+    assert 0 < halved["max_mm"] < 1.0
+    assert halved["validate"] * metrics["identified"]["validate"]["e_internal_mm"] < 0.02  # a share of next to nothing
     found = json.loads((root / "artifacts/identify_control/parameters.json").read_text())["parameters"]
     for name, tolerance in (("kp", 0.05), ("kv", 0.10), ("time_constant", 0.10), ("force_range", 0.10)):
         assert found[name]["value"] == pytest.approx(PARAMETERS[name].read(truth), rel=tolerance), name

@@ -67,7 +67,7 @@ def bootstrap(linear: Linearisation, seed: int) -> np.ndarray:
     cross-checks `certainty`: it takes no symmetry for granted, but is too narrow for a handful of trials.
 
     Returns:
-        Lowest and highest z. Shape (2, P).
+        Lowest and highest z, infinite where nothing depends on a parameter. Shape (2, P).
     """
     trials = len(linear.residuals)
     normals = np.stack([j.T @ j for j in linear.jacobians])
@@ -76,7 +76,9 @@ def bootstrap(linear: Linearisation, seed: int) -> np.ndarray:
     scores = scores - scores.mean(axis=0)  # at the estimate they sum to nothing, but for a search that stopped early
     sums = np.einsum("bt,tpq->bpq", weights, normals)
     steps = -np.einsum("bpq,bq->bp", np.linalg.pinv(sums, hermitian=True), weights @ scores)
-    return linear.vector + np.percentile(steps, [2.5, 97.5], axis=0)
+    interval = linear.vector + np.percentile(steps, [2.5, 97.5], axis=0)
+    blind = np.diag(normals.sum(axis=0)) == 0
+    return np.where(blind, [[-np.inf], [np.inf]], interval)
 
 
 def weakest_in_words(names: list[str], weakest: np.ndarray) -> str:

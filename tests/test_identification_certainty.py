@@ -1,0 +1,95 @@
+"""Intervals against linear models whose answer is known, and where the data say nothing."""
+
+import numpy as np
+import pytest
+
+from tests.matched_plant import curl, segments_of, small_model
+from trunkline.arm.parameters import PARAMETERS
+from trunkline.identification.certainty import bootstrap, certainty, weakest_in_words
+from trunkline.identification.experiment import prepare
+from trunkline.identification.identify import Method, identify
+from trunkline.identification.loss import LossWeights
+from trunkline.identification.problem import Bounds
+from trunkline.identification.run import parameter_table, undetermined
+from trunkline.identification.search import LeastSquares, Linearisation
+
+SHARED, OWN = 0.6, 0.3  # standard deviations of what a cluster's residuals have in common, and of each
+
+
+def straight_line(clusters: int, rows: int = 5) -> tuple[Linearisation, np.ndarray, np.ndarray]:
+    """A line fitted to points in clusters: it, and the exact errors (2,) with and without regard to clusters."""
+    rng = np.random.default_rng(4)
+    designs = np.stack([rng.uniform(-1, 1, (clusters, 1)).repeat(rows, 1), np.ones((clusters, rows))], axis=2)
+    noise = rng.normal(0, SHARED, (clusters, 1)) + rng.normal(0, OWN, (clusters, rows))
+    design = designs.reshape(-1, 2)
+    estimate = np.linalg.lstsq(design, -noise.ravel(), rcond=None)[0]  # of residuals design @ z + noise
+    linear = Linearisation(estimate, list(designs @ estimate + noise), list(designs))
+    inverse = np.linalg.inv(design.T @ design)
+    omega = SHARED**2 * np.ones((rows, rows)) + OWN**2 * np.eye(rows)
+    clustered = inverse @ sum(d.T @ omega @ d for d in designs) @ inverse
+    return linear, np.sqrt(np.diag(clustered)), np.sqrt(np.diag(inverse) * (SHARED**2 + OWN**2))
+
+
+def test_clustered_errors_are_the_exact_ones():
+    linear, exact, naive = straight_line(clusters=600)
+    assert (exact > 1.9 * naive).all()  # else the test could not tell the two apart
+    found = certainty(linear)
+    np.testing.assert_allclose(found.standard_error, exact, rtol=0.08)  # ± 1/√(2·600) is one standard deviation
+    np.testing.assert_allclose(found.half_width, 1.964 * found.standard_error, rtol=1e-3)  # t of 599 degrees
+
+
+def test_the_bootstrap_agrees_with_the_exact_errors():
+    linear, exact, _ = straight_line(clusters=600)
+    low, high = bootstrap(linear, seed=1)
+    np.testing.assert_allclose((high - low) / 2, 1.96 * exact, rtol=0.1)
+    np.testing.assert_allclose((high + low) / 2, linear.vector, atol=0.15 * exact.max())
+
+
+def test_the_bootstrap_of_equal_designs_is_dirichlet():
+    """Trials of the same Jacobian: a draw is their mean estimate under Dirichlet weights, of known variance."""
+    steps = np.array([-1.0, -0.5, 0.2, 0.4, 0.9])
+    linear = Linearisation(np.array([3.0]), [-steps[[t]] for t in range(5)], [np.ones((1, 1))] * 5)
+    low, high = bootstrap(linear, seed=1)
+    weights = np.random.default_rng(99).dirichlet(np.ones(5), 100_000)
+    expected = 3.0 + np.percentile(weights @ steps, [2.5, 97.5])
+    np.testing.assert_allclose([low[0], high[0]], expected, atol=0.04)
+
+
+def test_independent_residuals_of_a_straight_line():
+    """Slope and intercept with clusters of one residual: the textbook's errors, nearly."""
+    rng = np.random.default_rng(0)
+    x = np.linspace(-1, 1, 400)
+    design = np.stack([x, np.ones_like(x)], axis=1)
+    residual = rng.normal(0, 0.5, len(x))
+    residual -= design @ np.linalg.lstsq(design, residual, rcond=None)[0]
+    found = certainty(Linearisation(np.zeros(2), list(residual[:, None]), list(design[:, None])))
+    expected = 0.5 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    np.testing.assert_allclose(found.standard_error, expected, rtol=0.12)
+    assert found.condition == pytest.approx(1, abs=0.01)
+
+
+def test_the_weakest_direction_is_named():
+    assert weakest_in_words(["a", "b", "c"], np.array([0.7, -0.7, 0.1])) == "a and b trade off"
+    assert weakest_in_words(["a", "b"], np.array([0.05, 0.99])) == "b is determined least"
+
+
+def test_a_force_range_that_no_pull_reaches_is_undetermined():
+    model = small_model(4)
+    names = ("kp", "force_range")
+    bounds = {name: Bounds(0.8 * PARAMETERS[name].read(model), 2 * PARAMETERS[name].read(model)) for name in names}
+    trials = [curl(model, level, frames=60, noise=3e-4, seed=k, tendon=k) for k, level in enumerate((4, 6, 8))]
+    experiments = [prepare(trial, model, 437) for trial in trials]
+    found = identify(
+        "test", model, experiments, segments_of(model), bounds, (), "positions",
+        LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01),
+        Method(LeastSquares(0, 1, 4, 1e-3), 1.0, 437, 99, 4, 1e-6, LeastSquares(0, 1, 1, 1.0), 0.1, seed=1),
+    )  # fmt: skip
+    assert found.certainty.standard_error[1] == found.certainty.half_width[1] == np.inf
+    assert undetermined(found, bounds) == [False, True]
+    rows = parameter_table(found, bounds)["parameters"]
+    limits = [bounds["force_range"].low, bounds["force_range"].high]
+    assert rows["force_range"]["undetermined"]
+    assert rows["force_range"]["interval_95"] == pytest.approx(limits)
+    assert rows["force_range"]["bootstrap_95"] == pytest.approx(limits)
+    low, high = rows["kp"]["interval_95"]
+    assert bounds["kp"].low < low < rows["kp"]["value"] < high < bounds["kp"].high
