@@ -57,13 +57,15 @@ def tilt(model, tilt_deg: float, split="identify", noise=0.0, seed=0) -> Trial:
     """At rest under tilted gravity, friction off."""
     settled = model.__copy__()
     settled.tendon_frictionloss[:] = 0
-    settled.dof_damping[:] = 0.15 * settled.jnt_stiffness[settled.dof_jntid]
+    settled.dof_damping[:] = 0.1 * settled.jnt_stiffness[settled.dof_jntid]
     pulls = np.full((1, 3), -SLACK)
     gravity = gravity_in_base(np.radians(tilt_deg))
     settled.opt.gravity[:] = gravity
     data = mujoco.MjData(settled)
     data.ctrl[:] = data.act[:] = settled.tendon_length0 + SLACK
-    mujoco.mj_step(settled, data, 8000)
+    mujoco.mj_step(settled, data, 4000)
+    while np.abs(data.qvel).max() > 1e-6:  # rad/s; the hinges are then some 1e-6 rad from rest
+        mujoco.mj_step(settled, data, 1000)
     rng = np.random.default_rng(seed)
     return _trial(model, f"tilt_{tilt_deg:.0f}_{split}", "static_tilt", split, tilt_deg, gravity, 1, data.qpos,
                   pulls, noise, rng)

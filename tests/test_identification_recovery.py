@@ -29,12 +29,14 @@ def changed(model, **values):
     return copy
 
 
-def test_stiffness_comes_back_within_2_percent():
+def test_stiffness_and_hardening_come_back():
     model = small_model()
-    truth = changed(model, stiffness=0.6 * PARAMETERS["stiffness"].read(model))
+    true = {"stiffness": 0.6 * PARAMETERS["stiffness"].read(model), "hardening": 1.5}
+    truth = changed(model, **true)
     trials = [tilt(truth, 30), tilt(truth, 60), tilt(truth, 90), tilt(truth, 45, "validate")]
-    found = identified(trials, model, {"stiffness": (0.2, 20.0)})
-    assert found.values["stiffness"] == pytest.approx(PARAMETERS["stiffness"].read(truth), rel=0.02)
+    found = identified(trials, model, {"stiffness": (0.2, 20.0), "hardening": (0.02, 20.0)})
+    assert found.values["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
+    assert found.values["hardening"] == pytest.approx(true["hardening"], rel=0.05)
     assert not found.at_bound
 
 
@@ -50,13 +52,15 @@ def test_per_joint_factors_come_back():
     np.testing.assert_allclose(stiffness[::2][:3], factors[:3], atol=0.02)  # beyond, gravity bends too little
 
 
-def test_damping_and_tendon_friction_come_back():
+def test_damping_and_tendon_friction_and_its_creep_come_back():
     model = small_model()
-    truth = changed(model, damping=2.5 * PARAMETERS["damping"].read(model), tendon_friction=0.6)
+    true = {"damping": 2.5 * PARAMETERS["damping"].read(model), "tendon_friction": 0.6, "friction_time": 0.03}
+    truth = changed(model, **true)
     trials = [release(truth, 0.3, frames=100), release(truth, -0.25, frames=100)]
-    found = identified(trials, model, {"damping": (0.005, 1.0), "tendon_friction": (0.02, 3.0)})
-    assert found.values["damping"] == pytest.approx(PARAMETERS["damping"].read(truth), rel=0.05)
-    assert found.values["tendon_friction"] == pytest.approx(0.6, rel=0.2)
+    ranges = {"damping": (0.005, 1.0), "tendon_friction": (0.02, 3.0), "friction_time": (0.003, 0.3)}
+    found = identified(trials, model, ranges)
+    for name, tolerance in (("damping", 0.05), ("tendon_friction", 0.2), ("friction_time", 0.2)):
+        assert found.values[name] == pytest.approx(true[name], rel=tolerance), name
 
 
 def test_validate_trials_are_never_fitted():
