@@ -124,7 +124,7 @@ def read_case(stage: str, size: Size) -> Case:
     chosen = [_shortened(e, size.frames) for e in experiments if e.kind in config.experiments]
     return Case(
         model=model,
-        experiments=_spread([e for e in chosen if e.split == "identify"], size.trials),
+        experiments=spread([e for e in chosen if e.split == "identify"], size.trials),
         unseen=[e for e in chosen if e.split == "validate"],
         segments=segments,
         bounds={name: Bounds(r.low, r.high) for name, r in config.parameters.items()},
@@ -134,7 +134,7 @@ def read_case(stage: str, size: Size) -> Case:
     )
 
 
-def _spread(items: list, count: int) -> list:
+def spread(items: list, count: int) -> list:
     """At most `count` of `items`, evenly spread from first to last."""
     return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, count).round().astype(int))]
 

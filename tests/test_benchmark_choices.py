@@ -1,0 +1,58 @@
+"""The table of choices: each row changes what it says, and settings that a stage accepts."""
+
+from importlib import import_module
+
+import pytest
+
+from benchmarks.choices import CHOICES, quick
+from benchmarks.identification.case import STAGES
+from trunkline.config import load_config
+from trunkline.identification.run import method_of
+from trunkline.identification.search import LeastSquares
+
+CHANGED = {  # name → stage → the settings that it changes
+    "committed": {},
+    "no-hardening": {"identify_stiffness": {"parameters"}},
+    "no-creep": {"identify_damping": {"parameters"}},
+    "joint-friction": {"identify_damping": {"parameters"}},
+    "delay": {stage: {"command_delay"} for stage in STAGES},
+    "distances": {stage: {"loss"} for stage in STAGES},
+    "least-squares": {stage: {"optimizer"} for stage in STAGES},
+    "joint-damping": {"identify_damping": {"per_joint"}},
+    "no-factors": {"identify_stiffness": {"per_joint"}},
+}
+
+
+@pytest.fixture(scope="module")
+def settings():
+    return {stage: load_config(import_module(f"stages.{stage}").Config, stage) for stage in STAGES}
+
+
+@pytest.mark.parametrize("name", CHOICES)
+def test_a_choice_changes_what_it_says(name, settings):
+    change = CHOICES[name][1]
+    changed = {}
+    for stage, config in settings.items():
+        before, after = vars(config), vars(change(stage, config))
+        if keys := {key for key in before if before[key] != after[key]}:
+            changed[stage] = keys
+    assert changed == CHANGED[name]
+
+
+def test_least_squares_is_the_method_of_every_stage(settings):
+    for stage, config in settings.items():
+        method = method_of(CHOICES["least-squares"][1](stage, config))
+        assert isinstance(method.optimizer, LeastSquares)
+
+
+def test_a_parameter_left_out_is_not_searched(settings):
+    config = CHOICES["no-creep"][1]("identify_damping", settings["identify_damping"])
+    assert set(settings["identify_damping"].parameters) - set(config.parameters) == {"friction_time"}
+
+
+@pytest.mark.parametrize("name", CHOICES)
+def test_quick_settings_are_small_and_valid(name, settings):
+    for stage, config in settings.items():
+        small = quick(stage, CHOICES[name][1](stage, config))
+        assert small.frames <= 60
+        assert method_of(small).optimizer.steps() <= 3
