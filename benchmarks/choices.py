@@ -105,7 +105,7 @@ def quick(stage: str, config: IdentificationSettings) -> IdentificationSettings:
         frames=min(config.frames, 60),
         optimizer=optimizer,
         polish=replace(config.polish, iterations=2),
-        fine=LeastSquaresSettings(method="least_squares", starts=0, descents=1, iterations=1, tolerance=0.1),
+        fine=LeastSquaresSettings(method="least_squares", starts=0, descents=1, iterations=2, tolerance=0.1),
     )
 
 

@@ -1,5 +1,7 @@
 """Intervals against linear models whose answer is known, and where the data say nothing."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -12,6 +14,7 @@ from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds
 from trunkline.identification.run import parameter_table, undetermined
 from trunkline.identification.search import LeastSquares, Linearisation
+from trunkline.stage import write_json
 
 SHARED, OWN = 0.6, 0.3  # standard deviations of what a cluster's residuals have in common, and of each
 
@@ -36,6 +39,39 @@ def test_clustered_errors_are_the_exact_ones():
     found = certainty(linear)
     np.testing.assert_allclose(found.standard_error, exact, rtol=0.08)  # ± 1/√(2·600) is one standard deviation
     np.testing.assert_allclose(found.half_width, 1.964 * found.standard_error, rtol=1e-3)  # t of 599 degrees
+
+
+def test_errors_are_those_of_fits_without_each_trial():
+    linear, *_ = straight_line(clusters=7)
+    designs, target = np.stack(linear.jacobians), np.stack(linear.jacobians) @ linear.vector - linear.residuals
+    fits = []
+    for left_out in range(7):
+        kept = [t for t in range(7) if t != left_out]
+        fits.append(np.linalg.lstsq(designs[kept].reshape(-1, 2), target[kept].ravel(), rcond=None)[0])
+    expected = np.sqrt(6 / 7 * ((fits - np.mean(fits, axis=0)) ** 2).sum(axis=0))
+    np.testing.assert_allclose(certainty(linear).standard_error, expected, rtol=1e-9)
+
+
+def test_few_trials_that_tell_unequally_much_do_not_promise_too_much():
+    """Six trials, of which the last holds most of the information: a plain sandwich's errors are 0.6 of the scatter."""
+    rng = np.random.default_rng(3)
+    design = np.repeat([0.3, 0.4, 0.5, 0.6, 0.8, 1.5], 4).reshape(6, 4, 1)
+    estimates, errors = [], []
+    for _ in range(400):
+        noise = rng.normal(0, SHARED, (6, 1)) + rng.normal(0, OWN, (6, 4))
+        estimate = -(design[..., 0] * noise).sum() / (design**2).sum()
+        found = certainty(Linearisation(np.array([estimate]), list(design[..., 0] * estimate + noise), list(design)))
+        estimates.append(estimate)
+        errors.append(found.standard_error[0])
+    assert 0.85 < np.mean(errors) / np.std(estimates) < 1.4
+
+
+def test_what_one_trial_alone_determines_has_no_interval():
+    designs = [np.array([[1.0, 0.0], [0.5, 0.0]])] * 3 + [np.array([[1.0, 0.0], [0.0, 1.0]])]
+    residuals = [np.array([0.1, -0.2]), np.array([-0.1, 0.2]), np.array([0.2, -0.4]), np.array([-0.2, 0.0])]
+    error = certainty(Linearisation(np.zeros(2), residuals, designs)).standard_error
+    assert np.isfinite(error[0])
+    assert error[1] == np.inf
 
 
 def test_the_bootstrap_agrees_with_the_exact_errors():
@@ -93,3 +129,19 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
     assert rows["force_range"]["bootstrap_95"] == pytest.approx(limits)
     low, high = rows["kp"]["interval_95"]
     assert bounds["kp"].low < low < rows["kp"]["value"] < high < bounds["kp"].high
+
+
+def test_factors_that_one_trial_alone_determines_have_no_width(tmp_path):
+    model = small_model(3)
+    experiments = [prepare(curl(model, 6, frames=5), model, 5)]
+    own = PARAMETERS["stiffness"].read(model)
+    bounds = {"stiffness": Bounds(0.5 * own, 2 * own)}
+    found = identify(
+        "test", model, experiments, segments_of(model), bounds, ("stiffness",), "positions",
+        LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01),
+        Method(LeastSquares(0, 1, 1, 1.0), 1.0, 5, 1, 1, 1.0, LeastSquares(0, 1, 1, 1.0), 0.1, seed=1),
+    )  # fmt: skip
+    write_json(tmp_path / "parameters.json", parameter_table(found, bounds))
+    table = json.loads((tmp_path / "parameters.json").read_text())
+    assert table["per_joint"]["stiffness"]["half_width_95"] == [None] * 3
+    assert table["parameters"]["stiffness"]["undetermined"]

@@ -8,6 +8,7 @@ from scipy.stats import t as student
 from trunkline.identification.search import Linearisation
 
 RESAMPLINGS = 2000
+ALONE = 1e-9  # share of a parameter's information; if all other trials have less, one determines it alone
 
 
 @dataclass
@@ -15,7 +16,7 @@ class Certainty:
     """95 % intervals around an estimate z, and how well its directions are determined.
 
     Attributes:
-        standard_error: of each parameter; infinite where nothing depends on it. Shape (P,).
+        standard_error: of each parameter; infinite where nothing, or one trial alone, depends on it. Shape (P,).
         half_width: of its 95 % interval. Shape (P,).
         correlation: of the estimates. Shape (P, P).
         condition: of the Jacobian with columns of unit length; 1 is ideal.
@@ -30,27 +31,34 @@ class Certainty:
 
 
 def certainty(linear: Linearisation) -> Certainty:
-    """Sandwich estimate, clustered by trial: (JᵀJ)⁻¹ (Σ_t g_t g_tᵀ) (JᵀJ)⁻¹ with g_t = J_tᵀ r_t (Liang, Zeger 1986).
+    """Jackknife over trials: how far the estimate moves when one is left out (CV3; MacKinnon, Nielsen, Webb 2023).
 
     Residuals of one trial hang together (the model is wrong in the same way from frame to frame), so a formula for
-    independent ones would promise far too much. Trials are taken as independent, with T - 1 degrees of freedom.
+    independent ones would promise far too much. Without trial t a Gauss-Newton step leads from the estimate to
+    (JᵀJ - J_tᵀJ_t)⁻¹ J_tᵀ r_t. The sandwich over trials (Liang, Zeger 1986) has JᵀJ in its place; a trial that
+    weighs much has drawn the estimate to itself, and with a handful of trials that makes it too sure. Trials are
+    taken as independent, with T - 1 degrees of freedom. What one trial alone determines has no interval.
 
     Args:
         linear: of the residuals, at the estimate.
     """
     residuals, jacobians = linear.residuals, linear.jacobians
     trials = len(residuals)
-    normal = sum(j.T @ j for j in jacobians)
+    normals = np.stack([j.T @ j for j in jacobians])
+    normal = normals.sum(axis=0)
     scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-    inverse = np.linalg.pinv(normal * np.outer(scale, scale)) * np.outer(scale, scale)
+    scaling = np.outer(scale, scale)
     scores = np.stack([j.T @ r for j, r in zip(jacobians, residuals, strict=True)])
     scores -= scores.mean(axis=0)
-    correction = trials / max(trials - 1, 1)
-    covariance = inverse @ (scores.T @ scores * correction) @ inverse
-    error = np.sqrt(np.maximum(np.diag(covariance), 0))
+    rest = np.linalg.pinv((normal - normals) * scaling, hermitian=True) * scaling
+    moves = np.einsum("tpq,tq->tp", rest, scores)
+    moves -= moves.mean(axis=0)
+    covariance = moves.T @ moves * (trials - 1) / trials
+    error = np.sqrt(np.diag(covariance))
+    least = np.min([np.diag(normal - own) for own in normals], axis=0)
+    error = np.where(least > ALONE * np.diag(normal), error, np.inf)
     safe = np.where(error > 0, error, 1.0)
-    error = np.where(np.diag(normal) > 0, error, np.inf)
-    singular, directions = np.linalg.eigh(normal * np.outer(scale, scale))
+    singular, directions = np.linalg.eigh(normal * scaling)
     return Certainty(
         standard_error=error,
         half_width=error * float(student.ppf(0.975, max(trials - 1, 1))),

@@ -231,12 +231,12 @@ def _within(bounds: Bounds, interval: np.ndarray) -> list[float]:
 
 
 def _factor_table(result: Identification) -> dict:
-    """Factors on top of the scaling law, unit by unit, with the half width of their 95 % intervals."""
+    """Factors on top of the scaling law by unit, with the half width of their 95 % intervals, null if infinite."""
     if not result.factors:
         return {}
     widths = result.factor_certainty.half_width.reshape(len(result.factors), -1)
     return {
-        name: {"factor": factors, "half_width_95": width}
+        name: {"factor": factors, "half_width_95": np.where(np.isfinite(width), width, None)}
         for (name, factors), width in zip(result.factors.items(), widths, strict=True)
     }
 
