@@ -53,7 +53,7 @@ def test_errors_are_those_of_fits_without_each_trial():
 
 
 def test_few_trials_that_tell_unequally_much_do_not_promise_too_much():
-    """Six trials, of which the last holds most of the information: a plain sandwich's errors are 0.77 of the scatter."""
+    """Six trials, of which the last holds most of the information: a plain sandwich finds 0.77 of the scatter."""
     rng = np.random.default_rng(3)
     design = np.repeat([0.3, 0.4, 0.5, 0.6, 0.8, 1.5], 4).reshape(6, 4, 1)
     estimates, errors = [], []

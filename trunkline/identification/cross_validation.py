@@ -29,7 +29,8 @@ def cross_validate(
     """Errors on trials of the `identify` split that the fit did not see, before and after per-joint tuning.
 
     Every trial is left out once. A fit on the others starts from the one on all: least squares ends in the same place
-    from there, and sooner. Per-joint tuning that only fits noise lowers the errors of `identify` but not these.
+    from there, and sooner. Per-joint tuning that only fits noise lowers the errors of `identify` but not these. A
+    measured shape at rest is the one of all releases, those left out included.
 
     Args:
         folds: into how many groups the trials go, in turn.

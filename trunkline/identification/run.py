@@ -40,8 +40,10 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     model = spec.compile()
     if not model.ntendon and config.experiments == ["curl"]:
         raise Skipped(f"{model_path}: the arm has no tendons, so there are no curls to learn from")
+    check_parameters(stage, config, model)
     experiments, segments = read_experiments(config, model)
     fitted = [e for e in experiments if e.kind in config.experiments]
+    check_folds(stage, config.cross_validation_folds, fitted)
     weights = LossWeights(**{k: v for k, v in vars(config.loss).items() if k != "kind"})
     bounds = {name: Bounds(r.low, r.high) for name, r in config.parameters.items()}
     method = method_of(config)
@@ -56,6 +58,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     if whole:
         models["cad"] = read_spec(CAD_MODEL).compile()
         models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
+        models["coarse"].qpos_spring[:] = model.qpos_spring  # the shape at rest is not a matter of scalars
     replays = {name: replay(m, experiments, segments) for name, m in models.items()}
     metrics = {name: scores(r, experiments, config.loss.kind, weights) for name, r in replays.items()}
     metrics |= {
@@ -65,12 +68,18 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         "undetermined": sum(undetermined(result, bounds)),
         "converged": result.converged,
         "start_fit": _start_fit(experiments),
-        "halved_step": _halved_step(models["identified"], experiments, segments, replays["identified"], metrics),
     }
+    if any(e.frames > 1 for e in experiments):
+        metrics["halved_step"] = _halved_step(
+            models["identified"], experiments, segments, replays["identified"], metrics
+        )
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
         metrics["cross_validation"] = cross_validate(stage, result, *problem, config.cross_validation_folds, rest)
+    for search, converged in result.converged.items():
+        if not converged:
+            print(f"{stage}: the {search.replace('_', ' ')} search ended before it had converged")
     for name in result.at_bound:
         print(f"{stage}: {name} ended on a bound of its range")
     for name, vague in zip(result.values, undetermined(result, bounds), strict=True):
@@ -121,6 +130,21 @@ def undetermined(result: Identification, bounds: dict[str, Bounds]) -> list[bool
         bool(result.certainty.half_width[i] > 0.5 * np.log(bounds[name].high / bounds[name].low))
         for i, name in enumerate(result.values)
     ]
+
+
+def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
+    """Refuse parameters of tendons and motors that the arm has not got."""
+    for name in config.parameters:
+        if not model.ntendon and PARAMETERS[name].fields[0].startswith(("tendon_", "actuator_")):
+            found = "found it for an arm without tendons, expected parameters of joints alone"
+            raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}")
+
+
+def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:
+    """Refuse to leave out more groups of trials than there are trials to identify from."""
+    trials = sum(e.split == "identify" for e in fitted)
+    if folds > trials:
+        raise InputError(f"{stage}.cross_validation_folds: found {folds}, expected at most {trials}, one a trial")
 
 
 def _halved_step(model, experiments, segments, replayed: Replay, metrics: dict) -> dict[str, float]:

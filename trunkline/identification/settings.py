@@ -74,8 +74,7 @@ class IdentificationSettings:
     command_delay: float = Field(ge=0, le=1)
     experiments: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
     reported: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
-    rest_shape: Literal["straight", "measured"] = "straight"
-    rest_shape: Literal["straight", "measured"] = "straight"
+    rest_shape: Literal["unchanged", "measured"]
     loss: Loss
     parameters: dict[ParameterName, Range] = Field(min_length=1)
     optimizer: Optimizer

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import Chain
+from trunkline.kinematics.chain import FORCE_ROUNDING, Chain
 from trunkline.kinematics.statics import forward
 
 
@@ -16,10 +16,12 @@ class TipErrors:
     Attributes:
         position: distance from the target, m. Shape (N,).
         orientation: angle from the target, rad. Shape (N,).
+        beyond_force: where the lengths ask for more pull than the motors have; None if not looked at. Shape (N,).
     """
 
     position: np.ndarray
     orientation: np.ndarray
+    beyond_force: np.ndarray | None = None
 
     def metrics(self, length: float) -> dict:
         """Summary in mm and degrees; a target without an answer counts as missed.
@@ -30,7 +32,8 @@ class TipErrors:
         missed = ~np.isfinite(self.position)
         position = np.where(missed, length, self.position)
         orientation = np.where(missed, np.pi, self.orientation)
-        return {
+        force = {} if self.beyond_force is None else {"beyond_force": float(np.mean(self.beyond_force))}
+        return force | {
             "position_error_mm": {
                 "median": np.median(position) * 1e3,
                 "p95": np.quantile(position, 0.95) * 1e3,
@@ -54,7 +57,8 @@ def tip_errors(chain: Chain, inputs: np.ndarray, lengths: np.ndarray) -> TipErro
     overlap = np.abs(np.einsum("ni,ni->n", found.quaternion, inputs[:, 4:]))
     orientation = 2 * np.arccos(np.clip(overlap, 0, 1))
     position[~found.converged], orientation[~found.converged] = np.nan, np.nan
-    return TipErrors(position, orientation)
+    beyond = found.converged & (found.tensions > (1 + FORCE_ROUNDING) * chain.max_tension).any(axis=1)
+    return TipErrors(position, orientation, beyond)
 
 
 def outside_targets(count: int, length: float, rng: np.random.Generator) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.kinematics.chain import Chain
+from trunkline.kinematics.chain import FORCE_ROUNDING, Chain
 from trunkline.kinematics.statics import forward as soft_forward
 from trunkline.reachability.grid import Lattice
 from trunkline.reachability.inverse import solve
@@ -23,7 +23,6 @@ COARSE_TIPS = 600
 TRIES = 4  # pairs per point that go to inverse kinematics
 STARTS = 40
 CLOSE = 1e-3  # m, how near its point a tip must come out when a pose is verified
-FORCE_ROUNDING = 1e-3  # share by which a tension may exceed the motors' force
 DEEP = -0.01  # m; a pair whose mount lies this deep needs no finer search
 
 
