@@ -134,3 +134,22 @@ def test_a_missing_model_is_named(project):
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)})
     with pytest.raises(InputError, match="nowhere.xml: no such file"):
         run("identify_stiffness", config, root / "nowhere.xml")
+
+
+def test_more_folds_than_trials_are_refused(project):
+    root, model, write = project
+    write([tilt(model, 30), tilt(model, 60), tilt(model, 75, "validate")])
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)}, cross_validation_folds=3)
+    with pytest.raises(InputError, match="cross_validation_folds: found 3, expected at most 2"):
+        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
+
+
+def test_tendon_parameters_of_an_arm_without_tendons_are_refused(project):
+    root, _, _ = project
+    spec = mujoco.MjSpec.from_file(str(root / "artifacts/build_mjcf/arm.xml"))
+    for element in (*spec.actuators, *spec.tendons):
+        spec.delete(element)
+    (root / "artifacts/build_mjcf/arm.xml").write_text(spec.to_xml())
+    config = settings(["release"], ["release"], {"damping": (0.01, 1.0), "tendon_friction": (0.1, 1.0)})
+    with pytest.raises(InputError, match="identify_damping.parameters.tendon_friction: found it for an arm without"):
+        run("identify_damping", config, root / "artifacts/build_mjcf/arm.xml")

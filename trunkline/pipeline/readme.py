@@ -17,6 +17,7 @@ from trunkline.pipeline.gate import Limit, Limits, lookup, read_limits
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
 PICTURES = {
     "artifacts/identify_control/distances.png": "docs/distances.png",
+    "artifacts/reachability/maps.png": "docs/maps.png",
     "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
 }
 EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README and of its own README
