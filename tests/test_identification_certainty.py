@@ -145,3 +145,14 @@ def test_factors_that_one_trial_alone_determines_have_no_width(tmp_path):
     table = json.loads((tmp_path / "parameters.json").read_text())
     assert table["per_joint"]["stiffness"]["half_width_95"] == [None] * 3
     assert table["parameters"]["stiffness"]["undetermined"]
+
+
+def test_a_prior_holds_what_the_trials_do_not_tell_and_says_how_little_that_is():
+    """Two factors, one told by six trials, one by none: that one stays at 1, known to the prior's deviation."""
+    rng = np.random.default_rng(2)
+    designs = [np.array([[1.0, 0.0], [0.8, 0.0]]) for _ in range(6)]
+    residuals = [rng.normal(0, 1e-3, 2) for _ in range(6)]
+    weights = np.array([0.05, 0.05])
+    found = certainty(Linearisation(np.ones(2), residuals, designs, weights), prior_deviation=0.04)
+    assert found.standard_error[1] == pytest.approx(0.04)
+    assert found.standard_error[0] < 0.002

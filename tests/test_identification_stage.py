@@ -36,7 +36,7 @@ def settings(experiments, reported, parameters, per_joint=(), iterations=8, **ch
         "optimizer": LeastSquaresSettings(method="least_squares", starts=4, descents=1, iterations=4, tolerance=1e-3),
         "rough": RoughSettings(step_factor=1.0, frames=437, trials=99),
         "polish": PolishSettings(iterations=iterations, tolerance=1e-8),
-        "per_joint": list(per_joint), "per_joint_range": 0.1,
+        "per_joint": list(per_joint), "per_joint_range": 0.1, "per_joint_deviation": 1.0,
         "fine": LeastSquaresSettings(method="least_squares", starts=0, descents=1, iterations=3, tolerance=1e-2),
         "cross_validation_folds": 0,
     } | changed)  # fmt: skip

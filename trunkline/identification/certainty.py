@@ -30,7 +30,7 @@ class Certainty:
     weakest: np.ndarray
 
 
-def certainty(linear: Linearisation) -> Certainty:
+def certainty(linear: Linearisation, prior_deviation: float = 0.0) -> Certainty:
     """Jackknife over trials: how far the estimate moves when one is left out (CV3; MacKinnon, Nielsen, Webb 2023).
 
     Residuals of one trial hang together (the model is wrong in the same way from frame to frame), so a formula for
@@ -41,11 +41,15 @@ def certainty(linear: Linearisation) -> Certainty:
 
     Args:
         linear: of the residuals, at the estimate.
+        prior_deviation: standard deviation of the truth around the prior's mean, towards which the estimate is pulled
+            where the trials say little; it widens the interval there.
     """
     residuals, jacobians = linear.residuals, linear.jacobians
     trials = len(residuals)
     normals = np.stack([j.T @ j for j in jacobians])
     normal = normals.sum(axis=0)
+    if linear.prior is not None:
+        normal = normal + np.diag(linear.prior**2)
     scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     scaling = np.outer(scale, scale)
     scores = np.stack([j.T @ r for j, r in zip(jacobians, residuals, strict=True)])
@@ -54,6 +58,9 @@ def certainty(linear: Linearisation) -> Certainty:
     moves = np.einsum("tpq,tq->tp", rest, scores)
     moves -= moves.mean(axis=0)
     covariance = moves.T @ moves * (trials - 1) / trials
+    if linear.prior is not None:
+        pulled = np.linalg.pinv(normal * scaling, hermitian=True) * scaling @ np.diag(linear.prior**2)
+        covariance = covariance + prior_deviation**2 * pulled @ pulled.T
     error = np.sqrt(np.diag(covariance))
     least = np.min([np.diag(normal - own) for own in normals], axis=0)
     error = np.where(least > ALONE * np.diag(normal), error, np.inf)

@@ -24,7 +24,8 @@ class Method:
     optimizer: of the scalars, roughly: with a time step `rough_step_factor` times the model's own, over the first
         `rough_frames` of `rough_trials` trials.
     polish_iterations, polish_tolerance: of the least squares that follows, on whole trials at the model's own step.
-    fine: optimizer of the factors of every joint, within `per_joint_range` of 1.
+    fine: optimizer of the factors of every joint, within `per_joint_range` of 1. per_joint_deviation: by how much
+        joints are expected to scatter around 1, standard deviation; infinite for no such prior.
     """
 
     optimizer: Optimizer
@@ -36,6 +37,7 @@ class Method:
     fine: Optimizer
     per_joint_range: float
     seed: int
+    per_joint_deviation: float = np.inf
 
 
 @dataclass
@@ -101,12 +103,14 @@ def identify(
     factors: dict[str, np.ndarray] = {}
     factor_certainty = None
     if per_joint:
+        # trials count as independent, each with the coarse fit's loss for its variance
+        prior_weight = np.sqrt(2 * found.loss / len(seen)) / method.per_joint_deviation
         joints = Problem(
             coarse, seen, segments, {}, loss, weights, per_joint=per_joint, per_joint_range=method.per_joint_range,
-            rest=rest,
+            prior_weight=prior_weight, rest=rest,
         )  # fmt: skip
         searches["per_joint"] = found = _search(joints, method.fine, method.seed, f"{label} per joint")
-        factor_certainty = certainty(linearise(joints, found.vector))
+        factor_certainty = certainty(linearise(joints, found.vector), method.per_joint_deviation)
         factors = dict(zip(per_joint, found.vector.reshape(len(per_joint), -1), strict=True))
         at_bound += _factors_at_bound(factors, method.per_joint_range)
         problems.append(joints)

@@ -28,9 +28,9 @@ class Problem:
     """Minimise the mean loss over `experiments` of a model whose parameters are free within bounds.
 
     A candidate is a vector z: first the scalars of `parameters` (natural logarithm), then, if `per_joint` names
-    them, the factors of every unit, within `per_joint_range` of 1. `step_factor` is how much coarser than the model's
-    own time step to simulate. With `rest`, every candidate hangs in that shape. Counts evaluations (one candidate on
-    all trials), divergences and steps.
+    them, the factors of every unit, within `per_joint_range` of 1 and pulled towards it by `prior`. `step_factor` is
+    how much coarser than the model's own time step to simulate. With `rest`, every candidate hangs in that shape.
+    Counts evaluations (one candidate on all trials), divergences and steps.
     """
 
     model: mujoco.MjModel
@@ -42,6 +42,7 @@ class Problem:
     step_factor: float = 1.0
     per_joint: tuple[str, ...] = ()
     per_joint_range: float = 0.0
+    prior_weight: float = 0.0
     rest: RestShape | None = None
     evaluations: int = 0
     diverged: int = 0
@@ -85,8 +86,14 @@ class Problem:
         return blocks
 
     def losses(self, vectors: np.ndarray) -> np.ndarray:
-        """Loss of each candidate (C, P) → (C,)."""
-        return sum(loss_of(block) for block in self.residuals(vectors))
+        """Loss of each candidate (C, P) → (C,), that of the prior included."""
+        return sum(loss_of(block) for block in self.residuals(vectors)) + loss_of(self.prior(vectors))
+
+    def prior(self, vectors: np.ndarray) -> np.ndarray:
+        """Residuals w (f - 1) of factors, w the `prior_weight`; 0 for scalars. (C, P) → (C, P)."""
+        residuals = self.prior_weight * (vectors - 1)
+        residuals[:, : len(self.parameters)] = 0
+        return residuals
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest vector z."""

@@ -104,6 +104,7 @@ def method_of(config: IdentificationSettings) -> Method:
         polish_tolerance=config.polish.tolerance,
         fine=_optimizer(config.fine),
         per_joint_range=config.per_joint_range,
+        per_joint_deviation=config.per_joint_deviation,
         seed=config.seed,
     )
 

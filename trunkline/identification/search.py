@@ -65,11 +65,12 @@ class Convergence:
 
 @dataclass
 class Linearisation:
-    """Residuals (R,) and their derivatives (R, P) per trial, around a vector."""
+    """Residuals (R,) and their derivatives (R, P) per trial, around a vector, and the weights (P,) of a prior."""
 
     vector: np.ndarray
     residuals: list[np.ndarray]
     jacobians: list[np.ndarray]
+    prior: np.ndarray | None = None
 
 
 @dataclass
@@ -139,15 +140,17 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
         return known[key]
 
     def residuals(vector: np.ndarray) -> np.ndarray:
-        return np.concatenate(linear(vector).residuals)
+        return np.concatenate([*linear(vector).residuals, problem.prior(vector[None])[0]])
 
     def derivatives(vector: np.ndarray) -> np.ndarray:
         found = linear(vector)
-        loss = 0.5 * sum(float(block @ block) for block in found.residuals)
+        blocks = [*found.residuals, problem.prior(vector[None])[0]]
+        loss = 0.5 * sum(float(block @ block) for block in blocks)
         convergence.best.append(loss)
         convergence.mean.append(loss)
         report(loss)
-        return np.concatenate(found.jacobians)
+        prior = np.zeros(len(vector)) if found.prior is None else found.prior
+        return np.concatenate([*found.jacobians, np.diag(prior)])
 
     inside = np.clip(start, low + 1e-9, high - 1e-9)
     result = least_squares(
@@ -166,7 +169,8 @@ def linearise(problem: Problem, vector: np.ndarray) -> Linearisation:
     candidates = np.concatenate([vector[None], vector + np.diag(steps)])
     blocks = problem.residuals(candidates)
     columns = [((block[1:] - block[0]) / steps[:, None]).T for block in blocks]
-    return Linearisation(vector, [block[0] for block in blocks], columns)
+    weights = problem.prior(np.full((1, len(vector)), 2.0))[0]  # of f - 1 = 1
+    return Linearisation(vector, [block[0] for block in blocks], columns, weights if weights.any() else None)
 
 
 def _evolve(

@@ -82,6 +82,7 @@ class IdentificationSettings:
     polish: PolishSettings
     per_joint: list[Literal["stiffness", "damping"]]
     per_joint_range: float = Field(gt=0, lt=1)
+    per_joint_deviation: PositiveFloat
     fine: Optimizer
     cross_validation_folds: NonNegativeInt
 
