@@ -20,16 +20,14 @@ from pathlib import Path
 import mujoco
 from omegaconf import OmegaConf
 
-from benchmarks.identification.case import STAGES, spread
+from benchmarks.identification.case import STAGES, bounds_of, require_demo, spread, weights_of
 from benchmarks.identification.timing import Stopwatch
 from trunkline.config import load_config
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Identification, identify
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.problem import Bounds
-from trunkline.identification.run import CAD_MODEL, TRIALS, method_of, read_experiments, read_spec, undetermined
+from trunkline.identification.run import CAD_MODEL, method_of, read_experiments, read_spec, undetermined
 from trunkline.identification.settings import (
     DifferentialEvolutionSettings,
     IdentificationSettings,
@@ -134,20 +132,14 @@ def chain(settings: dict[str, IdentificationSettings], trials: int | None) -> tu
 
 def found(stage: str, config, model, experiments: list[Experiment], segments) -> Identification:
     fitted = [e for e in experiments if e.kind in config.experiments]
-    bounds = {name: Bounds(r.low, r.high) for name, r in config.parameters.items()}
     return identify(
-        stage, model, fitted, segments, bounds, tuple(config.per_joint), config.loss.kind, weights_of(config),
-        method_of(config),
+        stage, model, fitted, segments, bounds_of(config), tuple(config.per_joint), config.loss.kind,
+        weights_of(config), method_of(config),
     )  # fmt: skip
 
 
-def weights_of(config: IdentificationSettings) -> LossWeights:
-    return LossWeights(**{key: value for key, value in vars(config.loss).items() if key != "kind"})
-
-
 def open_or_at_bound(result: Identification, config: IdentificationSettings) -> list[str]:
-    bounds = {name: Bounds(r.low, r.high) for name, r in config.parameters.items()}
-    vague = [n for n, is_vague in zip(result.values, undetermined(result, bounds), strict=True) if is_vague]
+    vague = [n for n, is_vague in zip(result.values, undetermined(result, bounds_of(config)), strict=True) if is_vague]
     return [f"{n} ended on a bound" for n in result.at_bound] + [f"{n} is not determined" for n in vague]
 
 
@@ -182,9 +174,7 @@ def main() -> int:
     heads = [f"{error}, {kind}s (mm)" for error in ("E_internal", "position") for kind in KINDS]
     heads += [f"CPU {stage.removeprefix('identify_')} (s)" for stage in STAGES]
     try:
-        for path in (CAD_MODEL, TRIALS / "trials.parquet"):
-            if not path.is_file():
-                raise InputError(f"{path}: no such file, expected what `make demo` writes; run it first")
+        require_demo(CAD_MODEL)
         print("| choice | " + " | ".join(heads) + " |\n|---|" + "---:|" * len(heads), flush=True)
         for name in arguments.only:
             print(row(*CHOICES[name], arguments.quick), flush=True)

@@ -20,6 +20,7 @@ from trunkline.identification.identify import Method, identify, with_parameters
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds, Problem
 from trunkline.identification.run import CAD_MODEL, TRIALS, method_of, read_experiments, read_spec, undetermined
+from trunkline.identification.settings import IdentificationSettings
 
 # every stage, and the model that it begins with
 STAGES = {
@@ -115,9 +116,7 @@ def read_case(stage: str, size: Size) -> Case:
     Raises:
         InputError: if the pipeline has not run so far.
     """
-    for path in (STAGES[stage], TRIALS / "trials.parquet"):
-        if not path.is_file():
-            raise InputError(f"{path}: no such file, expected what `make demo` writes; run it first")
+    require_demo(STAGES[stage])
     config = load_config(import_module(f"stages.{stage}").Config, stage)
     model = read_spec(STAGES[stage]).compile()
     experiments, segments = read_experiments(config, model)
@@ -127,11 +126,26 @@ def read_case(stage: str, size: Size) -> Case:
         experiments=spread([e for e in chosen if e.split == "identify"], size.trials),
         unseen=[e for e in chosen if e.split == "validate"],
         segments=segments,
-        bounds={name: Bounds(r.low, r.high) for name, r in config.parameters.items()},
+        bounds=bounds_of(config),
         loss=config.loss.kind,
-        weights=LossWeights(**{k: v for k, v in vars(config.loss).items() if k != "kind"}),
+        weights=weights_of(config),
         method=method_of(config),
     )
+
+
+def require_demo(model: Path) -> None:
+    """Refuse to begin without the demo session's trials and the `model` to begin with."""
+    for path in (model, TRIALS / "trials.parquet"):
+        if not path.is_file():
+            raise InputError(f"{path}: no such file, expected what `make demo` writes; run it first")
+
+
+def bounds_of(config: IdentificationSettings) -> dict[str, Bounds]:
+    return {name: Bounds(r.low, r.high) for name, r in config.parameters.items()}
+
+
+def weights_of(config: IdentificationSettings) -> LossWeights:
+    return LossWeights(**{key: value for key, value in vars(config.loss).items() if key != "kind"})
 
 
 def spread(items: list, count: int) -> list:
