@@ -12,7 +12,7 @@ import argparse
 import contextlib
 import sys
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -20,31 +20,38 @@ from pathlib import Path
 import mujoco
 from omegaconf import OmegaConf
 
-from benchmarks.identification.case import STAGES, bounds_of, require_demo, spread, weights_of
+from benchmarks.identification.case import STAGES, require_demo, spread
 from benchmarks.identification.timing import Stopwatch
 from trunkline.config import load_config
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
-from trunkline.identification.identify import Identification, identify
-from trunkline.identification.run import CAD_MODEL, method_of, read_experiments, read_spec, undetermined
+from trunkline.identification.identify import Fit, identify
+from trunkline.identification.run import CAD_MODEL, doubts
 from trunkline.identification.settings import (
     DifferentialEvolutionSettings,
     IdentificationSettings,
     LeastSquaresSettings,
     Range,
 )
+from trunkline.identification.setup import read_reported, read_spec, set_up
+from trunkline.recording.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")
 JOINT_FRICTION = Range(low=1e-4, high=0.1)  # rad of a joint's own spring
+MOUNT = Range(low=-0.1, high=0.1)  # rad by which the mount is turned in the tracked base frame
 COMMAND_DELAY = 0.02  # s
 KINDS = ("release", "curl")
+QUICK_TRIALS = 2  # of each kind and split
 
-Change = Callable[[str, IdentificationSettings], IdentificationSettings]  # of a stage's settings, by its name
 
+@dataclass
+class Choice:
+    """A row: `settings` of a stage, by its name, and the trials as they are changed for it."""
 
-def committed(stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    return config
+    title: str
+    settings: Callable[[str, IdentificationSettings], IdentificationSettings] = lambda stage, config: config
+    trials: Callable[[list[Trial]], list[Trial]] = lambda trials: trials
 
 
 def without(name: str, stage: str, config: IdentificationSettings) -> IdentificationSettings:
@@ -52,14 +59,30 @@ def without(name: str, stage: str, config: IdentificationSettings) -> Identifica
     return replace(config, parameters={key: span for key, span in config.parameters.items() if key != name})
 
 
-def with_joint_friction(stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    if stage != "identify_damping":
-        return config
-    return replace(config, parameters=config.parameters | {"joint_friction": JOINT_FRICTION})
+def with_parameter(
+    name: str, span: Range, in_stage: str, stage: str, config: IdentificationSettings
+) -> IdentificationSettings:
+    return replace(config, parameters=config.parameters | {name: span}) if stage == in_stage else config
+
+
+def with_turned_mount(stage: str, config: IdentificationSettings) -> IdentificationSettings:
+    """Tilt shows in shapes at rest; only the tendons' directions tell the twist."""
+    for name in ("mount_tilt_x", "mount_tilt_y"):
+        config = with_parameter(name, MOUNT, "identify_stiffness", stage, config)
+    return with_parameter("mount_twist", MOUNT, "identify_control", stage, config)
+
+
+def with_measured_markers(stage: str, config: IdentificationSettings) -> IdentificationSettings:
+    return replace(config, markers="measured") if stage == "identify_stiffness" else config
 
 
 def with_command_delay(stage: str, config: IdentificationSettings) -> IdentificationSettings:
     return replace(config, command_delay=COMMAND_DELAY)
+
+
+def in_motion(trials: list[Trial]) -> list[Trial]:
+    """With the velocity that the arm has in the frame of its start pose, in place of none."""
+    return [replace(trial, in_motion=trial.experiment != "static_tilt") for trial in trials]
 
 
 def with_distances(stage: str, config: IdentificationSettings) -> IdentificationSettings:
@@ -78,16 +101,21 @@ def without_factors(stage: str, config: IdentificationSettings) -> Identificatio
     return replace(config, per_joint=[])
 
 
-CHOICES: dict[str, tuple[str, Change]] = {
-    "committed": ("as committed", committed),
-    "no-hardening": ("without hardening", partial(without, "hardening")),
-    "no-creep": ("friction_time at its CAD value", partial(without, "friction_time")),
-    "joint-friction": ("with joint_friction", with_joint_friction),
-    "delay": (f"command_delay {COMMAND_DELAY:g} s", with_command_delay),
-    "distances": ("loss: distances", with_distances),
-    "least-squares": ("optimizer: least_squares", with_least_squares),
-    "joint-damping": ("per_joint damping too", with_factors_of_damping),
-    "no-factors": ("per_joint none", without_factors),
+CHOICES: dict[str, Choice] = {
+    "committed": Choice("as committed"),
+    "no-hardening": Choice("without hardening", partial(without, "hardening")),
+    "no-creep": Choice("friction_time at its CAD value", partial(without, "friction_time")),
+    "joint-friction": Choice(
+        "with joint_friction", partial(with_parameter, "joint_friction", JOINT_FRICTION, "identify_damping")
+    ),
+    "delay": Choice(f"command_delay {COMMAND_DELAY:g} s", with_command_delay),
+    "mount": Choice("with mount_tilt_x, mount_tilt_y, mount_twist", with_turned_mount),
+    "markers": Choice("markers: measured", with_measured_markers),
+    "velocity": Choice("started with measured velocities", trials=in_motion),
+    "distances": Choice("loss: distances", with_distances),
+    "least-squares": Choice("optimizer: least_squares", with_least_squares),
+    "joint-damping": Choice("per_joint damping too", with_factors_of_damping),
+    "no-factors": Choice("per_joint none", without_factors),
 }
 
 
@@ -107,40 +135,33 @@ def quick(stage: str, config: IdentificationSettings) -> IdentificationSettings:
     )
 
 
-def chain(settings: dict[str, IdentificationSettings], trials: int | None) -> tuple[mujoco.MjModel, list, list[float]]:
-    """The three stages in order.
+@dataclass
+class Chain:
+    """What the three stages end with: the last model, the last stage's trials and fit, CPU seconds by stage."""
 
-    Args:
-        trials: of each kind and split, at most; None for all.
+    model: mujoco.MjModel
+    experiments: list[Experiment]
+    fit: Fit
+    spent: list[float]
 
-    Returns:
-        The last model, the trials of the last stage with their segments, and CPU seconds by stage.
-    """
+
+def chain(choice: Choice, is_quick: bool) -> Chain:
+    """The three stages in order, each on what the one before it found."""
     model, spent = read_spec(CAD_MODEL).compile(), []
-    for stage, config in settings.items():
+    for stage in STAGES:
+        config = load_config(import_module(f"stages.{stage}").Config, stage)
+        config = choice.settings(stage, config)
+        config = quick(stage, config) if is_quick else config
         with contextlib.redirect_stdout(sys.stderr):
-            experiments, segments = read_experiments(config, model)
-            experiments = fewer(experiments, trials) if trials else experiments
+            model, experiments, fit = set_up(config, choice.trials(read_reported(config)), model)
+            experiments = fewer(experiments, QUICK_TRIALS) if is_quick else experiments
             clock = Stopwatch()
-            result = found(stage, config, model, experiments, segments)
+            result = identify(stage, model, [e for e in experiments if e.kind in config.experiments], fit)
             spent.append(clock.read().cpu)
-            for name in open_or_at_bound(result, config):
-                print(f"{stage}: {name}")
+            for line in [*doubts(result, fit.parameters), result.values]:
+                print(f"{stage}: {line}")
         model = result.models["identified"]
-    return model, [experiments, segments], spent
-
-
-def found(stage: str, config, model, experiments: list[Experiment], segments) -> Identification:
-    fitted = [e for e in experiments if e.kind in config.experiments]
-    return identify(
-        stage, model, fitted, segments, bounds_of(config), tuple(config.per_joint), config.loss.kind,
-        weights_of(config), method_of(config),
-    )  # fmt: skip
-
-
-def open_or_at_bound(result: Identification, config: IdentificationSettings) -> list[str]:
-    vague = [n for n, is_vague in zip(result.values, undetermined(result, bounds_of(config)), strict=True) if is_vague]
-    return [f"{n} ended on a bound" for n in result.at_bound] + [f"{n} is not determined" for n in vague]
+    return Chain(model, experiments, fit, spent)
 
 
 def fewer(experiments: list[Experiment], trials: int) -> list[Experiment]:
@@ -151,19 +172,14 @@ def fewer(experiments: list[Experiment], trials: int) -> list[Experiment]:
     return [experiment for group in groups.values() for experiment in spread(group, trials)]
 
 
-def row(title: str, change: Change, is_quick: bool) -> str:
+def row(choice: Choice, is_quick: bool) -> str:
     """One line of the table."""
-    settings = {}
-    for stage in STAGES:
-        config = load_config(import_module(f"stages.{stage}").Config, stage)
-        settings[stage] = change(stage, quick(stage, config) if is_quick else config)
-    model, (experiments, segments), spent = chain(settings, 2 if is_quick else None)
-    unseen = [e for e in experiments if e.split == "validate"]
-    last = settings["identify_control"]
-    table = scores(replay(model, unseen, segments), unseen, last.loss.kind, weights_of(last))["validate"]
-    by_kind = [table["by_experiment"][kind] for kind in KINDS]
-    errors = [f"{scored[key]:.3f}" for key in ("e_internal_mm", "e_position_mm") for scored in by_kind]
-    return "| " + " | ".join([title, *errors, *(f"{seconds:.0f}" for seconds in spent)]) + " |"
+    found = chain(choice, is_quick)
+    unseen = [e for e in found.experiments if e.split == "validate"]
+    replayed = replay(found.model, unseen, found.fit.segments)
+    table = scores(replayed, unseen, found.fit.loss, found.fit.weights)["validate"]["by_experiment"]
+    errors = [f"{table[kind][key]:.3f}" for key in ("e_internal_mm", "e_position_mm") for kind in KINDS]
+    return "| " + " | ".join([choice.title, *errors, *(f"{seconds:.0f}" for seconds in found.spent)]) + " |"
 
 
 def main() -> int:
@@ -177,7 +193,7 @@ def main() -> int:
         require_demo(CAD_MODEL)
         print("| choice | " + " | ".join(heads) + " |\n|---|" + "---:|" * len(heads), flush=True)
         for name in arguments.only:
-            print(row(*CHOICES[name], arguments.quick), flush=True)
+            print(row(CHOICES[name], arguments.quick), flush=True)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 1

@@ -10,6 +10,7 @@ from trunkline.arm.parameters import PARAMETERS, candidate_fields, save_model, s
 VALUES = {
     "stiffness": 2.5, "hardening": 0.7, "joint_friction": 0.01, "damping": 0.02, "tendon_friction": 0.8,
     "friction_time": 0.03, "kp": 1500.0, "kv": 60.0, "force_range": 45.0, "time_constant": 0.08,
+    "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
 }  # fmt: skip
 
 

@@ -7,14 +7,17 @@ import pytest
 from benchmarks.choices import CHOICES, quick
 from benchmarks.identification.case import STAGES
 from trunkline.config import load_config
-from trunkline.identification.run import method_of
 from trunkline.identification.search import LeastSquares
+from trunkline.identification.setup import fit_of
 
 CHANGED = {  # name → stage → the settings that it changes
     "committed": {},
     "no-hardening": {"identify_stiffness": {"parameters"}},
     "no-creep": {"identify_damping": {"parameters"}},
     "joint-friction": {"identify_damping": {"parameters"}},
+    "mount": {"identify_stiffness": {"parameters"}, "identify_control": {"parameters"}},
+    "markers": {"identify_stiffness": {"markers"}},
+    "velocity": {},
     "delay": {stage: {"command_delay"} for stage in STAGES},
     "distances": {stage: {"loss"} for stage in STAGES},
     "least-squares": {stage: {"optimizer"} for stage in STAGES},
@@ -30,7 +33,7 @@ def settings():
 
 @pytest.mark.parametrize("name", CHOICES)
 def test_a_choice_changes_what_it_says(name, settings):
-    change = CHOICES[name][1]
+    change = CHOICES[name].settings
     changed = {}
     for stage, config in settings.items():
         before, after = vars(config), vars(change(stage, config))
@@ -41,18 +44,18 @@ def test_a_choice_changes_what_it_says(name, settings):
 
 def test_least_squares_is_the_method_of_every_stage(settings):
     for stage, config in settings.items():
-        method = method_of(CHOICES["least-squares"][1](stage, config))
+        method = fit_of(CHOICES["least-squares"].settings(stage, config), ()).method
         assert isinstance(method.optimizer, LeastSquares)
 
 
 def test_a_parameter_left_out_is_not_searched(settings):
-    config = CHOICES["no-creep"][1]("identify_damping", settings["identify_damping"])
+    config = CHOICES["no-creep"].settings("identify_damping", settings["identify_damping"])
     assert set(settings["identify_damping"].parameters) - set(config.parameters) == {"friction_time"}
 
 
 @pytest.mark.parametrize("name", CHOICES)
 def test_quick_settings_are_small_and_valid(name, settings):
     for stage, config in settings.items():
-        small = quick(stage, CHOICES[name][1](stage, config))
+        small = quick(stage, CHOICES[name].settings(stage, config))
         assert small.frames <= 60
-        assert method_of(small).optimizer.steps() <= 3
+        assert fit_of(small, ()).method.optimizer.steps() <= 3

@@ -12,7 +12,7 @@ from benchmarks.identification.sysid import by_sysid, stalled
 from tests.matched_plant import release, segments_of, small_model
 from trunkline.arm.parameters import candidate_fields, set_fields
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Method
+from trunkline.identification.identify import Fit, Method
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.population import Population
 from trunkline.identification.problem import Bounds
@@ -30,21 +30,20 @@ def case():
     set_fields(truth, candidate_fields(model, dict(zip(bounds, np.exp(TRUTH)[:, None], strict=True))))
     trials = [release(truth, 0.3, frames=20), release(truth, -0.25, frames=20), release(truth, 0.2, "validate", 20)]
     experiments = [prepare(trial, model, 20) for trial in trials]
-    return Case(
-        model, experiments[:2], experiments[2:], segments_of(model), bounds, "positions",
-        LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01),
-        Method(LeastSquares(4, 1, 4, 1e-3), 2.0, 20, 2, 8, 1e-9, LeastSquares(0, 1, 1, 1.0), 0.1, 1),
-    )  # fmt: skip
+    weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
+    method = Method(LeastSquares(4, 1, 4, 1e-3), 2.0, 20, 2, 8, 1e-9, LeastSquares(0, 1, 1, 1.0), 0.1, 1)
+    fit = Fit(segments_of(model), bounds, (), "positions", weights, method)
+    return Case(model, experiments[:2], experiments[2:], fit)
 
 
 def test_bare_simulations_end_where_the_populations_do(case):
     fields = case.problem().fields(TRUTH + np.array([[0.0, 0.0], [0.3, -0.5], [-1.0, 1.0]]))
     batch, run = bare_batch(case, fields, 3, 1.0)
     seen = batch.bind("site_xpos")
-    simulated = Population(case.model, case.experiments, case.segments).simulate(fields)
+    simulated = Population(case.model, case.experiments, case.fit.segments).simulate(fields)
     assert run() == simulated.steps
     batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
-    sites = [case.model.site(f"{name}_center").id for name in case.segments]
+    sites = [case.model.site(f"{name}_center").id for name in case.fit.segments]
     for trial, positions in enumerate(simulated.positions):
         np.testing.assert_array_equal(seen[3 * trial : 3 * trial + 3, sites], positions[:, -1])
 

@@ -8,7 +8,7 @@ from trunkline.arm.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Method, identify
+from trunkline.identification.identify import Fit, Method, identify
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds
 from trunkline.identification.search import LeastSquares
@@ -33,13 +33,13 @@ def errors(first: np.ndarray, second: np.ndarray) -> tuple[dict, dict]:
         experiments.append(prepare(tilt(truth, angle), model, 1))
     segments, own = segments_of(model), PARAMETERS["stiffness"].read(model)
     bounds = {"stiffness": Bounds(0.5 * own, 2 * own)}
-    problem = (segments, bounds, ("stiffness",), "positions", WEIGHTS, METHOD)
-    alone = identify("test", model, experiments[:1], *problem)
+    fit = Fit(segments, bounds, ("stiffness",), "positions", WEIGHTS, METHOD)
+    alone = identify("test", model, experiments[:1], fit)
     fitted = {}
     for name in ("coarse", "identified"):
         replayed = replay(alone.models[name], experiments[:1], segments)
         fitted[name] = scores(replayed, experiments[:1], "positions", WEIGHTS)["identify"]["e_position_mm"]
-    left_out = cross_validate("test", alone, experiments, *problem, folds=2)
+    left_out = cross_validate("test", alone, experiments, fit, folds=2)
     return fitted, {name: table["e_position_mm"] for name, table in left_out.items()}
 
 
@@ -69,6 +69,6 @@ def test_every_trial_is_left_out_once(monkeypatch):
         lambda replayed, *rest: {"identify": {"e_internal_mm": float(len(replayed)), "e_position_mm": 1.0}},
     )
     result = type("Result", (), {"models": {"coarse": model, "identified": model}})()
-    table = cross_validate("test", result, trials, (), {}, (), "positions", WEIGHTS, METHOD, folds=2)
+    table = cross_validate("test", result, trials, Fit((), {}, (), "positions", WEIGHTS, METHOD), folds=2)
     assert seen[::2] == [[trials[0].name, trials[2].name], [trials[1].name]]
     assert table["coarse"]["e_internal_mm"] == pytest.approx((2 * 2 + 1 * 1) / 3)

@@ -16,7 +16,7 @@ from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Method, identify
+from trunkline.identification.identify import Fit, Method, identify
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds
 from trunkline.identification.resting import resting_shape
@@ -87,10 +87,9 @@ def test_the_shape_is_that_of_the_releases_ends(model, truth, experiments):
 def test_stiffness_and_damping_come_back_without_static_tilts(model, truth, experiments):
     bounds = {"stiffness": Bounds(0.3, 10.0), "damping": Bounds(0.005, 1.0)}
     rest = resting_shape(model, experiments, SEGMENTS)
-    found = identify(
-        "test", model, experiments, SEGMENTS, bounds, (), "positions", WEIGHTS,
-        Method(LeastSquares(5, 1, 6, 1e-2), 1.0, 200, 2, 8, 1e-6, LeastSquares(0, 1, 1, 1e-2), 0.1, 3), rest,
-    )  # fmt: skip
+    method = Method(LeastSquares(5, 1, 6, 1e-2), 1.0, 200, 2, 8, 1e-6, LeastSquares(0, 1, 1, 1e-2), 0.1, 3)
+    fit = Fit(SEGMENTS, bounds, (), "positions", WEIGHTS, method, rest)
+    found = identify("test", model, experiments, fit)
     assert found.values["stiffness"] == pytest.approx(1.7, rel=0.05)
     assert found.values["damping"] == pytest.approx(0.15, rel=0.05)
     identified = found.models["identified"]

@@ -30,7 +30,7 @@ LOSS = Loss(
 
 def settings(experiments, reported, parameters, per_joint=(), iterations=8, **changed) -> IdentificationSettings:
     return IdentificationSettings(**{
-        "seed": 1, "frames": 437, "rest_shape": "unchanged", "command_delay": 0.0,
+        "seed": 1, "frames": 437, "rest_shape": "unchanged", "markers": "unchanged", "command_delay": 0.0,
         "experiments": experiments, "reported": reported, "loss": LOSS,
         "parameters": {name: Range(low=low, high=high) for name, (low, high) in parameters.items()},
         "optimizer": LeastSquaresSettings(method="least_squares", starts=4, descents=1, iterations=4, tolerance=1e-3),

@@ -16,11 +16,11 @@ from trunkline.config import load_config
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
-from trunkline.identification.identify import Method, identify, with_parameters
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.problem import Bounds, Problem
-from trunkline.identification.run import CAD_MODEL, TRIALS, method_of, read_experiments, read_spec, undetermined
-from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.identify import Fit, identify, values_of, with_parameters
+from trunkline.identification.parameter_table import undetermined
+from trunkline.identification.problem import Problem
+from trunkline.identification.run import CAD_MODEL
+from trunkline.identification.setup import TRIALS, read_reported, read_spec, set_up
 
 # every stage, and the model that it begins with
 STAGES = {
@@ -59,26 +59,23 @@ class Case:
     model: mujoco.MjModel
     experiments: list[Experiment]
     unseen: list[Experiment]
-    segments: tuple[str, ...]
-    bounds: dict[str, Bounds]
-    loss: str
-    weights: LossWeights
-    method: Method
+    fit: Fit
 
     def problem(self) -> Problem:
         """At the model's own time step, over whole trials."""
-        return Problem(self.model, self.experiments, self.segments, self.bounds, self.loss, self.weights)
+        return self.fit.problem(self.model, self.experiments)
 
     def values(self, vector: np.ndarray) -> str:
         """A candidate in words."""
-        pairs = zip(self.bounds, np.exp(vector), strict=True)
+        pairs = values_of(self.fit.parameters, vector).items()
         return ", ".join(f"{name} {value:.4g} {PARAMETERS[name].unit}" for name, value in pairs)
 
     def unseen_errors(self, vector: np.ndarray) -> str:
         """E_internal and position error of a candidate on the unseen trials, in words."""
-        model = with_parameters(self.model, dict(zip(self.bounds, np.exp(vector).tolist(), strict=True)))
-        replayed = replay(model, self.unseen, self.segments)
-        table = scores(replayed, self.unseen, self.loss, self.weights)["validate"]
+        replayed = replay(
+            with_parameters(self.model, values_of(self.fit.parameters, vector)), self.unseen, self.fit.segments
+        )
+        table = scores(replayed, self.unseen, self.fit.loss, self.fit.weights)["validate"]
         return f"validate: E_internal {table['e_internal_mm']:.3f} mm, position {table['e_position_mm']:.2f} mm"
 
 
@@ -89,7 +86,7 @@ ReadCase = Callable[[str, Size], Case]
 class Identified:
     """What `identify` found, without factors of joints.
 
-    vector: ln(value) of the scalars. loss: its, over whole trials. undetermined: names of what the data leave open.
+    vector: of the scalars, as searched. loss: its, over whole trials. undetermined: names of what the data leave open.
     """
 
     vector: np.ndarray
@@ -101,12 +98,10 @@ class Identified:
 def identified(case: Case) -> Identified:
     clock = Stopwatch()
     with contextlib.redirect_stdout(io.StringIO()):
-        result = identify(
-            "", case.model, case.experiments, case.segments, case.bounds, (), case.loss, case.weights, case.method
-        )
+        result = identify("", case.model, case.experiments, replace(case.fit, per_joint=()))
     spent = clock.read()
-    vector = np.log([result.values[name] for name in case.bounds])
-    vague = [name for name, is_vague in zip(case.bounds, undetermined(result, case.bounds), strict=True) if is_vague]
+    vector = np.array([PARAMETERS[name].coordinate(value) for name, value in result.values.items()])
+    vague = undetermined(result, case.fit.parameters)
     return Identified(vector, float(case.problem().losses(vector[None])[0]), spent, vague)
 
 
@@ -119,17 +114,13 @@ def read_case(stage: str, size: Size) -> Case:
     require_demo(STAGES[stage])
     config = load_config(import_module(f"stages.{stage}").Config, stage)
     model = read_spec(STAGES[stage]).compile()
-    experiments, segments = read_experiments(config, model)
-    chosen = [_shortened(e, size.frames) for e in experiments if e.kind in config.experiments]
+    model, experiments, fit = set_up(config, read_reported(config), model)
+    chosen = [e.shortened(size.frames) for e in experiments if e.kind in config.experiments]
     return Case(
         model=model,
         experiments=spread([e for e in chosen if e.split == "identify"], size.trials),
         unseen=[e for e in chosen if e.split == "validate"],
-        segments=segments,
-        bounds=bounds_of(config),
-        loss=config.loss.kind,
-        weights=weights_of(config),
-        method=method_of(config),
+        fit=fit,
     )
 
 
@@ -140,20 +131,6 @@ def require_demo(model: Path) -> None:
             raise InputError(f"{path}: no such file, expected what `make demo` writes; run it first")
 
 
-def bounds_of(config: IdentificationSettings) -> dict[str, Bounds]:
-    return {name: Bounds(r.low, r.high) for name, r in config.parameters.items()}
-
-
-def weights_of(config: IdentificationSettings) -> LossWeights:
-    return LossWeights(**{key: value for key, value in vars(config.loss).items() if key != "kind"})
-
-
 def spread(items: list, count: int) -> list:
     """At most `count` of `items`, evenly spread from first to last."""
     return [items[i] for i in np.unique(np.linspace(0, len(items) - 1, count).round().astype(int))]
-
-
-def _shortened(experiment: Experiment, frames: int) -> Experiment:
-    window = slice(0, frames)
-    parts = {name: getattr(experiment, name)[window] for name in ("controls", "positions", "measured")}
-    return replace(experiment, **parts)

@@ -53,7 +53,7 @@ def _case_of_units(case: Case, units: int) -> Case:
     spec, *_ = build_mjcf.initial_spec(replace(config, arm=replace(config.arm, units=units)))
     model = spec.compile()
     experiment, segments = bent_release(model, first.frames, first.frame_step)
-    return replace(case, model=model, experiments=[experiment], segments=segments)
+    return replace(case, model=model, experiments=[experiment], fit=replace(case.fit, segments=segments))
 
 
 def bent_release(model: mujoco.MjModel, frames: int, frame_step: float) -> tuple[Experiment, tuple[str, ...]]:

@@ -21,7 +21,7 @@ CANDIDATES = 12
 def report(read_case: ReadCase, size: Size) -> None:
     case = read_case("identify_damping", replace(size, trials=99, frames=size.rate_frames))
     print(f"(1) steps: {CANDIDATES} candidates x {len(case.experiments)} releases of {size.rate_frames} frames")
-    for factor in sorted({1.0, case.method.rough_step_factor}):
+    for factor in sorted({1.0, case.fit.method.rough_step_factor}):
         times = rate(case, CANDIDATES, factor, size.repeats)
         bare = times["bare Batch.step"]
         print(f"    {case.model.opt.timestep * factor * 1e3:.2f} ms a step   steps/s  of bare   CPU us/step  of bare")
@@ -38,9 +38,9 @@ def rate(case: Case, count: int, step_factor: float, repeats: int) -> dict[str, 
     All three run the same candidates through the same trials; the first reads nothing back on the way.
     """
     problem = replace(case.problem(), step_factor=step_factor)
-    vectors = np.random.default_rng(0).uniform(*problem.bounds(), (count, len(case.bounds)))
+    vectors = np.random.default_rng(0).uniform(*problem.bounds(), (count, len(case.fit.parameters)))
     fields = problem.fields(vectors)
-    population = Population(case.model, case.experiments, case.segments, step_factor)
+    population = Population(case.model, case.experiments, case.fit.segments, step_factor)
 
     def losses() -> int:
         before = problem.steps

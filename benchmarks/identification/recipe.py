@@ -21,8 +21,8 @@ def report(read_case: ReadCase, size: Size) -> None:
     case = read_case("identify_damping", replace(size, trials=2))
     print(f"(2) damping stage, {len(case.experiments)} releases of {size.frames} frames, to the same loss within 1 %")
     own_total, total, sign = Spent(0.0, 0.0), Spent(0.0, 0.0), ""
-    for seed in range(case.method.seed, case.method.seed + size.seeds):
-        seeded = replace(case, method=replace(case.method, seed=seed))
+    for seed in range(case.fit.method.seed, case.fit.method.seed + size.seeds):
+        seeded = replace(case, fit=replace(case.fit, method=replace(case.fit.method, seed=seed)))
         own = identified(seeded)
         target = SAME_LOSS * own.loss
         rival = by_recipe(seeded, target, size.budget)
@@ -48,7 +48,7 @@ def by_recipe(case: Case, target: float, budget: float) -> Rival:
         return value
 
     with contextlib.suppress(Rival.Stop):
-        differential_evolution(objective, list(zip(*case.problem().bounds(), strict=True)), rng=case.method.seed)
+        differential_evolution(objective, list(zip(*case.problem().bounds(), strict=True)), rng=case.fit.method.seed)
     return rival
 
 
@@ -56,7 +56,7 @@ def as_first_written(case: Case) -> Callable[[np.ndarray], float]:
     """The loss of one candidate (P,), the way one would write it first: a Python loop of mj_step, trial by trial."""
     model, problem = copy.copy(case.model), case.problem()
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    sites = [model.site(f"{name}_center").id for name in case.segments]
+    sites = [model.site(f"{name}_center").id for name in case.fit.segments]
 
     def loss(vector: np.ndarray) -> float:
         set_fields(model, problem.fields(vector[None]))
@@ -76,7 +76,8 @@ def as_first_written(case: Case) -> Callable[[np.ndarray], float]:
                 seen[frame] = data.site_xpos[sites]
             if not np.isfinite(seen).all() or any(warning.number for warning in data.warning):
                 return DIVERGED_LOSS
-            residuals = RESIDUALS[case.loss](seen[None], experiment.positions, experiment.measured, case.weights)
+            compared = seen[None], experiment.positions, experiment.measured, case.fit.weights
+            residuals = RESIDUALS[case.fit.loss](*compared)
             losses.append(float(loss_of(residuals)[0]))
         return float(np.mean(losses))
 

@@ -43,7 +43,7 @@ def by_sysid(case: Case, budget: float, **options) -> Rival:
     from mujoco import sysid
 
     problem = case.problem()
-    rows = zip(case.bounds, problem.start(), *problem.bounds(), strict=True)
+    rows = zip(case.fit.parameters, problem.start(), *problem.bounds(), strict=True)
     parameters = sysid.ParameterDict({row[0]: sysid.Parameter(*row) for row in rows})
     rival = Rival(budget=budget)
 
@@ -67,7 +67,7 @@ def stalled(case: Case, vector: np.ndarray, own: Identified) -> list[str]:
     start = case.problem().start()
     blind = ~np.any(np.concatenate(linearise(case.problem(), start).jacobians), axis=0)
     lines = []
-    for i, name in enumerate(case.bounds):
+    for i, name in enumerate(case.fit.parameters):
         if abs(vector[i] - start[i]) < UNMOVED <= abs(own.vector[i] - start[i]):
             why = "no residual depends on it there" if blind[i] else "residuals do depend on it there"
             vague = ", undetermined" if name in own.undetermined else ""

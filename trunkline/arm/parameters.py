@@ -2,9 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
+
+from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 
 Fields = dict[str, np.ndarray]  # name of an MjModel field → its values per candidate, (candidates, ...)
 
@@ -18,12 +22,22 @@ class Parameter:
         fields: the MjModel fields that it writes.
         read: its value in a model.
         write: (fields, values (candidates,), model) sets it in every candidate.
+        signed: whether it may be 0 or less. Only others are searched on a logarithmic scale.
     """
 
     unit: str
     fields: tuple[str, ...]
     read: Callable[[mujoco.MjModel], float]
     write: Callable[[Fields, np.ndarray, mujoco.MjModel], None]
+    signed: bool = False
+
+    def coordinate(self, value):
+        """Where a value lies on the axis that is searched: its natural logarithm, or itself if signed."""
+        return np.asarray(value, dtype=float) if self.signed else np.log(value)
+
+    def value(self, coordinate):
+        """The inverse of `coordinate`."""
+        return np.asarray(coordinate, dtype=float) if self.signed else np.exp(coordinate)
 
 
 def _column(values: np.ndarray, field: np.ndarray) -> np.ndarray:
@@ -61,6 +75,26 @@ def _write_hardening(fields: Fields, values: np.ndarray, model: mujoco.MjModel) 
 
 def _write_joint_friction(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
     fields["dof_frictionloss"][:] = values[:, None] * fields["jnt_stiffness"]
+
+
+def _read_mount(model: mujoco.MjModel, axis: int) -> float:
+    return float(rotation_from_wxyz(model.body("base").quat).as_rotvec()[axis])
+
+
+def _write_mount(axis: int) -> Callable:
+    """Set one component of the rotation vector that turns the mount in the tracked base frame."""
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        turned = fields["body_quat"][:, model.body("base").id]
+        vectors = rotation_from_wxyz(turned).as_rotvec()
+        vectors[:, axis] = values
+        turned[:] = wxyz_from_rotation(Rotation.from_rotvec(vectors))
+
+    return write
+
+
+def _mount(axis: int) -> Parameter:
+    return Parameter("rad", ("body_quat",), partial(_read_mount, axis=axis), _write_mount(axis), signed=True)
 
 
 STIFFNESS_FIELDS = ("jnt_stiffness", "jnt_stiffnesspoly")
@@ -105,6 +139,9 @@ PARAMETERS: dict[str, Parameter] = {
     "time_constant": Parameter(
         "s", ("actuator_dynprm",), lambda m: float(m.actuator_dynprm[0, 0]), _set("actuator_dynprm", (slice(None), 0)),
     ),
+    "mount_tilt_x": _mount(0),
+    "mount_tilt_y": _mount(1),
+    "mount_twist": _mount(2),
 }  # fmt: skip
 
 PER_JOINT_FIELDS = {"stiffness": STIFFNESS_FIELDS, "damping": DAMPING_FIELDS}
@@ -159,6 +196,9 @@ def save_model(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
         joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
         joint.frictionloss = model.dof_frictionloss[dof]
         joint.springref = model.qpos_spring[model.jnt_qposadr[index]]
+    spec.body("base").quat = model.body("base").quat
+    for site in spec.sites:
+        site.pos = model.site(site.name).pos
     for tendon in spec.tendons:
         index = model.tendon(tendon.name).id
         tendon.frictionloss = model.tendon_frictionloss[index]

@@ -4,12 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from trunkline.arm.rest import RestShape
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
-from trunkline.identification.identify import Identification, Method, identify
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.problem import Bounds
+from trunkline.identification.identify import Fit, Identification, identify
 from trunkline.identification.search import LeastSquares
 
 
@@ -17,14 +14,8 @@ def cross_validate(
     label: str,
     result: Identification,
     experiments: list[Experiment],
-    segments: tuple[str, ...],
-    parameters: dict[str, Bounds],
-    per_joint: tuple[str, ...],
-    loss: str,
-    weights: LossWeights,
-    method: Method,
+    fit: Fit,
     folds: int,
-    rest: RestShape | None = None,
 ) -> dict[str, dict[str, float]]:
     """Errors on trials of the `identify` split that the fit did not see, before and after per-joint tuning.
 
@@ -39,18 +30,16 @@ def cross_validate(
         "coarse" and "identified", each with `e_internal_mm` and `e_position_mm`, means over all left-out trials.
     """
     seen = [e for e in experiments if e.split == "identify"]
-    near = replace(method, optimizer=LeastSquares(starts=0, descents=1, iterations=1, tolerance=1.0))
+    near = replace(fit.method, optimizer=LeastSquares(starts=0, descents=1, iterations=1, tolerance=1.0))
     rows: dict[str, list] = {"coarse": [], "identified": []}
     for fold in range(folds):
         left_out = seen[fold::folds]
         kept = [e for i, e in enumerate(seen) if i % folds != fold]
-        found = identify(
-            f"{label} fold {fold + 1} of {folds}", result.models["coarse"], kept, segments, parameters, per_joint,
-            loss, weights, near, rest,
-        )  # fmt: skip
+        title = f"{label} fold {fold + 1} of {folds}"
+        found = identify(title, result.models["coarse"], kept, replace(fit, method=near))
         for name, table in rows.items():
             model = found.models[name]
-            found_scores = scores(replay(model, left_out, segments), left_out, loss, weights)["identify"]
+            found_scores = scores(replay(model, left_out, fit.segments), left_out, fit.loss, fit.weights)["identify"]
             table.append((len(left_out), found_scores))
     return {
         name: {

@@ -1,6 +1,6 @@
 """A trial set up for simulation: where it starts, what drives it, what it is compared with."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -52,6 +52,11 @@ class Experiment:
     def frames(self) -> int:
         return len(self.positions)
 
+    def shortened(self, frames: int) -> "Experiment":
+        """Its first `frames` frames."""
+        parts = {name: getattr(self, name)[:frames] for name in ("controls", "positions", "measured")}
+        return replace(self, **parts)
+
 
 def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: float = 0.0) -> Experiment:
     """Set up one trial: from its detected start, for at most `frames` frames.
@@ -65,11 +70,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     check_names(trial, model)
     static = trial.experiment == "static_tilt"
     step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 else 0.0
-    # the frame at the start or just before it; the pose there is that of the arm still held
-    held = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
-    seen = _start_frame(trial, held if trial.in_motion else max(held - QUIET_FRAMES, 0))
-    if trial.in_motion:
-        held = seen  # pose and velocity hold there
+    held, seen = start_frames(trial)
     window = slice(0, 1) if static else slice(held + 1, held + 1 + frames)
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
@@ -96,19 +97,28 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     )
 
 
+def start_frames(trial: Trial) -> tuple[int, int]:
+    """The last frame that is not compared, the arm being still held then, and the one of the pose to start from."""
+    static = trial.experiment == "static_tilt"
+    held = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
+    seen = _seen_frame(trial, held if trial.in_motion else max(held - QUIET_FRAMES, 0))
+    return (seen if trial.in_motion else held), seen  # of an arm in motion, pose and velocity hold in that frame
+
+
 def _lead(trial: Trial, held: int) -> float:
     """Time to simulate until the first frame: from the start, or from the frame whose velocity is known, s."""
     begin = trial.time[held] if trial.in_motion else max(trial.start, trial.time[held])
     return max(float(trial.time[held + 1] - begin), 1e-4)
 
 
+def measured_pose(trial: Trial, frame: int) -> tuple[np.ndarray, np.ndarray | None]:
+    """Positions (S, 3) of a frame, m, nan where not measured, and orientations (S, 4) if the trial has any."""
+    positions = np.where(trial.measured[frame][:, None], trial.positions[frame], np.nan)
+    return positions, None if trial.quaternions is None else trial.quaternions[frame]
+
+
 def _fit_frame(trial: Trial, model: mujoco.MjModel, frame: int) -> PoseFit:
-    return fit_pose(
-        model,
-        trial.segments,
-        np.where(trial.measured[frame][:, None], trial.positions[frame], np.nan),
-        None if trial.quaternions is None else trial.quaternions[frame],
-    )
+    return fit_pose(model, trial.segments, *measured_pose(trial, frame))
 
 
 def _velocity(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
@@ -118,7 +128,7 @@ def _velocity(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
     return turned / (trial.time[after] - trial.time[before])
 
 
-def _start_frame(trial: Trial, latest: int) -> int:
+def _seen_frame(trial: Trial, latest: int) -> int:
     """The last frame up to `latest` in which enough segments were measured."""
     for frame in range(latest, max(latest - LOOK_BACK, -1), -1):
         if trial.measured[frame].mean() >= SEEN_SHARE:

@@ -1,11 +1,11 @@
 """One function for the three stages: they differ in their experiments and in their parameters."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
-from trunkline.arm.parameters import candidate_fields, set_fields
+from trunkline.arm.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.arm.rest import RestShape, spring_references
 from trunkline.identification.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.experiment import Experiment
@@ -41,13 +41,39 @@ class Method:
 
 
 @dataclass
+class Fit:
+    """What is fitted to trials, and how.
+
+    segments: names of those that the trials track.
+    parameters: scalars of the whole arm and their ranges.
+    per_joint: what then gets a factor for each joint, "stiffness" or "damping".
+    loss: "distances" (the paper's) or "positions".
+    rest: the shape in which the arm hangs, whatever its stiffness; None where it is as the model says.
+    """
+
+    segments: tuple[str, ...]
+    parameters: dict[str, Bounds]
+    per_joint: tuple[str, ...]
+    loss: str
+    weights: LossWeights
+    method: Method
+    rest: RestShape | None = None
+
+    def problem(self, model: mujoco.MjModel, experiments: list[Experiment], step_factor: float = 1.0) -> Problem:
+        """The search for the scalars, from those of `model`."""
+        return Problem(
+            model, experiments, self.segments, self.parameters, self.loss, self.weights, step_factor, rest=self.rest
+        )
+
+
+@dataclass
 class Identification:
     """Result of a stage.
 
     models: "initial", "coarse" and "identified", each a compiled model.
     values: identified scalars. factors: per-joint factors (units,) by parameter, empty if there are none.
-    certainty: of the scalars, in ln(value), before joints got factors. bootstrap: their 95 % intervals by
-        resampling trials, lowest and highest ln(value), shape (2, P).
+    certainty: of the scalars, on the axes of the search, before joints got factors. bootstrap: their 95 % intervals
+        by resampling trials, lowest and highest z, shape (2, P).
     factor_certainty: of all factors, given the scalars; None without factors.
     at_bound: names of what ended on a bound. converged: which searches stopped for that reason.
     """
@@ -66,35 +92,20 @@ class Identification:
     steps: int
 
 
-def identify(
-    label: str,
-    model: mujoco.MjModel,
-    experiments: list[Experiment],
-    segments: tuple[str, ...],
-    parameters: dict[str, Bounds],
-    per_joint: tuple[str, ...],
-    loss: str,
-    weights: LossWeights,
-    method: Method,
-    rest: RestShape | None = None,
-) -> Identification:
+def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], fit: Fit) -> Identification:
     """Fit the parameters to the `identify` split among `experiments`; the others are never looked at.
 
     Args:
         label: shown with the progress.
         model: the model that the stage begins with.
-        parameters: scalars of the whole arm and their ranges.
-        per_joint: what then gets a factor for each joint, "stiffness" or "damping".
-        loss: "distances" (the paper's) or "positions".
-        rest: the shape in which the arm hangs, whatever its stiffness; None where it is as the model says.
     """
+    method, parameters, per_joint, rest = fit.method, fit.parameters, fit.per_joint, fit.rest
     seen = [e for e in experiments if e.split == "identify"]
-    short = [_shortened(e, method.rough_frames) for e in _few(seen, method.rough_trials)]
-    rough = Problem(model, short, segments, parameters, loss, weights, method.rough_step_factor, rest=rest)
-    exact = Problem(model, seen, segments, parameters, loss, weights, rest=rest)
+    short = [e.shortened(method.rough_frames) for e in _few(seen, method.rough_trials)]
+    rough, exact = fit.problem(model, short, method.rough_step_factor), fit.problem(model, seen)
     searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}
     searches["polish"] = found = _polish(exact, searches["coarse"].vector, method, f"{label} polish")
-    values = dict(zip(parameters, np.exp(found.vector).tolist(), strict=True))
+    values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
     linear = linearise(exact, found.vector)
@@ -105,9 +116,9 @@ def identify(
     if per_joint:
         # trials count as independent, each with the coarse fit's loss for its variance
         prior_weight = np.sqrt(2 * found.loss / len(seen)) / method.per_joint_deviation
-        joints = Problem(
-            coarse, seen, segments, {}, loss, weights, per_joint=per_joint, per_joint_range=method.per_joint_range,
-            prior_weight=prior_weight, rest=rest,
+        joints = replace(
+            replace(fit, parameters={}).problem(coarse, seen),
+            per_joint=per_joint, per_joint_range=method.per_joint_range, prior_weight=prior_weight,
         )  # fmt: skip
         searches["per_joint"] = found = _search(joints, method.fine, method.seed, f"{label} per joint")
         factor_certainty = certainty(linearise(joints, found.vector), method.per_joint_deviation)
@@ -131,19 +142,16 @@ def identify(
     )
 
 
+def values_of(parameters, vector: np.ndarray) -> dict[str, float]:
+    """What the scalars at the head of a candidate z are, in their units."""
+    return {name: float(PARAMETERS[name].value(z)) for name, z in zip(parameters, vector, strict=False)}
+
+
 def _few(experiments: list[Experiment], count: int) -> list[Experiment]:
     """`count` of them, from the one that swings out least to the one that swings out most, evenly between."""
     order = np.argsort([np.linalg.norm(e.positions[..., :2], axis=-1).max() for e in experiments], kind="stable")
     places = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
     return [experiments[i] for i in order[places]]
-
-
-def _shortened(experiment: Experiment, frames: int) -> Experiment:
-    window = slice(0, frames)
-    return Experiment(
-        **vars(experiment)
-        | {name: getattr(experiment, name)[window] for name in ("controls", "positions", "measured")}
-    )
 
 
 def _search(problem: Problem, optimizer: Optimizer, seed: int, label: str) -> Found:

@@ -6,6 +6,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 from scipy.signal import butter, sosfiltfilt
 
+from trunkline.arm.parameters import PARAMETERS
 from trunkline.frames import tilt_of_gravity
 from trunkline.identification.evaluation import Replay
 from trunkline.identification.experiment import Experiment
@@ -173,20 +174,20 @@ def shape_figure(table: pd.DataFrame) -> Figure:
 
 
 def parameter_figure(
-    identification: Identification, bounds, units: dict[str, str], undetermined: list[bool]
+    identification: Identification, bounds, units: dict[str, str], undetermined: list[str]
 ) -> Figure:
     """Each scalar with its 95 % interval within its range, grey if that is open or a bound, and per-joint factors."""
     panels = 1 + bool(identification.factors)
     figure, axes = plt.subplots(1, panels, figsize=(5.5 * panels, 3.2), squeeze=False)
     for row, (name, value) in enumerate(identification.values.items()):
-        low, high = np.log(bounds[name].low), np.log(bounds[name].high)
-        place = (np.log(value) - low) / (high - low)
+        low, high, place = PARAMETERS[name].coordinate([bounds[name].low, bounds[name].high, value])
+        place = (place - low) / (high - low)
         width = identification.certainty.half_width[row] / (high - low)
-        doubt = "not determined" if undetermined[row] else "on a bound" if name in identification.at_bound else ""
+        doubt = "not determined" if name in undetermined else "on a bound" if name in identification.at_bound else ""
         axes[0, 0].errorbar(place, row, xerr=width, fmt="o", color=DOUBTFUL if doubt else IDENTIFIED, capsize=4)
         axes[0, 0].annotate(f"{value:.4g} {units[name]} {doubt}".strip(), (place, row), xytext=(0, 8),
                             textcoords="offset points", ha="center", fontsize=9)
-    axes[0, 0].set(xlim=(0, 1), ylim=(-0.6, len(identification.values) - 0.2), xlabel="place in its range (log scale)",
+    axes[0, 0].set(xlim=(0, 1), ylim=(-0.6, len(identification.values) - 0.2), xlabel="place in the range searched",
                    yticks=range(len(identification.values)), yticklabels=list(identification.values),
                    title="Parameters, 95 % intervals")
     for name, factors in identification.factors.items():

@@ -29,14 +29,8 @@ class PoseFit:
     converged: bool
 
 
-def fit_pose(
-    model: mujoco.MjModel,
-    segments: tuple[str, ...],
-    positions: np.ndarray,
-    quaternions: np.ndarray | None = None,
-    max_iterations: int = 100,
-) -> PoseFit:
-    """Least squares over positions, orientations and the change of bend from joint to joint.
+class PoseProblem:
+    """Residuals of joint angles: positions, orientations, and the change of bend from joint to joint.
 
     The last term decides what the tracked segments leave open (units without markers) and is weak beside them.
 
@@ -44,33 +38,87 @@ def fit_pose(
         segments: names of the tracked bodies, whose frames are the sites `<name>_center`.
         positions: m, base frame. Shape (S, 3); rows that are not finite are left out.
         quaternions: wxyz. Shape (S, 4), or None for positions alone.
+
+    Attributes:
+        seen: indices of the measured segments, from the base on.
     """
-    data = mujoco.MjData(model)
-    sites = np.array([model.site(f"{name}_center").id for name in segments])
-    targets = None if quaternions is None else rotation_from_wxyz(quaternions).as_matrix()
-    seen = np.flatnonzero(np.isfinite(positions).all(axis=1))
-    bodies = model.site_bodyid[sites[seen]]
-    seen = seen[np.argsort(bodies)]  # the chain numbers its bodies from the base on
-    per_joint = int(np.bincount(model.jnt_bodyid).max())
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        segments: tuple[str, ...],
+        positions: np.ndarray,
+        quaternions: np.ndarray | None = None,
+    ):
+        self.model, self.data = model, mujoco.MjData(model)
+        self.sites = np.array([model.site(f"{name}_center").id for name in segments])
+        self.positions = positions
+        self._targets = None if quaternions is None else rotation_from_wxyz(quaternions).as_matrix()
+        seen = np.flatnonzero(np.isfinite(positions).all(axis=1))
+        self.seen = seen[np.argsort(model.site_bodyid[self.sites[seen]])]  # the chain numbers its bodies from the base
+        self.hinges = int(np.bincount(model.jnt_bodyid).max())  # of each joint
+        rows = np.eye(model.nq, k=self.hinges)[: -self.hinges] - np.eye(model.nq)[: -self.hinges]
+        self._smooth = rows / BEND_CHANGE_SIGMA
+
+    def linearise(self, qpos: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Jacobian (R, nv) and residuals (R,) in units of sigma, against the segments `seen`.
+
+        First the changes of bend; then of every segment three rows for its position, and three for its orientation
+        if it has one.
+        """
+        model, data = self.model, self.data
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        rows, residuals = [self._smooth], [self._smooth @ qpos]
+        jac_position, jac_rotation = np.empty((3, model.nv)), np.empty((3, model.nv))
+        for index in seen:
+            site = self.sites[index]
+            mujoco.mj_jacSite(model, data, jac_position, jac_rotation, site)
+            rows.append(jac_position / POSITION_SIGMA)
+            residuals.append((data.site_xpos[site] - self.positions[index]) / POSITION_SIGMA)
+            if self._targets is not None:
+                error = _rotation_vector(data.site_xmat[site].reshape(3, 3) @ self._targets[index].T)
+                rows.append(jac_rotation / ROTATION_SIGMA)
+                residuals.append(error / ROTATION_SIGMA)
+        return np.concatenate(rows), np.concatenate(residuals)
+
+    def position_rows(self) -> np.ndarray:
+        """Which residuals are those of the positions of `seen`, all of them given. Shape (len(seen), 3)."""
+        each = 3 if self._targets is None else 6
+        return len(self._smooth) + each * np.arange(len(self.seen))[:, None] + np.arange(3)
+
+
+def fit_pose(
+    model: mujoco.MjModel,
+    segments: tuple[str, ...],
+    positions: np.ndarray,
+    quaternions: np.ndarray | None = None,
+    max_iterations: int = 100,
+) -> PoseFit:
+    """Least squares over the residuals of a `PoseProblem`, whose arguments these are."""
+    problem = PoseProblem(model, segments, positions, quaternions)
+    seen, hinges = problem.seen, problem.hinges
     qpos = np.zeros(model.nq)
     # From the base on, a segment at a time, each new joint first bent as the one before it: a coil of more
     # than one turn has many wrong answers near the straight arm, and none on this way.
     for known in range(1, len(seen) + 1):
-        free = model.jnt_bodyid <= model.site_bodyid[sites[seen[known - 1]]]
+        free = model.jnt_bodyid <= model.site_bodyid[problem.sites[seen[known - 1]]]
         first = int(free.sum())
-        fit = _gauss_newton(model, data, qpos, sites, positions, targets, seen[:known], free, max_iterations)
+        fit = _gauss_newton(problem, qpos, seen[:known], free, max_iterations)
         qpos = fit.qpos
         if 0 < first < model.nq:
-            qpos[first:] = np.resize(qpos[first - per_joint : first], model.nq - first)
+            qpos[first:] = np.resize(qpos[first - hinges : first], model.nq - first)
     return fit
 
 
-def _gauss_newton(model, data, qpos, sites, positions, targets, seen, free, max_iterations) -> PoseFit:
+def _gauss_newton(problem: PoseProblem, qpos, seen, free, max_iterations: int) -> PoseFit:
     """Levenberg-Marquardt over the hinges `free` (nv,), against the segments `seen`, from `qpos`."""
-    smooth = _smoothness(model)
+    model, data = problem.model, problem.data
     lower, upper = model.jnt_range.T * LIMIT_GIVE
     damping = 1e-3
-    cost, jacobian, residual = _linearise(model, data, qpos, sites, positions, targets, seen, smooth)
+    jacobian, residual = problem.linearise(qpos, seen)
+    cost = float(residual @ residual)
     iteration, settled = 0, False
     while not settled and iteration < max_iterations:
         iteration += 1
@@ -81,9 +129,8 @@ def _gauss_newton(model, data, qpos, sites, positions, targets, seen, free, max_
         trial[free] += np.linalg.solve(normal, -jacobian.T @ residual)
         trial = np.where(model.jnt_limited, np.clip(trial, lower, upper), trial)
         change = np.abs(trial - qpos).max()
-        trial_cost, trial_jacobian, trial_residual = _linearise(
-            model, data, trial, sites, positions, targets, seen, smooth
-        )
+        trial_jacobian, trial_residual = problem.linearise(trial, seen)
+        trial_cost = float(trial_residual @ trial_residual)
         settled = change < STEP_TOLERANCE or abs(cost - trial_cost) < COST_TOLERANCE * cost
         if trial_cost <= cost:
             qpos, cost, residual = trial, trial_cost, trial_residual
@@ -91,38 +138,11 @@ def _gauss_newton(model, data, qpos, sites, positions, targets, seen, free, max_
             jacobian = trial_jacobian
         else:
             damping *= 8
-            jacobian = _linearise(model, data, qpos, sites, positions, targets, seen, smooth)[1]
+            jacobian, _ = problem.linearise(qpos, seen)
     data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
-    offsets = np.linalg.norm(data.site_xpos[sites] - positions, axis=1)
+    offsets = np.linalg.norm(data.site_xpos[problem.sites] - problem.positions, axis=1)
     return PoseFit(qpos, offsets, iteration, bool(settled))
-
-
-def _smoothness(model: mujoco.MjModel) -> np.ndarray:
-    """Rows (q_{i+1} - q_i)/σ along the chain, hinge by hinge of the same axis."""
-    per_joint = int(np.bincount(model.jnt_bodyid).max())
-    rows = np.eye(model.nq, k=per_joint)[:-per_joint] - np.eye(model.nq)[:-per_joint]
-    return rows / BEND_CHANGE_SIGMA
-
-
-def _linearise(model, data, qpos, sites, positions, targets, seen, smooth):
-    """Cost, Jacobian (rows, nv) and residual (rows,), all in units of sigma."""
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    rows, residuals = [smooth], [smooth @ qpos]
-    jac_position, jac_rotation = np.empty((3, model.nv)), np.empty((3, model.nv))
-    for index in seen:
-        site = sites[index]
-        mujoco.mj_jacSite(model, data, jac_position, jac_rotation, site)
-        rows.append(jac_position / POSITION_SIGMA)
-        residuals.append((data.site_xpos[site] - positions[index]) / POSITION_SIGMA)
-        if targets is not None:
-            error = _rotation_vector(data.site_xmat[site].reshape(3, 3) @ targets[index].T)
-            rows.append(jac_rotation / ROTATION_SIGMA)
-            residuals.append(error / ROTATION_SIGMA)
-    residual = np.concatenate(residuals)
-    return float(residual @ residual), np.concatenate(rows), residual
 
 
 def _rotation_vector(matrix: np.ndarray) -> np.ndarray:

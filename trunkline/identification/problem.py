@@ -17,7 +17,7 @@ DIVERGED_LOSS = 1e3  # finite, and with sensible weights far above the loss of a
 
 @dataclass
 class Bounds:
-    """Range of a parameter in its own unit, 0 < low < high: it is searched on a logarithmic scale."""
+    """Range of a parameter in its own unit, low < high."""
 
     low: float
     high: float
@@ -27,10 +27,10 @@ class Bounds:
 class Problem:
     """Minimise the mean loss over `experiments` of a model whose parameters are free within bounds.
 
-    A candidate is a vector z: first the scalars of `parameters` (natural logarithm), then, if `per_joint` names
-    them, the factors of every unit, within `per_joint_range` of 1 and pulled towards it by `prior`. `step_factor` is
-    how much coarser than the model's own time step to simulate. With `rest`, every candidate hangs in that shape.
-    Counts evaluations (one candidate on all trials), divergences and steps.
+    A candidate is a vector z: first the scalars of `parameters` (natural logarithms, but for signed ones), then, if
+    `per_joint` names them, the factors of every unit, within `per_joint_range` of 1 and pulled towards it by `prior`.
+    `step_factor` is how much coarser than the model's own time step to simulate. With `rest`, every candidate hangs
+    in that shape. Counts evaluations (one candidate on all trials), divergences and steps.
     """
 
     model: mujoco.MjModel
@@ -56,7 +56,7 @@ class Problem:
     def fields(self, vectors: np.ndarray) -> dict[str, np.ndarray]:
         """Model fields of candidates (C, P)."""
         scalars = len(self.parameters)
-        values = {name: np.exp(vectors[:, i]) for i, name in enumerate(self.parameters)}
+        values = {name: PARAMETERS[name].value(vectors[:, i]) for i, name in enumerate(self.parameters)}
         blocks = vectors[:, scalars:].reshape(len(vectors), len(self.per_joint), self.units)
         fields = candidate_fields(
             self.model, values, {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
@@ -97,8 +97,8 @@ class Problem:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest vector z."""
-        low = [np.log(b.low) for b in self.parameters.values()]
-        high = [np.log(b.high) for b in self.parameters.values()]
+        low = [PARAMETERS[name].coordinate(b.low) for name, b in self.parameters.items()]
+        high = [PARAMETERS[name].coordinate(b.high) for name, b in self.parameters.items()]
         joints = len(self.per_joint) * self.units
         return (
             np.array(low + [1 - self.per_joint_range] * joints),
@@ -108,10 +108,12 @@ class Problem:
     def start(self) -> np.ndarray:
         """The vector z of the model itself, within bounds; a parameter that it lacks (0) starts mid-range."""
         low, high = self.bounds()
-        values = np.array([PARAMETERS[name].read(self.model) for name in self.parameters])
-        middle = 0.5 * (low + high)
-        scalars = np.where(values > 0, np.log(np.where(values > 0, values, 1.0)), middle[: len(values)])
-        return np.clip(np.append(scalars, np.ones(len(low) - len(values))), low, high)
+        vector = np.append(0.5 * (low + high)[: len(self.parameters)], np.ones(len(self.per_joint) * self.units))
+        for index, name in enumerate(self.parameters):
+            value = PARAMETERS[name].read(self.model)
+            if value > 0 or PARAMETERS[name].signed:
+                vector[index] = PARAMETERS[name].coordinate(value)
+        return np.clip(vector, low, high)
 
     def effort(self) -> dict[str, float]:
         """What a progress bar shows: evaluations so far, and the simulator's speed."""

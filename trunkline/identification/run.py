@@ -10,21 +10,18 @@ import numpy as np
 from trunkline.arm.parameters import PARAMETERS, save_model
 from trunkline.errors import InputError, Skipped
 from trunkline.identification import plots
-from trunkline.identification.certainty import weakest_in_words
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import Replay, replay, scores
-from trunkline.identification.experiment import Experiment, prepare
-from trunkline.identification.identify import Identification, Method, identify, with_parameters
-from trunkline.identification.loss import LossWeights, internal_error
+from trunkline.identification.experiment import Experiment
+from trunkline.identification.identify import Identification, identify, with_parameters
+from trunkline.identification.loss import internal_error
+from trunkline.identification.parameter_table import parameter_table, undetermined
 from trunkline.identification.problem import Bounds
-from trunkline.identification.resting import resting_shape
-from trunkline.identification.search import DifferentialEvolution, LeastSquares, Optimizer
 from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.setup import check_folds, check_parameters, read_reported, read_spec, set_up
 from trunkline.plots import save_figure
-from trunkline.recording.trial import read_trials
 from trunkline.stage import output_folder, write_json
 
-TRIALS = Path("data/processed/filter")
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 
 
@@ -41,31 +38,27 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     if not model.ntendon and config.experiments == ["curl"]:
         raise Skipped(f"{model_path}: the arm has no tendons, so there are no curls to learn from")
     check_parameters(stage, config, model)
-    experiments, segments = read_experiments(config, model)
-    fitted = [e for e in experiments if e.kind in config.experiments]
+    model, experiments, fit = set_up(config, read_reported(config), model)
+    fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)
-    weights = LossWeights(**{k: v for k, v in vars(config.loss).items() if k != "kind"})
-    bounds = {name: Bounds(r.low, r.high) for name, r in config.parameters.items()}
-    method = method_of(config)
-    problem = (fitted, segments, bounds, tuple(config.per_joint), config.loss.kind, weights, method)
-    rest = resting_shape(model, fitted, segments) if config.rest_shape == "measured" else None
-    if "stiffness" in bounds and "static_tilt" not in config.experiments:
+    if "stiffness" in fit.parameters and "static_tilt" not in config.experiments:
         print(f"{stage}: without static tilts, stiffness comes from the shape at rest and the ring-down of releases")
-    result = identify(stage, model, *problem, rest)
+    result = identify(stage, model, fitted, fit)
     identified = save_model(spec, result.models["identified"])
     # score what is written, not what was in memory: MJCF keeps six digits
     models = result.models | {"identified": mujoco.MjModel.from_xml_string(identified)}
     if whole:
         models["cad"] = read_spec(CAD_MODEL).compile()
         models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
-        models["coarse"].qpos_spring[:] = model.qpos_spring  # the shape at rest is not a matter of scalars
+        for field in ("qpos_spring", "site_pos"):  # the shape at rest and the markers are no matter of scalars
+            getattr(models["coarse"], field)[:] = getattr(model, field)
     replays = {name: replay(m, experiments, segments) for name, m in models.items()}
-    metrics = {name: scores(r, experiments, config.loss.kind, weights) for name, r in replays.items()}
+    metrics = {name: scores(r, experiments, fit.loss, fit.weights) for name, r in replays.items()}
     metrics |= {
         "evaluations": result.evaluations,
         "diverged": result.diverged,
         "at_bound": len(result.at_bound),
-        "undetermined": sum(undetermined(result, bounds)),
+        "undetermined": len(undetermined(result, fit.parameters)),
         "converged": result.converged,
         "start_fit": _start_fit(experiments),
     }
@@ -76,42 +69,15 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
-        metrics["cross_validation"] = cross_validate(stage, result, *problem, config.cross_validation_folds, rest)
-    for search, converged in result.converged.items():
-        if not converged:
-            print(f"{stage}: the {search.replace('_', ' ')} search ended before it had converged")
-    for name in result.at_bound:
-        print(f"{stage}: {name} ended on a bound of its range")
-    for name, vague in zip(result.values, undetermined(result, bounds), strict=True):
-        if vague:
-            print(f"{stage}: {name} is not determined: its 95 % interval spans its range")
+        metrics["cross_validation"] = cross_validate(stage, result, fitted, fit, config.cross_validation_folds)
+    for doubt in doubts(result, fit.parameters):
+        print(f"{stage}: {doubt}")
     artifacts = Path("artifacts") / stage
     with output_folder(artifacts) as folder:
         (folder / "arm.xml").write_text(identified)
-        write_json(folder / "parameters.json", parameter_table(result, bounds))
+        write_json(folder / "parameters.json", parameter_table(result, fit.parameters))
         write_json(folder / "metrics.json", metrics)
-        write_plots(folder, result, bounds, experiments, segments, replays)
-
-
-def method_of(config: IdentificationSettings) -> Method:
-    """The settings' part that says how to search."""
-    return Method(
-        optimizer=_optimizer(config.optimizer),
-        rough_step_factor=config.rough.step_factor,
-        rough_frames=config.rough.frames,
-        rough_trials=config.rough.trials,
-        polish_iterations=config.polish.iterations,
-        polish_tolerance=config.polish.tolerance,
-        fine=_optimizer(config.fine),
-        per_joint_range=config.per_joint_range,
-        per_joint_deviation=config.per_joint_deviation,
-        seed=config.seed,
-    )
-
-
-def _optimizer(config) -> Optimizer:
-    kind = {"least_squares": LeastSquares, "differential_evolution": DifferentialEvolution}[config.method]
-    return kind(**{key: value for key, value in vars(config).items() if key != "method"})
+        write_plots(folder, result, fit.parameters, experiments, segments, replays)
 
 
 def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
@@ -125,27 +91,14 @@ def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
     return values
 
 
-def undetermined(result: Identification, bounds: dict[str, Bounds]) -> list[bool]:
-    """Which scalars the data leave open: a 95 % interval as wide as the range that was searched."""
-    return [
-        bool(result.certainty.half_width[i] > 0.5 * np.log(bounds[name].high / bounds[name].low))
-        for i, name in enumerate(result.values)
-    ]
-
-
-def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
-    """Refuse parameters of tendons and motors that the arm has not got."""
-    for name in config.parameters:
-        if not model.ntendon and PARAMETERS[name].fields[0].startswith(("tendon_", "actuator_")):
-            found = "found it for an arm without tendons, expected parameters of joints alone"
-            raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}")
-
-
-def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:
-    """Refuse to leave out more groups of trials than there are trials to identify from."""
-    trials = sum(e.split == "identify" for e in fitted)
-    if folds > trials:
-        raise InputError(f"{stage}.cross_validation_folds: found {folds}, expected at most {trials}, one a trial")
+def doubts(result: Identification, bounds: dict[str, Bounds]) -> list[str]:
+    """What a user should know before trusting the result, a line each."""
+    unfinished = [search.replace("_", " ") for search, converged in result.converged.items() if not converged]
+    return (
+        [f"the {search} search ended before it had converged" for search in unfinished]
+        + [f"{name} ended on a bound of its range" for name in result.at_bound]
+        + [f"{name} is not determined: its 95 % interval spans its range" for name in undetermined(result, bounds)]
+    )
 
 
 def _halved_step(model, experiments, segments, replayed: Replay, metrics: dict) -> dict[str, float]:
@@ -177,92 +130,11 @@ def _start_fit(experiments: list[Experiment]) -> dict[str, float]:
     }
 
 
-def read_spec(path: Path) -> mujoco.MjSpec:
-    """The MJCF at `path`.
-
-    Raises:
-        InputError: if there is none, or MuJoCo refuses it.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, expected the model of an earlier stage")
-    try:
-        return mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
-        raise InputError(f"{path}: not a model that MuJoCo reads: {str(error).splitlines()[0]}") from error
-
-
-def read_experiments(
-    config: IdentificationSettings, model: mujoco.MjModel
-) -> tuple[list[Experiment], tuple[str, ...]]:
-    """The session's trials of the reported kinds, set up for `model`, and the segments they track."""
-    trials = [t for t in read_trials(TRIALS) if t.experiment in config.reported]
-    for kind in config.experiments:
-        for split in ("identify", "validate"):
-            if not any(t.experiment == kind and t.split == split for t in trials):
-                raise InputError(f"session.yaml: found no {kind} trial with split {split}, expected at least one")
-    segments = trials[0].segments
-    for trial in trials:
-        if trial.segments != segments:
-            raise InputError(
-                f"trial {trial.name}: found {len(trial.segments)} segments, expected the {len(segments)} of "
-                f"{trials[0].name}"
-            )
-    return [prepare(trial, model, config.frames, config.command_delay) for trial in trials], segments
-
-
 def _gain(metrics: dict) -> dict[str, float]:
     """Share of E_internal that per-joint tuning removes from the coarse result, per split."""
     return {
         split: 1 - metrics["identified"][split]["e_internal_mm"] / metrics["coarse"][split]["e_internal_mm"]
         for split in metrics["coarse"]
-    }
-
-
-def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
-    """parameters.json: values, 95 % intervals, correlations, factors, and what the data leave open.
-
-    A value is the scalar of the scaling law; the model's joint i has that times α^{3(i-1)} times its factor.
-    Intervals are given what earlier stages found, and those of factors given the scalars; they end where the range
-    does. `bootstrap_95` cross-checks `interval_95` by resampling trials.
-    """
-    names, certainty = list(result.values), result.certainty
-    initial, vague = result.models["initial"], undetermined(result, bounds)
-    scalars = {
-        name: {
-            "value": value,
-            "unit": PARAMETERS[name].unit,
-            "initial": PARAMETERS[name].read(initial),
-            "interval_95": _within(bounds[name], np.log(value) + certainty.half_width[i] * np.array([-1, 1])),
-            "bootstrap_95": _within(bounds[name], result.bootstrap[:, i]),
-            "range": [bounds[name].low, bounds[name].high],
-            "at_bound": name in result.at_bound,
-            "undetermined": vague[i],
-        }
-        for i, (name, value) in enumerate(result.values.items())
-    }
-    return {
-        "parameters": scalars,
-        "correlation": {a: dict(zip(names, certainty.correlation[i], strict=True)) for i, a in enumerate(names)},
-        "condition": certainty.condition,
-        "weakest_direction": weakest_in_words(names, certainty.weakest),
-        "per_joint": _factor_table(result),
-        "at_bound": result.at_bound,
-    }
-
-
-def _within(bounds: Bounds, interval: np.ndarray) -> list[float]:
-    """An interval of ln(value) as values, its ends no further out than those of the range searched."""
-    return np.exp(np.clip(interval, np.log(bounds.low), np.log(bounds.high))).tolist()
-
-
-def _factor_table(result: Identification) -> dict:
-    """Factors on top of the scaling law by unit, with the half width of their 95 % intervals, null if infinite."""
-    if not result.factors:
-        return {}
-    widths = result.factor_certainty.half_width.reshape(len(result.factors), -1)
-    return {
-        name: {"factor": factors, "half_width_95": np.where(np.isfinite(width), width, None)}
-        for (name, factors), width in zip(result.factors.items(), widths, strict=True)
     }
 
 

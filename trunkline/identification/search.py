@@ -111,7 +111,7 @@ def _leave_plateaus(problem: Problem, found: Found, report: Report) -> Found:
     for index in np.flatnonzero(~columns.any(axis=0)):
         scan = np.repeat(found.vector[None], PLATEAU_SCAN, axis=0)
         scan[:, index] = np.linspace(low[index], high[index], PLATEAU_SCAN)
-        matters = np.flatnonzero(np.abs(problem.losses(scan) / found.loss - 1) > PLATEAU_LEVEL)
+        matters = np.flatnonzero(np.abs(problem.losses(scan) - found.loss) > PLATEAU_LEVEL * found.loss)
         nearest = matters[np.argsort(np.abs(scan[matters, index] - found.vector[index]))][:PLATEAU_STARTS]
         if len(nearest):
             again = _best_descent(problem, scan[nearest], PLATEAU_ITERATIONS, PLATEAU_TOLERANCE, report)

@@ -2,20 +2,21 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import Field, FiniteFloat, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
+from trunkline.arm.parameters import PARAMETERS
 from trunkline.config import settings
 
 ParameterName = Literal[
     "stiffness", "hardening", "joint_friction", "damping", "tendon_friction", "friction_time",
-    "kp", "kv", "force_range", "time_constant",
+    "kp", "kv", "force_range", "time_constant", "mount_tilt_x", "mount_tilt_y", "mount_twist",
 ]  # fmt: skip
 
 
 @settings
 class Range:
-    low: PositiveFloat
-    high: PositiveFloat
+    low: FiniteFloat
+    high: FiniteFloat
 
     def __post_init__(self):
         if self.low >= self.high:
@@ -75,6 +76,7 @@ class IdentificationSettings:
     experiments: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
     reported: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
     rest_shape: Literal["unchanged", "measured"]
+    markers: Literal["unchanged", "measured"]
     loss: Loss
     parameters: dict[ParameterName, Range] = Field(min_length=1)
     optimizer: Optimizer
@@ -91,3 +93,6 @@ class IdentificationSettings:
             raise ValueError(f"reported: found {self.reported}, expected at least {self.experiments}")
         if self.cross_validation_folds == 1:
             raise ValueError("cross_validation_folds: found 1, expected 0 (none) or at least 2")
+        for name, span in self.parameters.items():
+            if span.low <= 0 and not PARAMETERS[name].signed:
+                raise ValueError(f"parameters.{name}.low: found {span.low}, expected more than 0")

@@ -1,0 +1,66 @@
+"""parameters.json: what was identified, how sure that is, and what the data leave open."""
+
+import numpy as np
+
+from trunkline.arm.parameters import PARAMETERS
+from trunkline.identification.certainty import weakest_in_words
+from trunkline.identification.identify import Identification
+from trunkline.identification.problem import Bounds
+
+ENDS = np.array([-1, 1])
+
+
+def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
+    """parameters.json: values, 95 % intervals, correlations, factors, and what the data leave open.
+
+    A value is the scalar of the scaling law; the model's joint i has that times α^{3(i-1)} times its factor.
+    Intervals are given what earlier stages found, and those of factors given the scalars; they end where the range
+    does. `bootstrap_95` cross-checks `interval_95` by resampling trials.
+    """
+    names, certainty = list(result.values), result.certainty
+    initial, vague = result.models["initial"], undetermined(result, bounds)
+    scalars = {
+        name: {
+            "value": value,
+            "unit": PARAMETERS[name].unit,
+            "initial": PARAMETERS[name].read(initial),
+            "interval_95": _within(name, bounds, PARAMETERS[name].coordinate(value) + ENDS * certainty.half_width[i]),
+            "bootstrap_95": _within(name, bounds, result.bootstrap[:, i]),
+            "range": [bounds[name].low, bounds[name].high],
+            "at_bound": name in result.at_bound,
+            "undetermined": name in vague,
+        }
+        for i, (name, value) in enumerate(result.values.items())
+    }
+    return {
+        "parameters": scalars,
+        "correlation": {a: dict(zip(names, certainty.correlation[i], strict=True)) for i, a in enumerate(names)},
+        "condition": certainty.condition,
+        "weakest_direction": weakest_in_words(names, certainty.weakest),
+        "per_joint": _factor_table(result),
+        "at_bound": result.at_bound,
+    }
+
+
+def undetermined(result: Identification, bounds: dict[str, Bounds]) -> list[str]:
+    """Which scalars the data leave open: a 95 % interval as wide as the range that was searched."""
+    searched = {name: np.diff(PARAMETERS[name].coordinate([span.low, span.high]))[0] for name, span in bounds.items()}
+    halves = zip(result.values, result.certainty.half_width, strict=True)
+    return [name for name, half in halves if 2 * half > searched[name]]
+
+
+def _within(name: str, bounds: dict[str, Bounds], interval: np.ndarray) -> list[float]:
+    """An interval on the axis of the search as values, its ends no further out than those of the range searched."""
+    parameter, span = PARAMETERS[name], bounds[name]
+    return parameter.value(np.clip(interval, *parameter.coordinate([span.low, span.high]))).tolist()
+
+
+def _factor_table(result: Identification) -> dict:
+    """Factors on top of the scaling law by unit, with the half width of their 95 % intervals, null if infinite."""
+    if not result.factors:
+        return {}
+    widths = result.factor_certainty.half_width.reshape(len(result.factors), -1)
+    return {
+        name: {"factor": factors, "half_width_95": np.where(np.isfinite(width), width, None)}
+        for (name, factors), width in zip(result.factors.items(), widths, strict=True)
+    }
