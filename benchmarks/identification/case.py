@@ -3,20 +3,22 @@
 import contextlib
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from benchmarks.identification.timing import Spent, Stopwatch
+from benchmarks.identification.rival import Rival
+from benchmarks.identification.timing import Spent
 from trunkline.arm.parameters import PARAMETERS
 from trunkline.config import load_config
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Fit, identify, values_of, with_parameters
+from trunkline.identification.loss import loss_of
 from trunkline.identification.parameter_table import undetermined
 from trunkline.identification.problem import Problem
 from trunkline.identification.run import CAD_MODEL
@@ -33,15 +35,16 @@ SAME_LOSS = 1.01  # within 1 % counts as the same
 
 @dataclass
 class Size:
-    """How much is run. trials, frames: of each problem, at most. budget: s for each search of a rival.
+    """How much is run: all trials of the session, if not `--quick`.
 
+    trials, frames: of each problem, at most. budget: s for each search of a rival.
     seeds: runs against the recipe, whose luck differs. repeats: of each timing. rate_frames, growth_frames: frames
     simulated there. units: of the arms in `growth`.
     """
 
-    trials: int = 3
+    trials: int = 99
     frames: int = 437
-    budget: float = 120.0
+    budget: float = 300.0
     seeds: int = 3
     repeats: int = 3
     rate_frames: int = 60
@@ -86,23 +89,46 @@ ReadCase = Callable[[str, Size], Case]
 class Identified:
     """What `identify` found, without factors of joints.
 
-    vector: of the scalars, as searched. loss: its, over whole trials. undetermined: names of what the data leave open.
+    vector: of the scalars, as searched. loss: its, over whole trials. spent: by the whole stage, intervals included.
+    undetermined: names of what the data leave open. watch: when which loss over whole trials was reached.
     """
 
     vector: np.ndarray
     loss: float
     spent: Spent
     undetermined: list[str]
+    watch: Rival
+
+
+@dataclass
+class WatchedFit(Fit):
+    """Notes in `watch` when each loss over all `frames` was known; those of the rough search count for nothing."""
+
+    watch: Rival = field(default_factory=Rival)
+    frames: int = 0
+
+    def problem(self, model: mujoco.MjModel, experiments: list[Experiment], step_factor: float = 1.0) -> Problem:
+        problem = super().problem(model, experiments, step_factor)
+        if sum(e.frames for e in experiments) == self.frames and step_factor == 1:
+            residuals = problem.residuals
+
+            def noted(vectors: np.ndarray) -> list[np.ndarray]:
+                blocks = residuals(vectors)
+                self.watch.note(vectors, sum(loss_of(block) for block in blocks))
+                return blocks
+
+            problem.residuals = noted
+        return problem
 
 
 def identified(case: Case) -> Identified:
-    clock = Stopwatch()
+    fit = WatchedFit(**vars(case.fit) | {"per_joint": ()}, frames=sum(e.frames for e in case.experiments))
     with contextlib.redirect_stdout(io.StringIO()):
-        result = identify("", case.model, case.experiments, replace(case.fit, per_joint=()))
-    spent = clock.read()
+        result = identify("", case.model, case.experiments, fit)
+    spent = fit.watch.clock.read()
     vector = np.array([PARAMETERS[name].coordinate(value) for name, value in result.values.items()])
     vague = undetermined(result, case.fit.parameters)
-    return Identified(vector, float(case.problem().losses(vector[None])[0]), spent, vague)
+    return Identified(vector, float(case.problem().losses(vector[None])[0]), spent, vague, fit.watch)
 
 
 def read_case(stage: str, size: Size) -> Case:

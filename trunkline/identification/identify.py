@@ -108,7 +108,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
-    linear = linearise(exact, found.vector)
+    linear = found.linear or linearise(exact, found.vector)
     problems = [rough, exact]
 
     factors: dict[str, np.ndarray] = {}
@@ -121,7 +121,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
             per_joint=per_joint, per_joint_range=method.per_joint_range, prior_weight=prior_weight,
         )  # fmt: skip
         searches["per_joint"] = found = _search(joints, method.fine, method.seed, f"{label} per joint")
-        factor_certainty = certainty(linearise(joints, found.vector), method.per_joint_deviation)
+        factor_certainty = certainty(found.linear or linearise(joints, found.vector), method.per_joint_deviation)
         factors = dict(zip(per_joint, found.vector.reshape(len(per_joint), -1), strict=True))
         at_bound += _factors_at_bound(factors, method.per_joint_range)
         problems.append(joints)

@@ -78,12 +78,14 @@ class Found:
     """Result of a search.
 
     vector: the best candidate z. loss: its. converged: stopped for that reason, not because its time was up.
+    linear: the residuals around it, if least squares ended there.
     """
 
     vector: np.ndarray
     loss: float
     convergence: Convergence
     converged: bool
+    linear: Linearisation | None = None
 
 
 def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) -> Found:
@@ -107,7 +109,7 @@ def _leave_plateaus(problem: Problem, found: Found, report: Report) -> Found:
     there to a smaller minimum below.
     """
     low, high = problem.bounds()
-    columns = np.concatenate(linearise(problem, found.vector).jacobians)
+    columns = np.concatenate((found.linear or linearise(problem, found.vector)).jacobians)
     for index in np.flatnonzero(~columns.any(axis=0)):
         scan = np.repeat(found.vector[None], PLATEAU_SCAN, axis=0)
         scan[:, index] = np.linspace(low[index], high[index], PLATEAU_SCAN)
@@ -116,7 +118,7 @@ def _leave_plateaus(problem: Problem, found: Found, report: Report) -> Found:
         if len(nearest):
             again = _best_descent(problem, scan[nearest], PLATEAU_ITERATIONS, PLATEAU_TOLERANCE, report)
             if again.loss < found.loss:
-                found = replace(found, vector=again.vector, loss=again.loss)
+                found = replace(found, vector=again.vector, loss=again.loss, linear=again.linear)
     return found
 
 
@@ -129,6 +131,7 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
     """Least squares on the loss's residuals. A step and the Jacobian that it will need are one batch."""
     convergence = Convergence()
     known: dict[bytes, Linearisation] = {}
+    accepted: list[Linearisation] = []
     low, high = problem.bounds()
 
     def linear(vector: np.ndarray) -> Linearisation:
@@ -144,6 +147,7 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
 
     def derivatives(vector: np.ndarray) -> np.ndarray:
         found = linear(vector)
+        accepted[:] = [found]  # scipy asks for derivatives at its iterates alone
         blocks = [*found.residuals, problem.prior(vector[None])[0]]
         loss = 0.5 * sum(float(block @ block) for block in blocks)
         convergence.best.append(loss)
@@ -159,7 +163,8 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
     if result.cost != convergence.best[-1]:
         convergence.best.append(float(result.cost))
         convergence.mean.append(float(result.cost))
-    return Found(result.x, float(result.cost), convergence, result.status > 0)
+    last = accepted[0] if np.array_equal(accepted[0].vector, result.x) else linearise(problem, result.x)
+    return Found(result.x, float(result.cost), convergence, result.status > 0, last)
 
 
 def linearise(problem: Problem, vector: np.ndarray) -> Linearisation:
