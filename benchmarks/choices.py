@@ -23,7 +23,7 @@ from omegaconf import OmegaConf
 from benchmarks.identification.case import STAGES, require_demo, spread
 from benchmarks.identification.timing import Stopwatch
 from trunkline.config import load_config
-from trunkline.errors import InputError
+from trunkline.errors import in_one_line
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Fit, identify
@@ -182,6 +182,7 @@ def row(choice: Choice, is_quick: bool) -> str:
     return "| " + " | ".join([choice.title, *errors, *(f"{seconds:.0f}" for seconds in found.spent)]) + " |"
 
 
+@in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(prog="benchmarks.choices", description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="few trials, frames and iterations: only whether it runs")
@@ -189,14 +190,10 @@ def main() -> int:
     arguments = parser.parse_args()
     heads = [f"{error}, {kind}s (mm)" for error in ("E_internal", "position") for kind in KINDS]
     heads += [f"CPU {stage.removeprefix('identify_')} (s)" for stage in STAGES]
-    try:
-        require_demo(CAD_MODEL)
-        print("| choice | " + " | ".join(heads) + " |\n|---|" + "---:|" * len(heads), flush=True)
-        for name in arguments.only:
-            print(row(CHOICES[name], arguments.quick), flush=True)
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    require_demo(CAD_MODEL)
+    print("| choice | " + " | ".join(heads) + " |\n|---|" + "---:|" * len(heads), flush=True)
+    for name in arguments.only:
+        print(row(CHOICES[name], arguments.quick), flush=True)
     return 0
 
 

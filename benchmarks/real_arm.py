@@ -1,42 +1,87 @@
 """What each part of the model is worth on real releases: `python -m benchmarks.real_arm`
 
-Identifies the example examples/asl_trunk again and again, each time without one thing that its model has or with one
-that it has not, and prints the mean position error on the validate releases. Run its stages up to filter first.
+Identifies the example examples/asl_trunk again and again, as its stage identify_stiffness does, each time without one
+thing that its model has or with one that it has not, and prints the mean position error on the validate releases. Run
+its stages up to filter first.
 """
 
+import contextlib
+import io
 import sys
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from stages.build_mjcf import Config, initial_spec
+from stages import build_mjcf, filter, identify_stiffness
 from trunkline.config import load_config
-from trunkline.errors import InputError
+from trunkline.errors import in_one_line
 from trunkline.identification.evaluation import replay, scores
-from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Method, identify
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.problem import Bounds
-from trunkline.identification.resting import resting_shape
-from trunkline.identification.search import LeastSquares
-from trunkline.recording.filtering import Filter, filter_take
+from trunkline.identification.identify import identify
+from trunkline.identification.settings import Range
+from trunkline.identification.setup import set_up
+from trunkline.recording.filtering import filter_take
 from trunkline.recording.take import Take, read_takes
 
 EXAMPLE = Path("examples/asl_trunk")
-FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "free")
-FRAMES = 437
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
-METHOD = Method(LeastSquares(11, 2, 6, 1e-2), 1.0, 240, 4, 10, 1e-5, LeastSquares(0, 1, 8, 1e-3), 0.5, 1)
-RANGES = {"stiffness": Bounds(0.3, 30.0), "damping": Bounds(0.01, 5.0)}
 
 
-def arm(**changes) -> mujoco.MjModel:
-    """The example's initial arm, with other numbers."""
-    config = load_config(Config, "build_mjcf", EXAMPLE)
-    return initial_spec(replace(config, arm=replace(config.arm, **changes)))[0].compile()
+@dataclass
+class Case:
+    """What is changed: numbers of the arm, what is fitted in addition, other settings of filter and identification.
+
+    quadratic_damping: share by which damping grows with speed v (rad/s), D (1 + share v). as_stamped: without the
+        time of lost frames.
+    """
+
+    arm: dict = field(default_factory=dict)
+    parameters: dict[str, Range] = field(default_factory=dict)
+    filtered: dict = field(default_factory=dict)
+    settings: dict = field(default_factory=dict)
+    quadratic_damping: float = 0.0
+    as_stamped: bool = False
+
+
+def cases() -> dict[str, Case]:
+    mass = load_config(build_mjcf.Config, "build_mjcf", EXAMPLE).arm.unit_masses[0]
+    return {
+        "as in the example": Case(),
+        "started at rest when the arm begins to move": Case(filtered={"release": "onset"}),
+        "straight at rest": Case(settings={"rest_shape": "unchanged"}),
+        "lost frames left lost": Case(as_stamped=True),
+        "with hardening": Case(parameters={"hardening": Range(low=0.02, high=50.0)}),
+        "with joint friction": Case(parameters={"joint_friction": Range(low=1e-4, high=0.1)}),
+        "with quadratic damping": Case(quadratic_damping=1.0),
+        "with factors of every joint's stiffness": Case(settings={"per_joint": ["stiffness"]}),
+        "with markers where they were measured": Case(settings={"markers": "measured"}),
+        "hose half as heavy": Case(arm={"unit_masses": [mass / 2]}),
+        "hose twice as heavy": Case(arm={"unit_masses": [2 * mass]}),
+        "6 units": Case(arm={"units": 6}),
+        "12 units": Case(arm={"units": 12}),
+    }
+
+
+def error(case: Case, takes: list[Take]) -> tuple[float, float, float]:
+    """Mean position error on the identify and on the validate releases, mm, and the latter over the arm's length."""
+    chosen = filter.filter_of(replace(load_config(filter.Config, "filter", EXAMPLE), **case.filtered))
+    trials = [filter_take(as_stamped(take) if case.as_stamped else take, chosen)[0] for take in takes]
+    config = load_config(identify_stiffness.Config, "identify_stiffness", EXAMPLE)
+    config = replace(config, parameters=config.parameters | case.parameters, **case.settings)
+    model, experiments, fit = set_up(config, trials, arm(case))
+    with contextlib.redirect_stdout(io.StringIO()):
+        found = identify("", model, experiments, fit)
+    table = scores(replay(found.models["identified"], experiments, fit.segments), experiments, fit.loss, fit.weights)
+    unseen = table["validate"]
+    return table["identify"]["e_position_mm"], unseen["e_position_mm"], unseen["e_position_pct"]
+
+
+def arm(case: Case) -> mujoco.MjModel:
+    """The example's initial arm, changed."""
+    config = load_config(build_mjcf.Config, "build_mjcf", EXAMPLE)
+    model = build_mjcf.initial_spec(replace(config, arm=replace(config.arm, **case.arm)))[0].compile()
+    model.dof_dampingpoly[:, 0] = case.quadratic_damping * model.dof_damping
+    return model
 
 
 def as_stamped(take: Take) -> Take:
@@ -44,61 +89,13 @@ def as_stamped(take: Take) -> Take:
     return replace(take, time=np.arange(len(take.time)) * np.median(np.diff(take.time)))
 
 
-def error(
-    takes: list[Take],
-    model: mujoco.MjModel,
-    ranges: dict[str, Bounds],
-    filtered: Filter = FILTER,
-    straight: bool = False,
-    per_joint: tuple[str, ...] = (),
-) -> tuple[float, float]:
-    """Mean position error on the identify and on the validate releases after identification, mm."""
-    experiments = [prepare(filter_take(take, filtered)[0], model, FRAMES) for take in takes]
-    segments = takes[0].segments
-    rest = None if straight else resting_shape(model, experiments, segments)
-    found = identify("", model, experiments, segments, ranges, per_joint, "positions", WEIGHTS, METHOD, rest)
-    table = scores(replay(found.models["identified"], experiments, segments), experiments, "positions", WEIGHTS)
-    return table["identify"]["e_position_mm"], table["validate"]["e_position_mm"]
-
-
-def damped(model: mujoco.MjModel, share: float) -> mujoco.MjModel:
-    """With a damping that grows with speed v (rad/s) as D (1 + `share` v)."""
-    model.dof_dampingpoly[:, 0] = share * model.dof_damping
-    return model
-
-
-def cases(takes: list[Take]) -> dict[str, Callable[[], tuple[float, float]]]:
-    """What is tried, by what it is called."""
-    mass = load_config(Config, "build_mjcf", EXAMPLE).arm.unit_masses[0]
-    return {
-        "as in the example": lambda: error(takes, arm(), RANGES),
-        "started at rest when the arm begins to move": lambda: error(
-            takes, arm(), RANGES, replace(FILTER, release="onset")
-        ),
-        "straight at rest": lambda: error(takes, arm(), RANGES, straight=True),
-        "lost frames left lost": lambda: error([as_stamped(take) for take in takes], arm(), RANGES),
-        "with hardening": lambda: error(takes, arm(), RANGES | {"hardening": Bounds(0.02, 50.0)}),
-        "with joint friction": lambda: error(takes, arm(), RANGES | {"joint_friction": Bounds(1e-4, 0.1)}),
-        "with quadratic damping": lambda: error(takes, damped(arm(), 1.0), RANGES),
-        "with factors of every joint's stiffness": lambda: error(takes, arm(), RANGES, per_joint=("stiffness",)),
-        "hose half as heavy": lambda: error(takes, arm(unit_masses=[mass / 2]), RANGES),
-        "hose twice as heavy": lambda: error(takes, arm(unit_masses=[2 * mass]), RANGES),
-        "6 units": lambda: error(takes, arm(units=6), RANGES),
-        "12 units": lambda: error(takes, arm(units=12), RANGES),
-    }
-
-
+@in_one_line
 def main() -> int:
-    try:
-        takes = read_takes(EXAMPLE / "data/processed/ingest")
-    except InputError as problem:
-        print(f"error: {problem}", file=sys.stderr)
-        return 1
-    length = load_config(Config, "build_mjcf", EXAMPLE).arm.length
+    takes = read_takes(EXAMPLE / "data/processed/ingest")
     print(f"{'':45}  identify  validate: mean position error, and of the length")
-    for name, run in cases(takes).items():
-        identify_mm, validate_mm = run()
-        print(f"{name:45}  {identify_mm:5.2f} mm  {validate_mm:5.2f} mm  {validate_mm / length / 10:.2f} %", flush=True)
+    for name, case in cases().items():
+        identify_mm, validate_mm, share = error(case, takes)
+        print(f"{name:45}  {identify_mm:5.2f} mm  {validate_mm:5.2f} mm  {share:.2f} %", flush=True)
     return 0
 
 

@@ -38,10 +38,14 @@ class Config:
             )
 
 
-def main(config: Config) -> None:
-    chosen = Filter(
+def filter_of(config: Config) -> Filter:
+    return Filter(
         config.rate, config.cutoff, config.order, config.longest_bridge, config.outlier_deviations, config.release
     )
+
+
+def main(config: Config) -> None:
+    chosen = filter_of(config)
     takes = read_takes(INGEST)
     trials, findings = [], []
     with progress(len(takes), "filter", "trials") as bar:

@@ -1,11 +1,15 @@
 """The exceptions that end a stage in one line: a user's mistake, and nothing to do."""
 
+import sys
+from collections.abc import Callable
+from functools import wraps
+
 
 class InputError(Exception):
     """A user's mistake: bad log, bad parameter, missing file.
 
     The message is one line that names the file, topic or key, what was found and what was expected.
-    Stages print it as ``error: <message>`` and exit with code 1, without a traceback.
+    Stages and commands print it as ``error: <message>`` and exit with code 1, without a traceback.
     """
 
     def __str__(self) -> str:
@@ -14,3 +18,18 @@ class InputError(Exception):
 
 class Skipped(Exception):
     """A stage that has nothing to do for this arm; the message, one line, says why. It writes nothing."""
+
+
+def in_one_line(main: Callable[..., int]) -> Callable[..., int]:
+    """A command's `main`, whose InputError becomes its last line, on stderr, and exit code 1."""
+
+    @wraps(main)
+    def command(*args) -> int:
+        try:
+            return main(*args)
+        except InputError as error:
+            sys.stdout.flush()
+            print(f"error: {error}", file=sys.stderr)
+            return 1
+
+    return command

@@ -12,12 +12,13 @@ import sys
 
 from benchmarks.identification import growth, rate, recipe, sysid
 from benchmarks.identification.case import QUICK, Size, read_case
-from trunkline.errors import InputError
+from trunkline.errors import in_one_line
 from trunkline.threads import thread_count
 
 PARTS = {"rate": rate.report, "recipe": recipe.report, "sysid": sysid.report, "growth": growth.report}
 
 
+@in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(prog="benchmarks.identification", description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="a small run, some minutes on 2 quiet cores")
@@ -25,13 +26,9 @@ def main() -> int:
     arguments = parser.parse_args()
     size = QUICK if arguments.quick else Size()
     print(f"{thread_count()} threads; load average before: {os.getloadavg()[0]:.1f}", flush=True)
-    try:
-        for name in arguments.only:
-            PARTS[name](read_case, size)
-            sys.stdout.flush()
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    for name in arguments.only:
+        PARTS[name](read_case, size)
+        sys.stdout.flush()
     return 0
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from mcap_ros2.writer import Writer
 
-from trunkline.errors import InputError
+from trunkline.errors import InputError, in_one_line
 from trunkline.recording.definitions import TRUNK_RIGID_BODIES
 from trunkline.stage import output_folder
 
@@ -85,6 +85,7 @@ def make_session(source: Path, session: Path = SESSION) -> int:
     return len(logs) + len(trajectories)
 
 
+@in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m examples.asl_trunk.session",
@@ -92,11 +93,7 @@ def main(arguments: list[str] | None = None) -> int:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("source", type=Path, metavar="SOURCE", help="folder of logs, or the CSV")
-    try:
-        count = make_session(parser.parse_args(arguments).source)
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    count = make_session(parser.parse_args(arguments).source)
     print(f"{SESSION}: {count} logs and session.yaml")
     return 0
 

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from trunkline.config import check_settings, own_or_project
-from trunkline.errors import InputError
+from trunkline.errors import in_one_line
 
 
 def check_once(root: Path = Path(".")) -> None:
@@ -33,12 +33,9 @@ def check_once(root: Path = Path(".")) -> None:
     passed.write_text(digest.hexdigest())
 
 
+@in_one_line
 def main() -> int:
-    try:
-        stages = check_settings()
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    stages = check_settings()
     print(f"settings: {len(stages)} stages checked")
     return 0
 

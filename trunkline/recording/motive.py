@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from mcap_ros2.writer import Writer
 
-from trunkline.errors import InputError
+from trunkline.errors import InputError, in_one_line
 from trunkline.recording.definitions import MARKERS, RIGID_BODIES
 from trunkline.recording.proposal import propose
 from trunkline.recording.survey import survey
@@ -175,6 +175,7 @@ def _start(about: dict[str, str]) -> int:
     return round(moment.timestamp() * 1e3) * 1_000_000
 
 
+@in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog="python -m trunkline.recording.motive",
@@ -185,19 +186,15 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--session", required=True, type=Path, help="folder that becomes the session")
     chosen = parser.parse_args(arguments)
     chosen.session.mkdir(parents=True, exist_ok=True)
-    try:
-        for path in chosen.exports:
-            export, log = read_export(path), chosen.session / f"{path.stem}.mcap"
-            write_log(log, export)
-            seen = np.isfinite(export.positions[..., 0]).mean()
-            print(f"{log}: {len(export.time)} frames of {len(export.names)} bodies, {100 * seen:.1f} % seen")
-        target = chosen.session / "session.yaml"
-        if not target.exists():
-            target.write_text(propose([survey(log) for log in sorted(chosen.session.glob("*.mcap"))], UP))
-            print(f"{target}: proposed; check each trial's experiment, level and split")
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    for path in chosen.exports:
+        export, log = read_export(path), chosen.session / f"{path.stem}.mcap"
+        write_log(log, export)
+        seen = np.isfinite(export.positions[..., 0]).mean()
+        print(f"{log}: {len(export.time)} frames of {len(export.names)} bodies, {100 * seen:.1f} % seen")
+    target = chosen.session / "session.yaml"
+    if not target.exists():
+        target.write_text(propose([survey(log) for log in sorted(chosen.session.glob("*.mcap"))], UP))
+        print(f"{target}: proposed; check each trial's experiment, level and split")
     return 0
 
 
