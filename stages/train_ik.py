@@ -131,6 +131,8 @@ def read_table(path: Path, tendons: int) -> pd.DataFrame:
     missing = [name for name in INPUTS + length_columns(tendons) + ["split"] if name not in table]
     if missing:
         raise InputError(f"{path}: found no column {missing[0]!r}, expected samples of an arm of {tendons} tendons")
+    if table["theta_g"].nunique() < 2:
+        raise InputError(f"{path}: found 1 gravity angle, expected at least 2: the network is tested between them")
     return table
 
 

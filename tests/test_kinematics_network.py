@@ -9,7 +9,9 @@ import pandas as pd
 import pytest
 import torch
 
+from stages.train_ik import read_table
 from tests.bent_chain import stump
+from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics import sampling
 from trunkline.kinematics.chain import read_chain
@@ -182,3 +184,10 @@ def test_same_seed_gives_the_same_file(samples):
         files.append(to_onnx(network, ["a", "b", "c"]).SerializeToString())
     assert files[0] == files[1]
     assert isinstance(network, InverseKinematics)
+
+
+def test_a_single_gravity_angle_is_refused_before_anything_is_trained(tmp_path):
+    samples = pd.DataFrame(np.zeros((3, len(INPUTS) + 3)), columns=[*INPUTS, "l1", "l2", "split"])
+    samples.to_parquet(tmp_path / "samples.parquet")
+    with pytest.raises(InputError, match="samples.parquet: found 1 gravity angle, expected at least 2"):
+        read_table(tmp_path / "samples.parquet", 2)

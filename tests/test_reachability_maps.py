@@ -9,7 +9,7 @@ from trunkline.errors import InputError
 from trunkline.kinematics.chain import read_chain
 from trunkline.reachability.downward import sample_downward
 from trunkline.reachability.grid import Lattice, overlap
-from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, tip_position, verified
+from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, verified
 from trunkline.reachability.hybrid_map import minkowski_field, swept_cells
 from trunkline.reachability.labels import agreement, beyond_links, draw_points, label
 from trunkline.reachability.maps import RigidSettings, angle_name, build_rigid, build_soft
@@ -253,6 +253,11 @@ def test_hybrid_of_two_balls_is_the_ball_of_both_radii():
     error = (result - true)[np.abs(true) < 0.015]
     assert np.abs(error).max() < 0.015
     assert abs(error.mean()) < 0.004
+
+
+def tip_position(mount: np.ndarray, rotation: np.ndarray, tip: np.ndarray) -> np.ndarray:
+    """Where soft `tip` (N, 3) is, in the Panda's base frame, with the mount at a pose (N, 3), (N, 3, 3)."""
+    return mount + np.einsum("nij,nj->ni", rotation * np.array([1.0, -1.0, -1.0]), tip)
 
 
 def test_points_of_the_hybrid_map_are_reached_and_points_beside_it_are_not(rigid):

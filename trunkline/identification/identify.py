@@ -108,7 +108,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
-    linear = found.linear or linearise(exact, found.vector)
+    linear = found.linear
     problems = [rough, exact]
 
     factors: dict[str, np.ndarray] = {}

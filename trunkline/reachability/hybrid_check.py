@@ -126,11 +126,6 @@ def mount_pose(points: NDArray, tips: NDArray, yaw: NDArray) -> tuple[NDArray, N
     return points - np.einsum("nij,nj->ni", turn, tips), turn * np.array([1.0, -1.0, -1.0])
 
 
-def tip_position(mount: NDArray, rotation: NDArray, tip: NDArray) -> NDArray:
-    """Where soft ``tip`` (N, 3) is, in the Panda's base frame, with the mount at a pose (N, 3), (N, 3, 3)."""
-    return mount + np.einsum("nij,nj->ni", rotation * np.array([1.0, -1.0, -1.0]), tip)
-
-
 def _deepest(point: NDArray, tips: NDArray, yaws: int, rigid: NDArray, lattice: Lattice):
     """Tips (TRIES,), yaws and depths whose mount lies deepest in the rigid map, no tip twice, deepest first."""
     angles = 2 * np.pi * np.arange(yaws) / yaws
