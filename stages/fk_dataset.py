@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
+from trunkline.arm.tendons import require_tendons
 from trunkline.config import settings
-from trunkline.errors import Skipped
 from trunkline.kinematics.chain import load_model, read_chain
 from trunkline.kinematics.dataset import Density, mujoco_deviation, sample_table, split
 from trunkline.kinematics.plots import density_figure, deviation_figure
@@ -36,9 +36,8 @@ class Config:
 
 
 def main(config: Config) -> None:
+    require_tendons()
     model = load_model(MODEL)
-    if not model.ntendon:
-        raise Skipped(f"{MODEL}: the arm has no tendons, and so no kinematics from their lengths")
     chain = read_chain(model)
     rng = np.random.default_rng(config.seed)
     angles = np.radians(sorted(config.angles_deg))

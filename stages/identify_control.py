@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from trunkline.arm.tendons import require_tendons
 from trunkline.identification.run import run
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.stage import run_stage
@@ -10,6 +11,7 @@ Config = IdentificationSettings
 
 
 def main(config: Config) -> None:
+    require_tendons()
     earlier = ("identify_stiffness", "identify_damping")
     run("identify_control", config, Path("artifacts/identify_damping/arm.xml"), whole=earlier)
 

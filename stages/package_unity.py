@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, PositiveFloat
 
+from trunkline.arm.tendons import require_tendons
 from trunkline.bundle.linearize import compile_with
 from trunkline.bundle.manifest import Manifest
 from trunkline.bundle.package import read_tarball, write_tarball
@@ -44,6 +45,7 @@ class Config:
 
 
 def main(config: Config) -> None:
+    require_tendons()
     trajectory = Trajectory(
         duration=config.roundtrip.duration,
         pull=config.roundtrip.pull,

@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, PositiveInt
 
+from trunkline.arm.tendons import require_tendons
 from trunkline.config import settings
 from trunkline.errors import InputError
 from trunkline.kinematics.chain import Chain, load_model, read_chain
@@ -88,6 +89,7 @@ class Config:
 
 
 def main(config: Config) -> None:
+    require_tendons()
     chain = read_chain(load_model(MODEL))
     tips_at = read_tips(SAMPLES, chain, config)
     shape = SoftShape(config.soft.tolerance, config.soft.closing, config.soft.smoothing, config.soft.smallest)

@@ -9,8 +9,9 @@ import pandas as pd
 import torch
 from pydantic import Field, PositiveFloat, PositiveInt
 
+from trunkline.arm.tendons import require_tendons
 from trunkline.config import settings
-from trunkline.errors import InputError, Skipped
+from trunkline.errors import InputError
 from trunkline.kinematics.chain import Chain, load_model, read_chain
 from trunkline.kinematics.dataset import (
     length_by_tension,
@@ -62,9 +63,8 @@ class Config:
 
 
 def main(config: Config) -> None:
+    require_tendons()
     model = load_model(MODEL)
-    if not model.ntendon:
-        raise Skipped(f"{MODEL}: the arm has no tendons, and so no kinematics from their lengths")
     chain = read_chain(model)
     table = read_table(SAMPLES, chain.tendons)
     network, curve = fit(table, chain.tendons, config)

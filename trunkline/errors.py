@@ -17,7 +17,7 @@ class InputError(Exception):
 
 
 class Skipped(Exception):
-    """A stage that has nothing to do for this arm; the message, one line, says why. It writes nothing."""
+    """A stage that has nothing to do for this arm; the message, one line, says why."""
 
 
 def in_one_line(main: Callable[..., int]) -> Callable[..., int]:

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from trunkline.arm.parameters import PARAMETERS, save_model
-from trunkline.errors import InputError, Skipped
+from trunkline.errors import InputError
 from trunkline.identification import plots
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import Replay, replay, scores
@@ -35,8 +35,6 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     """
     spec = read_spec(model_path)
     model = spec.compile()
-    if not model.ntendon and config.experiments == ["curl"]:
-        raise Skipped(f"{model_path}: the arm has no tendons, so there are no curls to learn from")
     check_parameters(stage, config, model)
     model, experiments, fit = set_up(config, read_reported(config), model)
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
