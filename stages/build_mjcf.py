@@ -1,5 +1,6 @@
 """Build the initial arm from geometry and material alone."""
 
+import re
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -9,7 +10,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import UnitProperties, unit_properties
-from trunkline.arm.mjcf import Solver, Tendons, build_spec
+from trunkline.arm.mjcf import Solver, Tendons, build_spec, unit_name
 from trunkline.arm.plots import arm_figure
 from trunkline.arm.spiral import spiral_chain
 from trunkline.arm.uniform import uniform_chain, uniform_properties
@@ -21,49 +22,53 @@ ARTIFACTS = Path("artifacts/build_mjcf")
 
 
 @settings
-class Spiral:
-    kind: Literal["spiral"]
+class Arm:
     length: PositiveFloat
-    base_width: PositiveFloat
-    tip_width: PositiveFloat
     units: PositiveInt
-    modulus: PositiveFloat
-    density: PositiveFloat
     damping_ratio: PositiveFloat
-    core_ratio: float = Field(gt=0, lt=1)
-    tendons: int = Field(ge=0, le=12)
-    hole_ratio: float = Field(gt=0, le=1)
-    tip_load: NonNegativeFloat
-    segments: dict[str, PositiveFloat]
-
-
-@settings
-class Uniform:
-    kind: Literal["uniform"]
-    length: PositiveFloat
-    width: PositiveFloat
-    units: PositiveInt
-    unit_masses: list[PositiveFloat]
-    bending_stiffness: PositiveFloat | None = None
-    joint_stiffness: PositiveFloat | None = None
-    damping_ratio: PositiveFloat
-    joint_range_deg: float = Field(gt=0, le=180)
     tendons: int = Field(ge=0, le=12)
     hole_ratio: float = Field(gt=0, le=1)
     tip_load: NonNegativeFloat
     segments: dict[str, PositiveFloat]
 
     def __post_init__(self):
+        for name, distance in self.segments.items():
+            if name == "base" or re.fullmatch(r"unit_\d+", name):
+                raise ValueError(f"segments.{name}: found the name of a body, expected another: the mount is `base`, "
+                                 f"and the {self.units} units' centres have names, {unit_name(0)} to "
+                                 f"{unit_name(self.units - 1)}, without an entry")
+            if distance > self.length:
+                raise ValueError(f"segments.{name}: found {distance} m, expected at most the length of "
+                                 f"{self.length} m")
+
+
+@settings
+class Spiral(Arm):
+    kind: Literal["spiral"]
+    base_width: PositiveFloat
+    tip_width: PositiveFloat
+    modulus: PositiveFloat
+    density: PositiveFloat
+    core_ratio: float = Field(gt=0, lt=1)
+
+
+@settings
+class Uniform(Arm):
+    kind: Literal["uniform"]
+    width: PositiveFloat
+    unit_masses: list[PositiveFloat]
+    bending_stiffness: PositiveFloat | None = None
+    joint_stiffness: PositiveFloat | None = None
+    joint_range_deg: float = Field(gt=0, le=180)
+
+    def __post_init__(self):
+        super().__post_init__()
         if (self.bending_stiffness is None) == (self.joint_stiffness is None):
             found = "neither" if self.joint_stiffness is None else "both"
             raise ValueError(f"found {found}, expected either bending_stiffness (EI) or joint_stiffness (K)")
         if len(self.unit_masses) not in (1, self.units):
             raise ValueError(f"unit_masses: found {len(self.unit_masses)}, expected one for all units, or "
                              f"one for each of the {self.units}")
-        far = next((name for name, distance in self.segments.items() if distance > self.length), None)
-        if far is not None:
-            raise ValueError(f"segments.{far}: found {self.segments[far]} m, expected at most the length of "
-                             f"{self.length} m")
 
 
 @settings

@@ -124,6 +124,23 @@ def test_a_mistake_names_the_key(project, changes, message):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize("arm", ["asl_trunk", "spiral"])
+@pytest.mark.parametrize(
+    ("segments", "found"),
+    [
+        ({"wrist": 0.6}, "segments.wrist: found 0.6 m, expected at most the length of "),
+        ({"base": 0.1}, "segments.base: found the name of a body, expected another"),
+        ({"unit_01": 0.1}, "segments.unit_01: found the name of a body, expected another"),
+        ({"unit_99": 0.1}, "units' centres have names, unit_01 to unit_"),
+    ],
+)
+def test_a_tracked_point_lies_on_the_arm_and_has_a_name_of_its_own(project, arm, segments, found):
+    with pytest.raises(InputError) as caught:
+        project({"segments": segments}, arm)
+    assert found in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
 @pytest.mark.parametrize("changes", [{}, {"tendons": 4}, {"bending_stiffness": None, "joint_stiffness": 0.4}])
 def test_the_stage_builds_it(project, tmp_path, changes):
     main(project(changes))
