@@ -323,19 +323,6 @@ def test_topics_can_be_given_by_body(tmp_path):
     np.testing.assert_array_equal(poses.positions[poses.present[:, 1], 1], POSITIONS[~HIDDEN[:, 2], 2])
 
 
-def test_only_transforms_of_the_named_frame_count(tmp_path):
-    path = tmp_path / "log.mcap"
-    with open(path, "wb") as file, RosWriter(file) as writer:
-        schema = writer.register_msgdef("tf2_msgs/msg/TFMessage", TF_MESSAGE)
-        for frame in range(COUNT):
-            extra = transforms(0)[0] | {"header": header(STAMPS[frame], "base"), "child_frame_id": "camera"}
-            writer.write_message("/tf", schema, {"transforms": [*transforms(frame), extra]}, int(STAMPS[frame]))
-    with pytest.raises(InputError, match=r"/tf: found poses in the frames mocap, base, expected one, .*frame\.name"):
-        open_log(path, a_session())
-    poses = open_log(path, a_session(frame={"up": [0, 0, 1], "name": "mocap"})).poses
-    assert set(poses.names) == set(BODIES)
-
-
 @pytest.mark.parametrize(
     ("encoding", "schema_encoding", "found"),
     [("ros1", "ros1msg", "encoding 'ros1'"), ("cdr", "ros2idl", "schema in 'ros2idl'")],

@@ -27,11 +27,11 @@ from trunkline.recording.source import Source, open_log
 from trunkline.recording.streams import PoseStream
 from trunkline.recording.swaps import find_swaps, usual_distances
 from trunkline.recording.take import Take
+from trunkline.recording.transforms import is_rotation
 from trunkline.recording.units import extent, likely_unit
 from trunkline.recording.vertical import check_vertical
 
 UNIT = {"m": 1.0, "mm": 1e-3}
-NORM_TOLERANCE = 0.01  # of a quaternion's length; float32 rounding is far below, anything above is no rotation
 
 
 @dataclass
@@ -296,10 +296,9 @@ def _good_samples(
     quaternions = None
     if poses.quaternions is not None:
         quaternions = poses.quaternions[np.ix_(rows, columns)]
-        norm = np.linalg.norm(quaternions, axis=-1)
-        rotation = np.abs(norm - 1) < NORM_TOLERANCE  # False for NaN
+        rotation = is_rotation(quaternions)
         _count(present & good & ~rotation, "with a NaN, zero or unnormalised quaternion", names, findings)
-        quaternions = quaternions / np.where(rotation, norm, 1)[..., None]
+        quaternions[rotation] /= np.linalg.norm(quaternions[rotation], axis=-1, keepdims=True)
         good, bad = good & rotation, present & ~good
         quaternions[~good] = np.nan
     else:

@@ -24,7 +24,8 @@ class Entry(BaseModel):
 class Frame(Entry):
     """The motion-capture frame: which way is up in it, and the unit of its positions.
 
-    name: the parent frame of the poses, for logs of transforms between several frames.
+    name: for logs of transforms between several frames, the one that the poses are wanted in; by default the nearest
+    that holds them all.
     """
 
     name: str | None = None

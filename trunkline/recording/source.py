@@ -11,6 +11,7 @@ from trunkline.recording.messages import JOINTS, POSES, TOPIC_PER_BODY
 from trunkline.recording.session import Session
 from trunkline.recording.streams import JointStream, PoseStream, joint_stream, pose_stream
 
+STATIC = "tf_static"  # how the topic's name ends
 COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "position")
 
 
@@ -45,7 +46,7 @@ def open_log(path: Path, session: Session) -> Source:
         raise InputError(f"{path}: no pose topic, found {found}{damage}, expected {named}one of {', '.join(POSES)}")
     name = ", ".join(topic.name for topic in topics.values())
     where = f"{path}: {name}"
-    poses = _understood(where, pose_stream, topics, session.bodies, session.frame.name)
+    poses = _understood(where, pose_stream, topics, session.bodies, session.frame.name, static_topics(log))
     if poses.unnamed is not None:
         found = f"found {poses.unnamed} poses without names"
         raise InputError(f"{where}: {found}, expected `bodies` in session.yaml to name them, in order")
@@ -54,7 +55,7 @@ def open_log(path: Path, session: Session) -> Source:
         names = f" with {len(session.bodies)} `bodies`, as in session.yaml" if session.bodies else ""
         raise InputError(f"{where}: no message fits its schema {schema}{names}")
     if len(poses.parents) > 1 and session.frame.name is None:
-        found = f"found poses in the frames {', '.join(poses.parents)}"
+        found = f"found poses in the frames {', '.join(poses.parents)}, which nothing connects"
         raise InputError(f"{where}: {found}, expected one, or its name in session.yaml: frame.name")
     joints = []
     for wanted, role, words in (
@@ -89,6 +90,11 @@ def pose_topics(log: Log, wanted: str | dict[str, str] | None) -> dict[str | Non
     return {} if topic is None else {None: topic}
 
 
+def static_topics(log: Log) -> list[Topic]:
+    """The topics of transforms that hold all the time."""
+    return [topic for topic in log.topics.values() if topic.name.endswith(STATIC) and short_name(topic.schema) in POSES]
+
+
 def choose(
     log: Log, name: str | None, registry: dict, role: str, wanted: tuple[str, ...] = ("",)
 ) -> Topic | None:
@@ -113,7 +119,7 @@ def _best(log: Log, registry: dict, words: tuple[str, ...] = ("",)) -> list[Topi
         for topic in log.topics.values()
         if short_name(topic.schema) in registry
         and any(word in topic.name for word in words)
-        and not topic.name.endswith("tf_static")
+        and not topic.name.endswith(STATIC)
     ]
     rank = list(registry).index
     first = min((rank(short_name(topic.schema)) for topic in told), default=None)

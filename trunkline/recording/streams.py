@@ -9,6 +9,8 @@ from trunkline.recording.cdr import short_name
 from trunkline.recording.encodings import decode
 from trunkline.recording.log import Topic
 from trunkline.recording.messages import JOINTS, POSES, Poses
+from trunkline.recording.samples import Samples
+from trunkline.recording.transforms import in_one_frame
 
 
 @dataclass
@@ -18,7 +20,8 @@ class PoseStream:
     present: (T, B) whether a body is in a frame. positions: (T, B, 3) in the log's unit, quaternions:
     (T, B, 4) wxyz or None; NaN where absent. undecodable: messages that do not fit their schema, or that hold
     another number of poses than there are names. unnamed: poses in a message that nobody names, else None.
-    parents: names of the frames that the poses are in, where messages say it for each.
+    parents: names of the frames that the poses are in, where messages say it for each; several, where nothing
+    connects them.
     """
 
     stamps: np.ndarray
@@ -68,21 +71,25 @@ class Batch:
 
 # what readers raise where a message is not as expected
 READING = (AttributeError, TypeError, ValueError, IndexError, OverflowError)
-FRAMES_OPEN = 16  # frames back to which a body's late sample may still belong
 
 
 def pose_stream(
-    topics: dict[str | None, Topic], bodies: Sequence[str] | None = None, parent: str | None = None
+    topics: dict[str | None, Topic],
+    bodies: Sequence[str] | None = None,
+    frame: str | None = None,
+    statics: Sequence[Topic] = (),
 ) -> PoseStream:
     """All messages of topics whose schema is in `POSES`.
 
     Args:
         topics: one under None, or by the name of the body that each holds.
         bodies: names of the poses in a message that names none.
-        parent: of poses in several frames, only those in this one count.
+        frame: where poses are in several frames, the one in which they are wanted, and only those below it count. By
+            default the nearest that holds all; where nothing connects them, poses stay in their own frames.
+        statics: topics of transforms that hold all the time; they connect frames, and are no bodies.
 
     Raises:
-        ValueError: the messages cannot be read at all.
+        ValueError: the messages cannot be read at all, or frames are no tree, or `frame` is none of them.
     """
     unnamed, read = None, []
     for name, topic in topics.items():
@@ -94,11 +101,15 @@ def pose_stream(
         read.append((topic, [part for batch in batches for part in _batches(*batch, topic, given)]))
     parents = {frame: None for _, batches in read for batch in batches for frame in batch.parents or ()}
     kept = sum(len(batch.rows) for _, batches in read for batch in batches)
-    if parent is not None:
-        for _, batches in read:
-            batches[:] = [_within(batch, parent) for batch in batches]
     own_times = any(batch.time.ndim == 2 for _, batches in read for batch in batches)
-    stream = _gather(read) if own_times or len(read) > 1 else _by_message(*read[0])
+    if not own_times and len(read) == 1:
+        stream = _by_message(*read[0])
+    else:
+        samples = _samples(read)
+        if parents and list(parents) != [frame or next(iter(parents))]:
+            fixed = [(t, [part for batch in _read_poses(t) for part in _batches(*batch, t, ())]) for t in statics]
+            samples, parents = in_one_frame(samples, _samples(fixed), list(parents), frame)
+        stream = _gather(samples)
     stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - kept
     stream.unnamed, stream.parents = unnamed, tuple(parents)
     return stream
@@ -184,22 +195,6 @@ def _batches(rows: np.ndarray, poses: Poses, topic: Topic, given: Sequence[str] 
             )
 
 
-def _within(batch: Batch, parent: str) -> Batch:
-    """The bodies of a batch whose poses are in the frame `parent`; all, where the messages do not say."""
-    if batch.parents is None:
-        return batch
-    inside = [i for i, frame in enumerate(batch.parents) if frame == parent]
-    return Batch(
-        batch.rows,
-        [batch.names[i] for i in inside],
-        batch.time[:, inside],
-        batch.positions[:, inside],
-        None if batch.orientations is None else batch.orientations[:, inside],
-        batch.frame,
-        None,
-    )
-
-
 def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
     """A frame a message."""
     names, count = _union([(batch.rows, batch.names) for batch in batches]), len(topic.messages)
@@ -228,68 +223,40 @@ def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
     )
 
 
-def _gather(read: list[tuple[Topic, list[Batch]]]) -> PoseStream:
-    """Frames from bodies that have times of their own: samples at most half a frame's interval apart belong together.
+def _gather(samples: Samples) -> PoseStream:
+    """Frames from bodies that have times of their own, in the order in which their first sample was logged, so that a
+    clock that runs back shows."""
+    names, body = samples.bodies()
+    frame, first = samples.frames(body)
+    present = np.zeros((len(first), len(names)), bool)
+    positions = np.full((*present.shape, 3), np.nan)
+    quaternions = np.full((*present.shape, 4), np.nan) if np.isfinite(samples.quaternions).any() else None
+    present[frame, body], positions[frame, body] = True, samples.positions
+    if quaternions is not None:
+        quaternions[frame, body] = samples.quaternions
+    return PoseStream(
+        samples.stamps[first], samples.logged[first], None, names, present, positions, quaternions, 0
+    )
 
-    Where no message is stamped, the log times tell what belongs together. Frames are in the order in which their
-    first sample was logged, so that a clock that runs back shows.
-    """
-    names = _union([(topic.log_times[batch.rows], batch.names) for topic, batches in read for batch in batches])
-    index = {name: i for i, name in enumerate(names)}
-    stamps, logged, body, positions, quaternions = [], [], [], [], []
+
+def _samples(read: list[tuple[Topic, list[Batch]]]) -> Samples:
+    """What batches hold, body by body."""
+    parts = [Samples.none()]
     for topic, batches in read:
         for batch in batches:
             shape = (len(batch.rows), len(batch.names))
             time = batch.time if batch.time.ndim == 2 else batch.time[:, None]
-            stamps.append(np.broadcast_to(time, shape).ravel())
-            logged.append(np.repeat(topic.log_times[batch.rows], shape[1]))
-            body.append(np.tile([index[name] for name in batch.names], shape[0]).astype(int))
-            positions.append(batch.positions.reshape(-1, 3))
             turned = np.full((*shape, 4), np.nan) if batch.orientations is None else batch.orientations
-            quaternions.append(turned.reshape(-1, 4))
-    if not stamps:
-        empty = np.empty(0, np.int64)
-        return PoseStream(empty, empty, None, (), np.empty((0, 0), bool), np.empty((0, 0, 3)), None, 0)
-    stamps, logged, body = np.concatenate(stamps), np.concatenate(logged), np.concatenate(body)
-    order = np.argsort(logged, kind="stable")
-    stamps, logged, body = stamps[order], logged[order], body[order]
-    clock = stamps if stamps.any() else logged
-    frame, first = _frames(clock, body)
-    oriented = np.concatenate(quaternions)[order]
-    stream = PoseStream(
-        stamps[first],
-        logged[first],
-        None,
-        names,
-        np.zeros((len(first), len(names)), bool),
-        np.full((len(first), len(names), 3), np.nan),
-        np.full((len(first), len(names), 4), np.nan) if np.isfinite(oriented).any() else None,
-        0,
-    )
-    stream.present[frame, body] = True
-    stream.positions[frame, body] = np.concatenate(positions)[order]
-    if stream.quaternions is not None:
-        stream.quaternions[frame, body] = oriented
-    return stream
-
-
-def _frames(clock: np.ndarray, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Each sample's frame (M,), and the index of each frame's first sample."""
-    steps = np.concatenate([np.diff(np.sort(clock[body == i])) for i in np.unique(body)])
-    steps = steps[steps > 0]
-    apart = 0.5 * float(np.median(steps)) if len(steps) else 0.0
-    frame, first, taken = np.empty(len(clock), int), [], []
-    for sample, (time, who) in enumerate(zip(clock.tolist(), body.tolist(), strict=True)):
-        for place in range(len(first) - 1, max(-1, len(first) - 1 - FRAMES_OPEN), -1):
-            if abs(time - clock[first[place]]) <= apart and who not in taken[place]:
-                break
-        else:
-            place = len(first)
-            first.append(sample)
-            taken.append(set())
-        frame[sample] = place
-        taken[place].add(who)
-    return frame, np.array(first)
+            parts.append(Samples(
+                np.broadcast_to(time, shape).ravel(),
+                np.repeat(topic.log_times[batch.rows], shape[1]),
+                np.tile(np.array(batch.names, dtype=str), shape[0]),
+                np.tile(np.array(batch.parents or [""] * shape[1], dtype=str), shape[0]),
+                batch.positions.reshape(-1, 3),
+                turned.reshape(-1, 4),
+            ))  # fmt: skip
+    samples = Samples(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    return samples.take(np.argsort(samples.logged, kind="stable"))
 
 
 def _union(batches: list[tuple[np.ndarray, list[str]]]) -> tuple[str, ...]:

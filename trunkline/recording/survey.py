@@ -9,7 +9,7 @@ from trunkline.errors import InputError
 from trunkline.recording.cdr import short_name
 from trunkline.recording.log import Log, Topic, read_log
 from trunkline.recording.messages import JOINTS, POSES
-from trunkline.recording.source import COMMAND_WORDS, POSITION_WORDS, choose, pose_topics
+from trunkline.recording.source import COMMAND_WORDS, POSITION_WORDS, choose, pose_topics, static_topics
 from trunkline.recording.streams import JointStream, PoseStream, joint_stream, pose_stream
 
 GAP = 1.5  # median intervals between frames that make a gap
@@ -39,7 +39,7 @@ def survey(path: Path) -> Survey:
     try:
         found.pose_topics = pose_topics(found.log, None)
         if found.pose_topics:
-            found.poses = pose_stream(found.pose_topics)
+            found.poses = pose_stream(found.pose_topics, statics=static_topics(found.log))
     except (InputError, ValueError) as error:
         found.notes.append(f"poses: {error}")
     for role, words in (("command", COMMAND_WORDS), ("position", POSITION_WORDS)):

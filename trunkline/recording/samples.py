@@ -1,0 +1,64 @@
+"""Poses that come body by body, each with a time of its own, and which of them belong together."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+FRAMES_OPEN = 16  # frames back to which a body's late sample may still belong
+
+
+class Samples(NamedTuple):
+    """M poses, in the order in which they were logged.
+
+    stamps, logged: ns, of the header and the recorder. Shape (M,). names: the bodies. Shape (M,). parents: names of
+    the frames that the poses are in, empty where messages do not say. Shape (M,). positions: in the log's unit.
+    Shape (M, 3). quaternions: wxyz, NaN where there are none. Shape (M, 4).
+    """
+
+    stamps: np.ndarray
+    logged: np.ndarray
+    names: np.ndarray
+    parents: np.ndarray
+    positions: np.ndarray
+    quaternions: np.ndarray
+
+    @classmethod
+    def none(cls) -> "Samples":
+        time, names = np.empty(0, np.int64), np.empty(0, str)
+        return cls(time, time, names, names, np.empty((0, 3)), np.empty((0, 4)))
+
+    def take(self, rows: np.ndarray) -> "Samples":
+        return Samples(*(values[rows] for values in self))
+
+    @property
+    def clock(self) -> np.ndarray:
+        """What dates a sample, ns: its stamp, or the log time where no message is stamped. Shape (M,)."""
+        return self.stamps if self.stamps.any() else self.logged
+
+    def bodies(self) -> tuple[tuple[str, ...], np.ndarray]:
+        """All names, in the order of their first appearance, and each sample's by index (M,)."""
+        sorted_names, first, which = np.unique(self.names, return_index=True, return_inverse=True)
+        order = np.argsort(first)
+        return tuple(sorted_names[order].tolist()), np.argsort(order)[which]
+
+    def frames(self, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Each sample's frame (M,), and the index of each frame's first sample.
+
+        Samples of different bodies (M,) at most half a frame's interval apart belong together.
+        """
+        clock = self.clock
+        steps = np.concatenate([[0], *(np.diff(np.sort(clock[body == i])) for i in np.unique(body))])
+        steps = steps[steps > 0]
+        apart = 0.5 * float(np.median(steps)) if len(steps) else 0.0
+        frame, first, taken = np.empty(len(clock), int), [], []
+        for sample, (time, who) in enumerate(zip(clock.tolist(), body.tolist(), strict=True)):
+            for place in range(len(first) - 1, max(-1, len(first) - 1 - FRAMES_OPEN), -1):
+                if abs(time - clock[first[place]]) <= apart and who not in taken[place]:
+                    break
+            else:
+                place = len(first)
+                first.append(sample)
+                taken.append(set())
+            frame[sample] = place
+            taken[place].add(who)
+        return frame, np.array(first, int)
