@@ -37,9 +37,9 @@ class Samples(NamedTuple):
 
     def bodies(self) -> tuple[tuple[str, ...], np.ndarray]:
         """All names, in the order of their first appearance, and each sample's by index (M,)."""
-        sorted_names, first, which = np.unique(self.names, return_index=True, return_inverse=True)
-        order = np.argsort(first)
-        return tuple(sorted_names[order].tolist()), np.argsort(order)[which]
+        names = self.names.tolist()
+        index = {name: place for place, name in enumerate(dict.fromkeys(names))}
+        return tuple(index), np.array([index[name] for name in names], int)
 
     def frames(self, body: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Each sample's frame (M,), and the index of each frame's first sample.
