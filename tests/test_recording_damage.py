@@ -74,6 +74,23 @@ def test_a_segment_taken_for_the_base_is_put_right(tmp_path):
     test_bodies_taken_for_each_other_are_put_right(tmp_path, slice(60, 110), (0, 1))
 
 
+@pytest.mark.parametrize("bodies", [(2, 3, 4, 5), (0, 2, 1, 3), (4, 7, 5, 6)])
+def test_rounds_of_four_are_told_too(bodies):
+    """On a tapering arm of nine segments that swings; for two frames, and for one."""
+    rng = np.random.default_rng(0)
+    along = np.concatenate([[0], np.cumsum(0.06 * 0.9 ** np.arange(9))])
+    angle = 2.0 * np.sin(0.1 * np.arange(300))[:, None] * along / along[-1] + 1e-9
+    arc = np.stack([1 - np.cos(angle), 0 * angle, -np.sin(angle)], axis=-1) / (angle[:, -1:, None] / along[-1])
+    right = arc + rng.normal(scale=3e-4, size=arc.shape)
+    usual, positions = usual_distances([right]), right.copy()
+    wrong = np.isin(np.arange(300), [50, 51, 120])
+    positions[np.ix_(wrong, bodies)] = right[np.ix_(wrong, [*bodies[1:], bodies[0]])]
+    assert find_swaps(right, usual) == []
+    for swap in find_swaps(positions, usual):
+        positions[np.ix_(swap.frames, [*swap.bodies[1:], swap.bodies[0]])] = positions[np.ix_(swap.frames, swap.bodies)]
+    np.testing.assert_array_equal(positions, right)
+
+
 @pytest.mark.parametrize("truth", [release_truth(), static_truth(60.0), curl_truth(100.0)])
 def test_nothing_is_swapped_where_nothing_was(tmp_path, truth):
     for seed in range(3):

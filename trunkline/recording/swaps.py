@@ -5,10 +5,12 @@ at the other's usual distances from their neighbours.
 """
 
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 from scipy.ndimage import binary_opening
 
+LONGEST = 4  # labels in a round
 NEIGHBOURS = 2  # nearest segments with which one may be exchanged
 REFERENCES = 4  # nearest other bodies by whose distances two segments are told apart
 LEAST_CONTRAST = 3e-3  # m by which the distances of two segments must differ
@@ -43,7 +45,7 @@ def usual_distances(logs: list[np.ndarray]) -> np.ndarray:
 
 
 def find_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = True) -> list[Swap]:
-    """Labels that changed places, two or three at a time, among the bodies of (T, B, 3) m, the base first.
+    """Labels that changed places, up to `LONGEST` at a time, among the bodies of (T, B, 3) m, the base first.
 
     Args:
         usual: distances (B, B) m.
@@ -52,37 +54,39 @@ def find_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = Tru
     candidates = _candidates(usual, marked_base)
     if not candidates:
         return []
-    flags = [_exchanged(positions, usual, bodies) for bodies in candidates]
+    distances = np.linalg.norm(positions[:, :, None] - positions[:, None], axis=-1)
+    flags = [_exchanged(distances, usual, bodies) for bodies in candidates]
     misfits = np.full((len(candidates), len(positions)), np.inf)  # what is left where several would do
     for place, (bodies, flagged) in enumerate(zip(candidates, flags, strict=True)):
-        misfits[place, flagged] = _misfit(positions[flagged], usual, bodies)
+        misfits[place, flagged] = _misfit(distances[flagged], usual, bodies)
     best = np.where(np.isfinite(misfits).any(axis=0), np.argmin(misfits, axis=0), -1)
     return [Swap(bodies, best == place) for place, bodies in enumerate(candidates) if (best == place).any()]
 
 
 def _candidates(usual: np.ndarray, marked_base: bool) -> list[tuple[int, ...]]:
-    """Pairs of near bodies, then rounds of three near ones, either way."""
+    """Rounds of near bodies, the shortest first, in every order."""
     nearness = np.where(np.isfinite(usual), usual, np.inf)
     bodies = range(0 if marked_base else 1, len(usual))
     order = np.argsort(nearness, axis=1, kind="stable").tolist()
     near = {first: [other for other in order[first] if other in bodies and other != first] for first in bodies}
     near = {first: others[:NEIGHBOURS] for first, others in near.items()}
-    pairs = {tuple(sorted((a, b))) for a in bodies for b in near[a] if np.isfinite(usual[a, b])}
-    rounds = {tuple(sorted((a, b, c))) for a, b in pairs for c in near[a] + near[b] if c not in (a, b)}
-    return sorted(pairs) + sorted(order for a, b, c in rounds for order in ((a, b, c), (a, c, b)))
+    rounds, sets = [], {frozenset((a, b)) for a in bodies for b in near[a] if np.isfinite(usual[a, b])}
+    for _ in range(2, LONGEST + 1):
+        ordered = sorted(map(sorted, sets))
+        rounds += [(first, *others) for first, *rest in ordered for others in permutations(rest)]
+        sets = {some | {more} for some in sets for body in some for more in near[body] if more not in some}
+    return rounds
 
 
-def _misfit(positions: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -> np.ndarray:
-    """Mean misfit (T,) m of all distances, each of the labels `bodies` taken for the next."""
+def _misfit(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -> np.ndarray:
+    """Mean misfit (T,) m of all distances (T, B, B), each of the labels `bodies` taken for the next."""
     order = np.arange(len(usual))
     order[[*bodies[1:], bodies[0]]] = bodies
-    righted = positions[:, order]
     first, second = np.triu_indices(len(usual), 1)
-    off = np.abs(np.linalg.norm(righted[:, first] - righted[:, second], axis=-1) - usual[first, second])
-    return np.nanmean(off, axis=1)
+    return np.nanmean(np.abs(distances[:, order[first], order[second]] - usual[first, second]), axis=1)
 
 
-def _exchanged(positions: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -> np.ndarray:
+def _exchanged(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -> np.ndarray:
     """(T,) frames in which the labels `bodies` fit their neighbours only when each is taken for the next.
 
     Where but one of them is seen, an outlier may look like it, and it has to last.
@@ -91,11 +95,11 @@ def _exchanged(positions: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]
     others = [b for b in np.argsort(nearness, kind="stable").tolist() if b not in bodies]
     others = [b for b in others if np.isfinite(usual[list(bodies), b]).all()][:REFERENCES]
     if len(others) < 2:
-        return np.zeros(len(positions), bool)
-    kept, exchanged, contrast, terms, both = (np.zeros(len(positions)) for _ in range(5))
+        return np.zeros(len(distances), bool)
+    kept, exchanged, contrast, terms, both = (np.zeros(len(distances)) for _ in range(5))
     for label, pose in zip(bodies, (*bodies[1:], bodies[0]), strict=True):
         own, other = usual[label, others], usual[pose, others]
-        found = np.linalg.norm(positions[:, [label]] - positions[:, others], axis=-1)
+        found = distances[:, label, others]
         seen = np.isfinite(found)
         kept += np.sum(np.where(seen, abs(found - own), 0), axis=1)
         exchanged += np.sum(np.where(seen, abs(found - other), 0), axis=1)
