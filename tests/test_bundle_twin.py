@@ -293,7 +293,8 @@ def project(tmp_path, sources) -> Path:
     for stage in [*stages.split(), "reachability"]:
         (root / "artifacts" / stage).mkdir(parents=True)
         (root / "artifacts" / stage / "metrics.json").write_text("{}")
-    (root / "artifacts/identify_control/arm.xml").write_text(sources.mjcf)
+    for stage in ("build_mjcf", "identify_control"):
+        (root / "artifacts" / stage / "arm.xml").write_text(sources.mjcf)
     shutil.copy(sources.network, root / "artifacts/train_ik/ik.onnx")
     (root / "artifacts/reachability/meshes").mkdir()
     for path in sources.meshes:
