@@ -22,15 +22,15 @@ from benchmarks.identification.case import STAGES, Case, Size, read_case, requir
 from stages.filter import Config as FilterConfig
 from trunkline.arm.parameters import PARAMETERS
 from trunkline.config import load_config
-from trunkline.errors import InputError
+from trunkline.errors import in_one_line
 from trunkline.frames import wxyz_from_rotation
 from trunkline.identification.certainty import certainty
 from trunkline.identification.evaluation import replay
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS
 from trunkline.identification.pose_fit import PoseFit, fit_pose
-from trunkline.identification.run import read_spec
-from trunkline.identification.search import descend, linearise
+from trunkline.identification.search import descend
+from trunkline.identification.setup import read_spec
 from trunkline.progress import progress
 from trunkline.recording.smoothing import low_pass
 
@@ -119,18 +119,18 @@ def fitted_start(experiment: Experiment, model: mujoco.MjModel, segments, shifts
 
 def recover(case: Case, plant: mujoco.MjModel, noise: Noise, repetitions: int, seed: int = 1) -> dict[str, Recovered]:
     """Identify the plant's parameters with every loss from the same noisy trials, again and again."""
-    exact = np.log([PARAMETERS[name].read(plant) for name in case.bounds])
-    clean = played(plant, case.experiments, case.segments)
+    exact = np.log([PARAMETERS[name].read(plant) for name in case.fit.parameters])
+    clean = played(plant, case.experiments, case.fit.segments)
     rng = np.random.default_rng(seed)
     rows: dict[str, list] = {loss: [] for loss in RESIDUALS}
     with progress(repetitions * len(RESIDUALS), "losses", "searches") as bar:
         for _ in range(repetitions):
-            trials = [noisy(experiment, case.model, case.segments, noise, rng) for experiment in clean]
+            trials = [noisy(experiment, case.model, case.fit.segments, noise, rng) for experiment in clean]
             start = exact + rng.normal(0, PERTURBATION, len(exact))
             for loss, table in rows.items():
-                problem = replace(case, experiments=trials, loss=loss).problem()
+                problem = replace(case.fit, loss=loss).problem(case.model, trials)
                 found = descend(problem, start, ITERATIONS, TOLERANCE, lambda best: None)
-                width = certainty(linearise(problem, found.vector)).half_width
+                width = certainty(found.linear).half_width
                 table.append((found.vector - exact, width, found.converged))
                 bar.update(1)
     return {
@@ -155,6 +155,7 @@ def table(names: list[str], results: dict[str, Recovered]) -> str:
     return "\n".join(lines)
 
 
+@in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(prog="benchmarks.losses", description=__doc__.splitlines()[0])
     parser.add_argument("--repetitions", type=int, default=20, help="with noise drawn anew, at least 2")
@@ -162,17 +163,14 @@ def main() -> int:
     parser.add_argument("--frames", type=int, default=180, help="of each release")
     parser.add_argument("--weight-velocity", type=float, help="of the velocity term, in place of the configured one")
     arguments = parser.parse_args()
-    try:
-        for model in (STAGES[STAGE], PLANT):
-            require_demo(model)
-        case = read_case(STAGE, Size(trials=arguments.trials, frames=arguments.frames))
-    except InputError as error:
-        print(f"error: {error}", file=sys.stderr)
-        return 1
+    for model in (STAGES[STAGE], PLANT):
+        require_demo(model)
+    case = read_case(STAGE, Size(trials=arguments.trials, frames=arguments.frames))
     if arguments.weight_velocity is not None:
-        case = replace(case, weights=replace(case.weights, weight_velocity=arguments.weight_velocity))
+        weights = replace(case.fit.weights, weight_velocity=arguments.weight_velocity)
+        case = replace(case, fit=replace(case.fit, weights=weights))
     results = recover(case, read_spec(PLANT).compile(), read_noise(), arguments.repetitions)
-    print(table(list(case.bounds), results))
+    print(table(list(case.fit.parameters), results))
     for loss, found in results.items():
         print(f"{loss}: {found.converged} of {arguments.repetitions} searches converged", file=sys.stderr)
     return 0
