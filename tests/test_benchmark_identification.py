@@ -30,7 +30,7 @@ def case():
     set_fields(truth, candidate_fields(model, dict(zip(bounds, np.exp(TRUTH)[:, None], strict=True))))
     trials = [release(truth, 0.3, frames=20), release(truth, -0.25, frames=20), release(truth, 0.2, "validate", 20)]
     experiments = [prepare(trial, model, 20) for trial in trials]
-    weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
+    weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     method = Method(LeastSquares(4, 1, 4, 1e-3), 2.0, 20, 2, 8, 1e-9, LeastSquares(0, 1, 1, 1.0), 0.1, 1)
     fit = Fit(segments_of(model), bounds, (), "positions", weights, method)
     return Case(model, experiments[:2], experiments[2:], fit)

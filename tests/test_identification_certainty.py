@@ -120,7 +120,7 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
     trials = [curl(model, level, frames=60, noise=3e-4, seed=k, tendon=k) for k, level in enumerate((4, 6, 8))]
     experiments = [prepare(trial, model, 437) for trial in trials]
     method = Method(LeastSquares(0, 1, 4, 1e-3), 1.0, 437, 99, 4, 1e-6, LeastSquares(0, 1, 1, 1.0), 0.1, seed=1)
-    weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
+    weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     found = identify(
         "test", model, experiments, Fit(segments_of(model), bounds, (), "positions", weights, method)
     )
@@ -141,7 +141,7 @@ def test_factors_that_one_trial_alone_determines_have_no_width(tmp_path):
     own = PARAMETERS["stiffness"].read(model)
     bounds = {"stiffness": Bounds(0.5 * own, 2 * own)}
     method = Method(LeastSquares(0, 1, 1, 1.0), 1.0, 5, 1, 1, 1.0, LeastSquares(0, 1, 1, 1.0), 0.1, seed=1)
-    weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
+    weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     found = identify(
         "test", model, experiments, Fit(segments_of(model), bounds, ("stiffness",), "positions", weights, method)
     )

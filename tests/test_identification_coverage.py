@@ -23,14 +23,14 @@ from trunkline.identification.certainty import bootstrap, certainty
 from trunkline.identification.experiment import prepare
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds, Problem
-from trunkline.identification.search import descend, linearise
+from trunkline.identification.search import WIDE_DIFFERENCE, descend, linearise
 from trunkline.recording.trial import Trial
 
 REPETITIONS, TRIALS, FRAMES = 20, 6, 60
 NOISE = 0.3e-3, np.radians(0.3)  # m and rad, per axis
 LOW_PASS = butter(4, 20.0, fs=1 / FRAME, output="sos")
 MARGIN = 30  # frames, beyond which the low-pass's ends are not felt
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
+WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
 @dataclass
@@ -104,7 +104,7 @@ def repetitions(request) -> Repetitions:
         problem = Problem(model, experiments, segments_of(model), bounds, "positions", WEIGHTS)
         found = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 12, 1e-6, lambda best: None)
         assert found.converged
-        linear = linearise(problem, found.vector)
+        linear = linearise(problem, found.vector, WIDE_DIFFERENCE)
         errors.append(found.vector - exact)
         widths.append(certainty(linear).half_width)
         resampled.append(bootstrap(linear, seed=1) - exact)

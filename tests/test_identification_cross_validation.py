@@ -13,7 +13,7 @@ from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds
 from trunkline.identification.search import LeastSquares
 
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
+WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 METHOD = Method(LeastSquares(0, 1, 3, 1e-2), 1.0, 1, 99, 4, 1e-4, LeastSquares(0, 1, 3, 1e-2), 0.2, seed=1)
 
 

@@ -57,6 +57,15 @@ def test_position_loss_sees_a_swing_that_distances_do_not():
     assert loss_of(position_residuals(simulated[None], real, seen, WEIGHTS))[0] == pytest.approx(expected)
 
 
+def test_moving_position_loss_by_hand():
+    real = np.array([[[0.0, 0.0, -1.0]], [[0.03, 0.0, -1.0]], [[0.03, 0.04, -1.0]]])
+    simulated = real + [[[0, 0, 0]], [[0, 0, 0]], [[0.009, 0, 0]]]
+    position = 0.5 * (0.009 / np.sqrt(0.03**2 + 0.04**2 + 1)) ** 2
+    velocity = 0.5 * (0.009 / (np.sqrt((0.03**2 + 0.04**2) / 2) + 0.01)) ** 2  # relative to the mean square step
+    residuals = position_residuals(simulated[None], real, np.ones((3, 1), bool), WEIGHTS)
+    assert loss_of(residuals)[0] == pytest.approx((2.0 * position + 3.0 * velocity) / 3)
+
+
 @pytest.mark.parametrize("residuals", [distance_residuals, position_residuals])
 def test_what_was_not_measured_does_not_count(residuals):
     rng = np.random.default_rng(1)
@@ -67,6 +76,8 @@ def test_what_was_not_measured_does_not_count(residuals):
     before = loss_of(residuals(simulated, real, measured, WEIGHTS))
     simulated[:, 2, 1] += 1.0
     simulated[:, 4] -= 1.0
+    real[2, 1] -= 0.5
+    real[4] += 0.3
     np.testing.assert_allclose(loss_of(residuals(simulated, real, measured, WEIGHTS)), before)
 
 

@@ -11,7 +11,7 @@ from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import DIVERGED_LOSS, Bounds, Problem
 from trunkline.identification.search import LeastSquares
 
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
+WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 
 def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3)):  # noqa: B008

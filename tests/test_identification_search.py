@@ -25,7 +25,7 @@ def problem():
     experiments = [prepare(release(truth, bend, frames=50), model, 50) for bend in (0.3, -0.25)]
     bounds = {"damping": Bounds(0.005, 1.0), "tendon_friction": Bounds(0.02, 3.0)}
     return Problem(
-        model, experiments, segments_of(model), bounds, "positions", LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.01)
+        model, experiments, segments_of(model), bounds, "positions", LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     )
 
 

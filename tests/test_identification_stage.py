@@ -24,7 +24,7 @@ from trunkline.recording.trial import write_trials
 
 LOSS = Loss(
     kind="positions", delta_position=0.2, delta_velocity=2.0, epsilon=0.02, epsilon_velocity=0.002,
-    weight_position=1.0, weight_velocity=0.01,
+    weight_position=1.0, weight_velocity=0.03,
 )  # fmt: skip
 
 

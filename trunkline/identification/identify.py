@@ -11,7 +11,15 @@ from trunkline.identification.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds, Problem
-from trunkline.identification.search import Convergence, Found, Optimizer, descend, linearise, search
+from trunkline.identification.search import (
+    WIDE_DIFFERENCE,
+    Convergence,
+    Found,
+    Optimizer,
+    descend,
+    linearise,
+    search,
+)
 from trunkline.progress import progress
 
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
@@ -108,7 +116,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
-    linear = found.linear
+    linear = linearise(exact, found.vector, WIDE_DIFFERENCE)
     problems = [rough, exact]
 
     factors: dict[str, np.ndarray] = {}

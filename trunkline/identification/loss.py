@@ -52,7 +52,9 @@ def distance_residuals(
     Returns:
         Shape (C, R).
     """
-    return _residuals(distances(simulated)[..., None], distances(real)[..., None], distances(real), measured, weights)
+    real = distances(real)
+    steps = np.abs(np.diff(real, axis=0))
+    return _residuals(distances(simulated)[..., None], real[..., None], real, steps, measured, weights)
 
 
 def position_residuals(
@@ -61,9 +63,13 @@ def position_residuals(
     """As `distance_residuals`, with positions in the base frame in place of distances from the base.
 
     Distances hardly change while an arm swings gently to and fro; positions do. A Huber loss is then of the
-    length of a vector, relative to the segment's distance from the base, or to its step.
+    length of a vector, relative to the segment's distance from the base, or to the root mean square of its steps:
+    relative to each measured step, the slowest count most, and their noise biases the motors' gains.
     """
-    return _residuals(simulated, real, distances(real), measured, weights)
+    pairs = (measured[1:] & measured[:-1])[..., None]
+    squares = np.where(pairs, np.diff(real, axis=0) ** 2, 0).sum(axis=(0, 2))
+    steps = np.sqrt(squares / np.maximum(pairs.sum(axis=(0, 2)), 1))
+    return _residuals(simulated, real, distances(real), steps, measured, weights)
 
 
 RESIDUALS = {"distances": distance_residuals, "positions": position_residuals}
@@ -74,16 +80,18 @@ def loss_of(residuals: np.ndarray) -> np.ndarray:
     return 0.5 * np.einsum("...r,...r->...", residuals, residuals)
 
 
-def _residuals(simulated, real, scale, measured, weights: LossWeights) -> np.ndarray:
-    """Position and velocity terms of (C, T, S, K) against (T, S, K), K = 1 for distances, 3 for positions."""
+def _residuals(simulated, real, scale, step_scale, measured, weights: LossWeights) -> np.ndarray:
+    """Position and velocity terms of (C, T, S, K) against (T, S, K), K = 1 for distances, 3 for positions.
+
+    They are relative to `scale` (T, S) and to `step_scale`, (T - 1, S) or (S,).
+    """
     offset = (simulated - real) / (scale + weights.epsilon)[..., None]
     frames = measured.any(axis=-1).sum()
     shares = measured / np.maximum(measured.sum(axis=-1, keepdims=True), 1) / frames
     terms = [_whiten(offset, weights.delta_position, weights.weight_position * shares)]
     if len(real) > 1 and weights.weight_velocity > 0:
-        step = np.diff(real, axis=0)
-        step_scale = np.linalg.norm(step, axis=-1, keepdims=True) + weights.epsilon_velocity
-        offset = (np.diff(simulated, axis=1) - step) / step_scale
+        offset = np.diff(simulated, axis=1) - np.diff(real, axis=0)
+        offset /= (step_scale + weights.epsilon_velocity)[..., None]
         pairs = measured[1:] & measured[:-1]
         shares = pairs / np.maximum(pairs.sum(axis=-1, keepdims=True), 1) / frames
         terms.append(_whiten(offset, weights.delta_velocity, weights.weight_velocity * shares))

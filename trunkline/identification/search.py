@@ -9,7 +9,8 @@ from scipy.stats import qmc
 
 from trunkline.identification.problem import Problem
 
-DIFFERENCE = 1e-3  # step of a forward difference, in ln(value) or in a factor
+DIFFERENCE = 1e-3  # step of a one-sided difference, in ln(value) or in a factor
+WIDE_DIFFERENCE = 3e-3  # for intervals: small jumps of simulated curls shall not pass for slopes
 PLATEAU_SCAN = 24  # values over the range of a parameter that does not matter, and
 PLATEAU_STARTS = 3  # from how many of the nearest that do matter to search again
 PLATEAU_ITERATIONS, PLATEAU_TOLERANCE = 6, 1e-3  # of each
@@ -167,10 +168,10 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
     return Found(result.x, float(result.cost), convergence, result.status > 0, last)
 
 
-def linearise(problem: Problem, vector: np.ndarray) -> Linearisation:
+def linearise(problem: Problem, vector: np.ndarray, difference: float = DIFFERENCE) -> Linearisation:
     """Derivatives of all residuals by differences towards the inside of the bounds, all columns in one batch."""
     high = problem.bounds()[1]
-    steps = np.where(vector + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
+    steps = np.where(vector + difference > high, -difference, difference)
     candidates = np.concatenate([vector[None], vector + np.diag(steps)])
     blocks = problem.residuals(candidates)
     columns = [((block[1:] - block[0]) / steps[:, None]).T for block in blocks]
