@@ -20,6 +20,7 @@ PICTURES = {
     "artifacts/reachability/maps.png": "docs/maps.png",
     "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
 }
+PNG = b"\x89PNG"  # how such a file begins
 EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README and of its own README
 
 # E_internal of the paper's arm before and after, over 437 frames
@@ -167,11 +168,16 @@ def generate(root: Path) -> dict[Path, str]:
 def main(root: Path = Path(".")) -> int:
     for path, text in generate(root).items():
         path.write_text(text, encoding="utf-8")
+    copy_pictures(root)
+    return 0
+
+
+def copy_pictures(root: Path) -> None:
+    """To where the READMEs show them; not what a skipped stage left in a picture's place, which is a line of text."""
     for source, target in PICTURES.items():
-        if (root / source).is_file():
+        if (root / source).is_file() and (root / source).read_bytes().startswith(PNG):
             (root / target).parent.mkdir(exist_ok=True)
             shutil.copyfile(root / source, root / target)
-    return 0
 
 
 if __name__ == "__main__":
