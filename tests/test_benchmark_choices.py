@@ -1,5 +1,6 @@
 """The table of choices: each row changes what it says, and settings that a stage accepts."""
 
+from dataclasses import dataclass
 from importlib import import_module
 
 import pytest
@@ -40,6 +41,17 @@ def test_a_choice_changes_what_it_says(name, settings):
         if keys := {key for key in before if before[key] != after[key]}:
             changed[stage] = keys
     assert changed == CHANGED[name]
+
+
+def test_a_choice_of_trials_starts_those_that_move_with_their_velocity():
+    @dataclass
+    class Trial:
+        experiment: str
+        in_motion: bool = False
+
+    trials = [Trial(kind) for kind in ("static_tilt", "release", "curl")]
+    assert [trial.in_motion for trial in CHOICES["velocity"].trials(trials)] == [False, True, True]
+    assert all(choice.trials(trials) is trials for name, choice in CHOICES.items() if name != "velocity")
 
 
 def test_least_squares_is_the_method_of_every_stage(settings):
