@@ -1,6 +1,7 @@
 """Logs whose bytes are whole and whose content is wrong: each mistake is named, and put right where that is safe."""
 
 import json
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -89,6 +90,18 @@ def test_rounds_of_four_are_told_too(bodies):
     for swap in find_swaps(positions, usual):
         positions[np.ix_(swap.frames, [*swap.bodies[1:], swap.bodies[0]])] = positions[np.ix_(swap.frames, swap.bodies)]
     np.testing.assert_array_equal(positions, right)
+
+
+def test_memory_for_finding_swaps_hardly_grows_with_the_rounds_that_are_tried():
+    """Beside the distances between all bodies, only what is kept of each frame."""
+    frames, bodies = 2000, 19
+    positions = np.linspace([0, 0, 0], [0, 0, -0.5], bodies) + np.random.default_rng(0).normal(0, 3e-4, (frames, 1, 3))
+    usual = usual_distances([positions])
+    tracemalloc.start()
+    find_swaps(positions, usual)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2 * 8 * frames * bodies**2
 
 
 @pytest.mark.parametrize("truth", [release_truth(), static_truth(60.0), curl_truth(100.0)])

@@ -54,12 +54,15 @@ def find_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = Tru
     candidates = _candidates(usual, marked_base)
     if not candidates:
         return []
-    distances = np.linalg.norm(positions[:, :, None] - positions[:, None], axis=-1)
-    flags = [_exchanged(distances, usual, bodies) for bodies in candidates]
-    misfits = np.full((len(candidates), len(positions)), np.inf)  # what is left where several would do
-    for place, (bodies, flagged) in enumerate(zip(candidates, flags, strict=True)):
-        misfits[place, flagged] = _misfit(distances[flagged], usual, bodies)
-    best = np.where(np.isfinite(misfits).any(axis=0), np.argmin(misfits, axis=0), -1)
+    distances = np.empty((len(positions), *usual.shape))
+    for body in range(len(usual)):  # one by one, as all differences at once take three times the memory
+        distances[:, body] = np.linalg.norm(positions - positions[:, [body]], axis=-1)
+    least, best = np.full(len(positions), np.inf), np.full(len(positions), -1)  # the first that leaves least
+    for place, bodies in enumerate(candidates):
+        flagged = np.flatnonzero(_exchanged(distances, usual, bodies))
+        left = _misfit(distances[flagged], usual, bodies)
+        better = left < least[flagged]
+        least[flagged[better]], best[flagged[better]] = left[better], place
     return [Swap(bodies, best == place) for place, bodies in enumerate(candidates) if (best == place).any()]
 
 
