@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.matched_plant import curl, release, segments_of, small_model, tilt
+from tests.small_arm import small_spec
 from tests.test_identification_recovery import changed, identified
 from trunkline.arm.parameters import candidate_fields, set_fields
 from trunkline.identification.experiment import prepare
@@ -34,6 +35,19 @@ def test_markers_are_found_where_they_sit(model):
     np.testing.assert_allclose(found.site_pos[sites(model)], off.site_pos[sites(model)], atol=2e-4)
     unseen = [prepare(release(off, 0.15, "validate", 3), m, 3).fit.residuals.mean() for m in (model, found)]
     assert unseen[1] < 0.3 * unseen[0]
+
+
+def test_a_marker_is_found_that_is_tracked_at_its_bodys_origin(model):
+    """MuJoCo takes such a site's place from its body, whatever `site_pos` says, unless told otherwise."""
+    at_origin = small_spec(6)
+    at_origin.site("unit_03_center").pos = [0, 0, 0]
+    at_origin = at_origin.compile()
+    off, marker = model.__copy__(), model.site("unit_03_center").id
+    off.site_pos[marker] = [1e-3, -1e-3, 0]
+    found = with_measured_markers(at_origin, trials(off))
+    np.testing.assert_allclose(found.site_pos[marker], off.site_pos[marker], atol=2e-4)
+    residuals = prepare(release(off, 0.15, "validate", 3), found, 3).fit.residuals
+    assert residuals[segments_of(model).index("unit_03")] < 2e-4
 
 
 def test_markers_on_their_axes_stay_there(model):

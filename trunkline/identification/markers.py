@@ -16,6 +16,7 @@ def with_measured_markers(model: mujoco.MjModel, trials: list[Trial]) -> mujoco.
     model = model.__copy__()
     seen = [trial for trial in trials if trial.split == "identify"]
     sites = [model.site(f"{name}_center").id for name in seen[0].segments]
+    model.site_sameframe[sites] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # else a site at its body's origin stays there
     moved = np.zeros((len(sites), 3))
     straight = model.site_pos[sites].copy()
     for _ in range(ROUNDS):

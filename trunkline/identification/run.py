@@ -48,7 +48,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     if whole:
         models["cad"] = read_spec(CAD_MODEL).compile()
         models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
-        for field in ("qpos_spring", "site_pos"):  # the shape at rest and the markers are no matter of scalars
+        for field in ("qpos_spring", "site_pos", "site_sameframe"):  # rest shape and markers are no matter of scalars
             getattr(models["coarse"], field)[:] = getattr(model, field)
     replays = {name: replay(m, experiments, segments) for name, m in models.items()}
     metrics = {name: scores(r, experiments, fit.loss, fit.weights) for name, r in replays.items()}
