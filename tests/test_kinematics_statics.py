@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.bent_chain import cantilever, hardening_stump, stump
+from trunkline.arm.parameters import candidate_fields, set_fields
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.chain import read_chain
 from trunkline.kinematics.sampling import pull_directions
@@ -40,6 +41,17 @@ def test_equilibrium_is_where_mujoco_comes_to_rest(build):
     assert settled.rested.all()
     np.testing.assert_allclose(settled.position, found.position, rtol=0, atol=2e-5)
     np.testing.assert_allclose(settled.tensions, tensions, rtol=0, atol=2e-3)
+
+
+def test_an_arm_on_a_turned_mount_rests_there_in_its_own_frame(arm, chain):
+    """As an identified mount is; gravity and tip are then in the frame of the mount, not of the world."""
+    turned = arm.__copy__()
+    set_fields(turned, candidate_fields(arm, {"mount_tilt_x": np.array([0.1]), "mount_twist": np.array([-0.2])}))
+    tensions, gravity = random_pulls(chain, 3)
+    found = equilibrium(read_chain(turned), tensions, gravity)
+    np.testing.assert_allclose(found.position, equilibrium(chain, tensions, gravity).position, atol=1e-9)
+    settled = settle(turned, found.lengths - tensions / chain.gain, gravity)
+    np.testing.assert_allclose(settled.position, found.position, rtol=0, atol=2e-5)
 
 
 def test_actuators_saturate_as_mujocos_do(arm, chain):

@@ -41,14 +41,18 @@ def settle(
 
     Args:
         commands: target path lengths of the position actuators, m. Shape (B, K), K in the order of the actuators.
-        gravity: in the base frame, m/s²; the base must not be turned in the world. Shape (3,) or (B, 3).
+        gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate.
         ramp: time over which the commands go from the straight arm's path lengths to `commands`, s.
     """
     model = _frictionless(model)
     count = len(commands)
     simulation = mujoco.batch.Batch(model, nsim=count, nthread=thread_count())
-    simulation.expand("opt.gravity")[:] = gravity
+    base = model.body_parentid[unit_bodies(model)[0]]
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    to_world = data.xmat[base].reshape(3, 3)  # an identified mount may be turned
+    simulation.expand("opt.gravity")[:] = gravity @ to_world.T
     slack = _straight_commands(model)
     qvel, ctrl = simulation.bind("qvel"), simulation.bind("ctrl")
     site = simulation.bind("site_xpos")
@@ -64,9 +68,8 @@ def settle(
         if np.abs(qvel).max() < REST_SPEED:
             break
     simulation.forward()
-    base = model.body_parentid[unit_bodies(model)[0]]
-    position = site[:, model.site(tip_site).id] - simulation.bind("xpos")[:, base]
-    return Settled(position.copy(), qpos.copy(), -force.copy(), np.abs(qvel).max(axis=1) < REST_SPEED)
+    position = (site[:, model.site(tip_site).id] - simulation.bind("xpos")[:, base]) @ to_world
+    return Settled(position, qpos.copy(), -force.copy(), np.abs(qvel).max(axis=1) < REST_SPEED)
 
 
 def _frictionless(model: mujoco.MjModel) -> mujoco.MjModel:
