@@ -137,31 +137,43 @@ def quick(stage: str, config: IdentificationSettings) -> IdentificationSettings:
 
 @dataclass
 class Chain:
-    """What the three stages end with: the last model, the last stage's trials and fit, CPU seconds by stage."""
+    """What stages end with: the last model, the last stage's trials and fit, CPU seconds by stage."""
 
     model: mujoco.MjModel
     experiments: list[Experiment]
-    fit: Fit
+    fit: Fit | None
     spent: list[float]
 
 
-def chain(choice: Choice, is_quick: bool) -> Chain:
-    """The three stages in order, each on what the one before it found."""
-    model, spent = read_spec(CAD_MODEL).compile(), []
+def chain(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> Chain:
+    """The three stages in order, each on what the one before it found.
+
+    Args:
+        known: chains so far by all that they depend on; a row that changes a later stage alone begins with them.
+    """
+    found, key = Chain(read_spec(CAD_MODEL).compile(), [], None, []), ""
     for stage in STAGES:
-        config = load_config(import_module(f"stages.{stage}").Config, stage)
-        config = choice.settings(stage, config)
+        config = choice.settings(stage, load_config(import_module(f"stages.{stage}").Config, stage))
         config = quick(stage, config) if is_quick else config
-        with contextlib.redirect_stdout(sys.stderr):
-            model, experiments, fit = set_up(config, choice.trials(read_reported(config)), model)
-            experiments = fewer(experiments, QUICK_TRIALS) if is_quick else experiments
-            clock = Stopwatch()
-            result = identify(stage, model, [e for e in experiments if e.kind in config.experiments], fit)
-            spent.append(clock.read().cpu)
-            for line in [*doubts(result, fit.parameters), result.values]:
-                print(f"{stage}: {line}")
-        model = result.models["identified"]
-    return Chain(model, experiments, fit, spent)
+        trials = choice.trials(read_reported(config))
+        key += f"{stage} {config} {[trial.in_motion for trial in trials]}\n"
+        if key not in known:
+            with contextlib.redirect_stdout(sys.stderr):
+                known[key] = next_link(found, stage, config, trials, is_quick)
+        found = known[key]
+    return found
+
+
+def next_link(before: Chain, stage: str, config: IdentificationSettings, trials: list[Trial], is_quick: bool) -> Chain:
+    """The chain with one stage more."""
+    model, experiments, fit = set_up(config, trials, before.model)
+    experiments = fewer(experiments, QUICK_TRIALS) if is_quick else experiments
+    clock = Stopwatch()
+    result = identify(stage, model, [e for e in experiments if e.kind in config.experiments], fit)
+    spent = [*before.spent, clock.read().cpu]
+    for line in [*doubts(result, fit.parameters), result.values]:
+        print(f"{stage}: {line}")
+    return Chain(result.models["identified"], experiments, fit, spent)
 
 
 def fewer(experiments: list[Experiment], trials: int) -> list[Experiment]:
@@ -172,9 +184,9 @@ def fewer(experiments: list[Experiment], trials: int) -> list[Experiment]:
     return [experiment for group in groups.values() for experiment in spread(group, trials)]
 
 
-def row(choice: Choice, is_quick: bool) -> str:
+def row(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> str:
     """One line of the table."""
-    found = chain(choice, is_quick)
+    found = chain(choice, is_quick, known)
     unseen = [e for e in found.experiments if e.split == "validate"]
     replayed = replay(found.model, unseen, found.fit.segments)
     table = scores(replayed, unseen, found.fit.loss, found.fit.weights)["validate"]["by_experiment"]
@@ -192,8 +204,9 @@ def main() -> int:
     heads += [f"CPU {stage.removeprefix('identify_')} (s)" for stage in STAGES]
     require_demo(CAD_MODEL)
     print("| choice | " + " | ".join(heads) + " |\n|---|" + "---:|" * len(heads), flush=True)
+    known: dict[str, Chain] = {}
     for name in arguments.only:
-        print(row(CHOICES[name], arguments.quick), flush=True)
+        print(row(CHOICES[name], arguments.quick, known), flush=True)
     return 0
 
 

@@ -9,13 +9,13 @@ from scipy.stats import qmc
 
 from trunkline.identification.problem import Problem
 
-DIFFERENCE = 1e-3  # step of a one-sided difference, in ln(value) or in a factor
+DIFFERENCE = 1e-3  # step of a one-sided difference: in ln(value), in a factor, or in a signed value
 WIDE_DIFFERENCE = 3e-3  # for intervals: small jumps of simulated curls shall not pass for slopes
 PLATEAU_SCAN = 24  # values over the range of a parameter that does not matter, and
 PLATEAU_STARTS = 3  # from how many of the nearest that do matter to search again
 PLATEAU_ITERATIONS, PLATEAU_TOLERANCE = 6, 1e-3  # of each
 PLATEAU_LEVEL = 1e-6  # relative change of the loss that matters
-STEP_TOLERANCE = 1e-5  # of ln(value) or a factor, relative: a smaller step of least squares is no step
+STEP_TOLERANCE = 1e-5  # of a candidate z, relative: a smaller step of least squares is no step
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
 
 
