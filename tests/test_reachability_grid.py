@@ -139,7 +139,8 @@ def test_mesh_of_nothing_is_refused():
 
 def test_mesh_that_needs_more_triangles_is_refused():
     lattice = lattice_around(0.2)
-    with pytest.raises(InputError, match=r"soft.voxel: found 0.01 m and \d+ triangles, expected 1 to .* 4"):
+    refused = r"soft.voxel: found 0.01 m and \d+ triangles, expected a closed mesh of at most .* 4"
+    with pytest.raises(InputError, match=refused):
         surface(np.abs(ball(lattice, 0.14)) - 0.04, lattice, 4, "reachability.soft")
 
 

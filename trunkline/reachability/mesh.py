@@ -1,9 +1,9 @@
-"""Closed surfaces of signed distance fields: marching cubes, then a simplifier that keeps them manifold."""
+"""Closed surfaces of signed distance fields: marching cubes, then collapsed edges of least quadric error."""
 
 from dataclasses import dataclass
 from pathlib import Path
 
-import manifold3d
+import fast_simplification
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
@@ -11,12 +11,10 @@ from skimage.measure import marching_cubes
 
 from trunkline.errors import InputError
 from trunkline.reachability.grid import Lattice
-from trunkline.reachability.mesh_fit import fit_vertices
 
 # Lattice points at exactly the level make marching cubes emit degenerate triangles and open edges.
 LEVEL = 1e-3  # voxels outside zero
-FIRST_TOLERANCE = 0.1  # voxels
-TOLERANCE_GROWTH = 1.12
+HASTE = range(3, 10)  # of the simplifier: the least that comes down to the triangles asked for moves the surface least
 
 
 @dataclass(frozen=True)
@@ -41,25 +39,36 @@ def surface(field: NDArray, lattice: Lattice, most_triangles: int, settings: str
 
     ``settings`` is the section of params.yaml in which the field's ``voxel`` is set, for errors.
 
+    Edges are collapsed by quadric error (Garland, Heckbert 1997). That may leave a mesh that is not closed; such a one
+    is not taken.
+
     Raises:
-        InputError: if nothing is inside, or no tolerance brings the mesh below ``most_triangles``.
+        InputError: if nothing is inside, or no closed mesh of at most ``most_triangles`` comes out.
     """
     if not (field < 0).any():
         raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and an empty map, "
                          f"expected less, or a smaller {settings}.smallest")
-    vertices, faces = unsimplified(field, lattice)
-    solid = manifold3d.Manifold(manifold3d.Mesh(vertices.astype(np.float32), faces.astype(np.uint32)))
-    tolerance = FIRST_TOLERANCE * lattice.spacing
-    simple = solid.simplify(tolerance)
-    while simple.num_tri() > most_triangles and tolerance < 10 * lattice.spacing:
-        tolerance *= TOLERANCE_GROWTH
-        simple = solid.simplify(tolerance)
-    if not 0 < simple.num_tri() <= most_triangles:
-        raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and {simple.num_tri()} "
-                         f"triangles, expected 1 to reachability.most_triangles, {most_triangles}")
-    mesh = simple.to_mesh()
-    vertices, faces = np.asarray(mesh.vert_properties[:, :3], float), np.asarray(mesh.tri_verts, int)
-    return Surface(fit_vertices(vertices, faces, field, lattice, LEVEL * lattice.spacing), faces)
+    whole = unsimplified(field, lattice)
+    shape = Surface(*whole)
+    for haste in HASTE:
+        if _is_small(shape, most_triangles):
+            break
+        shape = _simplified(*whole, most_triangles, haste)
+    if not _is_small(shape, most_triangles):
+        raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and {len(shape.faces)} "
+                         f"triangles, expected a closed mesh of at most reachability.most_triangles, {most_triangles}")
+    return shape
+
+
+def _is_small(shape: Surface, most_triangles: int) -> bool:
+    return len(shape.faces) <= most_triangles and shape.is_closed()
+
+
+def _simplified(vertices: NDArray, faces: NDArray, triangles: int, haste: int) -> Surface:
+    """Edges collapsed until ``triangles`` are left, or ``haste`` allows no more."""
+    return Surface(*fast_simplification.simplify(
+        vertices.astype(np.float32), faces.astype(np.int32), target_count=triangles, agg=haste
+    ))  # fmt: skip
 
 
 def unsimplified(field: NDArray, lattice: Lattice) -> tuple[NDArray, NDArray]:
