@@ -9,6 +9,7 @@ truth for the same parameters. Bias and scatter (standard deviation) are of ln(v
 """
 
 import argparse
+import contextlib
 import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -119,7 +120,7 @@ def fitted_start(experiment: Experiment, model: mujoco.MjModel, segments, shifts
 
 def recover(case: Case, plant: mujoco.MjModel, noise: Noise, repetitions: int, seed: int = 1) -> dict[str, Recovered]:
     """Identify the plant's parameters with every loss from the same noisy trials, again and again."""
-    exact = np.log([PARAMETERS[name].read(plant) for name in case.fit.parameters])
+    exact = np.array([PARAMETERS[name].coordinate(PARAMETERS[name].read(plant)) for name in case.fit.parameters])
     clean = played(plant, case.experiments, case.fit.segments)
     rng = np.random.default_rng(seed)
     rows: dict[str, list] = {loss: [] for loss in RESIDUALS}
@@ -169,7 +170,8 @@ def main() -> int:
     if arguments.weight_velocity is not None:
         weights = replace(case.fit.weights, weight_velocity=arguments.weight_velocity)
         case = replace(case, fit=replace(case.fit, weights=weights))
-    results = recover(case, read_spec(PLANT).compile(), read_noise(), arguments.repetitions)
+    with contextlib.redirect_stdout(sys.stderr):
+        results = recover(case, read_spec(PLANT).compile(), read_noise(), arguments.repetitions)
     print(table(list(case.fit.parameters), results))
     for loss, found in results.items():
         print(f"{loss}: {found.converged} of {arguments.repetitions} searches converged", file=sys.stderr)
