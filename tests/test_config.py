@@ -11,6 +11,7 @@ from pydantic import Field
 
 from trunkline.config import check_settings, compose_settings, group_options, load_config, settings
 from trunkline.errors import InputError
+from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.settings import check_once
 
 ROOT = Path(__file__).parents[1]
@@ -203,3 +204,11 @@ def _nested(schema: type) -> list[tuple[str, ...]]:
         if is_dataclass(field.type):
             found += [(field.name,), *((field.name, *rest) for rest in _nested(field.type))]
     return found
+
+
+def test_a_rule_between_fields_names_the_key_and_the_file_that_set_it(tmp_path):
+    text = (ROOT / "params.yaml").read_text().replace("stiffness: {low: 0.3,", "stiffness: {low: -0.3,")
+    (tmp_path / "params.yaml").write_text(text)
+    expected = "params.yaml: identify_stiffness.parameters.stiffness.low: found -0.3, expected more than 0"
+    with pytest.raises(InputError, match=expected):
+        load_config(IdentificationSettings, "identify_stiffness", tmp_path)

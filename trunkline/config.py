@@ -60,11 +60,13 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
     except ValidationError as error:
         problems = sorted(error.errors(), key=_rank)
         first, more = problems[0], len(problems) - 1
-        tuned = first["type"] == "missing" or (first["loc"] and first["loc"][0] in section)
-        key = ".".join([stage, *_path(first, composed)])
-        where = f"{params if tuned else folder}: {key}"
-        text = f"{where}: {_describe(first, adapter)}" + (f" (and {more} more)" if more else "")
-        raise InputError(text) from error
+        path, described = [stage, *map(str, _path(first, composed))], _describe(first, adapter)
+        ruled = described.split(":")[0]  # a rule between the stage's fields names the one that breaks it
+        if not first["loc"] and ruled.split(".")[0] in composed:
+            path, described = [*path, *ruled.split(".")], described.removeprefix(f"{ruled}: ")
+        tuned = first["type"] == "missing" or (len(path) > 1 and path[1] in section)
+        where = f"{params if tuned else folder}: {'.'.join(path)}"
+        raise InputError(f"{where}: {described}" + (f" (and {more} more)" if more else "")) from error
 
 
 def check_settings(root: str | Path = ".") -> list[str]:
