@@ -1,4 +1,4 @@
-"""An arm that is not straight at rest: spring references that hold it in the shape in which it hangs."""
+"""Arms at rest: how to step them there, and spring references that hold one that is not straight then."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,17 @@ import numpy as np
 
 from trunkline.arm.parameters import Fields
 
+LONGEST_STEP = 0.005  # s
 NEWTON_STEPS = 30  # far more than a stiffening spring needs
+
+
+def longest_step(model: mujoco.MjModel) -> float:
+    """Time step, s, for an arm that is damped so that it settles: the rest shape is the same as at any smaller one.
+
+    MuJoCo softens a joint limit whose time constant is less than two steps (flag refsafe).
+    """
+    constants = model.jnt_solref[:, 0][model.jnt_solref[:, 0] > 0]  # the others are in another format
+    return min([LONGEST_STEP, *constants / 2])
 
 
 @dataclass(frozen=True)

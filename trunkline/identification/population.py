@@ -8,12 +8,12 @@ import numpy as np
 from mujoco.batch import Batch
 
 from trunkline.arm.parameters import Fields
+from trunkline.arm.rest import longest_step
 from trunkline.identification.experiment import Experiment
 from trunkline.threads import thread_count
 
 RELAXATION = 0.4  # s, damping over stiffness while a static shape settles: quick, without swinging
-SETTLE_STEP = 0.002  # s
-SETTLE_CHUNK = 100  # steps between looks at whether a shape rests
+SETTLE_CHUNK = 0.2  # s between looks at whether a shape rests
 SETTLE_TIME = 10.0  # s, the most; a shape that does not rest by then counts as diverged
 REST_SPEED = 2e-5  # rad/s of the fastest hinge; with the relaxation above some 1e-5 rad are left then
 
@@ -92,7 +92,9 @@ class Population:
     def _settle(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
         """Static shapes: friction off, heavily damped, until each is at rest."""
         batch = self._batch("static", experiments, fields, count)
-        batch.expand("opt.timestep")[:] = SETTLE_STEP
+        timestep = self._step_factor * longest_step(self._model)
+        chunk = round(SETTLE_CHUNK / timestep)
+        batch.expand("opt.timestep")[:] = timestep
         for name in ("dof_frictionloss", "tendon_frictionloss", "dof_dampingpoly"):
             batch.expand(name)[:] = 0
         stiffness = batch.expand("jnt_stiffness")
@@ -105,11 +107,11 @@ class Population:
                 batch.bind("act")[:] = controls
         seen, speed = batch.bind("site_xpos"), batch.bind("qvel")
         moving, steps = np.arange(batch.nsim, dtype=np.int32), 0
-        for _ in range(round(SETTLE_TIME / SETTLE_STEP / SETTLE_CHUNK)):
+        for _ in range(round(SETTLE_TIME / SETTLE_CHUNK)):
             if not len(moving):
                 break
-            batch.step(ids=moving, nstep=SETTLE_CHUNK, stage=mujoco.mjtStage.mjSTAGE_POS)
-            steps += SETTLE_CHUNK * len(moving)
+            batch.step(ids=moving, nstep=chunk, stage=mujoco.mjtStage.mjSTAGE_POS)
+            steps += chunk * len(moving)
             moving = moving[~(np.abs(speed[moving]).max(axis=1) < REST_SPEED)]
         shapes = seen[:, None, self._sites()]
         shapes[moving] = np.nan

@@ -7,11 +7,11 @@ import mujoco
 import mujoco.batch
 import numpy as np
 
+from trunkline.arm.rest import longest_step
 from trunkline.kinematics.supported import unit_bodies
 from trunkline.threads import thread_count
 
 RETARDATION = 0.25  # s, damping over stiffness of each joint while settling: about critical for the arm's slowest swing
-MAX_TIMESTEP = 0.004  # s
 CHUNK = 0.5  # s between looks at whether all simulations rest
 REST_SPEED = 5e-6  # rad/s, of the fastest joint: at this retardation it has about as many rad still to go
 
@@ -79,9 +79,7 @@ def _frictionless(model: mujoco.MjModel) -> mujoco.MjModel:
     joints = model.dof_jntid
     model.dof_damping[:] = RETARDATION * model.jnt_stiffness[joints]
     model.dof_dampingpoly[:] = 0
-    # a longer step than half a limit's time constant would make MuJoCo soften the limit (flag refsafe)
-    standard = model.jnt_solref[:, 0][model.jnt_solref[:, 0] > 0]
-    model.opt.timestep = min(MAX_TIMESTEP, *(standard / 2), *([] if len(standard) else [model.opt.timestep]))
+    model.opt.timestep = longest_step(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     return model
 
