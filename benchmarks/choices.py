@@ -38,6 +38,7 @@ from trunkline.identification.setup import read_reported, read_spec, set_up
 from trunkline.recording.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")
+FINE_EVOLUTION = Path("conf/shared/fine/differential_evolution.yaml")
 JOINT_FRICTION = Range(low=1e-4, high=0.1)  # rad of a joint's own spring
 MOUNT = Range(low=-0.1, high=0.1)  # rad by which the mount is turned in the tracked base frame
 COMMAND_DELAY = 0.02  # s
@@ -93,6 +94,10 @@ def with_least_squares(stage: str, config: IdentificationSettings) -> Identifica
     return replace(config, optimizer=LeastSquaresSettings(**OmegaConf.to_container(OmegaConf.load(LEAST_SQUARES))))
 
 
+def with_evolved_factors(stage: str, config: IdentificationSettings) -> IdentificationSettings:
+    return replace(config, fine=DifferentialEvolutionSettings(**OmegaConf.to_container(OmegaConf.load(FINE_EVOLUTION))))
+
+
 def with_factors_of_damping(stage: str, config: IdentificationSettings) -> IdentificationSettings:
     return replace(config, per_joint=["damping"]) if stage == "identify_damping" else config
 
@@ -114,6 +119,7 @@ CHOICES: dict[str, Choice] = {
     "velocity": Choice("started with measured velocities", trials=in_motion),
     "distances": Choice("loss: distances", with_distances),
     "least-squares": Choice("optimizer: least_squares", with_least_squares),
+    "evolved-factors": Choice("fine: differential_evolution", with_evolved_factors),
     "joint-damping": Choice("per_joint damping too", with_factors_of_damping),
     "no-factors": Choice("per_joint none", without_factors),
 }

@@ -7,7 +7,7 @@ from small_arm import LIMIT
 
 from trunkline.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.arm.parameters import candidate_fields, save_model, set_fields
-from trunkline.arm.rest import rest_shape, spring_references
+from trunkline.arm.rest import longest_step, rest_shape, spring_references
 from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.frames import gravity_in_base
 
@@ -49,6 +49,15 @@ def test_a_stiff_arm_owes_its_shape_to_itself_and_a_soft_one_to_gravity(spec):
     soft, stiff = spring_references(fields, model, rest)
     np.testing.assert_allclose(stiff, POSE, atol=1e-5)
     assert np.abs(soft - POSE).max() > 0.1
+
+
+def test_the_step_to_rest_is_half_the_time_constant_of_the_hardest_limit(spec):
+    model = spec.compile()
+    model.jnt_solref[:, 0] = 0.05
+    assert longest_step(model) == 0.005
+    model.jnt_solref[2, 0] = 0.003
+    model.jnt_solref[3] = [-1000.0, -10.0]  # stiffness and damping: no time constant
+    assert longest_step(model) == pytest.approx(0.0015)
 
 
 def test_the_shape_is_saved(spec):

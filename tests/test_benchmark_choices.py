@@ -22,6 +22,7 @@ CHANGED = {  # name → stage → the settings that it changes
     "delay": {stage: {"command_delay"} for stage in STAGES},
     "distances": {stage: {"loss"} for stage in STAGES},
     "least-squares": {stage: {"optimizer"} for stage in STAGES},
+    "evolved-factors": {stage: {"fine"} for stage in STAGES},
     "joint-damping": {"identify_damping": {"per_joint"}},
     "no-factors": {"identify_stiffness": {"per_joint"}},
 }

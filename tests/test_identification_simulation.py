@@ -105,6 +105,19 @@ def test_a_static_shape_does_not_depend_on_where_it_starts():
     np.testing.assert_allclose(*shapes, atol=0.1e-3)
 
 
+def test_a_static_shape_that_leans_on_joint_limits_does_not_depend_on_the_step():
+    """Limits of 4 ms: MuJoCo would soften them at the step that does for others."""
+    model = small_model()
+    model.jnt_range[:] = [-0.05, 0.05]
+    model.jnt_solref[:, 0] = 0.004
+    experiment = prepare(tilt(model, 60), model, 1)
+    fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * 0.3})
+    standard, fine = (
+        Population(model, [experiment], segments_of(model), factor).simulate(fields).positions[0] for factor in (1, 0.25)
+    )
+    np.testing.assert_allclose(standard, fine, atol=5e-6)
+
+
 def test_a_start_that_nobody_saw_is_refused_by_name():
     model = small_model()
     trial = release(model, 0.2, frames=20)
