@@ -112,9 +112,8 @@ def test_a_static_shape_that_leans_on_joint_limits_does_not_depend_on_the_step()
     model.jnt_solref[:, 0] = 0.004
     experiment = prepare(tilt(model, 60), model, 1)
     fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * 0.3})
-    standard, fine = (
-        Population(model, [experiment], segments_of(model), factor).simulate(fields).positions[0] for factor in (1, 0.25)
-    )
+    populations = [Population(model, [experiment], segments_of(model), factor) for factor in (1, 0.25)]
+    standard, fine = (population.simulate(fields).positions[0] for population in populations)
     np.testing.assert_allclose(standard, fine, atol=5e-6)
 
 
