@@ -30,8 +30,9 @@ from trunkline.identification.evaluation import replay
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS
 from trunkline.identification.pose_fit import PoseFit, fit_pose
-from trunkline.identification.search import WIDE_DIFFERENCE, descend, linearise
+from trunkline.identification.search import descend
 from trunkline.identification.setup import read_spec
+from trunkline.identification.surrogate import surrogate
 from trunkline.progress import progress
 from trunkline.recording.smoothing import low_pass
 
@@ -131,7 +132,7 @@ def recover(case: Case, plant: mujoco.MjModel, noise: Noise, repetitions: int, s
             for loss, table in rows.items():
                 problem = replace(case.fit, loss=loss).problem(case.model, trials)
                 found = descend(problem, start, ITERATIONS, TOLERANCE, lambda best: None)
-                width = certainty(linearise(problem, found.vector, WIDE_DIFFERENCE)).half_width
+                width = certainty(found.linear, moves=surrogate(problem, found.vector).moves).half_width
                 table.append((found.vector - exact, width, found.converged))
                 bar.update(1)
     return {

@@ -23,7 +23,8 @@ from trunkline.identification.certainty import bootstrap, certainty
 from trunkline.identification.experiment import prepare
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds, Problem
-from trunkline.identification.search import WIDE_DIFFERENCE, descend, linearise
+from trunkline.identification.search import descend
+from trunkline.identification.surrogate import surrogate
 from trunkline.recording.trial import Trial
 
 REPETITIONS, TRIALS, FRAMES = 20, 6, 60
@@ -104,10 +105,10 @@ def repetitions(request) -> Repetitions:
         problem = Problem(model, experiments, segments_of(model), bounds, "positions", WEIGHTS)
         found = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 12, 1e-6, lambda best: None)
         assert found.converged
-        linear = linearise(problem, found.vector, WIDE_DIFFERENCE)
+        moves = surrogate(problem, found.vector).moves
         errors.append(found.vector - exact)
-        widths.append(certainty(linear).half_width)
-        resampled.append(bootstrap(linear, seed=1) - exact)
+        widths.append(certainty(found.linear, moves=moves).half_width)
+        resampled.append(bootstrap(found.linear, 1, moves) - exact)
     return Repetitions(list(stage.true), np.array(errors), np.array(widths), np.array(resampled))
 
 

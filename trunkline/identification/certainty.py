@@ -1,5 +1,6 @@
 """How sure the identified parameters are."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.stats import t as student
 from trunkline.identification.search import Linearisation
 
 RESAMPLINGS = 20_000  # of which some twenty lie beyond each end of an interval of six trials
+Moves = Callable[[np.ndarray], np.ndarray]  # weights of T trials (B, T) → by how much the estimate moves (B, P)
 ALONE = 1e-9  # share of a parameter's information; if all other trials have less, one determines it alone
 
 
@@ -31,34 +33,30 @@ class Certainty:
     weakest: np.ndarray
 
 
-def certainty(linear: Linearisation, prior_deviation: float = 0.0) -> Certainty:
+def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves | None = None) -> Certainty:
     """Jackknife over trials: how far the estimate moves when one is left out (CV3; MacKinnon, Nielsen, Webb 2023).
 
     Residuals of one trial hang together (the model is wrong in the same way from frame to frame), so a formula for
-    independent ones would promise far too much. Without trial t a Gauss-Newton step leads from the estimate to
-    (JᵀJ - J_tᵀJ_t)⁻¹ J_tᵀ r_t. The sandwich over trials (Liang, Zeger 1986) has JᵀJ in its place; a trial that
-    weighs much has drawn the estimate to itself, and with a handful of trials that makes it too sure. Trials are
-    taken as independent, with T - 1 degrees of freedom. What one trial alone determines has no interval.
+    independent ones would promise far too much. The sandwich over trials (Liang, Zeger 1986) answers a trial's weight
+    as if the others' curvature were all of it; a trial that weighs much has drawn the estimate to itself, and with a
+    handful of trials that makes it too sure. Trials are taken as independent, with T - 1 degrees of freedom. What one
+    trial alone determines has no interval.
 
     Args:
         linear: of the residuals, at the estimate.
         prior_deviation: standard deviation of the truth around the prior's mean, towards which the estimate is pulled
             where the trials say little; it widens the interval there.
+        moves: how the estimate answers weights of the trials; a Gauss-Newton step of `linear` if not given.
     """
-    residuals, jacobians = linear.residuals, linear.jacobians
-    trials = len(residuals)
-    normals = np.stack([j.T @ j for j in jacobians])
-    normal = normals.sum(axis=0)
+    normals = linear.normals()
+    trials, normal = len(normals), normals.sum(axis=0)
+    left_out = (moves or linear.moves)(1 - np.eye(trials))
+    left_out = left_out - left_out.mean(axis=0)
+    covariance = left_out.T @ left_out * (trials - 1) / trials
     if linear.prior is not None:
         normal = normal + np.diag(linear.prior**2)
     scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
     scaling = np.outer(scale, scale)
-    scores = np.stack([j.T @ r for j, r in zip(jacobians, residuals, strict=True)])
-    scores -= scores.mean(axis=0)
-    rest = np.linalg.pinv((normal - normals) * scaling, hermitian=True) * scaling
-    moves = np.einsum("tpq,tq->tp", rest, scores)
-    moves -= moves.mean(axis=0)
-    covariance = moves.T @ moves * (trials - 1) / trials
     if linear.prior is not None:
         pulled = np.linalg.pinv(normal * scaling, hermitian=True) * scaling @ np.diag(linear.prior**2)
         covariance = covariance + prior_deviation**2 * pulled @ pulled.T
@@ -81,28 +79,25 @@ def _told_by_one(normal: np.ndarray, normals: np.ndarray) -> np.ndarray:
     return least <= ALONE * np.diag(normal)
 
 
-def bootstrap(linear: Linearisation, seed: int) -> np.ndarray:
-    """95 % intervals of the estimate by giving trials random weights w_t, again and again (Rubin 1981).
+def bootstrap(linear: Linearisation, seed: int, moves: Moves | None = None) -> np.ndarray:
+    """95 % intervals of the estimate by giving trials random weights, again and again (Rubin 1981).
 
-    Each draw is answered by one Gauss-Newton step from the estimate, -(Σ w_t J_tᵀ J_t)⁻¹ Σ w_t J_tᵀ r_t. It
-    cross-checks `certainty`: it takes no symmetry for granted, and no formula for what a trial's weight does.
+    It cross-checks `certainty`: it takes no symmetry for granted, and no formula for what a trial's weight does.
     Draws scatter too little, by √((T - 1)/(T + 1)), and their percentiles know of no degrees of freedom. So these are
     taken further out, as Hesterberg (2015, expanded percentiles) does, where a mean of T numbers would get Student's
     interval: Φ(-√((T + 1)/(T - 1)) t). Below five trials that is further out than any draw, and too narrow.
 
+    Args: as for `certainty`.
+
     Returns:
         Lowest and highest z, infinite where nothing, or one trial alone, depends on a parameter. Shape (2, P).
     """
-    trials = len(linear.residuals)
-    normals = np.stack([j.T @ j for j in linear.jacobians])
-    scores = np.stack([j.T @ r for j, r in zip(linear.jacobians, linear.residuals, strict=True)])
+    normals = linear.normals()
+    trials = len(normals)
     weights = np.random.default_rng(seed).standard_exponential((RESAMPLINGS, trials))
-    scores = scores - scores.mean(axis=0)  # at the estimate they sum to nothing, but for a search that stopped early
-    sums = np.einsum("bt,tpq->bpq", weights, normals)
-    steps = -np.einsum("bpq,bq->bp", np.linalg.pinv(sums, hermitian=True), weights @ scores)
     degrees = max(trials - 1, 1)
     tail = norm.cdf(-np.sqrt((trials + 1) / degrees) * student.ppf(0.975, degrees))
-    interval = linear.vector + np.quantile(steps, [tail, 1 - tail], axis=0)
+    interval = linear.vector + np.quantile((moves or linear.moves)(weights), [tail, 1 - tail], axis=0)
     return np.where(_told_by_one(normals.sum(axis=0), normals), [[-np.inf], [np.inf]], interval)
 
 

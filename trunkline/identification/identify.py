@@ -12,7 +12,6 @@ from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds, Problem
 from trunkline.identification.search import (
-    WIDE_DIFFERENCE,
     Convergence,
     Found,
     Optimizer,
@@ -20,6 +19,7 @@ from trunkline.identification.search import (
     linearise,
     search,
 )
+from trunkline.identification.surrogate import surrogate
 from trunkline.progress import progress
 
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
@@ -116,7 +116,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
-    linear = linearise(exact, found.vector, WIDE_DIFFERENCE)
+    linear, moves = found.linear, surrogate(exact, found.vector).moves
     problems = [rough, exact]
 
     factors: dict[str, np.ndarray] = {}
@@ -138,8 +138,8 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
         models={"initial": model, "coarse": coarse, "identified": with_parameters(coarse, {}, factors, rest)},
         values=values,
         factors=factors,
-        certainty=certainty(linear),
-        bootstrap=bootstrap(linear, method.seed),
+        certainty=certainty(linear, moves=moves),
+        bootstrap=bootstrap(linear, method.seed, moves),
         factor_certainty=factor_certainty,
         at_bound=at_bound,
         converged={name: search.converged for name, search in searches.items()},

@@ -10,7 +10,6 @@ from scipy.stats import qmc
 from trunkline.identification.problem import Problem
 
 DIFFERENCE = 1e-3  # step of a one-sided difference: in ln(value), in a factor, or in a signed value
-WIDE_DIFFERENCE = 3e-3  # for intervals: small jumps of simulated curls shall not pass for slopes
 PLATEAU_SCAN = 24  # values over the range of a parameter that does not matter, and
 PLATEAU_STARTS = 3  # from how many of the nearest that do matter to search again
 PLATEAU_ITERATIONS, PLATEAU_TOLERANCE = 6, 1e-3  # of each
@@ -72,6 +71,21 @@ class Linearisation:
     residuals: list[np.ndarray]
     jacobians: list[np.ndarray]
     prior: np.ndarray | None = None
+
+    def normals(self) -> np.ndarray:
+        """JᵀJ of every trial. Shape (T, P, P)."""
+        return np.stack([j.T @ j for j in self.jacobians])
+
+    def moves(self, weights: np.ndarray) -> np.ndarray:
+        """By how much the minimum moves when trials weigh `weights` (B, T) in place of 1, to first order. (B, P)."""
+        normals = self.normals()
+        scores = np.stack([j.T @ r for j, r in zip(self.jacobians, self.residuals, strict=True)])
+        scores = scores - scores.mean(axis=0)  # they sum to nothing, but for a search that stopped early
+        prior = np.zeros_like(normals[0]) if self.prior is None else np.diag(self.prior**2)
+        scale = 1 / np.sqrt(np.maximum(np.diag(normals.sum(axis=0) + prior), 1e-300))
+        scaling = np.outer(scale, scale)
+        weighted = (np.einsum("bt,tpq->bpq", weights, normals) + prior) * scaling
+        return -np.einsum("bpq,bq->bp", np.linalg.pinv(weighted, hermitian=True) * scaling, weights @ scores)
 
 
 @dataclass
@@ -168,10 +182,10 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
     return Found(result.x, float(result.cost), convergence, result.status > 0, last)
 
 
-def linearise(problem: Problem, vector: np.ndarray, difference: float = DIFFERENCE) -> Linearisation:
+def linearise(problem: Problem, vector: np.ndarray) -> Linearisation:
     """Derivatives of all residuals by differences towards the inside of the bounds, all columns in one batch."""
     high = problem.bounds()[1]
-    steps = np.where(vector + difference > high, -difference, difference)
+    steps = np.where(vector + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
     candidates = np.concatenate([vector[None], vector + np.diag(steps)])
     blocks = problem.residuals(candidates)
     columns = [((block[1:] - block[0]) / steps[:, None]).T for block in blocks]

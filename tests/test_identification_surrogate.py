@@ -1,0 +1,84 @@
+"""The surrogate against residuals that bend by a known law, fitted again by scipy."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from trunkline.identification.search import Linearisation
+from trunkline.identification.surrogate import LONGEST, surrogate
+
+TRIALS, ROWS = 6, 40
+CURVATURE = 0.6  # of the residuals, beside slopes of about 1 and residuals of about 0.5
+
+
+@dataclass
+class BentResiduals:
+    """Six trials of residuals a + B z + z C z; stands in for a `Problem` of two parameters."""
+
+    offsets: np.ndarray
+    slopes: np.ndarray
+    bends: np.ndarray
+    parameters = ("stiffness", "damping")
+
+    def residuals(self, vectors):
+        lines = np.einsum("trp,cp->tcr", self.slopes, vectors)
+        bends = np.einsum("trpq,cp,cq->tcr", self.bends, vectors, vectors)
+        return list(self.offsets[:, None] + lines + bends)
+
+    def minimum(self, weights):
+        def weighted(z):
+            return np.concatenate([np.sqrt(w) * r[0] for w, r in zip(weights, self.residuals(z[None]), strict=True)])
+
+        return least_squares(weighted, np.zeros(2), jac="3-point", xtol=1e-14, ftol=1e-14, gtol=1e-14).x
+
+    def jacobians(self, z):
+        return list(self.slopes + 2 * np.einsum("trpq,q->trp", self.bends, z))
+
+
+def bent(curvature):
+    rng = np.random.default_rng(5)
+    bends = curvature * (np.eye(2) + rng.normal(size=(TRIALS, ROWS, 2, 2)))
+    offsets = 0.5 + 0.5 * rng.normal(size=(TRIALS, 1)) + 0.1 * rng.normal(size=(TRIALS, ROWS))
+    slopes = rng.normal(size=(TRIALS, ROWS, 2)) + 0.3
+    return BentResiduals(offsets, slopes, bends + bends.transpose(0, 1, 3, 2))
+
+
+def around(problem):
+    """The minimum, and both answers to weights there: to second order, and to first."""
+    vector = problem.minimum(np.ones(TRIALS))
+    blocks = [block[0] for block in problem.residuals(vector[None])]
+    return vector, surrogate(problem, vector), Linearisation(vector, blocks, problem.jacobians(vector))
+
+
+def test_trials_left_out_move_the_minimum_as_fits_without_them():
+    problem = bent(CURVATURE)
+    vector, second_order, first_order = around(problem)
+    weights = 1 - np.eye(TRIALS)
+    expected = [problem.minimum(row) - vector for row in weights]
+    np.testing.assert_allclose(second_order.moves(weights), expected, atol=1e-5)
+    assert np.abs(first_order.moves(weights) - expected).max() > 0.2 * np.abs(expected).max()
+
+
+def test_so_do_random_weights():
+    problem = bent(CURVATURE)
+    vector, second_order, _ = around(problem)
+    weights = np.random.default_rng(1).standard_exponential((50, TRIALS))
+    expected = [problem.minimum(row) - vector for row in weights]
+    np.testing.assert_allclose(second_order.moves(weights), expected, atol=1e-5)
+
+
+def test_of_straight_residuals_first_order_is_all():
+    _, second_order, first_order = around(bent(0.0))
+    weights = np.random.default_rng(1).standard_exponential((50, TRIALS))
+    np.testing.assert_allclose(second_order.moves(weights), first_order.moves(weights), atol=1e-6)
+
+
+def test_what_no_residual_depends_on_does_not_spoil_the_others():
+    problem = bent(CURVATURE)
+    problem.slopes[..., 1] = problem.bends[..., 1] = problem.bends[..., 1, :] = 0
+    vector, second_order, _ = around(problem)
+    weights = 1 - np.eye(TRIALS)
+    moves = second_order.moves(weights)
+    assert (np.abs(moves[:, 1]) <= LONGEST).all()
+    np.testing.assert_allclose(moves[:, 0], [problem.minimum(row)[0] - vector[0] for row in weights], atol=1e-5)

@@ -1,0 +1,105 @@
+"""The residuals around a minimum to second order, so that trials can be fitted again without simulating.
+
+First order does not do: a wrong model leaves residuals, and their own curvature then counts beside JᵀJ. Nor do small
+differences: simulated curls move by small jumps as a parameter changes, where joint limits close.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trunkline.arm.parameters import PARAMETERS
+from trunkline.identification.problem import Problem
+
+REACH = 0.2  # of the differences, in ln(value): about as far as intervals reach, far beyond the jumps
+SIGNED_REACH = 0.02  # the same of signed values
+ITERATIONS = 40
+DAMPING, DAMPING_CHANGE = 1e-3, 5.0  # of steps, with columns of unit length
+LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e6
+LONGEST = 3.0  # of a move, along each axis: nothing is known out there, nor of what no trial depends on
+LEAST_COLUMN = 1e-12  # of the largest: what is shorter is taken for rounding
+SETTLED = 1e-12  # relative decrease of the loss
+
+
+@dataclass
+class Surrogate:
+    """Losses of T trials as ½ φᵀ G_t φ, with φ = (1, d_1 … d_P, d_i d_j for i ≤ j) at d from the estimate.
+
+    grams: G, the residuals' coefficients times themselves: no loss is ever negative. Shape (T, F, F).
+    """
+
+    grams: np.ndarray
+
+    @property
+    def count(self) -> int:
+        """P, from F = (P + 1)(P + 2) / 2."""
+        return round(np.sqrt(2 * self.grams.shape[1] + 0.25) - 1.5)
+
+    def moves(self, weights: np.ndarray) -> np.ndarray:
+        """By how much the minimum moves when trials weigh `weights` (B, T) in place of 1. Shape (B, P)."""
+        return self._minimum(weights) - self._minimum(np.ones((1, weights.shape[1])))
+
+    def _minimum(self, weights: np.ndarray) -> np.ndarray:
+        """Damped Newton steps from d = 0, for all weights (B, T) at once. Shape (B, P)."""
+        grams = np.einsum("bt,tfg->bfg", weights, self.grams)
+        squares = np.diag(self.grams.sum(axis=0))[1 : self.count + 1]
+        scale = np.sqrt(np.maximum(squares, max(LEAST_COLUMN**2 * squares.max(), 1e-300)))
+        place, damping = np.zeros((len(weights), self.count)), np.full(len(weights), DAMPING)
+        loss, settled = _losses(grams, place), np.zeros(len(weights), dtype=bool)
+        for _ in range(ITERATIONS):
+            slopes = _slopes(place)
+            images = (grams @ _features(place)[..., None])[..., 0]
+            gradient = np.einsum("bf,bfp->bp", images, slopes) / scale
+            curvature = slopes.transpose(0, 2, 1) @ grams @ slopes + _bends(images, self.count)
+            damped = curvature / np.outer(scale, scale) + damping[:, None, None] * np.eye(self.count)
+            tried = place - np.linalg.solve(damped, gradient[..., None])[..., 0] / scale
+            tried = np.clip(tried, -LONGEST, LONGEST)
+            losses = _losses(grams, tried)
+            better = losses < loss
+            settled |= (better & (loss - losses <= SETTLED * loss)) | (damping > MOST_DAMPING)
+            place, loss = np.where(better[:, None], tried, place), np.where(better, losses, loss)
+            damping = np.where(better, np.maximum(damping / DAMPING_CHANGE, LEAST_DAMPING), damping * DAMPING_CHANGE)
+            if settled.all():
+                break
+        return place
+
+
+def surrogate(problem: Problem, vector: np.ndarray) -> Surrogate:
+    """Of the scalars `vector` (P,) of `problem`, from (P + 1)(P + 2) / 2 candidates in one batch."""
+    reach = np.diag([SIGNED_REACH if PARAMETERS[name].signed else REACH for name in problem.parameters])
+    rows, columns = np.tril_indices(len(vector), -1)
+    places = np.concatenate([np.zeros((1, len(vector))), reach, -reach, reach[rows] + reach[columns]])
+    coefficients = np.linalg.inv(_features(places))
+    blocks = problem.residuals(vector + places)
+    return Surrogate(np.stack([coefficients @ (block @ block.T) @ coefficients.T for block in blocks]))
+
+
+def _losses(grams: np.ndarray, places: np.ndarray) -> np.ndarray:
+    values = _features(places)
+    return 0.5 * np.einsum("bf,bf->b", values, (grams @ values[..., None])[..., 0])
+
+
+def _features(places: np.ndarray) -> np.ndarray:
+    """φ at places d (B, P). Shape (B, F)."""
+    rows, columns = np.triu_indices(places.shape[1])
+    return np.concatenate([np.ones((len(places), 1)), places, places[:, rows] * places[:, columns]], axis=1)
+
+
+def _slopes(places: np.ndarray) -> np.ndarray:
+    """Derivatives of φ at places d (B, P). Shape (B, F, P)."""
+    count = places.shape[1]
+    rows, columns = np.triu_indices(count)
+    slopes = np.zeros((len(places), 1 + count + len(rows), count))
+    slopes[:, range(1, count + 1), range(count)] = 1
+    products = count + 1 + np.arange(len(rows))
+    slopes[:, products, rows] += places[:, columns]
+    slopes[:, products, columns] += places[:, rows]
+    return slopes
+
+
+def _bends(images: np.ndarray, count: int) -> np.ndarray:
+    """Σ y_f ∂²φ_f of `images` y (B, F). Shape (B, P, P)."""
+    rows, columns = np.triu_indices(count)
+    bends = np.zeros((len(images), count, count))
+    bends[:, rows, columns] = images[:, count + 1 :]
+    return bends + bends.transpose(0, 2, 1)
