@@ -90,12 +90,17 @@ def with_distances(stage: str, config: IdentificationSettings) -> Identification
     return replace(config, loss=replace(config.loss, kind="distances"))
 
 
+def variant(schema: type, file: Path):
+    """A file of conf/shared/ as settings of type `schema`."""
+    return schema(**OmegaConf.to_container(OmegaConf.load(file)))
+
+
 def with_least_squares(stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    return replace(config, optimizer=LeastSquaresSettings(**OmegaConf.to_container(OmegaConf.load(LEAST_SQUARES))))
+    return replace(config, optimizer=variant(LeastSquaresSettings, LEAST_SQUARES))
 
 
 def with_evolved_factors(stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    return replace(config, fine=DifferentialEvolutionSettings(**OmegaConf.to_container(OmegaConf.load(FINE_EVOLUTION))))
+    return replace(config, fine=variant(DifferentialEvolutionSettings, FINE_EVOLUTION))
 
 
 def with_factors_of_damping(stage: str, config: IdentificationSettings) -> IdentificationSettings:
