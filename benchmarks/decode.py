@@ -16,9 +16,9 @@ from mcap_ros2.writer import Writer
 from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from trunkline.recording.definitions import RIGID_BODIES
-from trunkline.recording.log import read_log
-from trunkline.recording.streams import pose_stream
+from trunkline.logs.definitions import RIGID_BODIES
+from trunkline.logs.log import read_log
+from trunkline.logs.streams import pose_stream
 
 SCHEMA, BODIES, RATE = "mocap4r2_msgs/msg/RigidBodies", 19, 120
 START = 1_760_000_000_000_000_000  # ns

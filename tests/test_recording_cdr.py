@@ -7,10 +7,10 @@ import pytest
 from mcap_ros2.decoder import DecoderFactory
 
 from tests.sessions import curl_truth, instruments, record
-from trunkline.recording.cdr import decode, parse_definition, short_name
-from trunkline.recording.definitions import JOINT_STATE, RIGID_BODIES
-from trunkline.recording.log import read_log
-from trunkline.recording.messages import JOINTS, POSES
+from trunkline.logs.cdr import decode, parse_definition, short_name
+from trunkline.logs.definitions import JOINT_STATE, RIGID_BODIES
+from trunkline.logs.log import read_log
+from trunkline.logs.messages import JOINTS, POSES
 
 
 class Schema:

@@ -10,7 +10,7 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 
 from trunkline.errors import InputError
-from trunkline.recording.log import read_log
+from trunkline.logs.log import read_log
 
 COUNT = 120
 

@@ -12,8 +12,8 @@ from mcap.writer import CompressionType, Writer
 
 from tests.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
+from trunkline.logs.log import MAGIC, read_log
 from trunkline.recording.intake import Limits, take_in
-from trunkline.recording.log import MAGIC, read_log
 from trunkline.recording.session import read_session
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
-from trunkline.recording.definitions import HEADER, MARKERS, RIGID_BODIES, SEPARATOR
+from trunkline.logs.definitions import HEADER, MARKERS, RIGID_BODIES, SEPARATOR
 from trunkline.recording.intake import Limits, take_in
 from trunkline.recording.session import Session, read_session
 from trunkline.recording.source import open_log

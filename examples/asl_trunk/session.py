@@ -15,7 +15,7 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.recording.definitions import TRUNK_RIGID_BODIES
+from trunkline.logs.definitions import TRUNK_RIGID_BODIES
 from trunkline.stage import output_folder
 
 HERE = Path(__file__).parent

@@ -9,6 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
+from trunkline.logs.streams import PoseStream
+from trunkline.logs.transforms import is_rotation
 from trunkline.recording.checks import Findings, Limits, in_order
 from trunkline.recording.clock import (
     FrameFit,
@@ -24,10 +26,8 @@ from trunkline.recording.motors import check_curl, read_motors
 from trunkline.recording.session import FixedBase, Session, TrialEntry
 from trunkline.recording.smoothing import noise_level
 from trunkline.recording.source import Source, open_log
-from trunkline.recording.streams import PoseStream
 from trunkline.recording.swaps import find_swaps, usual_distances
 from trunkline.recording.take import Take
-from trunkline.recording.transforms import is_rotation
 from trunkline.recording.units import extent, likely_unit
 from trunkline.recording.vertical import check_vertical
 

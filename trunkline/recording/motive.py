@@ -18,7 +18,7 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.recording.definitions import MARKERS, RIGID_BODIES
+from trunkline.logs.definitions import MARKERS, RIGID_BODIES
 from trunkline.recording.proposal import propose
 from trunkline.recording.survey import survey
 

@@ -3,11 +3,11 @@
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.logs.messages import JOINTS
+from trunkline.logs.streams import JointStream
 from trunkline.recording.checks import Findings, Limits, in_order
-from trunkline.recording.messages import JOINTS
 from trunkline.recording.session import Session
 from trunkline.recording.source import Source
-from trunkline.recording.streams import JointStream
 
 ROLES = ("command", "tendon position")
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from trunkline.recording.cdr import short_name
+from trunkline.logs.cdr import short_name
+from trunkline.logs.messages import TOPIC_PER_BODY
 from trunkline.recording.clock import MIN_TRAVEL
-from trunkline.recording.messages import TOPIC_PER_BODY
 from trunkline.recording.survey import Survey
 from trunkline.recording.units import likely_unit
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.recording.cdr import short_name
-from trunkline.recording.log import Log, Topic, read_log
-from trunkline.recording.messages import JOINTS, POSES
+from trunkline.logs.cdr import short_name
+from trunkline.logs.log import Log, Topic, read_log
+from trunkline.logs.messages import JOINTS, POSES
+from trunkline.logs.streams import JointStream, PoseStream, joint_stream, pose_stream
 from trunkline.recording.source import COMMAND_WORDS, POSITION_WORDS, choose, pose_topics, static_topics
-from trunkline.recording.streams import JointStream, PoseStream, joint_stream, pose_stream
 
 GAP = 1.5  # median intervals between frames that make a gap
 

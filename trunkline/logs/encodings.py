@@ -8,8 +8,8 @@ import numpy as np
 from mcap.records import Schema
 from mcap_protobuf.decoder import DecoderFactory
 
-from trunkline.recording import cdr
-from trunkline.recording.log import Topic
+from trunkline.logs import cdr
+from trunkline.logs.log import Topic
 
 ENCODINGS = {"cdr": "ros2msg", "protobuf": "protobuf", "json": None}  # to the schema's encoding, None: any
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.recording.cdr import short_name
-from trunkline.recording.encodings import decode
-from trunkline.recording.log import Topic
-from trunkline.recording.messages import JOINTS, POSES, Poses
-from trunkline.recording.samples import Samples
-from trunkline.recording.transforms import in_one_frame
+from trunkline.logs.cdr import short_name
+from trunkline.logs.encodings import decode
+from trunkline.logs.log import Topic
+from trunkline.logs.messages import JOINTS, POSES, Poses
+from trunkline.logs.samples import Samples
+from trunkline.logs.transforms import in_one_frame
 
 
 @dataclass

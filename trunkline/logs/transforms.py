@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.recording.samples import Samples
+from trunkline.logs.samples import Samples
 
 NORM_TOLERANCE = 0.01  # of a quaternion's length; float32 rounding is far below, anything above is no rotation
 ALWAYS = np.iinfo(np.int64).min  # ns, since when a static transform holds
