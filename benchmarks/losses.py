@@ -34,7 +34,7 @@ from trunkline.identification.search import descend
 from trunkline.identification.setup import read_spec
 from trunkline.identification.surrogate import surrogate
 from trunkline.progress import progress
-from trunkline.recording.smoothing import low_pass
+from trunkline.signals.smoothing import low_pass
 
 STAGE = "identify_damping"
 PLANT = Path("artifacts") / STAGE / "arm.xml"

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from demo.instruments import measure, rotation_mocap_world
 from tests.sessions import instruments, static_truth
 from trunkline.frames import gravity_in_base, tilt_of_gravity
-from trunkline.recording.base_frame import average_base, gravity_from_up, to_base_frame
+from trunkline.signals.base_frame import average_base, gravity_from_up, to_base_frame
 
 EXACT = {"position_noise_mm": 0, "orientation_noise_deg": 0, "outliers": 0, "occlusions_per_s": 0}
 

@@ -5,7 +5,7 @@ import pytest
 
 from demo.instruments import measure
 from tests.sessions import curl_truth, instruments
-from trunkline.recording.clock import (
+from trunkline.signals.clock import (
     OffsetFit,
     agree_on_offset,
     estimate_offset,

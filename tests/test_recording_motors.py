@@ -9,8 +9,8 @@ import pytest
 from tests.sessions import curl_truth
 from tests.test_recording_intake import edit_session, one_trial, taken
 from trunkline.errors import InputError
-from trunkline.recording.clock import OffsetFit
 from trunkline.recording.intake import align_clocks
+from trunkline.signals.clock import OffsetFit
 
 
 def curl(folder, change=lambda m: None):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trunkline.recording.smoothing import bridged, low_pass, noise_level, outliers, resample
+from trunkline.signals.smoothing import bridged, low_pass, noise_level, outliers, resample
 
 RATE = 120.0
 TIME = np.arange(600) / RATE

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from trunkline.recording.smoothing import low_pass
-from trunkline.recording.start import cycle_time, free_time, release_time
+from trunkline.signals.smoothing import low_pass
+from trunkline.signals.start import cycle_time, free_time, release_time
 
 RATE = 120.0
 

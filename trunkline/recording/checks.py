@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.recording.clock import FrameFit, OffsetFit
+from trunkline.signals.clock import FrameFit, OffsetFit
 
 
 @dataclass

@@ -12,7 +12,15 @@ from trunkline.frames import wxyz_from_rotation
 from trunkline.logs.streams import PoseStream
 from trunkline.logs.transforms import is_rotation
 from trunkline.recording.checks import Findings, Limits, in_order
-from trunkline.recording.clock import (
+from trunkline.recording.frozen import frozen
+from trunkline.recording.lost import find_lost, put_back
+from trunkline.recording.motors import check_curl, read_motors
+from trunkline.recording.session import FixedBase, Session, TrialEntry
+from trunkline.recording.source import Source, open_log
+from trunkline.recording.swaps import find_swaps, usual_distances
+from trunkline.recording.take import Take
+from trunkline.recording.vertical import check_vertical
+from trunkline.signals.clock import (
     FrameFit,
     OffsetFit,
     agree_on_offset,
@@ -20,16 +28,8 @@ from trunkline.recording.clock import (
     first_motion_offset,
     fit_frames,
 )
-from trunkline.recording.frozen import frozen
-from trunkline.recording.lost import find_lost, put_back
-from trunkline.recording.motors import check_curl, read_motors
-from trunkline.recording.session import FixedBase, Session, TrialEntry
-from trunkline.recording.smoothing import noise_level
-from trunkline.recording.source import Source, open_log
-from trunkline.recording.swaps import find_swaps, usual_distances
-from trunkline.recording.take import Take
-from trunkline.recording.units import extent, likely_unit
-from trunkline.recording.vertical import check_vertical
+from trunkline.signals.smoothing import noise_level
+from trunkline.signals.units import extent, likely_unit
 
 UNIT = {"m": 1.0, "mm": 1e-3}
 

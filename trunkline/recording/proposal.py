@@ -7,9 +7,9 @@ import numpy as np
 
 from trunkline.logs.cdr import short_name
 from trunkline.logs.messages import TOPIC_PER_BODY
-from trunkline.recording.clock import MIN_TRAVEL
 from trunkline.recording.survey import Survey
-from trunkline.recording.units import likely_unit
+from trunkline.signals.clock import MIN_TRAVEL
+from trunkline.signals.units import likely_unit
 
 BASE_NAMES = ("base", "mount", "root", "origin")
 RESTING = 5e-3  # m; a trial whose every body stays within this, but for its worst hundredth, is at rest

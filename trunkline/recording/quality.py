@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.recording.checks import Findings
-from trunkline.recording.smoothing import noise_level
 from trunkline.recording.take import Take
+from trunkline.signals.smoothing import noise_level
 
 
 @dataclass
