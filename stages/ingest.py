@@ -12,8 +12,8 @@ from trunkline.progress import progress
 from trunkline.recording.intake import Limits, align_clocks, settle_vertical, take_in
 from trunkline.recording.plots import quality_figure
 from trunkline.recording.quality import judge, report, summary
-from trunkline.recording.session import read_session
 from trunkline.recording.take import write_takes
+from trunkline.sessions.session import read_session
 from trunkline.stage import output_folder, run_stage, write_json
 
 RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Path("artifacts/ingest")

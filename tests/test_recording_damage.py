@@ -13,8 +13,8 @@ from tests.sessions import SEGMENTS, all_truths, curl_truth, instruments, record
 from tests.workbench import ROOT
 from trunkline.recording.frozen import frozen
 from trunkline.recording.intake import Limits, settle_vertical, take_in
-from trunkline.recording.session import read_session
 from trunkline.recording.swaps import find_swaps, usual_distances
+from trunkline.sessions.session import read_session
 from trunkline.stage import run_stage
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)

@@ -13,7 +13,7 @@ from tests.sessions import SEGMENTS, curl_truth, instruments, record, release_tr
 from trunkline.errors import InputError
 from trunkline.recording.filtering import Filter, filter_take
 from trunkline.recording.intake import Limits, align_clocks, take_in
-from trunkline.recording.session import read_session
+from trunkline.sessions.session import read_session
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0)

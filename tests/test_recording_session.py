@@ -5,7 +5,7 @@ import pytest
 from omegaconf import OmegaConf
 
 from trunkline.errors import InputError
-from trunkline.recording.session import FixedBase, read_session
+from trunkline.sessions.session import FixedBase, read_session
 
 GOOD = {
     "frame": {"up": [0, 2, 0]},

@@ -24,9 +24,9 @@ from tests.test_recording_schemas import (
     rotation,
 )
 from trunkline.errors import InputError
-from trunkline.recording.inspect import propose
-from trunkline.recording.source import open_log
-from trunkline.recording.survey import survey
+from trunkline.preparation.inspect import propose
+from trunkline.preparation.survey import survey
+from trunkline.sessions.source import open_log
 
 WORLD = RigidTransform.from_components([1.0, -2.0, 0.5], Rotation.from_euler("xyz", [90, 20, 0], degrees=True))
 

@@ -15,11 +15,11 @@ from trunkline.recording.checks import Findings, Limits, in_order
 from trunkline.recording.frozen import frozen
 from trunkline.recording.lost import find_lost, put_back
 from trunkline.recording.motors import check_curl, read_motors
-from trunkline.recording.session import FixedBase, Session, TrialEntry
-from trunkline.recording.source import Source, open_log
 from trunkline.recording.swaps import find_swaps, usual_distances
 from trunkline.recording.take import Take
 from trunkline.recording.vertical import check_vertical
+from trunkline.sessions.session import FixedBase, Session, TrialEntry
+from trunkline.sessions.source import Source, open_log
 from trunkline.signals.clock import (
     FrameFit,
     OffsetFit,

@@ -6,8 +6,8 @@ from trunkline.errors import InputError
 from trunkline.logs.messages import JOINTS
 from trunkline.logs.streams import JointStream
 from trunkline.recording.checks import Findings, Limits, in_order
-from trunkline.recording.session import Session
-from trunkline.recording.source import Source
+from trunkline.sessions.session import Session
+from trunkline.sessions.source import Source
 
 ROLES = ("command", "tendon position")
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from trunkline.logs.cdr import short_name
 from trunkline.logs.messages import TOPIC_PER_BODY
-from trunkline.recording.survey import Survey
+from trunkline.preparation.survey import Survey
 from trunkline.signals.clock import MIN_TRAVEL
 from trunkline.signals.units import likely_unit
 

@@ -1,16 +1,16 @@
-"""What logs hold, and a session.yaml for them: `python -m trunkline.recording.inspect LOG…`"""
+"""What logs hold, and a session.yaml for them: `python -m trunkline.preparation.inspect LOG…`"""
 
 import argparse
 import sys
 from pathlib import Path
 
 from trunkline.errors import InputError
-from trunkline.recording.proposal import propose
-from trunkline.recording.survey import describe, survey
+from trunkline.preparation.proposal import propose
+from trunkline.preparation.survey import describe, survey
 
 
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m trunkline.recording.inspect", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m trunkline.preparation.inspect", description=__doc__)
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="an MCAP log, or a folder of them")
     surveys, code = [], 0
     for path in _logs(parser.parse_args(arguments).logs):

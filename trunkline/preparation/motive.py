@@ -1,4 +1,4 @@
-"""OptiTrack Motive's CSV export as MCAP logs: `python -m trunkline.recording.motive --session data/raw/NAME CSV…`
+"""OptiTrack Motive's CSV export as MCAP logs: `python -m trunkline.preparation.motive --session data/raw/NAME CSV…`
 
 Header rows are found by what they hold, as versions of Motive differ in their number. Cells end at commas, or at
 semicolons where numbers have decimal commas. Quaternions are x, y, z, w; an occluded body has empty cells; up is +y.
@@ -19,8 +19,8 @@ from mcap_ros2.writer import Writer
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.logs.definitions import MARKERS, RIGID_BODIES
-from trunkline.recording.proposal import propose
-from trunkline.recording.survey import survey
+from trunkline.preparation.proposal import propose
+from trunkline.preparation.survey import survey
 
 UP = (0, 1, 0)
 METRES = {"meters": 1.0, "millimeters": 1e-3, "centimeters": 1e-2}
@@ -178,7 +178,7 @@ def _start(about: dict[str, str]) -> int:
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m trunkline.recording.motive",
+        prog="python -m trunkline.preparation.motive",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

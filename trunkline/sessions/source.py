@@ -9,7 +9,7 @@ from trunkline.logs.cdr import short_name
 from trunkline.logs.log import Log, Topic, read_log
 from trunkline.logs.messages import JOINTS, POSES, TOPIC_PER_BODY
 from trunkline.logs.streams import JointStream, PoseStream, joint_stream, pose_stream
-from trunkline.recording.session import Session
+from trunkline.sessions.session import Session
 
 STATIC = "tf_static"  # how the topic's name ends
 COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "position")
