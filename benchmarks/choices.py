@@ -35,7 +35,7 @@ from trunkline.identification.settings import (
     Range,
 )
 from trunkline.identification.setup import read_reported, read_spec, set_up
-from trunkline.recording.trial import Trial
+from trunkline.trials.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")
 FINE_EVOLUTION = Path("conf/shared/fine/differential_evolution.yaml")

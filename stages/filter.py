@@ -7,13 +7,13 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from trunkline.config import settings
+from trunkline.figures.data import filter_figure
+from trunkline.filtering.filter import Filter, filter_take, summary
 from trunkline.plots import save_figure
 from trunkline.progress import progress
-from trunkline.recording.filtering import Filter, filter_take, summary
-from trunkline.recording.plots import filter_figure
-from trunkline.recording.take import read_takes
-from trunkline.recording.trial import write_trials
 from trunkline.stage import output_folder, run_stage, write_json
+from trunkline.takes.take import read_takes
+from trunkline.trials.trial import write_trials
 
 INGEST, PROCESSED, ARTIFACTS = (
     Path("data/processed/ingest"),

@@ -7,14 +7,14 @@ from pydantic import Field, PositiveFloat
 
 from trunkline.config import settings
 from trunkline.errors import InputError
+from trunkline.figures.data import quality_figure
 from trunkline.plots import save_figure
 from trunkline.progress import progress
-from trunkline.recording.intake import Limits, align_clocks, settle_vertical, take_in
-from trunkline.recording.plots import quality_figure
-from trunkline.recording.quality import judge, report, summary
-from trunkline.recording.take import write_takes
 from trunkline.sessions.session import read_session
 from trunkline.stage import output_folder, run_stage, write_json
+from trunkline.takes.intake import Limits, align_clocks, settle_vertical, take_in
+from trunkline.takes.quality import judge, report, summary
+from trunkline.takes.take import write_takes
 
 RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Path("artifacts/ingest")
 

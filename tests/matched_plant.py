@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from tests.small_arm import small_spec
 from trunkline.frames import gravity_in_base, wxyz_from_rotation
 from trunkline.identification.experiment import SLACK
-from trunkline.recording.trial import Trial
+from trunkline.trials.trial import Trial
 
 FRAME = 1 / 120
 

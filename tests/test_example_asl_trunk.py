@@ -7,9 +7,9 @@ import pytest
 
 from examples.asl_trunk.session import COLUMNS, SESSION, make_session, read_csv
 from trunkline.errors import InputError
-from trunkline.recording.checks import Limits
-from trunkline.recording.intake import take_in
 from trunkline.sessions.session import read_session
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
 
 SHARED = Path(__file__).parents[2] / "shared" / "data" / "asl_trunk"
 LIMITS = Limits(0.5, 0.3, 0.1, 1.0)

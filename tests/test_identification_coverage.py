@@ -25,7 +25,7 @@ from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds, Problem
 from trunkline.identification.search import descend
 from trunkline.identification.surrogate import surrogate
-from trunkline.recording.trial import Trial
+from trunkline.trials.trial import Trial
 
 REPETITIONS, TRIALS, FRAMES = 20, 6, 60
 NOISE = 0.3e-3, np.radians(0.3)  # m and rad, per axis

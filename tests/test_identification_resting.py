@@ -18,7 +18,7 @@ from trunkline.identification.loss import LossWeights
 from trunkline.identification.problem import Bounds
 from trunkline.identification.resting import resting_shape
 from trunkline.identification.search import LeastSquares
-from trunkline.recording.trial import Trial
+from trunkline.trials.trial import Trial
 
 ROOT = Path(__file__).parents[1]
 FRAME, FRAMES = 1 / 120, 360

@@ -20,7 +20,7 @@ from trunkline.identification.settings import (
     Range,
     RoughSettings,
 )
-from trunkline.recording.trial import write_trials
+from trunkline.trials.trial import write_trials
 
 LOSS = Loss(
     kind="positions", delta_position=0.2, delta_velocity=2.0, epsilon=0.02, epsilon_velocity=0.002,

@@ -7,8 +7,8 @@ import pytest
 from stages import ingest
 from tests.sessions import SEGMENTS
 from tests.workbench import workbench
-from trunkline.recording.take import read_takes
 from trunkline.stage import run_stage
+from trunkline.takes.take import read_takes
 
 
 @pytest.fixture

@@ -11,11 +11,11 @@ from demo.recorder import write_log, write_session
 from stages import ingest
 from tests.sessions import SEGMENTS, all_truths, curl_truth, instruments, record, release_truth, static_truth
 from tests.workbench import ROOT
-from trunkline.recording.frozen import frozen
-from trunkline.recording.intake import Limits, settle_vertical, take_in
-from trunkline.recording.swaps import find_swaps, usual_distances
 from trunkline.sessions.session import read_session
 from trunkline.stage import run_stage
+from trunkline.takes.frozen import frozen
+from trunkline.takes.intake import Limits, settle_vertical, take_in
+from trunkline.takes.swaps import find_swaps, usual_distances
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 CLEAN = instruments(occlusions_per_s=0.3, outliers=0)

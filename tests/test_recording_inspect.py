@@ -6,8 +6,8 @@ import pytest
 from tests.sessions import SEGMENTS, all_truths, instruments, record
 from tests.test_recording_schemas import CASES, write_foxglove, write_ros
 from trunkline.preparation.inspect import main
-from trunkline.recording.intake import Limits, take_in
 from trunkline.sessions.session import read_session
+from trunkline.takes.intake import Limits, take_in
 
 LIMITS = Limits(duration=0.2, coverage=0.3, disorder=0.1, clock_offset=1.0)
 

@@ -11,9 +11,9 @@ from demo.instruments import measure
 from demo.recorder import write_log, write_session
 from tests.sessions import SEGMENTS, curl_truth, instruments, record, release_truth, static_truth
 from trunkline.errors import InputError
-from trunkline.recording.filtering import Filter, filter_take
-from trunkline.recording.intake import Limits, align_clocks, take_in
+from trunkline.filtering.filter import Filter, filter_take
 from trunkline.sessions.session import read_session
+from trunkline.takes.intake import Limits, align_clocks, take_in
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trunkline.recording.lost import Lost, find_lost, put_back
+from trunkline.takes.lost import Lost, find_lost, put_back
 
 RATE = 100.0
 TIME = np.arange(300) / RATE

@@ -9,8 +9,8 @@ import pytest
 from tests.sessions import curl_truth
 from tests.test_recording_intake import edit_session, one_trial, taken
 from trunkline.errors import InputError
-from trunkline.recording.intake import align_clocks
 from trunkline.signals.clock import OffsetFit
+from trunkline.takes.intake import align_clocks
 
 
 def curl(folder, change=lambda m: None):

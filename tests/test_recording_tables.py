@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.recording.take import Take, read_takes, write_takes
-from trunkline.recording.trial import Trial, read_trials, write_trials
+from trunkline.takes.take import Take, read_takes, write_takes
+from trunkline.trials.trial import Trial, read_trials, write_trials
 
 RNG = np.random.default_rng(0)
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.identification.pose_fit import PoseFit, fit_pose
-from trunkline.recording.trial import Trial
+from trunkline.trials.trial import Trial
 
 SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend takes up
 

@@ -5,7 +5,7 @@ import numpy as np
 
 from trunkline.identification.experiment import measured_pose, start_frames
 from trunkline.identification.pose_fit import POSITION_SIGMA, PoseProblem, fit_pose
-from trunkline.recording.trial import Trial
+from trunkline.trials.trial import Trial
 
 MARKER_SIGMA = 2e-3  # m, how far beside its segment's axis a marker is expected; holds back what no pose tells
 ROUNDS = 3  # of fitting poses and moving markers; a round solves for both, but for what is not linear

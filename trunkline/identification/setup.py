@@ -14,7 +14,7 @@ from trunkline.identification.problem import Bounds
 from trunkline.identification.resting import resting_shape
 from trunkline.identification.search import DifferentialEvolution, LeastSquares, Optimizer
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.recording.trial import Trial, read_trials
+from trunkline.trials.trial import Trial, read_trials
 
 TRIALS = Path("data/processed/filter")
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.recording.checks import Findings
-from trunkline.recording.take import Take
 from trunkline.signals.smoothing import noise_level
+from trunkline.takes.checks import Findings
+from trunkline.takes.take import Take
 
 
 @dataclass

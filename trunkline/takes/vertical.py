@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from trunkline.recording.take import Take
 from trunkline.signals.base_frame import average_base
+from trunkline.takes.take import Take
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 OFF = np.radians(15)  # a misfit beyond aiming a tilt by hand

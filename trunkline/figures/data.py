@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE
-from trunkline.recording.quality import Quality
-from trunkline.recording.take import Take
-from trunkline.recording.trial import Trial
 from trunkline.signals.base_frame import average_base, to_base_frame
+from trunkline.takes.quality import Quality
+from trunkline.takes.take import Take
+from trunkline.trials.trial import Trial
 
 BIN = 1 / 30  # s, of the coverage picture
 LEAST_JITTER = 0.1  # ms, of the axis: less is none

@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from trunkline.recording.trial import long_table, pose_table, read_tables, stack
+from trunkline.trials.trial import long_table, pose_table, read_tables, stack
 
 BASE = "base"  # the base body's name in poses.parquet
 

@@ -5,9 +5,9 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.logs.messages import JOINTS
 from trunkline.logs.streams import JointStream
-from trunkline.recording.checks import Findings, Limits, in_order
 from trunkline.sessions.session import Session
 from trunkline.sessions.source import Source
+from trunkline.takes.checks import Findings, Limits, in_order
 
 ROLES = ("command", "tendon position")
 

@@ -11,13 +11,6 @@ from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
 from trunkline.logs.streams import PoseStream
 from trunkline.logs.transforms import is_rotation
-from trunkline.recording.checks import Findings, Limits, in_order
-from trunkline.recording.frozen import frozen
-from trunkline.recording.lost import find_lost, put_back
-from trunkline.recording.motors import check_curl, read_motors
-from trunkline.recording.swaps import find_swaps, usual_distances
-from trunkline.recording.take import Take
-from trunkline.recording.vertical import check_vertical
 from trunkline.sessions.session import FixedBase, Session, TrialEntry
 from trunkline.sessions.source import Source, open_log
 from trunkline.signals.clock import (
@@ -30,6 +23,13 @@ from trunkline.signals.clock import (
 )
 from trunkline.signals.smoothing import noise_level
 from trunkline.signals.units import extent, likely_unit
+from trunkline.takes.checks import Findings, Limits, in_order
+from trunkline.takes.frozen import frozen
+from trunkline.takes.lost import find_lost, put_back
+from trunkline.takes.motors import check_curl, read_motors
+from trunkline.takes.swaps import find_swaps, usual_distances
+from trunkline.takes.take import Take
+from trunkline.takes.vertical import check_vertical
 
 UNIT = {"m": 1.0, "mm": 1e-3}
 
