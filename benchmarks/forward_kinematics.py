@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import load_model, read_chain
 from trunkline.kinematics.polish import polish
 from trunkline.kinematics.sampling import pull_directions, sample_angle
-from trunkline.kinematics.settle import settle
-from trunkline.kinematics.statics import equilibrium, forward
+from trunkline.simulation.rest import settle
+from trunkline.statics.chain import load_model, read_chain
+from trunkline.statics.equilibria import equilibrium, forward
 from trunkline.threads import thread_count
 
 SETTLED, SOLVED, DIRECTIONS, STEPS = 48, 1000, 72, 100

@@ -13,10 +13,10 @@ import numpy as np
 import onnxruntime
 
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import load_model, read_chain
 from trunkline.kinematics.polish import polish
 from trunkline.kinematics.sampling import pull_directions
-from trunkline.kinematics.statics import equilibrium
+from trunkline.statics.chain import load_model, read_chain
+from trunkline.statics.equilibria import equilibrium
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 TARGETS, SINGLE = 400, 5000

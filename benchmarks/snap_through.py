@@ -15,12 +15,12 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import Chain, load_model, read_chain
-from trunkline.kinematics.restart import restart
 from trunkline.kinematics.sampling import pull_directions
-from trunkline.kinematics.statics import equilibrium, equilibrium_paths
 from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt, save_figure
 from trunkline.progress import progress
+from trunkline.statics.chain import Chain, load_model, read_chain
+from trunkline.statics.equilibria import equilibrium, equilibrium_paths
+from trunkline.statics.restart import restart
 
 DRAWN_IN_MM = (0.0, 1.0, 2.0, 5.0, 10.0)  # of the slack tendon
 APART = 1e-3  # m; equilibria whose tips are nearer than this count as one

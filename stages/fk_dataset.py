@@ -8,12 +8,12 @@ from pydantic import Field
 
 from trunkline.arm.tendons import require_tendons
 from trunkline.config import settings
-from trunkline.kinematics.chain import load_model, read_chain
 from trunkline.kinematics.dataset import Density, mujoco_deviation, sample_table, split
 from trunkline.kinematics.plots import density_figure, deviation_figure
 from trunkline.plots import save_figure
 from trunkline.progress import progress
 from trunkline.stage import output_folder, run_stage, write_json
+from trunkline.statics.chain import load_model, read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 DATA = Path("data/processed/fk_dataset")

@@ -9,7 +9,6 @@ from pydantic import Field, PositiveInt
 from trunkline.arm.tendons import require_tendons
 from trunkline.config import settings
 from trunkline.errors import InputError
-from trunkline.kinematics.chain import Chain, load_model, read_chain
 from trunkline.plots import save_figure
 from trunkline.progress import progress
 from trunkline.reachability.checks import Check, LabelSettings, SpotCheckSettings, check_maps
@@ -20,6 +19,7 @@ from trunkline.reachability.plots import heldout_figure, maps_figure, slices_fig
 from trunkline.reachability.soft_map import SoftShape
 from trunkline.reachability.tips import ArmTips, Tips
 from trunkline.stage import output_folder, run_stage, write_json
+from trunkline.statics.chain import Chain, load_model, read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")

@@ -12,7 +12,6 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from trunkline.arm.tendons import require_tendons
 from trunkline.config import settings
 from trunkline.errors import InputError
-from trunkline.kinematics.chain import Chain, load_model, read_chain
 from trunkline.kinematics.dataset import (
     length_by_tension,
     length_columns,
@@ -30,6 +29,7 @@ from trunkline.kinematics.tip_loss import tip_loss
 from trunkline.plots import save_figure
 from trunkline.progress import progress
 from trunkline.stage import output_folder, run_stage, write_json
+from trunkline.statics.chain import Chain, load_model, read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")

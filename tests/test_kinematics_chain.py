@@ -5,7 +5,7 @@ import pytest
 
 from tests.small_arm import small_spec
 from trunkline.errors import InputError
-from trunkline.kinematics.chain import load_model, read_chain
+from trunkline.statics.chain import load_model, read_chain
 
 
 def test_spiral_arm_reads_as_it_was_built():

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tests.bent_chain import hardening_stump
-from trunkline.kinematics import energy
-from trunkline.kinematics.chain import read_chain
+from trunkline.statics import energy
+from trunkline.statics.chain import read_chain
 
 GRAVITY = np.array([4.0, 1.5, -8.0])
 

@@ -6,9 +6,9 @@ import pytest
 
 from tests.bent_chain import stump
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import read_chain
-from trunkline.kinematics.hysteresis import friction_band, model_friction
-from trunkline.kinematics.statics import equilibrium
+from trunkline.statics.chain import read_chain
+from trunkline.statics.equilibria import equilibrium
+from trunkline.statics.hysteresis import friction_band, model_friction
 
 GRAVITY = gravity_in_base(0.6)
 TENSIONS = np.array([[24.0, 9.0, 0.0]])

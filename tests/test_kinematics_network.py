@@ -14,7 +14,6 @@ from tests.bent_chain import stump
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics import sampling
-from trunkline.kinematics.chain import read_chain
 from trunkline.kinematics.dataset import (
     length_by_tension,
     length_columns,
@@ -26,8 +25,9 @@ from trunkline.kinematics.dataset import (
 from trunkline.kinematics.network import INPUTS, InverseKinematics, Training, train
 from trunkline.kinematics.onnx import to_onnx
 from trunkline.kinematics.score import tip_errors
-from trunkline.kinematics.statics import forward
 from trunkline.kinematics.tip_loss import tip_loss
+from trunkline.statics.chain import read_chain
+from trunkline.statics.equilibria import forward
 
 # ops of opset 15 that Unity's inference engine runs (its manual, "Supported ONNX operators")
 UNITY_OPS = {"Gather", "Sin", "Cos", "Mul", "Add", "Sub", "Concat", "Gemm", "Relu", "Clip"}

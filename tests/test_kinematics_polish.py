@@ -6,14 +6,14 @@ import pytest
 
 from tests.bent_chain import stump
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import read_chain
 from trunkline.kinematics.dataset import length_columns, sample_table
 from trunkline.kinematics.network import INPUTS
 from trunkline.kinematics.polish import _bounded, polish
-from trunkline.kinematics.restart import restart
 from trunkline.kinematics.sampling import pull_directions
 from trunkline.kinematics.score import beyond_range, outside_targets
-from trunkline.kinematics.statics import equilibrium, forward
+from trunkline.statics.chain import read_chain
+from trunkline.statics.equilibria import equilibrium, forward
+from trunkline.statics.restart import restart
 
 
 @pytest.fixture(scope="module")

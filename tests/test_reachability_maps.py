@@ -6,7 +6,6 @@ from scipy.spatial import cKDTree
 
 from tests.bent_chain import stump
 from trunkline.errors import InputError
-from trunkline.kinematics.chain import read_chain
 from trunkline.reachability.downward import sample_downward
 from trunkline.reachability.grid import Lattice, overlap
 from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, verified
@@ -19,6 +18,7 @@ from trunkline.reachability.reach_signal import held_out, packed, points_beyond,
 from trunkline.reachability.rigid_map import profile, rigid_field
 from trunkline.reachability.soft_map import SoftShape, soft_field, soft_lattice
 from trunkline.reachability.tips import ArmTips, Tips
+from trunkline.statics.chain import read_chain
 
 OFFSET = 0.05  # m
 LENGTH = 0.5  # m, of the arm of constant curvature below

@@ -5,12 +5,12 @@ import pytest
 
 from tests.bent_chain import stump
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import read_chain
 from trunkline.reachability.hybrid_check import draw_inside_and_outside, verified
 from trunkline.reachability.panda import forward
 from trunkline.reachability.rigid_map import azimuth_from_joint_1
 from trunkline.reachability.tilted_map import draw_pairs, find_tilted, soft_base, tilted_field
 from trunkline.reachability.tips import ArmTips
+from trunkline.statics.chain import read_chain
 
 OFFSET, TILT = 0.05, 0.6
 HOW = {"mount_offset": OFFSET, "avoid_collisions": True}

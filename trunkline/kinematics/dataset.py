@@ -8,11 +8,11 @@ import pandas as pd
 
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import Chain
-from trunkline.kinematics.hysteresis import friction_band, model_friction
 from trunkline.kinematics.sampling import Candidates, crowding, sample_angle, thin
-from trunkline.kinematics.sensitivity import sensitivity
-from trunkline.kinematics.settle import settle
+from trunkline.simulation.rest import settle
+from trunkline.statics.chain import Chain
+from trunkline.statics.hysteresis import friction_band, model_friction
+from trunkline.statics.sensitivity import sensitivity
 
 POSE = ["x", "y", "z", "qw", "qx", "qy", "qz"]
 AXES = "xyz"

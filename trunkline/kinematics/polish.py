@@ -15,10 +15,10 @@ from itertools import combinations
 import numpy as np
 
 from trunkline.frames import gravity_in_base, rotation_from_wxyz
-from trunkline.kinematics.chain import Chain
-from trunkline.kinematics.restart import restart
-from trunkline.kinematics.sensitivity import sensitivity
-from trunkline.kinematics.statics import Equilibrium, forward
+from trunkline.statics.chain import Chain
+from trunkline.statics.equilibria import Equilibrium, forward
+from trunkline.statics.restart import restart
+from trunkline.statics.sensitivity import sensitivity
 
 SPARE = 2e-3  # m that slack tendons get beyond the path foreseen, so that none pulls where the tip turns out elsewhere
 NEGLIGIBLE = 1e-6  # m, pose error below which no further step is taken

@@ -13,8 +13,8 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import Chain
-from trunkline.kinematics.statics import Equilibrium, equilibrium_paths
+from trunkline.statics.chain import Chain
+from trunkline.statics.equilibria import Equilibrium, equilibrium_paths
 
 COARSE_STEPS = 48  # of the first look at a path, to space the second one evenly along the tip's way
 COARSE_POWER = 3.0  # tension ~ (step / steps)^power there: the tip's soft units bend under the first newton

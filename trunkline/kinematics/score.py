@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.chain import FORCE_ROUNDING, Chain
-from trunkline.kinematics.statics import forward
+from trunkline.statics.chain import FORCE_ROUNDING, Chain
+from trunkline.statics.equilibria import forward
 
 
 @dataclass

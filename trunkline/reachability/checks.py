@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunkline.kinematics.chain import Chain
 from trunkline.reachability.grid import Lattice
 from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, verified
 from trunkline.reachability.labels import Agreement, agreement, draw_points, label
@@ -17,6 +16,7 @@ from trunkline.reachability.mesh_distance import mesh_distance
 from trunkline.reachability.reach_signal import HeldOut, held_out, packed
 from trunkline.reachability.tilted_map import find_tilted
 from trunkline.reachability.tips import Tips, TipSource
+from trunkline.statics.chain import Chain
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.kinematics.chain import FORCE_ROUNDING, Chain
-from trunkline.kinematics.statics import forward as soft_forward
 from trunkline.reachability.grid import Lattice
 from trunkline.reachability.inverse import solve
 from trunkline.reachability.labels import beyond_links
 from trunkline.reachability.panda import forward
+from trunkline.statics.chain import FORCE_ROUNDING, Chain
+from trunkline.statics.equilibria import forward as soft_forward
 
 COARSE_YAWS, FINE_YAWS = 24, 72
 COARSE_TIPS = 600

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunkline.kinematics.chain import Chain
 from trunkline.kinematics.sampling import sample_angle
+from trunkline.statics.chain import Chain
 
 
 class Tips(NamedTuple):

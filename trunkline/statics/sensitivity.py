@@ -9,10 +9,10 @@ import numba
 import numpy as np
 from numba import njit, prange
 
-from trunkline.kinematics.chain import Chain
-from trunkline.kinematics.energy import Pull, evaluate, fill_hessian
-from trunkline.kinematics.factor import factorize, solve
-from trunkline.kinematics.newton import new_work
+from trunkline.statics.chain import Chain
+from trunkline.statics.energy import Pull, evaluate, fill_hessian
+from trunkline.statics.factor import factorize, solve
+from trunkline.statics.newton import new_work
 from trunkline.threads import thread_count
 
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.kinematics.chain import Chain
-from trunkline.kinematics.statics import Equilibrium, equilibrium_paths, solve_paths
-from trunkline.kinematics.supported import unit_bodies
+from trunkline.statics.chain import Chain
+from trunkline.statics.equilibria import Equilibrium, equilibrium_paths, solve_paths
+from trunkline.statics.supported import unit_bodies
 
 BACK = 0.98  # share of the tensions from which the direction of the way in is taken
 

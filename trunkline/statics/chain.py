@@ -12,7 +12,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.kinematics.supported import require_supported, unit_bodies
+from trunkline.statics.supported import require_supported, unit_bodies
 
 FORCE_ROUNDING = 1e-3  # share by which a tension may exceed the motors' force and count as within it
 MIN_IMPEDANCE, MAX_IMPEDANCE = mujoco.mjMINIMP, mujoco.mjMAXIMP

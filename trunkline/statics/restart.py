@@ -8,10 +8,10 @@ import numba
 import numpy as np
 from numba import njit, prange
 
-from trunkline.kinematics.chain import Chain
-from trunkline.kinematics.energy import Pull
-from trunkline.kinematics.newton import find_equilibrium, new_work
-from trunkline.kinematics.statics import PENALTY, Equilibrium, empty_equilibria, tip_pose
+from trunkline.statics.chain import Chain
+from trunkline.statics.energy import Pull
+from trunkline.statics.equilibria import PENALTY, Equilibrium, empty_equilibria, tip_pose
+from trunkline.statics.newton import find_equilibrium, new_work
 from trunkline.threads import thread_count
 
 

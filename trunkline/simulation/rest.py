@@ -8,7 +8,7 @@ import mujoco.batch
 import numpy as np
 
 from trunkline.arm.rest import longest_step
-from trunkline.kinematics.supported import unit_bodies
+from trunkline.statics.supported import unit_bodies
 from trunkline.threads import thread_count
 
 RETARDATION = 0.25  # s, damping over stiffness of each joint while settling: about critical for the arm's slowest swing

@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from trunkline.kinematics.energy import Pull, evaluate, fill_hessian, is_elastic, new_state
-from trunkline.kinematics.factor import factorize, solve
+from trunkline.statics.energy import Pull, evaluate, fill_hessian, is_elastic, new_state
+from trunkline.statics.factor import factorize, solve
 
 TORQUE_TOLERANCE = 1e-9  # N m; the softest joint of the arm, 0.02 N m/rad, turns by 5e-8 rad under it
 LENGTH_TOLERANCE = 1e-9  # m

@@ -11,9 +11,9 @@ import numba
 import numpy as np
 from numba import njit, prange
 
-from trunkline.kinematics.chain import Chain
-from trunkline.kinematics.energy import Pull
-from trunkline.kinematics.newton import follow, new_work
+from trunkline.statics.chain import Chain
+from trunkline.statics.energy import Pull
+from trunkline.statics.newton import follow, new_work
 from trunkline.threads import thread_count
 
 PENALTY = 1e5  # N/m, stiffness by which Newton feels a cable before its multiplier is known; no result depends on it
