@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.polish import polish
-from trunkline.kinematics.sampling import pull_directions, sample_angle
+from trunkline.ik.polish import polish
+from trunkline.ik.sampling import pull_directions, sample_angle
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import load_model, read_chain
 from trunkline.statics.equilibria import equilibrium, forward

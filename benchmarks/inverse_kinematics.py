@@ -13,8 +13,8 @@ import numpy as np
 import onnxruntime
 
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.polish import polish
-from trunkline.kinematics.sampling import pull_directions
+from trunkline.ik.polish import polish
+from trunkline.ik.sampling import pull_directions
 from trunkline.statics.chain import load_model, read_chain
 from trunkline.statics.equilibria import equilibrium
 

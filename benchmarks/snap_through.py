@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.sampling import pull_directions
+from trunkline.ik.sampling import pull_directions
 from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt, save_figure
 from trunkline.progress import progress
 from trunkline.statics.chain import Chain, load_model, read_chain

@@ -8,8 +8,8 @@ from pydantic import Field
 
 from trunkline.arm.tendons import require_tendons
 from trunkline.config import settings
-from trunkline.kinematics.dataset import Density, mujoco_deviation, sample_table, split
-from trunkline.kinematics.plots import density_figure, deviation_figure
+from trunkline.figures.dataset import density_figure, deviation_figure
+from trunkline.ik.dataset import Density, mujoco_deviation, sample_table, split
 from trunkline.plots import save_figure
 from trunkline.progress import progress
 from trunkline.stage import output_folder, run_stage, write_json

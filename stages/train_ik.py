@@ -12,7 +12,8 @@ from pydantic import Field, PositiveFloat, PositiveInt
 from trunkline.arm.tendons import require_tendons
 from trunkline.config import settings
 from trunkline.errors import InputError
-from trunkline.kinematics.dataset import (
+from trunkline.figures.network import error_map_figure, learning_figure, tip_error_figure
+from trunkline.ik.dataset import (
     length_by_tension,
     length_columns,
     sample_table,
@@ -20,12 +21,11 @@ from trunkline.kinematics.dataset import (
     tip_by_tension,
     turn_by_tension,
 )
-from trunkline.kinematics.network import INPUTS, InverseKinematics, Training, train
-from trunkline.kinematics.network_plots import error_map_figure, learning_figure, tip_error_figure
-from trunkline.kinematics.onnx import OPSET, to_onnx
-from trunkline.kinematics.polish import polish
-from trunkline.kinematics.score import TipErrors, beyond_range, outside_targets, tip_errors
-from trunkline.kinematics.tip_loss import tip_loss
+from trunkline.ik.network import INPUTS, InverseKinematics, Training, train
+from trunkline.ik.onnx import OPSET, to_onnx
+from trunkline.ik.polish import polish
+from trunkline.ik.score import TipErrors, beyond_range, outside_targets, tip_errors
+from trunkline.ik.tip_loss import tip_loss
 from trunkline.plots import save_figure
 from trunkline.progress import progress
 from trunkline.stage import output_folder, run_stage, write_json

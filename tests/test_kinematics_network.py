@@ -13,8 +13,8 @@ from stages.train_ik import read_table
 from tests.bent_chain import stump
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics import sampling
-from trunkline.kinematics.dataset import (
+from trunkline.ik import sampling
+from trunkline.ik.dataset import (
     length_by_tension,
     length_columns,
     mujoco_deviation,
@@ -22,10 +22,10 @@ from trunkline.kinematics.dataset import (
     tension_columns,
     tip_by_tension,
 )
-from trunkline.kinematics.network import INPUTS, InverseKinematics, Training, train
-from trunkline.kinematics.onnx import to_onnx
-from trunkline.kinematics.score import tip_errors
-from trunkline.kinematics.tip_loss import tip_loss
+from trunkline.ik.network import INPUTS, InverseKinematics, Training, train
+from trunkline.ik.onnx import to_onnx
+from trunkline.ik.score import tip_errors
+from trunkline.ik.tip_loss import tip_loss
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import forward
 

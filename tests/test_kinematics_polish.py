@@ -6,11 +6,11 @@ import pytest
 
 from tests.bent_chain import stump
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.dataset import length_columns, sample_table
-from trunkline.kinematics.network import INPUTS
-from trunkline.kinematics.polish import _bounded, polish
-from trunkline.kinematics.sampling import pull_directions
-from trunkline.kinematics.score import beyond_range, outside_targets
+from trunkline.ik.dataset import length_columns, sample_table
+from trunkline.ik.network import INPUTS
+from trunkline.ik.polish import _bounded, polish
+from trunkline.ik.sampling import pull_directions
+from trunkline.ik.score import beyond_range, outside_targets
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium, forward
 from trunkline.statics.restart import restart

@@ -6,7 +6,7 @@ import pytest
 from tests.bent_chain import cantilever, hardening_stump, stump
 from trunkline.arm.parameters import candidate_fields, set_fields
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.sampling import pull_directions
+from trunkline.ik.sampling import pull_directions
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import actuated, equilibrium, equilibrium_paths, forward

@@ -8,7 +8,7 @@ import pandas as pd
 
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
-from trunkline.kinematics.sampling import Candidates, crowding, sample_angle, thin
+from trunkline.ik.sampling import Candidates, crowding, sample_angle, thin
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain
 from trunkline.statics.hysteresis import friction_band, model_friction

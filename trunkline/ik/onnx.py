@@ -6,7 +6,7 @@ import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
 
-from trunkline.kinematics.network import FIRST, INPUTS, SECOND, InverseKinematics
+from trunkline.ik.network import FIRST, INPUTS, SECOND, InverseKinematics
 
 OPSET = 15
 IR_VERSION = 8  # of the ONNX release that brought opset 15

@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from trunkline.kinematics.tip_loss import TipLoss
+from trunkline.ik.tip_loss import TipLoss
 
 INPUTS = ["theta_g", "x", "y", "z", "qw", "qx", "qy", "qz"]
 # products of quaternion components: a rotation matrix is linear in them, and q and -q give the same ones

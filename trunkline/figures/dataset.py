@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from trunkline.kinematics.dataset import Density
+from trunkline.ik.dataset import Density
 from trunkline.plots import IDENTIFIED, INITIAL, VALIDATE, plt
 
 SLICE = 0.008  # m, half thickness of the slices shown
