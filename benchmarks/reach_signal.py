@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 
-from trunkline.reachability.grid import Lattice, blend
+from trunkline.fields.grid import Lattice, blend
 from trunkline.reachability.reach_signal import packed, reach_signal
 
 POINTS, ROUNDS = 64, 200

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from stages.reachability import Config
 from trunkline.config import load_config
-from trunkline.reachability.downward import sample_downward
-from trunkline.reachability.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
+from trunkline.panda.downward import sample_downward
+from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
+from trunkline.panda.kinematics import Q_MAX, Q_MIN, forward
+from trunkline.panda.mjcf import panda_spec
 from trunkline.reachability.maps import RigidSettings, build_rigid
-from trunkline.reachability.panda import Q_MAX, Q_MIN, forward
-from trunkline.reachability.panda_mjcf import panda_spec
 
 STARTS = 60
 MINK_STARTS = 10

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from trunkline.errors import InputError
-from trunkline.reachability.grid import (
+from trunkline.fields.grid import (
     Lattice,
     blend,
     close_gaps,
@@ -15,8 +15,8 @@ from trunkline.reachability.grid import (
     redistance,
     without_specks,
 )
-from trunkline.reachability.mesh import contains, surface, unsimplified, write_obj
-from trunkline.reachability.mesh_distance import mesh_distance
+from trunkline.fields.mesh import contains, surface, unsimplified, write_obj
+from trunkline.fields.mesh_distance import mesh_distance
 
 SPACING = 0.01  # m
 

@@ -6,17 +6,17 @@ from scipy.spatial import cKDTree
 
 from tests.bent_chain import stump
 from trunkline.errors import InputError
-from trunkline.reachability.downward import sample_downward
-from trunkline.reachability.grid import Lattice, overlap
+from trunkline.fields.grid import Lattice, overlap
+from trunkline.fields.mesh import contains
+from trunkline.panda.downward import sample_downward
+from trunkline.panda.kinematics import Q_MAX, forward
+from trunkline.panda.labels import agreement, beyond_links, draw_points, label
+from trunkline.reachability.hybrid import minkowski_field, swept_cells
 from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, verified
-from trunkline.reachability.hybrid_map import minkowski_field, swept_cells
-from trunkline.reachability.labels import agreement, beyond_links, draw_points, label
 from trunkline.reachability.maps import RigidSettings, angle_name, build_rigid, build_soft
-from trunkline.reachability.mesh import contains
-from trunkline.reachability.panda import Q_MAX, forward
 from trunkline.reachability.reach_signal import held_out, packed, points_beyond, reach_signal
-from trunkline.reachability.rigid_map import profile, rigid_field
-from trunkline.reachability.soft_map import SoftShape, soft_field, soft_lattice
+from trunkline.reachability.rigid import profile, rigid_field
+from trunkline.reachability.soft import SoftShape, soft_field, soft_lattice
 from trunkline.reachability.tips import ArmTips, Tips
 from trunkline.statics.chain import read_chain
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from trunkline.reachability.mesh_distance import mesh_distance, surface_points
+from trunkline.fields.mesh_distance import mesh_distance, surface_points
 
 
 def parts(mesh):

@@ -4,11 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from trunkline.reachability.collision import clearance, segment_distance
-from trunkline.reachability.downward import sample_downward, sample_tilted
-from trunkline.reachability.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
-from trunkline.reachability.panda import DH_A, FLANGE, Q_MAX, Q_MIN, forward, jacobian, joint_frames, within_limits
-from trunkline.reachability.panda_mjcf import panda_spec
+from trunkline.panda.collision import clearance, segment_distance
+from trunkline.panda.downward import sample_downward, sample_tilted
+from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
+from trunkline.panda.kinematics import DH_A, FLANGE, Q_MAX, Q_MIN, forward, jacobian, joint_frames, within_limits
+from trunkline.panda.mjcf import panda_spec
 
 OFFSET = 0.05  # m
 

@@ -5,10 +5,10 @@ import pytest
 
 from tests.bent_chain import stump
 from trunkline.frames import gravity_in_base
+from trunkline.panda.kinematics import forward
 from trunkline.reachability.hybrid_check import draw_inside_and_outside, verified
-from trunkline.reachability.panda import forward
-from trunkline.reachability.rigid_map import azimuth_from_joint_1
-from trunkline.reachability.tilted_map import draw_pairs, find_tilted, soft_base, tilted_field
+from trunkline.reachability.rigid import azimuth_from_joint_1
+from trunkline.reachability.tilted import draw_pairs, find_tilted, soft_base, tilted_field
 from trunkline.reachability.tips import ArmTips
 from trunkline.statics.chain import read_chain
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunkline.reachability.grid import Lattice
+from trunkline.fields.grid import Lattice
+from trunkline.fields.mesh import Surface, contains, unsimplified
+from trunkline.fields.mesh_distance import mesh_distance
+from trunkline.panda.labels import Agreement, agreement, draw_points, label
 from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, verified
-from trunkline.reachability.labels import Agreement, agreement, draw_points, label
 from trunkline.reachability.maps import Map, Maps, angle_name
-from trunkline.reachability.mesh import Surface, contains, unsimplified
-from trunkline.reachability.mesh_distance import mesh_distance
 from trunkline.reachability.reach_signal import HeldOut, held_out, packed
-from trunkline.reachability.tilted_map import find_tilted
+from trunkline.reachability.tilted import find_tilted
 from trunkline.reachability.tips import Tips, TipSource
 from trunkline.statics.chain import Chain
 

@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from trunkline.fields.grid import Lattice
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.reachability.grid import Lattice
-from trunkline.reachability.inverse import solve
-from trunkline.reachability.labels import beyond_links
-from trunkline.reachability.panda import forward
+from trunkline.panda.inverse import solve
+from trunkline.panda.kinematics import forward
+from trunkline.panda.labels import beyond_links
 from trunkline.statics.chain import FORCE_ROUNDING, Chain
 from trunkline.statics.equilibria import forward as soft_forward
 

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from trunkline.reachability.downward import sample_downward
-from trunkline.reachability.grid import Lattice
-from trunkline.reachability.hybrid_map import minkowski_field, swept_cells
-from trunkline.reachability.mesh import Surface, surface
+from trunkline.fields.grid import Lattice
+from trunkline.fields.mesh import Surface, surface
+from trunkline.panda.downward import sample_downward
+from trunkline.reachability.hybrid import minkowski_field, swept_cells
 from trunkline.reachability.reach_signal import THRESHOLD, packed
-from trunkline.reachability.rigid_map import profile, rigid_field
-from trunkline.reachability.soft_map import SoftShape, soft_fields
-from trunkline.reachability.tilted_map import Pairs, draw_pairs, tilted_field
+from trunkline.reachability.rigid import profile, rigid_field
+from trunkline.reachability.soft import SoftShape, soft_fields
+from trunkline.reachability.tilted import Pairs, draw_pairs, tilted_field
 from trunkline.reachability.tips import TipSource
 
 

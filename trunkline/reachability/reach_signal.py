@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from trunkline.reachability.grid import Lattice, blend, overlap
-from trunkline.reachability.soft_map import SoftShape, soft_field
+from trunkline.fields.grid import Lattice, blend, overlap
+from trunkline.reachability.soft import SoftShape, soft_field
 
 THRESHOLD = 0.0  # m; a signal above it means out of reach
 THICKNESS = 0.1  # of the distance of points outside: they are drawn from as much more

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from skimage.measure import marching_cubes
 
 from trunkline.errors import InputError
-from trunkline.reachability.grid import Lattice
+from trunkline.fields.grid import Lattice
 
 # Lattice points at exactly the level make marching cubes emit degenerate triangles and open edges.
 LEVEL = 1e-3  # voxels outside zero

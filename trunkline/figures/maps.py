@@ -8,12 +8,12 @@ from matplotlib.figure import Figure
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import NDArray
 
+from trunkline.fields.mesh import Surface
+from trunkline.panda.inverse import solve
+from trunkline.panda.kinematics import DH_A, FLANGE, joint_frames
 from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE
 from trunkline.reachability.checks import Check
-from trunkline.reachability.inverse import solve
 from trunkline.reachability.maps import Maps
-from trunkline.reachability.mesh import Surface
-from trunkline.reachability.panda import DH_A, FLANGE, joint_frames
 
 SUN = np.array([0.35, -0.75, 0.55])  # towards the light
 POSE = (0.45, 0.0, 0.55)  # m, where the drawn Panda holds the mount

@@ -9,7 +9,7 @@ flange is left out, since joint 7 turns it out of the way without moving the mou
 import numpy as np
 from numpy.typing import NDArray
 
-from trunkline.reachability.panda import FLANGE, Frame, joint_frames
+from trunkline.panda.kinematics import FLANGE, Frame, joint_frames
 
 # link: capsules as (end, end, radius) in m, in the frame of the joint that moves the link (0: base).
 CAPSULES = {

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
-from trunkline.reachability.collision import CHUNK, clearance
-from trunkline.reachability.panda import Q_MAX, Q_MIN, joint_frames, within_limits
+from trunkline.panda.collision import CHUNK, clearance
+from trunkline.panda.kinematics import Q_MAX, Q_MIN, joint_frames, within_limits
 from trunkline.threads import thread_count
 
 # Borders of the workspace lie where the arm is stretched in its plane or a joint stands at its limit: a

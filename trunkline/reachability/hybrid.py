@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, ndimage
 
-from trunkline.reachability.grid import Lattice, redistance, without_specks
+from trunkline.fields.grid import Lattice, redistance, without_specks
 
 # A tip counts for the nearest lattice point only if each coordinate is this near: with all tips, up to half a
 # step away, H would be 0.4 steps too large on average.

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from trunkline.reachability.downward import sample_tilted
-from trunkline.reachability.grid import Lattice
+from trunkline.fields.grid import Lattice
+from trunkline.panda.downward import sample_tilted
+from trunkline.panda.inverse import solve
+from trunkline.panda.kinematics import Q_MAX, Q_MIN, forward
 from trunkline.reachability.hybrid_check import STARTS, TRIES, Reach
-from trunkline.reachability.inverse import solve
-from trunkline.reachability.panda import Q_MAX, Q_MIN, forward
-from trunkline.reachability.rigid_map import azimuth_from_joint_1, outline, rigid_field
+from trunkline.reachability.rigid import azimuth_from_joint_1, outline, rigid_field
 
 TIPS_PER_POSE = 8
 NEAREST = 200  # pairs whose points are nearest to a target in (r, z), among which poses are looked for

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from trunkline.errors import InputError
-from trunkline.reachability.grid import Lattice, close_gaps, distance_from_cells, drop_specks, redistance
-from trunkline.reachability.panda import Q_MAX, forward
+from trunkline.fields.grid import Lattice, close_gaps, distance_from_cells, drop_specks, redistance
+from trunkline.panda.kinematics import Q_MAX, forward
 
 # Distances from cells go up and down by a part of a cell along a slanting border. Without these steps, the mesh needs
 # half as many triangles for the same accuracy.

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from trunkline.errors import InputError
-from trunkline.reachability.inverse import solve
-from trunkline.reachability.panda import DH_A, DH_D, FLANGE
+from trunkline.panda.inverse import solve
+from trunkline.panda.kinematics import DH_A, DH_D, FLANGE
 
 
 class Agreement(NamedTuple):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from trunkline.reachability.grid import Lattice, redistance, without_specks
+from trunkline.fields.grid import Lattice, redistance, without_specks
 from trunkline.reachability.tips import TipSource
 from trunkline.threads import thread_count
 

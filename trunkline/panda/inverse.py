@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunkline.reachability.collision import clearance
-from trunkline.reachability.panda import FLANGE, Q_MAX, Q_MIN, Frame, cross, jacobian, joint_frames
+from trunkline.panda.collision import clearance
+from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, Frame, cross, jacobian, joint_frames
 
 POSITION_TOLERANCE = 1e-5  # m
 ROTATION_TOLERANCE = 1e-4  # rad

@@ -7,8 +7,8 @@ about dynamics.
 import mujoco
 import numpy as np
 
-from trunkline.reachability.collision import PAIRS, link_capsules
-from trunkline.reachability.panda import DH_A, DH_ALPHA, DH_D, FLANGE, Q_MAX, Q_MIN
+from trunkline.panda.collision import PAIRS, link_capsules
+from trunkline.panda.kinematics import DH_A, DH_ALPHA, DH_D, FLANGE, Q_MAX, Q_MIN
 
 PLACEHOLDER_MASS = 1.0  # kg
 PLACEHOLDER_INERTIA = [1e-2, 1e-2, 1e-2]  # kg m^2
