@@ -10,17 +10,17 @@ import pandas as pd
 from pydantic import Field, PositiveFloat
 
 from trunkline.arm.tendons import require_tendons
-from trunkline.bundle.linearize import compile_with
-from trunkline.bundle.manifest import Manifest
-from trunkline.bundle.package import read_tarball, write_tarball
-from trunkline.bundle.plots import roundtrip_figure
-from trunkline.bundle.roundtrip import curl, deviation, simulate
-from trunkline.bundle.twin import MANIFEST, MODEL, Label, Sources, Trajectory, assemble, compare
-from trunkline.bundle.unity_importer import as_imported
 from trunkline.config import settings
 from trunkline.errors import InputError
+from trunkline.figures.package import roundtrip_figure
 from trunkline.plots import save_figure
 from trunkline.stage import output_folder, run_stage, write_json
+from trunkline.unity.importer import as_imported
+from trunkline.unity.linearize import compile_with
+from trunkline.unity.manifest import Manifest
+from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.roundtrip import curl, deviation, simulate
+from trunkline.unity.twin import MANIFEST, MODEL, Label, Sources, Trajectory, assemble, compare
 
 ARTIFACTS = Path("artifacts")
 MEASURED = ["ingest", "filter", "build_mjcf", "identify_stiffness", "identify_damping", "identify_control"]

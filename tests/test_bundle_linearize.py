@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from small_arm import small_spec
 
-from trunkline.bundle.linearize import compile_with, linearize_joints
+from trunkline.unity.linearize import compile_with, linearize_joints
 
 
 def test_the_slope_is_the_least_squares_one():

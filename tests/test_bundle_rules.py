@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from small_arm import small_mjcf, small_spec
 
-from trunkline.bundle.unity_rules import Violation, lint_mjcf, lint_network
 from trunkline.errors import InputError
+from trunkline.unity.rules import Violation, lint_mjcf, lint_network
 
 MJCF = small_mjcf()
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"

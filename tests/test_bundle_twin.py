@@ -17,13 +17,13 @@ import trimesh
 from onnx import TensorProto, helper
 from small_arm import small_mjcf
 
-from trunkline.bundle.linearize import JointLaw, compile_with
-from trunkline.bundle.manifest import Manifest, Model
-from trunkline.bundle.package import read_tarball, write_tarball
-from trunkline.bundle.roundtrip import curl, simulate
-from trunkline.bundle.twin import MANIFEST, MODEL, NETWORK, Label, Sources, Trajectory, assemble, compare
-from trunkline.bundle.unity_importer import as_imported
 from trunkline.errors import InputError
+from trunkline.unity.importer import as_imported
+from trunkline.unity.linearize import JointLaw, compile_with
+from trunkline.unity.manifest import Manifest, Model
+from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.roundtrip import curl, simulate
+from trunkline.unity.twin import MANIFEST, MODEL, NETWORK, Label, Sources, Trajectory, assemble, compare
 
 ROOT = Path(__file__).parents[1]
 LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0", trunkline="0.1.0")

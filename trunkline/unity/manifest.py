@@ -6,8 +6,8 @@ from typing import Literal
 import mujoco
 from pydantic import BaseModel, ConfigDict, Field
 
-from trunkline.bundle.linearize import JointLaw
-from trunkline.bundle.unity_frame import unity_position
+from trunkline.unity.frame import unity_position
+from trunkline.unity.linearize import JointLaw
 
 
 class _Block(BaseModel):

@@ -5,9 +5,9 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from trunkline.bundle.manifest import Grid, Mesh, Reach
-from trunkline.bundle.unity_frame import unity_obj, unity_position, unity_volume
 from trunkline.errors import InputError
+from trunkline.unity.frame import unity_obj, unity_position, unity_volume
+from trunkline.unity.manifest import Grid, Mesh, Reach
 
 FOLDER = "Runtime/Reachability"
 

@@ -4,9 +4,9 @@ import onnx
 from google.protobuf.message import DecodeError
 from onnx.external_data_helper import uses_external_data
 
-from trunkline.bundle.manifest import Network
-from trunkline.bundle.unity_rules import Violation, lint_network
 from trunkline.errors import InputError
+from trunkline.unity.manifest import Network
+from trunkline.unity.rules import Violation, lint_network
 
 INPUTS = ["theta_g", "x", "y", "z", "qw", "qx", "qy", "qz"]
 

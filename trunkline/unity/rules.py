@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import mujoco
 
-from trunkline.bundle.unity_importer import CHOICES, ELEMENTS, kept_attributes
 from trunkline.errors import InputError
+from trunkline.unity.importer import CHOICES, ELEMENTS, kept_attributes
 
 NAMED = {"body", "joint", "freejoint", "geom", "site", "spatial", "fixed", "general", "mesh", "material"}
 OPSETS = range(7, 16)  # Unity Inference Engine manual, "Supported models"

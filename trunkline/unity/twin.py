@@ -6,14 +6,14 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from trunkline.bundle.linearize import compile_with, linearize_joints
-from trunkline.bundle.manifest import Manifest, Versions, describe_model, hashes
-from trunkline.bundle.network import describe_network
-from trunkline.bundle.package import package_json, with_metas
-from trunkline.bundle.reach_maps import convert_grids, convert_meshes, describe_reach
-from trunkline.bundle.roundtrip import curl, deviation, simulate
-from trunkline.bundle.unity_importer import as_imported
-from trunkline.bundle.unity_rules import Violation, lint_mjcf
+from trunkline.unity.importer import as_imported
+from trunkline.unity.linearize import compile_with, linearize_joints
+from trunkline.unity.manifest import Manifest, Versions, describe_model, hashes
+from trunkline.unity.network import describe_network
+from trunkline.unity.package import package_json, with_metas
+from trunkline.unity.reach_maps import convert_grids, convert_meshes, describe_reach
+from trunkline.unity.roundtrip import curl, deviation, simulate
+from trunkline.unity.rules import Violation, lint_mjcf
 
 MODEL = "Runtime/Model/arm.xml"
 NETWORK = "Runtime/Network/ik.onnx"
