@@ -22,7 +22,6 @@ from omegaconf import OmegaConf
 
 from benchmarks.identification.case import STAGES, require_demo, spread
 from benchmarks.identification.timing import Stopwatch
-from trunkline.config import load_config
 from trunkline.errors import in_one_line
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
@@ -35,6 +34,7 @@ from trunkline.identification.settings import (
     Range,
 )
 from trunkline.identification.setup import read_reported, read_spec, set_up
+from trunkline.pipeline.config import load_config
 from trunkline.trials.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")

@@ -15,13 +15,13 @@ import mujoco
 import numpy as np
 
 from stages import build_mjcf, filter, identify_stiffness
-from trunkline.config import load_config
 from trunkline.errors import in_one_line
 from trunkline.filtering.filter import filter_take
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.identify import identify
 from trunkline.identification.settings import Range
 from trunkline.identification.setup import set_up
+from trunkline.pipeline.config import load_config
 from trunkline.takes.take import Take, read_takes
 
 EXAMPLE = Path("examples/asl_trunk")

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from stages.reachability import Config
-from trunkline.config import load_config
 from trunkline.panda.downward import sample_downward
 from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
 from trunkline.panda.kinematics import Q_MAX, Q_MIN, forward
 from trunkline.panda.mjcf import panda_spec
+from trunkline.pipeline.config import load_config
 from trunkline.reachability.maps import RigidSettings, build_rigid
 
 STARTS = 60

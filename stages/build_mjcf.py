@@ -11,12 +11,12 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import UnitProperties, unit_properties
 from trunkline.arm.mjcf import Solver, Tendons, build_spec, unit_name
-from trunkline.arm.plots import arm_figure
 from trunkline.arm.spiral import spiral_chain
 from trunkline.arm.uniform import uniform_chain, uniform_properties
-from trunkline.config import settings
-from trunkline.plots import save_figure
-from trunkline.stage import output_folder, run_stage, write_json
+from trunkline.figures.arm import arm_figure
+from trunkline.figures.style import save_figure
+from trunkline.pipeline.config import settings
+from trunkline.pipeline.stage import output_folder, run_stage, write_json
 
 ARTIFACTS = Path("artifacts/build_mjcf")
 

@@ -6,12 +6,12 @@ from typing import Literal
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from trunkline.config import settings
 from trunkline.figures.data import filter_figure
+from trunkline.figures.style import save_figure
 from trunkline.filtering.filter import Filter, filter_take, summary
-from trunkline.plots import save_figure
+from trunkline.pipeline.config import settings
+from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
-from trunkline.stage import output_folder, run_stage, write_json
 from trunkline.takes.take import read_takes
 from trunkline.trials.trial import write_trials
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from trunkline.identification.run import run
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.stage import run_stage
+from trunkline.pipeline.stage import run_stage
 
 Config = IdentificationSettings
 

@@ -8,7 +8,7 @@ import pytest
 from tests.small_arm import small_spec
 from tests.workbench import ROOT
 from trunkline.arm.tendons import CAD_MODEL
-from trunkline.stage import run_stage
+from trunkline.pipeline.stage import run_stage
 
 STAGES = ["identify_control", "fk_dataset", "train_ik", "reachability", "package_unity"]
 

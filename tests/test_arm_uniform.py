@@ -9,9 +9,9 @@ from small_arm import LIMIT
 from stages.build_mjcf import Config, main
 from trunkline.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.arm.uniform import uniform_chain, uniform_properties
-from trunkline.config import load_config
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.pipeline.config import load_config
 
 CHAIN = uniform_chain(0.3, 0.05, 6, 0.5)
 SEGMENTS = {"1": 0.1, "2": 0.175, "end": 0.3}

@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.choices import CHOICES, quick
 from benchmarks.identification.case import STAGES
-from trunkline.config import load_config
 from trunkline.identification.search import LeastSquares
 from trunkline.identification.setup import fit_of
+from trunkline.pipeline.config import load_config
 
 CHANGED = {  # name → stage → the settings that it changes
     "committed": {},

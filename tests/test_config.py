@@ -9,9 +9,9 @@ import pytest
 from omegaconf import OmegaConf
 from pydantic import Field
 
-from trunkline.config import check_settings, compose_settings, group_options, load_config, settings
 from trunkline.errors import InputError
 from trunkline.identification.settings import IdentificationSettings
+from trunkline.pipeline.config import check_settings, compose_settings, group_options, load_config, settings
 from trunkline.pipeline.settings import check_once
 
 ROOT = Path(__file__).parents[1]
@@ -114,7 +114,7 @@ def whole_project(tmp_path):
         (tmp_path / "conf" / stage).mkdir(parents=True)
         (tmp_path / "conf" / stage / "config.yaml").write_text("{}\n")
         (tmp_path / "stages" / f"{stage}.py").write_text(
-            "from trunkline.config import settings\n\n\n@settings\nclass Config:\n    count: int\n"
+            "from trunkline.pipeline.config import settings\n\n\n@settings\nclass Config:\n    count: int\n"
         )
 
     def check(params: str) -> None:

@@ -17,8 +17,8 @@ from demo.record import Config
 from tests.small_arm import small_spec
 from trunkline.arm.mjcf import unit_name
 from trunkline.arm.spiral import spiral_chain
-from trunkline.config import load_config
 from trunkline.errors import InputError
+from trunkline.pipeline.config import load_config
 
 DEMO = Path(__file__).parents[1] / "demo"
 UNITS = 6

@@ -11,7 +11,7 @@ from stages import ingest
 from tests.sessions import CURL_BEGIN, RELEASE, all_truths
 from tests.workbench import workbench
 from trunkline.frames import gravity_in_base, rotation_from_wxyz
-from trunkline.stage import run_stage
+from trunkline.pipeline.stage import run_stage
 from trunkline.trials.trial import read_trials
 
 

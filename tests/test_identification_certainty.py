@@ -16,7 +16,7 @@ from trunkline.identification.loss import LossWeights
 from trunkline.identification.parameter_table import parameter_table, undetermined
 from trunkline.identification.problem import Bounds
 from trunkline.identification.search import LeastSquares, Linearisation
-from trunkline.stage import write_json
+from trunkline.pipeline.stage import write_json
 
 SHARED, OWN = 0.6, 0.3  # standard deviations of what a cluster's residuals have in common, and of each
 

@@ -7,7 +7,7 @@ import pytest
 from stages import ingest
 from tests.sessions import SEGMENTS
 from tests.workbench import workbench
-from trunkline.stage import run_stage
+from trunkline.pipeline.stage import run_stage
 from trunkline.takes.take import read_takes
 
 

@@ -14,8 +14,8 @@ from omegaconf import OmegaConf
 from stub_pipeline import StubPipeline
 
 from trunkline.arm.tendons import CAD_MODEL
-from trunkline.config import SHARED, check_settings, group_options
 from trunkline.pipeline import lock
+from trunkline.pipeline.config import SHARED, check_settings, group_options
 
 ROOT = Path(__file__).parents[1]
 STAGES = [

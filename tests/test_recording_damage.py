@@ -11,8 +11,8 @@ from demo.recorder import write_log, write_session
 from stages import ingest
 from tests.sessions import SEGMENTS, all_truths, curl_truth, instruments, record, release_truth, static_truth
 from tests.workbench import ROOT
+from trunkline.pipeline.stage import run_stage
 from trunkline.sessions.session import read_session
-from trunkline.stage import run_stage
 from trunkline.takes.frozen import frozen
 from trunkline.takes.intake import Limits, settle_vertical, take_in
 from trunkline.takes.swaps import find_swaps, usual_distances

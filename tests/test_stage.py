@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.plots import save_figure
+from trunkline.figures.style import save_figure
+from trunkline.pipeline.stage import output_folder, write_json
 from trunkline.progress import progress
-from trunkline.stage import output_folder, write_json
 from trunkline.threads import thread_count
 
 ROOT = Path(__file__).parents[1]
@@ -21,9 +21,9 @@ STAGE = """
 import numpy as np
 from threadpoolctl import threadpool_info
 
-from trunkline.config import settings
+from trunkline.pipeline.config import settings
 from trunkline.errors import InputError
-from trunkline.stage import output_folder, run_stage
+from trunkline.pipeline.stage import output_folder, run_stage
 
 @settings
 class Config:
@@ -63,9 +63,9 @@ def test_a_stage_that_succeeds_writes_everything(run, tmp_path):
 
 
 SKIPPED = """
-from trunkline.config import settings
+from trunkline.pipeline.config import settings
 from trunkline.errors import Skipped
-from trunkline.stage import run_stage
+from trunkline.pipeline.stage import run_stage
 
 @settings
 class Config:

@@ -13,7 +13,6 @@ import numpy as np
 from benchmarks.identification.rival import Rival
 from benchmarks.identification.timing import Spent
 from trunkline.arm.parameters import PARAMETERS
-from trunkline.config import load_config
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
@@ -23,6 +22,7 @@ from trunkline.identification.parameter_table import undetermined
 from trunkline.identification.problem import Problem
 from trunkline.identification.run import CAD_MODEL
 from trunkline.identification.setup import TRIALS, read_reported, read_spec, set_up
+from trunkline.pipeline.config import load_config
 
 # every stage, and the model that it begins with
 STAGES = {

@@ -8,10 +8,10 @@ import numpy as np
 from benchmarks.identification.case import Case, ReadCase, Size
 from benchmarks.identification.timing import Spent, alternate
 from stages import build_mjcf
-from trunkline.config import load_config
 from trunkline.frames import gravity_in_base
 from trunkline.identification.experiment import SLACK, Experiment
 from trunkline.identification.pose_fit import PoseFit
+from trunkline.pipeline.config import load_config
 
 CANDIDATES = 10
 BEND = np.radians(270)  # of the whole arm

@@ -16,7 +16,7 @@ from mcap_ros2.writer import Writer
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.logs.definitions import TRUNK_RIGID_BODIES
-from trunkline.stage import output_folder
+from trunkline.pipeline.stage import output_folder
 
 HERE = Path(__file__).parent
 SESSION = HERE / "data" / "raw" / "asl_trunk"

@@ -8,7 +8,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE
+from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE
 from trunkline.signals.base_frame import average_base, to_base_frame
 from trunkline.takes.quality import Quality
 from trunkline.takes.take import Take

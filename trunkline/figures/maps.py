@@ -9,9 +9,9 @@ from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import NDArray
 
 from trunkline.fields.mesh import Surface
+from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE
 from trunkline.panda.inverse import solve
 from trunkline.panda.kinematics import DH_A, FLANGE, joint_frames
-from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE
 from trunkline.reachability.checks import Check
 from trunkline.reachability.maps import Maps
 

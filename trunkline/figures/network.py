@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from trunkline.plots import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt
+from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt
 
 SLICE = 0.016  # m, half thickness of the slices shown
 

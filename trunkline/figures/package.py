@@ -4,7 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from trunkline.plots import IDENTIFIED, INITIAL, MEASURED
+from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED
 
 
 def roundtrip_figure(time: np.ndarray, tips: dict[str, np.ndarray], gaps_mm: dict[str, np.ndarray]) -> Figure:

@@ -9,7 +9,8 @@ import numpy as np
 
 from trunkline.arm.parameters import PARAMETERS, save_model
 from trunkline.errors import InputError
-from trunkline.identification import plots
+from trunkline.figures import identification as plots
+from trunkline.figures.style import save_figure
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import Replay, replay, scores
 from trunkline.identification.experiment import Experiment
@@ -19,8 +20,7 @@ from trunkline.identification.parameter_table import parameter_table, undetermin
 from trunkline.identification.problem import Bounds
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import check_folds, check_parameters, read_reported, read_spec, set_up
-from trunkline.plots import save_figure
-from trunkline.stage import output_folder, write_json
+from trunkline.pipeline.stage import output_folder, write_json
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, FiniteFloat, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
 from trunkline.arm.parameters import PARAMETERS
-from trunkline.config import settings
+from trunkline.pipeline.config import settings
 
 ParameterName = Literal[
     "stiffness", "hardening", "joint_friction", "damping", "tendon_friction", "friction_time",

@@ -17,8 +17,8 @@ from typing import Annotated, Any
 from omegaconf import OmegaConf
 from pydantic import Field, NonNegativeFloat, PositiveFloat, TypeAdapter, ValidationError
 
-from trunkline.config import settings
 from trunkline.errors import InputError
+from trunkline.pipeline.config import settings
 
 
 @settings

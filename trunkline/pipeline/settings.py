@@ -4,8 +4,8 @@ import hashlib
 import sys
 from pathlib import Path
 
-from trunkline.config import check_settings, own_or_project
 from trunkline.errors import in_one_line
+from trunkline.pipeline.config import check_settings, own_or_project
 
 
 def check_once(root: Path = Path(".")) -> None:

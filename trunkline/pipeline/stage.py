@@ -14,8 +14,8 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from trunkline.config import load_config
 from trunkline.errors import InputError, Skipped
+from trunkline.pipeline.config import load_config
 from trunkline.pipeline.settings import check_once
 
 Config = TypeVar("Config")

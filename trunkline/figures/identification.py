@@ -7,12 +7,12 @@ from matplotlib.figure import Figure
 from scipy.signal import butter, sosfiltfilt
 
 from trunkline.arm.parameters import PARAMETERS
+from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED
 from trunkline.frames import tilt_of_gravity
 from trunkline.identification.evaluation import Replay
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Identification
 from trunkline.identification.loss import distances
-from trunkline.plots import IDENTIFIED, INITIAL, MEASURED
 
 ERROR_CUTOFF = 6.0  # Hz, of the low-pass over error curves, as the paper filters its figure
 DOUBTFUL = "#999999"

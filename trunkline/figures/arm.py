@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 from matplotlib.figure import Figure
 
-from trunkline.plots import IDENTIFIED, INITIAL
+from trunkline.figures.style import IDENTIFIED, INITIAL
 
 
 def arm_figure(model: mujoco.MjModel) -> Figure:
