@@ -5,8 +5,8 @@ from importlib import import_module
 
 import pytest
 
-from benchmarks.choices import CHOICES, quick
 from benchmarks.identification.case import STAGES
+from studies.choices import CHOICES, quick
 from trunkline.identification.search import LeastSquares
 from trunkline.identification.setup import fit_of
 from trunkline.pipeline.config import load_config

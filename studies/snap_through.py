@@ -1,6 +1,6 @@
 """Can the same tendon lengths hold the arm in two shapes? Equilibria sought from many first guesses.
 
-    python -m benchmarks.snap_through [arm.xml] [--figure docs/snap_through.png]
+    python -m studies.snap_through [arm.xml] [--figure docs/snap_through.png]
 
 Lengths are those of random equilibria at random gravity angles from 0 to 120°, with one tendon slack, as the data set
 has them, and the same with that tendon drawn in by some millimetres more, so that all three pull against each other.

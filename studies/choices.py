@@ -1,6 +1,6 @@
 """What every choice of model and method is worth: a Markdown table of errors on trials that no fit saw.
 
-    python -m benchmarks.choices [--quick] [--only NAME ...] > choices.md
+    python -m studies.choices [--quick] [--only NAME ...] > choices.md
 
 Needs the trials and the CAD model of the demo session (`make demo`). Each row changes one thing in the settings of
 params.yaml and conf/, runs the three stages one after the other, each on what the one before it found, and scores the
@@ -207,7 +207,7 @@ def row(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> str:
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="benchmarks.choices", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.choices", description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="few trials, frames and iterations: only whether it runs")
     parser.add_argument("--only", nargs="+", choices=CHOICES, default=list(CHOICES), help="some of the rows")
     arguments = parser.parse_args()

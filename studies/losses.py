@@ -1,6 +1,6 @@
 """How well each loss brings known parameters back from noisy releases: a Markdown table.
 
-    python -m benchmarks.losses [--repetitions N] [--trials N] [--frames N] [--weight-velocity W] > losses.md
+    python -m studies.losses [--repetitions N] [--trials N] [--frames N] [--weight-velocity W] > losses.md
 
 Needs the demo session up to `identify_damping` (`make demo`). The plant is the arm that this stage identified, let go
 from where the session's own releases start; the laboratory's noise comes on top, low-passed as `filter` does, over the
@@ -159,7 +159,7 @@ def table(names: list[str], results: dict[str, Recovered]) -> str:
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="benchmarks.losses", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.losses", description=__doc__.splitlines()[0])
     parser.add_argument("--repetitions", type=int, default=20, help="with noise drawn anew, at least 2")
     parser.add_argument("--trials", type=int, default=6, help="releases of the session, at most")
     parser.add_argument("--frames", type=int, default=180, help="of each release")

@@ -1,4 +1,4 @@
-"""What each part of the model is worth on real releases: `python -m benchmarks.real_arm`
+"""What each part of the model is worth on real releases: `python -m studies.real_arm`
 
 Identifies the example examples/asl_trunk again and again, as its stage identify_stiffness does, each time without one
 thing that its model has or with one that it has not, and prints the mean position error on the validate releases. Run
