@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.dataset.sampling import pull_directions, sample_angle
 from trunkline.frames import gravity_in_base
 from trunkline.ik.polish import polish
-from trunkline.ik.sampling import pull_directions, sample_angle
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import load_model, read_chain
 from trunkline.statics.equilibria import equilibrium, forward

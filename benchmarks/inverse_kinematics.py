@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import onnxruntime
 
+from trunkline.dataset.sampling import pull_directions
 from trunkline.frames import gravity_in_base
 from trunkline.ik.polish import polish
-from trunkline.ik.sampling import pull_directions
 from trunkline.statics.chain import load_model, read_chain
 from trunkline.statics.equilibria import equilibrium
 

@@ -12,9 +12,9 @@ from demo.plant import PlantSettings, build_plant
 from demo.recorder import write_log, write_session
 from trunkline.arm.mjcf import unit_name
 from trunkline.arm.spiral import spiral_chain
-from trunkline.pipeline.config import settings
 from trunkline.pipeline.stage import output_folder, run_stage
 from trunkline.progress import progress
+from trunkline.settings import settings
 
 SESSION = Path("data/raw/demo")
 

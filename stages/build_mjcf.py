@@ -15,8 +15,8 @@ from trunkline.arm.spiral import spiral_chain
 from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.figures.arm import arm_figure
 from trunkline.figures.style import save_figure
-from trunkline.pipeline.config import settings
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.settings import settings
 
 ARTIFACTS = Path("artifacts/build_mjcf")
 

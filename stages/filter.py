@@ -9,10 +9,10 @@ from pydantic import Field, PositiveFloat
 from trunkline.figures.data import filter_figure
 from trunkline.figures.style import save_figure
 from trunkline.filtering.filter import Filter, filter_take, summary
-from trunkline.pipeline.config import settings
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
-from trunkline.takes.take import read_takes
+from trunkline.settings import settings
+from trunkline.trials.take import read_takes
 from trunkline.trials.trial import write_trials
 
 INGEST, PROCESSED, ARTIFACTS = (

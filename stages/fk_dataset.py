@@ -7,12 +7,12 @@ import pandas as pd
 from pydantic import Field
 
 from trunkline.arm.tendons import require_tendons
+from trunkline.dataset.table import Density, mujoco_deviation, sample_table, split
 from trunkline.figures.dataset import density_figure, deviation_figure
 from trunkline.figures.style import save_figure
-from trunkline.ik.dataset import Density, mujoco_deviation, sample_table, split
-from trunkline.pipeline.config import settings
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
+from trunkline.settings import settings
 from trunkline.statics.chain import load_model, read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")

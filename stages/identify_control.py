@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from trunkline.arm.tendons import require_tendons
-from trunkline.identification.run import run
 from trunkline.identification.settings import IdentificationSettings
+from trunkline.pipeline.identify import run
 from trunkline.pipeline.stage import run_stage
 
 Config = IdentificationSettings

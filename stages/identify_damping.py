@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from trunkline.identification.run import run
 from trunkline.identification.settings import IdentificationSettings
+from trunkline.pipeline.identify import run
 from trunkline.pipeline.stage import run_stage
 
 Config = IdentificationSettings

@@ -8,13 +8,13 @@ from pydantic import Field, PositiveFloat
 from trunkline.errors import InputError
 from trunkline.figures.data import quality_figure
 from trunkline.figures.style import save_figure
-from trunkline.pipeline.config import settings
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.sessions.session import read_session
+from trunkline.settings import settings
 from trunkline.takes.intake import Limits, align_clocks, settle_vertical, take_in
 from trunkline.takes.quality import judge, report, summary
-from trunkline.takes.take import write_takes
+from trunkline.trials.take import write_takes
 
 RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Path("artifacts/ingest")
 

@@ -13,8 +13,8 @@ from trunkline.arm.tendons import require_tendons
 from trunkline.errors import InputError
 from trunkline.figures.package import roundtrip_figure
 from trunkline.figures.style import save_figure
-from trunkline.pipeline.config import settings
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.settings import settings
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with
 from trunkline.unity.manifest import Manifest

@@ -12,13 +12,13 @@ from trunkline.fields.mesh import Surface, write_obj
 from trunkline.figures.maps import heldout_figure, maps_figure, slices_figure
 from trunkline.figures.style import save_figure
 from trunkline.panda.mjcf import panda_spec
-from trunkline.pipeline.config import settings
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.reachability.checks import Check, LabelSettings, SpotCheckSettings, check_maps
 from trunkline.reachability.maps import HybridSettings, Maps, RigidSettings, blend_angles, build_maps
 from trunkline.reachability.soft import SoftShape
 from trunkline.reachability.tips import ArmTips, Tips
+from trunkline.settings import settings
 from trunkline.statics.chain import Chain, load_model, read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")

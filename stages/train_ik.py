@@ -10,10 +10,7 @@ import torch
 from pydantic import Field, PositiveFloat, PositiveInt
 
 from trunkline.arm.tendons import require_tendons
-from trunkline.errors import InputError
-from trunkline.figures.network import error_map_figure, learning_figure, tip_error_figure
-from trunkline.figures.style import save_figure
-from trunkline.ik.dataset import (
+from trunkline.dataset.table import (
     length_by_tension,
     length_columns,
     sample_table,
@@ -21,14 +18,17 @@ from trunkline.ik.dataset import (
     tip_by_tension,
     turn_by_tension,
 )
+from trunkline.errors import InputError
+from trunkline.figures.network import error_map_figure, learning_figure, tip_error_figure
+from trunkline.figures.style import save_figure
 from trunkline.ik.network import INPUTS, InverseKinematics, Training, train
 from trunkline.ik.onnx import OPSET, to_onnx
 from trunkline.ik.polish import polish
 from trunkline.ik.score import TipErrors, beyond_range, outside_targets, tip_errors
 from trunkline.ik.tip_loss import tip_loss
-from trunkline.pipeline.config import settings
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
+from trunkline.settings import settings
 from trunkline.statics.chain import Chain, load_model, read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")

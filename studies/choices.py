@@ -26,15 +26,14 @@ from trunkline.errors import in_one_line
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Fit, identify
-from trunkline.identification.run import CAD_MODEL, doubts
 from trunkline.identification.settings import (
     DifferentialEvolutionSettings,
     IdentificationSettings,
     LeastSquaresSettings,
     Range,
 )
-from trunkline.identification.setup import read_reported, read_spec, set_up
 from trunkline.pipeline.config import load_config
+from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported, read_spec, set_up
 from trunkline.trials.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")

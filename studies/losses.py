@@ -21,18 +21,18 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.identification.case import STAGES, Case, Size, read_case, require_demo
 from stages.filter import Config as FilterConfig
-from trunkline.arm.parameters import PARAMETERS
 from trunkline.errors import in_one_line
 from trunkline.frames import wxyz_from_rotation
 from trunkline.identification.certainty import certainty
 from trunkline.identification.evaluation import replay
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS
+from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.pose_fit import PoseFit, fit_pose
 from trunkline.identification.search import descend
-from trunkline.identification.setup import read_spec
 from trunkline.identification.surrogate import surrogate
 from trunkline.pipeline.config import load_config
+from trunkline.pipeline.identify import read_spec
 from trunkline.progress import progress
 from trunkline.signals.smoothing import low_pass
 

@@ -20,9 +20,9 @@ from trunkline.filtering.filter import filter_take
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.identify import identify
 from trunkline.identification.settings import Range
-from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
-from trunkline.takes.take import Take, read_takes
+from trunkline.pipeline.identify import set_up
+from trunkline.trials.take import Take, read_takes
 
 EXAMPLE = Path("examples/asl_trunk")
 

@@ -14,9 +14,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trunkline.dataset.sampling import pull_directions
 from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt, save_figure
 from trunkline.frames import gravity_in_base
-from trunkline.ik.sampling import pull_directions
 from trunkline.progress import progress
 from trunkline.statics.chain import Chain, load_model, read_chain
 from trunkline.statics.equilibria import equilibrium, equilibrium_paths

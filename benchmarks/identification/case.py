@@ -12,17 +12,16 @@ import numpy as np
 
 from benchmarks.identification.rival import Rival
 from benchmarks.identification.timing import Spent
-from trunkline.arm.parameters import PARAMETERS
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Fit, identify, values_of, with_parameters
 from trunkline.identification.loss import loss_of
 from trunkline.identification.parameter_table import undetermined
+from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Problem
-from trunkline.identification.run import CAD_MODEL
-from trunkline.identification.setup import TRIALS, read_reported, read_spec, set_up
 from trunkline.pipeline.config import load_config
+from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported, read_spec, set_up
 
 # every stage, and the model that it begins with
 STAGES = {

@@ -11,7 +11,7 @@ from mujoco.batch import Batch
 
 from benchmarks.identification.case import Case, ReadCase, Size
 from benchmarks.identification.timing import Spent, alternate
-from trunkline.arm.parameters import Fields
+from trunkline.identification.parameters import Fields
 from trunkline.identification.population import Population
 from trunkline.threads import thread_count
 

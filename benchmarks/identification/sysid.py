@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.identification.case import SAME_LOSS, STAGES, Case, Identified, ReadCase, Size, identified
 from benchmarks.identification.rival import Rival
-from trunkline.arm.parameters import PARAMETERS
 from trunkline.identification.loss import loss_of
+from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.search import DIFFERENCE, LeastSquares, linearise
 
 UNMOVED = 0.01  # a value that changed by less than this share of itself was left where it was

@@ -1,0 +1,1 @@
+"""Distance grids and meshes, which know no robot."""

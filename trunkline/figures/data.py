@@ -11,7 +11,7 @@ from matplotlib.patches import Patch
 from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE
 from trunkline.signals.base_frame import average_base, to_base_frame
 from trunkline.takes.quality import Quality
-from trunkline.takes.take import Take
+from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
 
 BIN = 1 / 30  # s, of the coverage picture

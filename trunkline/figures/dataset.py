@@ -4,8 +4,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from trunkline.dataset.table import Density
 from trunkline.figures.style import IDENTIFIED, INITIAL, VALIDATE, plt
-from trunkline.ik.dataset import Density
 
 SLICE = 0.008  # m, half thickness of the slices shown
 GOAL_MM = 0.02  # median distance of the statics from MuJoCo at rest

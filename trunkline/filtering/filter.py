@@ -9,8 +9,8 @@ from trunkline.errors import InputError
 from trunkline.frames import make_continuous, tilt_of_gravity
 from trunkline.signals.base_frame import average_base, gravity_from_up, to_base_frame
 from trunkline.signals.smoothing import bridged, fill_gaps, low_pass, outliers, resample
-from trunkline.signals.start import cycle_time, free_time, release_time
-from trunkline.takes.take import Take
+from trunkline.trials.start import cycle_time, free_time, release_time
+from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
 
 

@@ -5,12 +5,12 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from trunkline.arm.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.arm.rest import RestShape, spring_references
 from trunkline.identification.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import LossWeights
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import Bounds, Problem
+from trunkline.identification.resting import RestShape, spring_references
 from trunkline.identification.search import (
     Convergence,
     Found,

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from trunkline.arm.parameters import PARAMETERS
 from trunkline.identification.certainty import weakest_in_words
 from trunkline.identification.identify import Identification
+from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Bounds
 
 ENDS = np.array([-1, 1])

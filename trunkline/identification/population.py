@@ -7,9 +7,9 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.arm.parameters import Fields
-from trunkline.arm.rest import longest_step
 from trunkline.identification.experiment import Experiment
+from trunkline.identification.parameters import Fields
+from trunkline.simulation.rest import longest_step
 from trunkline.threads import thread_count
 
 RELAXATION = 0.4  # s, damping over stiffness while a static shape settles: quick, without swinging

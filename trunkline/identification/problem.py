@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.arm.parameters import PARAMETERS, candidate_fields, unit_of_hinge
-from trunkline.arm.rest import RestShape, spring_references
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, unit_of_hinge
 from trunkline.identification.population import Population
+from trunkline.identification.resting import RestShape, spring_references
 
 DIVERGED_LOSS = 1e3  # finite, and with sensible weights far above the loss of any arm that stays in one piece
 

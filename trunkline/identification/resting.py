@@ -1,16 +1,55 @@
-"""The shape in which an arm comes to rest after it was let go: what its springs hold when nothing pulls."""
+"""The shape in which an arm comes to rest after it was let go, and spring references that hold it there."""
+
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 
-from trunkline.arm.rest import RestShape, rest_shape
 from trunkline.errors import InputError
 from trunkline.identification.experiment import Experiment
+from trunkline.identification.parameters import Fields
 from trunkline.identification.pose_fit import fit_pose
 
 LAST = 0.5  # s at the end of a release in which it has to be at rest
 SAME_GRAVITY = 0.5  # m/s², 3° of tilt
+NEWTON_STEPS = 30  # far more than a stiffening spring needs
 STILL = 2e-3  # m, of every coordinate's range in that time
+
+
+@dataclass(frozen=True)
+class RestShape:
+    """A shape at rest under gravity.
+
+    pose: joint angles, rad. Shape (nq,). load: torque that gravity puts on each spring there, N m. Shape (nq,).
+    """
+
+    pose: np.ndarray
+    load: np.ndarray
+
+
+def rest_shape(model: mujoco.MjModel, pose: np.ndarray, gravity: np.ndarray) -> RestShape:
+    """The shape `pose` (nq,) of an arm without pull, and what its springs bear there under `gravity` (3,) m/s²."""
+    model = model.__copy__()
+    model.opt.gravity[:] = gravity
+    data = mujoco.MjData(model)
+    data.qpos[:] = pose
+    mujoco.mj_forward(model, data)
+    return RestShape(np.array(pose), -data.qfrc_bias.copy())
+
+
+def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) -> np.ndarray:
+    """Joint angles q_0 at which each candidate's springs are slack, so that it rests in `rest`. Shape (C, nq).
+
+    The torque of a spring is -(a x + b x² + c x³), x = q - q_0. At rest it balances the load, which bends it by x:
+    the stiffer the arm, the less of its shape comes from gravity. Fields that `fields` lacks are the model's.
+    """
+    a = fields.get("jnt_stiffness", model.jnt_stiffness[None])
+    poly = fields.get("jnt_stiffnesspoly", model.jnt_stiffnesspoly[None])
+    b, c = poly[..., 0], poly[..., 1]
+    bend = rest.load / a
+    for _ in range(NEWTON_STEPS):
+        bend = bend - (bend * (a + bend * (b + bend * c)) - rest.load) / (a + bend * (2 * b + 3 * bend * c))
+    return rest.pose - bend
 
 
 def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...]) -> RestShape:

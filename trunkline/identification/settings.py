@@ -4,8 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
 
-from trunkline.arm.parameters import PARAMETERS
-from trunkline.pipeline.config import settings
+from trunkline.identification.parameters import PARAMETERS
+from trunkline.settings import settings
 
 ParameterName = Literal[
     "stiffness", "hardening", "joint_friction", "damping", "tendon_friction", "friction_time",

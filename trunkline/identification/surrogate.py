@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.arm.parameters import PARAMETERS
+from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Problem
 
 REACH = 0.2  # of the differences, in ln(value): about as far as intervals reach, far beyond the jumps

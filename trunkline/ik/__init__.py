@@ -1,0 +1,1 @@
+"""Inverse kinematics: samples of equilibria, the network that inverts them, its score and its file."""

@@ -1,0 +1,1 @@
+"""The rigid robot: kinematics, collisions, inverse kinematics, MJCF."""

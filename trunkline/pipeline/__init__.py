@@ -1,1 +1,1 @@
-"""The pipeline seen as a whole: its settings, its lock file, its regression gate and its README."""
+"""The edge: settings, files, the lock, the gate, the README."""

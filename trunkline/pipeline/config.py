@@ -10,14 +10,13 @@ import difflib
 import json
 import runpy
 from pathlib import Path
-from typing import Any, TypeVar, dataclass_transform
+from typing import Any, TypeVar
 
 from hydra import compose, initialize_config_dir
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import InterpolationToMissingValueError, OmegaConfBaseException
-from pydantic import ConfigDict, Field, TypeAdapter, ValidationError
-from pydantic.dataclasses import dataclass
+from pydantic import TypeAdapter, ValidationError
 from yaml import YAMLError
 
 from trunkline.errors import InputError
@@ -26,17 +25,7 @@ Schema = TypeVar("Schema")
 
 SHARED = "shared"  # folder beside those of the stages, of groups that several of them use
 UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
-PROJECT = Path(__file__).parents[1]
-
-
-@dataclass_transform(kw_only_default=True, field_specifiers=(Field,))
-def settings(cls: type[Schema]) -> type[Schema]:
-    """Decorate a stage's ``Config`` and the classes nested in it: unknown keys and conversions are refused.
-
-    The class becomes a keyword-only pydantic dataclass. Ranges: ``PositiveFloat``, ``Field(gt=0)``; choices:
-    ``Literal``; rules between fields: a ``__post_init__`` that raises ValueError.
-    """
-    return dataclass(cls, config=ConfigDict(extra="forbid", strict=True), kw_only=True)
+PROJECT = Path(__file__).parents[2]
 
 
 def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Schema:

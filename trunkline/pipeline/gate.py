@@ -18,7 +18,7 @@ from omegaconf import OmegaConf
 from pydantic import Field, NonNegativeFloat, PositiveFloat, TypeAdapter, ValidationError
 
 from trunkline.errors import InputError
-from trunkline.pipeline.config import settings
+from trunkline.settings import settings
 
 
 @settings

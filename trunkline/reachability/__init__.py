@@ -1,1 +1,1 @@
-"""Where the rigid arm, the soft arm and both together can reach: kinematics, grids, meshes, maps."""
+"""Reachability maps: of the rigid arm, of the soft arm per gravity angle, of both together."""

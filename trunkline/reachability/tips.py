@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from trunkline.ik.sampling import sample_angle
+from trunkline.dataset.sampling import sample_angle
 from trunkline.statics.chain import Chain
 
 

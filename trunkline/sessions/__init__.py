@@ -1,0 +1,1 @@
+"""A session: what session.yaml says, and the logs that it names."""

@@ -1,0 +1,1 @@
+"""Numbers on a clock: smoothing, clocks, units, the base frame."""

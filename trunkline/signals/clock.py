@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.signals.smoothing import fill_gaps, low_pass, outliers
-from trunkline.signals.start import onset
+from trunkline.trials.start import onset
 
 LAG = 0.2  # s, the most by which the arm's lag may put a fit of the whole motion off
 MIN_TRAVEL = 5e-3  # m; a tendon that moves less says nothing about time

@@ -1,0 +1,1 @@
+"""One way to rest and one way to move, in batches of simulations."""

@@ -7,10 +7,9 @@ import mujoco
 import mujoco.batch
 import numpy as np
 
-from trunkline.arm.rest import longest_step
-from trunkline.statics.supported import unit_bodies
 from trunkline.threads import thread_count
 
+LONGEST_STEP = 0.005  # s
 RETARDATION = 0.25  # s, damping over stiffness of each joint while settling: about critical for the arm's slowest swing
 CHUNK = 0.5  # s between looks at whether all simulations rest
 REST_SPEED = 5e-6  # rad/s, of the fastest joint: at this retardation it has about as many rad still to go
@@ -48,7 +47,7 @@ def settle(
     model = _frictionless(model)
     count = len(commands)
     simulation = mujoco.batch.Batch(model, nsim=count, nthread=thread_count())
-    base = model.body_parentid[unit_bodies(model)[0]]
+    base = model.body_parentid[np.flatnonzero(model.body_jntnum)[0]]
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     to_world = data.xmat[base].reshape(3, 3)  # an identified mount may be turned
@@ -87,3 +86,12 @@ def _frictionless(model: mujoco.MjModel) -> mujoco.MjModel:
 def _straight_commands(model: mujoco.MjModel) -> np.ndarray:
     """Path length of each actuator's tendon when the arm is straight, m. Shape (K,)."""
     return model.tendon_length0[model.actuator_trnid[:, 0]]
+
+
+def longest_step(model: mujoco.MjModel) -> float:
+    """Time step, s, for an arm that is damped so that it settles: the rest shape is the same as at any smaller one.
+
+    MuJoCo softens a joint limit whose time constant is less than two steps (flag refsafe).
+    """
+    constants = model.jnt_solref[:, 0][model.jnt_solref[:, 0] > 0]  # the others are in another format
+    return min([LONGEST_STEP, *constants / 2])

@@ -1,0 +1,1 @@
+"""Takes: trials as recorded, checked and repaired, each on its own clocks."""

@@ -28,8 +28,8 @@ from trunkline.takes.frozen import frozen
 from trunkline.takes.lost import find_lost, put_back
 from trunkline.takes.motors import check_curl, read_motors
 from trunkline.takes.swaps import find_swaps, usual_distances
-from trunkline.takes.take import Take
 from trunkline.takes.vertical import check_vertical
+from trunkline.trials.take import Take
 
 UNIT = {"m": 1.0, "mm": 1e-3}
 

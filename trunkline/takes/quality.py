@@ -6,7 +6,7 @@ import numpy as np
 
 from trunkline.signals.smoothing import noise_level
 from trunkline.takes.checks import Findings
-from trunkline.takes.take import Take
+from trunkline.trials.take import Take
 
 
 @dataclass

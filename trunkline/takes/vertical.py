@@ -3,7 +3,7 @@
 import numpy as np
 
 from trunkline.signals.base_frame import average_base
-from trunkline.takes.take import Take
+from trunkline.trials.take import Take
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 OFF = np.radians(15)  # a misfit beyond aiming a tilt by hand

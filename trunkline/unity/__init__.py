@@ -1,0 +1,1 @@
+"""The Unity package: the importer's rules and frame, the manifest, the files, and the way back."""

@@ -2,7 +2,7 @@
 
 MuJoCo's joint torque is -(a q + b q² + c q³) for a spring and -(a v + b v|v| + c v³) for a damper. The line
 that stands in for it is nearest in the mean square over the angles and speeds of a given movement, Σ τ q / Σ q².
-In Unity, `unity/CalibratedSprings.cs` writes the polynomials back; `compile_with` does the same here.
+In Unity, `csharp/CalibratedSprings.cs` writes the polynomials back; `compile_with` does the same here.
 """
 
 from dataclasses import dataclass

@@ -18,7 +18,7 @@ from trunkline.unity.rules import Violation, lint_mjcf
 MODEL = "Runtime/Model/arm.xml"
 NETWORK = "Runtime/Network/ik.onnx"
 MANIFEST = "Runtime/manifest.json"
-SCRIPTS = [Path(__file__).parent / "unity" / name for name in ("CalibratedSprings.cs", "Trunkline.asmdef")]
+SCRIPTS = [Path(__file__).parent / "csharp" / name for name in ("CalibratedSprings.cs", "Trunkline.asmdef")]
 
 
 @dataclass

@@ -1,0 +1,179 @@
+"""The stand-in lab: its plant is not the model, its experiments are those promised, its settings are checked."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+import yaml
+from scipy.spatial.transform import Rotation
+
+from demo.experiments import curl_trials, release_trials, tilt_trials
+from demo.laboratory import SAMPLE_RATE, record, record_releases
+from demo.plant import build_plant
+from demo.record import Config
+from tests.support.small_arm import small_spec
+from trunkline.arm.mjcf import unit_name
+from trunkline.arm.spiral import spiral_chain
+from trunkline.errors import InputError
+from trunkline.pipeline.config import load_config
+
+DEMO = Path(__file__).parents[2] / "demo"
+UNITS = 6
+CONFIG = load_config(Config, "record", DEMO)
+SHORT = replace(
+    CONFIG.experiments, tilts=[0.0, 90.0], tilt_repeats=1, settle=0.05, rest_duration=0.05,
+    release_directions=[0.0, 90.0], bend_duration=0.05, bend_settle=0.02, hold_duration=0.033, release_duration=0.1,
+    curl_levels=[20.0], curl_tendons=[[1]], curl_rest=0.0515, curl_ramp=0.1, curl_hold=0.05,
+)  # fmt: skip
+
+
+def arm(units, seed):
+    a = CONFIG.arm
+    chain = spiral_chain(a.length, a.base_width, a.tip_width, units)
+    return build_plant(chain, CONFIG.plant, a.tendons, np.random.default_rng(seed))
+
+
+def session(seed):
+    tracked = [unit_name(index) for index in (1, 3, 5)]
+    return record(arm(UNITS, seed), CONFIG.motors, SHORT, 3, tracked, np.random.default_rng(seed))
+
+
+def test_a_seed_is_one_session_and_another_seed_is_another():
+    first, again, other = session(1), session(1), session(2)
+    assert [truth.name for truth in first] == ["tilt_000_a", "tilt_090_a", "release_000", "release_090", "curl_1_020"]
+    for a, b, c in zip(first, again, other, strict=True):
+        np.testing.assert_array_equal(a.positions, b.positions)
+        np.testing.assert_array_equal(a.base_quaternion, b.base_quaternion)
+        np.testing.assert_array_equal(a.tendon_positions, b.tendon_positions)
+        assert np.abs(a.positions[-1] - c.positions[-1]).max() > 1e-6, a.name
+    assert np.abs(first[0].base_quaternion - other[0].base_quaternion).max() > 1e-4
+
+
+def test_every_array_of_a_trial_is_on_its_clock():
+    """Also where a duration is not a whole number of samples, as the session's are not."""
+    for truth in session(1):
+        assert len(truth.time) == len(truth.positions) == len(truth.quaternions) == len(truth.tendon_positions)
+        assert len(truth.command_time) == len(truth.commands)
+
+
+def test_motors_lag_behind_their_commands():
+    curl = session(1)[-1]
+    command, wound = curl.commands[:, 0], curl.tendon_positions[:, 0]
+    late = round(CONFIG.motors.command_delay * SAMPLE_RATE)
+    rising = np.flatnonzero(command > 0)[0]
+    np.testing.assert_allclose(wound[: rising + late - 1], 0, atol=1e-12)
+    assert wound.max() == pytest.approx(0.020, rel=1e-6)
+    assert np.diff(wound).max() * SAMPLE_RATE <= CONFIG.motors.rate_limit + 1e-9
+
+
+def test_the_plant_is_not_the_model():
+    plant, model = arm(UNITS, 1), small_spec(UNITS).compile()
+    assert plant.nv == 2 * model.nv
+    assert plant.opt.integrator != model.opt.integrator
+    assert plant.opt.timestep != model.opt.timestep
+    identified = yaml.safe_load((DEMO.parent / "params.yaml").read_text())["build_mjcf"]["solver"]["timestep"]
+    assert CONFIG.plant.timestep != identified
+    assert (plant.jnt_stiffnesspoly[:, 1] > 0).all(), "joints harden"
+    assert (plant.dof_frictionloss > 0).all(), "joints have dry friction"
+
+
+def test_masses_and_stiffnesses_are_off_by_what_the_settings_say():
+    exact = replace(CONFIG.plant, mass_factor=1.0, stiffness_scatter=0.0)
+    a = CONFIG.arm
+    chain = spiral_chain(a.length, a.base_width, a.tip_width, a.units)
+    reference = build_plant(chain, exact, a.tendons, np.random.default_rng(0))
+    plant = arm(a.units, 3)
+    assert mujoco.mj_getTotalmass(plant) == pytest.approx(1.05 * mujoco.mj_getTotalmass(reference))
+    ratio = plant.jnt_stiffness / reference.jnt_stiffness - 1
+    assert 0.05 < np.abs(ratio).max() <= 0.08
+    assert np.std(ratio) == pytest.approx(0.08 / np.sqrt(3), rel=0.4)
+
+
+def test_every_imperfection_of_the_lab_is_there():
+    plant, motors, seen = CONFIG.plant, CONFIG.motors, CONFIG.instruments
+    assert (plant.stiffness_scatter, abs(plant.mass_factor - 1)) == (0.08, pytest.approx(0.05))
+    assert min(plant.hardening, plant.dry_friction, motors.rate_limit, motors.command_delay) > 0
+    assert (seen.position_noise_mm, seen.orientation_noise_deg) == (0.3, 0.3)
+    assert seen.occlusion_ms == (50.0, 300.0)
+    assert min(seen.occlusions_per_s, seen.dropped_frames, seen.outliers, seen.stamp_jitter_ms) > 0
+    assert min(seen.outlier_mm, seen.outlier_deg, seen.delivery_ms, seen.tendon_noise_mm) > 0
+    assert abs(seen.clock_offset_s) > 0
+    assert abs(seen.up[2]) < 1, "the cameras' frame is not z-up"
+
+
+def test_the_experiments_are_those_of_the_table():
+    tests = CONFIG.experiments
+    assert tests.tilts == [0.0, 30.0, 60.0, 90.0]
+    assert len(tests.release_directions) >= 4
+    assert tests.curl_levels == [20.0, 40.0, 60.0, 80.0, 100.0]
+    assert len(CONFIG.arm.tracked) == 18
+    for begin in (tests.hold_duration, tests.curl_rest):
+        frames = begin * CONFIG.instruments.frame_rate
+        assert 0.2 < frames % 1 < 0.8, "nothing begins on a frame"
+
+
+def test_a_quarter_of_each_experiment_is_for_validation():
+    tests = CONFIG.experiments
+    tilts, releases, curls = tilt_trials(tests), release_trials(tests), curl_trials(tests)
+    held = [[trial for trial in trials if trial.split == "validate"] for trials in (tilts, releases, curls)]
+    assert [len(trials) for trials in (tilts, releases, curls)] == [16, 12, 15]
+    assert [len(trials) for trials in held] == [4, 3, 4]
+    assert {trial.level for trial in held[0]} == set(tests.tilts)
+    levels = {trial.level for trial in held[2]}
+    assert len(levels) == 4
+    assert 100.0 in levels
+    assert {trial.level for trial in curls if trial.split == "identify"} == set(tests.curl_levels)
+    groups = {trial.name.rsplit("_", 1)[0] for trial in held[2]}
+    assert groups == {"curl_1", "curl_2_3", "curl_2"}
+
+
+def test_the_arm_is_fully_bent_when_it_is_let_go():
+    """By SPEC the whole arm turns by 270° or more; here with the weakest of the pulls."""
+    tests = replace(
+        CONFIG.experiments, release_directions=[0.0], release_factors=CONFIG.experiments.release_factors[:1],
+        release_duration=0.05,
+    )  # fmt: skip
+    assert CONFIG.experiments.release_factors[0] == min(CONFIG.experiments.release_factors)
+    tracked = [unit_name(number - 1) for number in CONFIG.arm.tracked]
+    (truth,) = record_releases(arm(CONFIG.arm.units, 7), tests, CONFIG.arm.tendons, tracked)
+    held = np.vstack([truth.base_quaternion, truth.quaternions[round(tests.hold_duration * SAMPLE_RATE) - 1]])
+    turns = Rotation.from_quat(held, scalar_first=True)
+    bends = (turns[:-1].inv() * turns[1:]).as_rotvec()  # all about +-y: they add up
+    assert np.degrees(np.abs(bends.sum(axis=0)[1])) >= 270
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("experiments.validate_every", 1, "found 1, expected greater than or equal to 2"),
+        ("experiments.validate_every", 50, "validate_every: found 50, expected trials of .* in both splits"),
+        ("experiments.tilt_repeats", 0, "found 0"),
+        ("experiments.curl_hold", 0.0, "curl_hold: found 0.0"),
+        ("experiments.curl_levels", [20.0, -40.0], "curl_levels.1: found -40.0"),
+        ("experiments.curl_levels", [20.0, 20.3], "experiments.curl_levels: found 'curl_1_020' twice"),
+        ("experiments.curl_tendons", [[1], [4]], r"experiments.curl_tendons: found \[4\], expected .* from 1 to 3"),
+        ("experiments.release_directions", [0.0, 360.0], "release_directions.1: found 360.0"),
+        ("plant.timestep", 0.0, "timestep: found 0.0"),
+        ("plant.timestep", 7.0e-4, "plant.timestep: found 0.0007, expected 0.002 s or a whole fraction"),
+        ("arm.tracked", [1, 25], r"arm.tracked: found \[1, 25\], expected distinct units from 1 to 24"),
+        ("arm.tracked", [1, 1], "arm.tracked: found .* expected distinct"),
+        ("motors.rate_limit", -1.0, "rate_limit: found -1.0"),
+        ("instruments.dropped_frames", 1.5, "dropped_frames: found 1.5"),
+        ("instruments.occlusion_ms", [300.0, 50.0], "occlusion_ms: found .* expected the shortest first"),
+        ("instruments.frame_rat", 120.0, "unknown key, did you mean 'frame_rate'"),
+    ],
+)
+def test_a_mistake_in_the_settings_is_one_line(tmp_path, key, value, message):
+    shutil.copytree(DEMO / "conf", tmp_path / "conf")
+    shutil.copy(DEMO / "params.yaml", tmp_path)
+    file = tmp_path / "conf/record/config.yaml"
+    config = yaml.safe_load(file.read_text())
+    group, name = key.split(".")
+    config[group][name] = value
+    file.write_text(yaml.safe_dump(config))
+    with pytest.raises(InputError, match=message) as error:
+        load_config(Config, "record", tmp_path)
+    assert "\n" not in str(error.value)

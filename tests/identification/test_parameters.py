@@ -1,0 +1,99 @@
+"""Parameters: what is written is what is read, and the physics that it stands for follows."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.support.small_arm import small_spec
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, save_model, set_fields, unit_of_hinge
+
+VALUES = {
+    "stiffness": 2.5, "hardening": 0.7, "joint_friction": 0.01, "damping": 0.02, "tendon_friction": 0.8,
+    "friction_time": 0.03, "kp": 1500.0, "kv": 60.0, "force_range": 45.0, "time_constant": 0.08,
+    "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
+}  # fmt: skip
+
+
+def model_with(values: dict[str, float], factors: dict[str, np.ndarray] | None = None) -> mujoco.MjModel:
+    model = small_spec().compile()
+    set_fields(model, candidate_fields(model, {k: np.array([v]) for k, v in values.items()}, factors))
+    return model
+
+
+def test_every_parameter_has_a_case():
+    assert set(VALUES) == set(PARAMETERS)
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_what_is_written_is_read(name):
+    model = model_with({name: VALUES[name]})
+    assert PARAMETERS[name].read(model) == pytest.approx(VALUES[name])
+    others = set(VALUES) - {name} - ({"joint_friction"} if name == "stiffness" else set())
+    start = small_spec().compile()
+    for other in others:  # nothing else moves
+        assert PARAMETERS[other].read(model) == pytest.approx(PARAMETERS[other].read(start)), other
+
+
+def test_all_at_once_in_any_order():
+    model = model_with(dict(reversed(VALUES.items())))
+    for name, value in VALUES.items():
+        assert PARAMETERS[name].read(model) == pytest.approx(value), name
+
+
+def test_scaling_keeps_the_arm_s_proportions():
+    start, model = small_spec().compile(), model_with({"stiffness": 2.5, "damping": 0.02})
+    np.testing.assert_allclose(model.jnt_stiffness / start.jnt_stiffness, 2.5 / start.jnt_stiffness[0])
+    np.testing.assert_allclose(model.dof_damping / start.dof_damping, 0.02 / start.dof_damping[0])
+
+
+def test_candidates_do_not_mix():
+    model = small_spec().compile()
+    fields = candidate_fields(model, {"kp": np.array([100.0, 200.0, 300.0])})
+    assert fields["actuator_gainprm"].shape == (3, *model.actuator_gainprm.shape)
+    for candidate, kp in enumerate((100.0, 200.0, 300.0)):
+        set_fields(model, fields, candidate)
+        assert PARAMETERS["kp"].read(model) == kp
+        assert (model.actuator_biasprm[:, 1] == -kp).all()
+
+
+def test_a_unit_s_factor_is_shared_by_its_two_hinges():
+    start = small_spec().compile()
+    factors = np.linspace(0.9, 1.1, 8)
+    model = model_with({}, {"stiffness": factors[None]})
+    np.testing.assert_allclose(model.jnt_stiffness / start.jnt_stiffness, np.repeat(factors, 2))
+    assert unit_of_hinge(model).tolist() == [index // 2 for index in range(16)]
+
+
+def test_hardening_makes_the_torque_k_times_q_plus_h_q_cubed():
+    model = model_with({"stiffness": 3.0, "hardening": 0.7, "damping": 0.0})
+    data = mujoco.MjData(model)
+    data.qpos[0] = -0.4
+    mujoco.mj_forward(model, data)
+    assert data.qfrc_passive[0] == pytest.approx(3.0 * (0.4 + 0.7 * 0.4**3))
+
+
+def test_a_longer_friction_time_lets_a_hook_creep_straight_sooner():
+    """Friction that holds any hook is regularised: a stuck tendon creeps, the faster the longer its time constant."""
+    left = []  # share of the hook, after some time
+    for friction_time in (0.01, 0.03, 0.1):
+        model = model_with({"tendon_friction": 5.0, "friction_time": friction_time, "damping": 0.05})
+        model.opt.gravity[:] = 0
+        data = mujoco.MjData(model)
+        data.qpos[1::2] = 0.1
+        data.ctrl[:] = data.act[:] = model.tendon_length0 + 0.3  # motors let the tendons go
+        hooks = []  # m of tendon that the bend has taken up
+        for steps in (200, 800):
+            mujoco.mj_step(model, data, steps)
+            hooks.append(np.abs(data.ten_length - model.tendon_length0).max())
+        left.append(hooks[1] / hooks[0])
+    assert 1 > left[0] > 1.1 * left[1] > 2 * left[2] > 0
+
+
+def test_a_saved_model_has_the_parameters():
+    spec = small_spec()
+    model = spec.compile()
+    factors = {"stiffness": np.linspace(0.9, 1.1, 8)[None]}
+    set_fields(model, candidate_fields(model, {k: np.array([v]) for k, v in VALUES.items()}, factors))
+    loaded = mujoco.MjModel.from_xml_string(save_model(spec, model))
+    for name in {field for parameter in PARAMETERS.values() for field in parameter.fields}:
+        np.testing.assert_allclose(getattr(loaded, name), getattr(model, name), rtol=1e-5, err_msg=name)

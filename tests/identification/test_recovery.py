@@ -1,0 +1,101 @@
+"""Known parameters come back, from a plant that is the model."""
+
+import numpy as np
+import pytest
+
+from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
+from trunkline.identification.experiment import prepare
+from trunkline.identification.identify import Fit, Method, identify
+from trunkline.identification.loss import LossWeights
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.problem import DIVERGED_LOSS, Bounds, Problem
+from trunkline.identification.search import LeastSquares
+
+WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
+
+
+def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3)):  # noqa: B008
+    experiments = [prepare(trial, model, 437) for trial in trials]
+    bounds = {name: Bounds(*span) for name, span in parameters.items()}
+    method = Method(optimizer, 1.0, 437, 99, 8, 1e-9, LeastSquares(0, 1, 30, 1e-9), 0.1, seed=3)
+    fit = Fit(segments_of(model), bounds, per_joint, "positions", WEIGHTS, method)
+    return identify("test", model, experiments, fit)
+
+
+def changed(model, **values):
+    copy = model.__copy__()
+    set_fields(copy, candidate_fields(model, {k: np.array([v]) for k, v in values.items()}))
+    return copy
+
+
+def test_stiffness_and_hardening_come_back():
+    model = small_model()
+    true = {"stiffness": 0.6 * PARAMETERS["stiffness"].read(model), "hardening": 1.5}
+    truth = changed(model, **true)
+    trials = [tilt(truth, 30), tilt(truth, 60), tilt(truth, 90), tilt(truth, 45, "validate")]
+    found = identified(trials, model, {"stiffness": (0.2, 20.0), "hardening": (0.02, 20.0)})
+    assert found.values["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
+    assert found.values["hardening"] == pytest.approx(true["hardening"], rel=0.05)
+    assert not found.at_bound
+
+
+def test_per_joint_factors_come_back():
+    model = small_model()
+    factors = np.array([0.93, 1.06, 1.0, 0.96, 1.05, 0.98])
+    truth = model.__copy__()
+    set_fields(truth, candidate_fields(model, {}, {"stiffness": factors[None]}))
+    trials = [tilt(truth, angle) for angle in (30, 60, 90)]
+    span = PARAMETERS["stiffness"].read(model)
+    found = identified(trials, model, {"stiffness": (0.99 * span, 1.01 * span)}, ("stiffness",))
+    stiffness = found.models["identified"].jnt_stiffness / model.jnt_stiffness
+    np.testing.assert_allclose(stiffness[::2][:3], factors[:3], atol=0.02)  # beyond, gravity bends too little
+
+
+def test_damping_and_tendon_friction_and_its_creep_come_back():
+    model = small_model()
+    true = {"damping": 2.5 * PARAMETERS["damping"].read(model), "tendon_friction": 0.6, "friction_time": 0.03}
+    truth = changed(model, **true)
+    trials = [release(truth, 0.3, frames=100), release(truth, -0.25, frames=100)]
+    ranges = {"damping": (0.005, 1.0), "tendon_friction": (0.02, 3.0), "friction_time": (0.003, 0.3)}
+    found = identified(trials, model, ranges)
+    for name, tolerance in (("damping", 0.05), ("tendon_friction", 0.2), ("friction_time", 0.2)):
+        assert found.values[name] == pytest.approx(true[name], rel=tolerance), name
+
+
+def test_validate_trials_are_never_fitted():
+    model = small_model()
+    truth, other = (changed(model, stiffness=f * PARAMETERS["stiffness"].read(model)) for f in (0.7, 1.6))
+    trials = [tilt(truth, 60), tilt(truth, 90), tilt(other, 60, "validate"), tilt(other, 90, "validate")]
+    found = identified(trials, model, {"stiffness": (0.2, 20.0)})
+    assert found.values["stiffness"] == pytest.approx(PARAMETERS["stiffness"].read(truth), rel=0.02)
+
+
+def test_a_parameter_on_its_bound_is_named():
+    model = small_model()
+    trials = [tilt(model, 60), tilt(model, 90)]
+    true = PARAMETERS["stiffness"].read(model)
+    found = identified(trials, model, {"stiffness": (1.5 * true, 3 * true)})
+    assert found.at_bound == ["stiffness"]
+
+
+def test_control_parameters_move_the_loss_the_right_way():
+    model = small_model()
+    trials = [curl(model, 60, frames=110)]
+    experiments = [prepare(trial, model, 437) for trial in trials]
+    spans = {name: Bounds(1e-4, 1e6) for name in ("kp", "kv", "force_range", "time_constant")}
+    problem = Problem(model, experiments, segments_of(model), spans, "positions", WEIGHTS)
+    truth = np.log([PARAMETERS[name].read(model) for name in spans])
+    candidates = truth + np.concatenate([np.zeros((1, 4)), np.diag(np.log([0.5, 3, 0.01, 2]))])
+    losses = problem.losses(candidates)
+    assert (losses[1:] > 10 * losses[0]).all()
+
+
+def test_divergence_is_a_finite_penalty_and_counted():
+    model = small_model()
+    experiments = [prepare(release(model, 0.25, frames=30), model, 30)]
+    problem = Problem(model, experiments, segments_of(model), {"stiffness": Bounds(1, 1e7)}, "positions", WEIGHTS)
+    losses = problem.losses(np.log([[PARAMETERS["stiffness"].read(model)], [1e6]]))
+    assert losses[0] < 1e-3
+    assert losses[1] == pytest.approx(DIVERGED_LOSS)
+    assert problem.diverged == 1
+    assert problem.evaluations == 2

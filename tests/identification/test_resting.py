@@ -1,0 +1,102 @@
+"""An arm that hangs crooked and was never tilted: its shape, stiffness and damping from releases alone."""
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.support.small_arm import LIMIT
+from trunkline.arm.mjcf import Solver, Tendons, build_spec
+from trunkline.arm.uniform import uniform_chain, uniform_properties
+from trunkline.errors import InputError
+from trunkline.frames import gravity_in_base
+from trunkline.identification.experiment import prepare
+from trunkline.identification.identify import Fit, Method, identify
+from trunkline.identification.loss import LossWeights
+from trunkline.identification.parameters import candidate_fields, set_fields
+from trunkline.identification.problem import Bounds
+from trunkline.identification.resting import resting_shape
+from trunkline.identification.search import LeastSquares
+from trunkline.trials.trial import Trial
+
+ROOT = Path(__file__).parents[2]
+FRAME, FRAMES = 1 / 120, 360
+SEGMENTS = ("1", "2", "3")
+CROOKED = np.array([0.06, -0.04, 0.02, 0.05, -0.05, 0.08, 0.03, 0.1])
+WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
+
+
+def straight_arm() -> mujoco.MjSpec:
+    """An arm without tendons, of four units."""
+    chain = uniform_chain(0.3, 0.05, 4, 1.0)
+    return build_spec(
+        chain, uniform_properties(chain, [0.02], 1.0, 2.0), Tendons(0, 0.8, 0.1, 200, 10, 20, 0.1),
+        Solver(FRAME / 8, 1e-5, *LIMIT, *LIMIT), 0.1, {"1": 0.1, "2": 0.2, "3": 0.3},
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def model() -> mujoco.MjModel:
+    return straight_arm().compile()
+
+
+@pytest.fixture(scope="module")
+def truth(model) -> mujoco.MjModel:
+    truth = model.__copy__()
+    set_fields(truth, candidate_fields(model, {"stiffness": np.array([1.7]), "damping": np.array([0.15])}))
+    truth.qpos_spring[:] = CROOKED
+    return truth
+
+
+def release(truth, x: float, y: float, split="identify", frames=FRAMES) -> Trial:
+    """Let go of from hinges bent by (x, y) rad; positions alone."""
+    data = mujoco.MjData(truth)
+    data.qpos[:] = np.tile([x, y], 4)
+    positions = np.empty((frames, 3, 3))
+    sites = [truth.site(f"{name}_center").id for name in SEGMENTS]
+    for frame in range(frames):
+        mujoco.mj_forward(truth, data)
+        positions[frame] = data.site_xpos[sites]
+        mujoco.mj_step(truth, data, 8)
+    nothing = np.zeros((frames, 0))
+    return Trial(
+        f"release_{x}_{y}", "release", split, None, gravity_in_base(0.0), np.arange(frames) * FRAME, SEGMENTS,
+        positions, None, np.ones((frames, 3), bool), (), nothing, nothing, 0.0,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def experiments(model, truth):
+    trials = [release(truth, 0.2, 0.1), release(truth, -0.15, 0.2), release(truth, 0.0, -0.2, "validate")]
+    return [prepare(trial, model, 437) for trial in trials]
+
+
+def test_the_shape_is_that_of_the_releases_ends(model, truth, experiments):
+    rest = resting_shape(model, experiments, SEGMENTS)
+    data = mujoco.MjData(model)
+    data.qpos[:] = rest.pose
+    mujoco.mj_kinematics(model, data)
+    for place, name in enumerate(SEGMENTS):
+        np.testing.assert_allclose(data.site(f"{name}_center").xpos, experiments[0].positions[-1, place], atol=5e-4)
+
+
+def test_stiffness_and_damping_come_back_without_static_tilts(model, truth, experiments):
+    bounds = {"stiffness": Bounds(0.3, 10.0), "damping": Bounds(0.005, 1.0)}
+    rest = resting_shape(model, experiments, SEGMENTS)
+    method = Method(LeastSquares(5, 1, 6, 1e-2), 1.0, 200, 2, 8, 1e-6, LeastSquares(0, 1, 1, 1e-2), 0.1, 3)
+    fit = Fit(SEGMENTS, bounds, (), "positions", WEIGHTS, method, rest)
+    found = identify("test", model, experiments, fit)
+    assert found.values["stiffness"] == pytest.approx(1.7, rel=0.05)
+    assert found.values["damping"] == pytest.approx(0.15, rel=0.05)
+    identified = found.models["identified"]
+    data = mujoco.MjData(identified)
+    data.qpos[:] = rest.pose
+    mujoco.mj_forward(identified, data)
+    np.testing.assert_allclose(data.qfrc_passive, data.qfrc_bias, atol=1e-9)
+
+
+def test_releases_that_never_rest_are_refused(model, truth):
+    moving = [prepare(release(truth, 0.2, 0.1, frames=90), model, 437)]
+    with pytest.raises(InputError, match="rest_shape: found no release with split identify that is at rest"):
+        resting_shape(model, moving, SEGMENTS)

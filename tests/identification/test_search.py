@@ -1,0 +1,100 @@
+"""Both optimizers and the descent, on plants that are the model."""
+
+import numpy as np
+import pytest
+
+from tests.support.matched_plant import release, segments_of, small_model
+from trunkline.identification.experiment import prepare
+from trunkline.identification.loss import LossWeights
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.problem import Bounds, Problem
+from trunkline.identification.search import DifferentialEvolution, LeastSquares, descend, linearise, search
+
+TRUE = {"damping": 0.07, "tendon_friction": 0.6}
+
+
+def quiet(best: float) -> None:
+    """No progress."""
+
+
+@pytest.fixture(scope="module")
+def problem():
+    model = small_model(4)
+    truth = model.__copy__()
+    set_fields(truth, candidate_fields(model, {name: np.array([value]) for name, value in TRUE.items()}))
+    experiments = [prepare(release(truth, bend, frames=50), model, 50) for bend in (0.3, -0.25)]
+    bounds = {"damping": Bounds(0.005, 1.0), "tendon_friction": Bounds(0.02, 3.0)}
+    return Problem(
+        model, experiments, segments_of(model), bounds, "positions", LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
+    )
+
+
+@pytest.mark.parametrize(
+    ("optimizer", "tolerance"),
+    [(DifferentialEvolution(6, 2, 30, 1e-3), 0.05), (LeastSquares(6, 2, 12, 1e-6), 0.02)],
+    ids=lambda value: type(value).__name__,
+)
+def test_an_optimizer_finds_the_plant(problem, optimizer, tolerance):
+    reported = []
+    found = search(problem, optimizer, seed=2, report=reported.append)
+    np.testing.assert_allclose(np.exp(found.vector), list(TRUE.values()), rtol=tolerance)
+    assert found.loss == pytest.approx(float(problem.losses(found.vector[None])[0]), rel=1e-9)
+    assert min(reported) <= 1.5 * found.loss
+    again = search(problem, optimizer, seed=2, report=quiet)
+    np.testing.assert_array_equal(found.vector, again.vector)
+
+
+def test_least_squares_takes_the_best_of_its_starts(problem):
+    """With the model far off, a start of the hypercube is better, and the descent goes on from there."""
+    far = Problem(
+        *(getattr(problem, name) for name in ("model", "experiments", "segments", "parameters", "loss", "weights"))
+    )
+    far.start = lambda: far.bounds()[1]
+    single = search(far, LeastSquares(0, 1, 1, 1e-6), seed=2, report=quiet)
+    several = search(far, LeastSquares(8, 1, 1, 1e-6), seed=2, report=quiet)
+    assert several.loss < 0.5 * single.loss
+
+
+def test_the_linearisation_where_a_descent_ends_is_that_of_central_differences(problem):
+    found = descend(problem, problem.start() + [0.3, -0.2], 10, 1e-9, quiet)
+    assert found.converged
+    linear = linearise(problem, found.vector)
+    step = 3e-4
+    for column in range(2):
+        either = np.zeros(2)
+        either[column] = step
+        ahead, behind = (problem.residuals((found.vector + sign * either)[None]) for sign in (1, -1))
+        for jacobian, a, b in zip(linear.jacobians, ahead, behind, strict=True):
+            central = (a[0] - b[0]) / (2 * step)
+            np.testing.assert_allclose(jacobian[:, column], central, atol=0.01 * np.abs(central).max())
+    at_end = 0.5 * sum(float(r @ r) for r in linear.residuals)
+    assert at_end == pytest.approx(found.loss, rel=1e-9)
+    gradient = sum(j.T @ r for j, r in zip(linear.jacobians, linear.residuals, strict=True))
+    away = linearise(problem, found.vector + 0.1)
+    steep = sum(j.T @ r for j, r in zip(away.jacobians, away.residuals, strict=True))
+    assert np.abs(gradient).max() < 0.02 * np.abs(steep).max()
+
+
+def test_differences_stay_within_the_bounds(problem):
+    low, high = problem.bounds()
+    seen = []
+    watched = Problem(
+        *(getattr(problem, name) for name in ("model", "experiments", "segments", "parameters", "loss", "weights"))
+    )
+    residuals = watched.residuals
+    watched.residuals = lambda vectors: seen.append(vectors) or residuals(vectors)
+    edge = linearise(watched, high)
+    assert (np.concatenate(seen) <= high).all()
+    inside = linearise(watched, high - 2e-3)
+    for a, b in zip(edge.jacobians, inside.jacobians, strict=True):
+        np.testing.assert_allclose(a, b, atol=0.05 * np.abs(b).max())
+
+
+def test_a_problem_starts_at_the_model_s_own_values(problem):
+    expected = [np.log(PARAMETERS[name].read(problem.model)) for name in TRUE]
+    np.testing.assert_allclose(problem.start(), expected)
+    hardening = Problem(
+        problem.model, problem.experiments, problem.segments, {"hardening": Bounds(0.02, 20.0)}, "positions",
+        problem.weights,
+    )  # fmt: skip
+    assert np.exp(hardening.start()[0]) == pytest.approx(np.sqrt(0.02 * 20.0))  # it has none: mid-range

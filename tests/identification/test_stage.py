@@ -1,0 +1,155 @@
+"""A whole identification stage on a plant that is the model: files, keys, recovery, threads."""
+
+import json
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.support.matched_plant import curl, release, small_model, tilt
+from tests.support.small_arm import small_spec
+from trunkline.errors import InputError
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, save_model, set_fields
+from trunkline.identification.settings import (
+    DifferentialEvolutionSettings,
+    IdentificationSettings,
+    LeastSquaresSettings,
+    Loss,
+    PolishSettings,
+    Range,
+    RoughSettings,
+)
+from trunkline.pipeline.identify import run
+from trunkline.trials.trial import write_trials
+
+LOSS = Loss(
+    kind="positions", delta_position=0.2, delta_velocity=2.0, epsilon=0.02, epsilon_velocity=0.002,
+    weight_position=1.0, weight_velocity=0.03,
+)  # fmt: skip
+
+
+def settings(experiments, reported, parameters, per_joint=(), iterations=8, **changed) -> IdentificationSettings:
+    return IdentificationSettings(**{
+        "seed": 1, "frames": 437, "rest_shape": "unchanged", "markers": "unchanged", "command_delay": 0.0,
+        "experiments": experiments, "reported": reported, "loss": LOSS,
+        "parameters": {name: Range(low=low, high=high) for name, (low, high) in parameters.items()},
+        "optimizer": LeastSquaresSettings(method="least_squares", starts=4, descents=1, iterations=4, tolerance=1e-3),
+        "rough": RoughSettings(step_factor=1.0, frames=437, trials=99),
+        "polish": PolishSettings(iterations=iterations, tolerance=1e-8),
+        "per_joint": list(per_joint), "per_joint_range": 0.1, "per_joint_deviation": 1.0,
+        "fine": LeastSquaresSettings(method="least_squares", starts=0, descents=1, iterations=3, tolerance=1e-2),
+        "cross_validation_folds": 0,
+    } | changed)  # fmt: skip
+
+
+def truth_of(model: mujoco.MjModel, **scales: float) -> mujoco.MjModel:
+    truth = model.__copy__()
+    values = {name: np.array([scale * PARAMETERS[name].read(model)]) for name, scale in scales.items()}
+    set_fields(truth, candidate_fields(model, values))
+    return truth
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A folder with a model and none of the trials yet; returns the model and a function that writes trials."""
+    monkeypatch.chdir(tmp_path)
+    spec, model = small_spec(6), small_model(6)
+    spec.option.timestep = model.opt.timestep
+    spec.compile()
+    (tmp_path / "artifacts/build_mjcf").mkdir(parents=True)
+    (tmp_path / "artifacts/build_mjcf/arm.xml").write_text(save_model(spec, model))
+    (tmp_path / "data/processed/filter").mkdir(parents=True)
+    return tmp_path, model, lambda trials: write_trials(tmp_path / "data/processed/filter", trials)
+
+
+def metrics_of(root, stage):
+    return json.loads((root / "artifacts" / stage / "metrics.json").read_text())
+
+
+def test_stiffness_stage_on_one_thread_and_on_two(project, monkeypatch):
+    root, model, write = project
+    truth = truth_of(model, stiffness=0.7)
+    write([tilt(truth, angle, noise=1e-4) for angle in (30, 60, 90)] + [tilt(truth, 75, "validate")])
+    middle = PARAMETERS["stiffness"].read(model)
+    config = settings(
+        ["static_tilt"], ["static_tilt"], {"stiffness": (0.5 * middle, 2 * middle)}, ["stiffness"]
+    )
+    files = {}
+    for threads in ("1", "2"):
+        monkeypatch.setenv("TRUNKLINE_THREADS", threads)
+        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
+        folder = root / "artifacts/identify_stiffness"
+        files[threads] = {p.name: p.read_bytes() for p in folder.iterdir()}
+    assert files["1"] == files["2"]
+    assert {"arm.xml", "parameters.json", "metrics.json", "shapes.png", "convergence.csv"} <= set(files["1"])
+    metrics = metrics_of(root, "identify_stiffness")
+    for model_name in ("initial", "coarse", "identified"):
+        for split in ("identify", "validate"):
+            keys = {"loss", "e_internal_mm", "e_internal_pct", "e_position_mm"}
+            assert keys <= set(metrics[model_name][split])
+    assert metrics["identified"]["validate"]["e_position_mm"] < 0.1 * metrics["initial"]["validate"]["e_position_mm"]
+    assert metrics["evaluations"] > 20
+    assert metrics["diverged"] == metrics["start_fit"]["unconverged"] == 0
+    written = mujoco.MjModel.from_xml_path(str(root / "artifacts/identify_stiffness/arm.xml"))
+    np.testing.assert_allclose(written.jnt_stiffness[:4] / truth.jnt_stiffness[:4], 1, atol=0.03)
+
+
+def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
+    root, model, write = project
+    truth = truth_of(model, kp=0.1, kv=0.3, force_range=0.02, time_constant=1.2)
+    trials = [curl(truth, level, tendon=k, frames=110) for level, k in ((30, 0), (60, 1), (90, 2))]
+    write([*trials, curl(truth, 50, "validate", frames=110), release(truth, 0.2, "validate", frames=30)])
+    ranges = {name: (0.2 * value, 5 * value) for name, value in
+              {n: PARAMETERS[n].read(truth) for n in ("kp", "kv", "force_range", "time_constant")}.items()}  # fmt: skip
+    evolution = DifferentialEvolutionSettings(
+        method="differential_evolution", population=6, population_per_parameter=2, generations=12, tolerance=1e-2
+    )
+    config = settings(["curl"], ["release", "curl"], ranges, iterations=25, optimizer=evolution)
+    (root / "artifacts/identify_damping").mkdir()
+    (root / "artifacts/identify_damping/parameters.json").write_text('{"parameters": {}}')
+    run("identify_control", config, root / "artifacts/build_mjcf/arm.xml", whole=("identify_damping",))
+    metrics = metrics_of(root, "identify_control")
+    assert metrics["cad"]["validate"]["e_internal_mm"] == metrics["initial"]["validate"]["e_internal_mm"]
+    assert set(metrics["identified"]["validate"]["by_experiment"]) == {"release", "curl"}
+    halved = metrics["halved_step"]
+    assert 0 < halved["max_mm"] < 1.0
+    assert halved["validate"] * metrics["identified"]["validate"]["e_internal_mm"] < 0.02  # a share of next to nothing
+    found = json.loads((root / "artifacts/identify_control/parameters.json").read_text())["parameters"]
+    for name, tolerance in (("kp", 0.05), ("kv", 0.10), ("time_constant", 0.10), ("force_range", 0.10)):
+        assert found[name]["value"] == pytest.approx(PARAMETERS[name].read(truth), rel=tolerance), name
+    assert (root / "artifacts/identify_control/errors.png").stat().st_size > 10_000
+
+
+def test_a_missing_split_is_named(project):
+    root, model, write = project
+    write([tilt(model, 30), tilt(model, 60)])
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)})
+    with pytest.raises(InputError, match="no static_tilt trial with split validate"):
+        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
+    assert not (root / "artifacts/identify_stiffness").exists()
+
+
+def test_a_missing_model_is_named(project):
+    root, _, _ = project
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)})
+    with pytest.raises(InputError, match="nowhere.xml: no such file"):
+        run("identify_stiffness", config, root / "nowhere.xml")
+
+
+def test_more_folds_than_trials_are_refused(project):
+    root, model, write = project
+    write([tilt(model, 30), tilt(model, 60), tilt(model, 75, "validate")])
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)}, cross_validation_folds=3)
+    with pytest.raises(InputError, match="cross_validation_folds: found 3, expected at most 2"):
+        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
+
+
+def test_tendon_parameters_of_an_arm_without_tendons_are_refused(project):
+    root, _, _ = project
+    spec = mujoco.MjSpec.from_file(str(root / "artifacts/build_mjcf/arm.xml"))
+    for element in (*spec.actuators, *spec.tendons):
+        spec.delete(element)
+    (root / "artifacts/build_mjcf/arm.xml").write_text(spec.to_xml())
+    config = settings(["release"], ["release"], {"damping": (0.01, 1.0), "tendon_friction": (0.1, 1.0)})
+    with pytest.raises(InputError, match="identify_damping.parameters.tendon_friction: found it for an arm without"):
+        run("identify_damping", config, root / "artifacts/build_mjcf/arm.xml")

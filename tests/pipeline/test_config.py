@@ -1,0 +1,215 @@
+"""Settings: what people type is composed, checked, and refused in one line that names the key."""
+
+import runpy
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Literal
+
+import pytest
+from omegaconf import OmegaConf
+from pydantic import Field
+
+from trunkline.errors import InputError
+from trunkline.identification.settings import IdentificationSettings
+from trunkline.pipeline.config import check_settings, compose_settings, group_options, load_config
+from trunkline.pipeline.settings import check_once
+from trunkline.settings import settings
+
+ROOT = Path(__file__).parents[2]
+STAGES = sorted(file.stem for file in (ROOT / "stages").glob("*.py"))
+
+
+@settings
+class Arm:
+    length: float = Field(gt=0)
+    tip: float
+
+
+@settings
+class Config:
+    arm: Arm
+    count: int = Field(gt=0)
+    loss: Literal["distance", "position"]
+    weights: tuple[float, float]
+    level: float | None
+
+    def __post_init__(self):
+        if self.weights[0] > self.weights[1]:
+            raise ValueError(f"found weights {self.weights}, expected them to rise")
+
+
+@pytest.fixture
+def project(tmp_path):
+    """A project of one stage with one group; call it with the text of its params.yaml section."""
+    folder = tmp_path / "conf" / "fit"
+    (folder / "arm").mkdir(parents=True)
+    (folder / "config.yaml").write_text(
+        "defaults:\n  - arm: ???\n  - _self_\ncount: ???\nloss: distance\nweights: [1, 2]\nlevel: null\n"
+    )
+    (folder / "arm" / "spiral.yaml").write_text("length: 0.5\ntip: ${count}\n")
+    (folder / "arm" / "straight.yaml").write_text("length: 0.3\ntip: 0.01\n")
+
+    def load(section: str) -> Config:
+        (tmp_path / "params.yaml").write_text(f"fit: {section}\n")
+        return load_config(Config, "fit", tmp_path)
+
+    return load
+
+
+def test_groups_values_and_interpolations_compose(project):
+    config = project("{arm: spiral, count: 3, level: 1e-6}")
+    assert config.arm == Arm(length=0.5, tip=3.0)
+    assert config.weights == (1.0, 2.0)
+    assert config.level == 1e-6  # a number, as OmegaConf reads it; PyYAML reads a string
+    assert project("{arm: straight, count: 3}").arm.length == 0.3
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        ("{arm: spiral, cuont: 3}", "fit.cuont: unknown key, did you mean 'count'?"),
+        ("{arm: spiral, count: 3, arm.length: 2}", "fit.arm.length: unknown key"),
+        ("{arm: spiral, count: 3.5}", "fit.count: found 3.5, expected a valid integer"),
+        ("{arm: spiral, count: '3'}", "fit.count: found '3', expected a valid integer"),
+        ("{arm: spiral, count: true}", "fit.count: found True, expected a valid integer"),
+        ("{arm: spiral, count: }", "fit.count: found None, expected a valid integer"),
+        ("{arm: spiral, count: 0}", "fit.count: found 0, expected greater than 0"),
+        ("{arm: spiral, count: 3, loss: posiiton}", "fit.loss: found 'posiiton', expected 'distance' or 'position'"),
+        ("{arm: spiral, count: 3, weights: [1, x]}", "fit.weights.1: found 'x', expected a valid number"),
+        ("{arm: spiral, count: 3, weights: [2, 1]}", "found weights (2.0, 1.0), expected them to rise"),
+        ("{arm: spiral}", "fit.count: missing, expected a value"),
+        ("{count: 3}", "fit.arm: missing, expected one of spiral, straight"),
+        ("{arm: spirla, count: 3}", "fit.arm: found 'spirla', expected one of spiral, straight, did you mean"),
+        ("{arm: {length: 1}, count: 3}", "fit.arm: found {'length': 1}, expected one of spiral, straight"),
+        ("[1, 2]", "fit: found [1, 2], expected a section"),
+        ("{arm: spiral, count: 3", "params.yaml: not readable as YAML"),
+        ("{arm: spiral, count: '${nothing}'}", "Interpolation key 'nothing' not found"),
+    ],
+)
+def test_a_mistake_is_one_line_that_names_the_key(project, section, message):
+    with pytest.raises(InputError) as caught:
+        project(section)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_section_and_missing_file(project, tmp_path):
+    project("{arm: spiral, count: 3}")
+    with pytest.raises(InputError, match="no section 'fitt', did you mean 'fit'"):
+        load_config(Config, "fitt", tmp_path)
+    (tmp_path / "params.yaml").unlink()
+    with pytest.raises(InputError, match="params.yaml: no such file"):
+        load_config(Config, "fit", tmp_path)
+
+
+def test_settings_of_every_stage_are_valid():
+    assert check_settings(ROOT) == STAGES
+
+
+@pytest.fixture
+def whole_project(tmp_path):
+    """A project of two stages; call it with the text of params.yaml to check it as a stage does before it works."""
+    (tmp_path / "dvc.yaml").write_text("stages: {fit: {cmd: x}, train: {cmd: x}}\n")
+    (tmp_path / "stages").mkdir()
+    for stage in ("fit", "train"):
+        (tmp_path / "conf" / stage).mkdir(parents=True)
+        (tmp_path / "conf" / stage / "config.yaml").write_text("{}\n")
+        (tmp_path / "stages" / f"{stage}.py").write_text(
+            "from trunkline.pipeline.config import settings\n\n\n@settings\nclass Config:\n    count: int\n"
+        )
+
+    def check(params: str) -> None:
+        (tmp_path / "params.yaml").write_text(params)
+        check_once(tmp_path)
+
+    return check
+
+
+def test_a_stage_checks_the_settings_of_all(whole_project):
+    with pytest.raises(InputError, match="train.cuont: unknown key, did you mean 'count'"):
+        whole_project("{fit: {count: 1}, train: {cuont: 2}}")
+    with pytest.raises(InputError, match="trian: no such stage, did you mean 'train'"):
+        whole_project("{fit: {count: 1}, trian: {count: 2}}")
+    whole_project("{fit: {count: 1}, train: {count: 2}}")
+    with pytest.raises(InputError, match="fit.count: found 'x', expected a valid integer"):
+        whole_project("{fit: {count: x}, train: {count: 2}}")
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_every_variant_composes(stage, tmp_path):
+    schema, section = _schema(stage), _section(stage)
+    for group, options in group_options(ROOT / "conf" / stage).items():
+        for option in options:
+            composed = compose_settings(ROOT / "conf" / stage, section | {group: option}, stage)
+            assert set(composed) <= {field.name for field in fields(schema)}, f"{stage} with {group}={option}"
+            OmegaConf.save(OmegaConf.create({stage: section | {group: option}}), tmp_path / "params.yaml")
+            load_config(schema, stage, tmp_path)
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_no_value_is_set_in_both_places(stage):
+    conf = OmegaConf.to_container(OmegaConf.load(ROOT / "conf" / stage / "config.yaml"))
+    both = _leaves(conf) & _leaves(_section(stage))
+    assert not both, f"set in params.yaml and in conf/{stage}/config.yaml: {both}"
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_unknown_keys_are_refused_at_every_level(stage, tmp_path):
+    schema = _schema(stage)
+    (tmp_path / "conf").symlink_to(ROOT / "conf")
+    groups = group_options(ROOT / "conf" / stage)  # chosen by name, so that params.yaml cannot reach into them
+    for path in [(), *(path for path in _nested(schema) if path[0] not in groups)]:
+        params = OmegaConf.create({stage: _section(stage)})
+        OmegaConf.update(params, ".".join([stage, *path, "tpyo"]), 1, force_add=True)
+        OmegaConf.save(params, tmp_path / "params.yaml")
+        with pytest.raises(InputError, match=".".join([stage, *path, "tpyo: unknown key"])):
+            load_config(schema, stage, tmp_path)
+
+
+def test_the_stand_in_lab_refuses_unknown_keys_too(tmp_path):
+    schema = runpy.run_path(str(ROOT / "demo" / "record.py"), run_name="record")["Config"]
+    load_config(schema, "record", ROOT / "demo")
+    (tmp_path / "conf").symlink_to(ROOT / "demo" / "conf")
+    for path in [(), *_nested(schema)]:
+        params = OmegaConf.load(ROOT / "demo" / "params.yaml")
+        OmegaConf.update(params, ".".join(["record", *path, "tpyo"]), 1, force_add=True)
+        OmegaConf.save(params, tmp_path / "params.yaml")
+        with pytest.raises(InputError, match=".".join(["record", *path, "tpyo: unknown key"])):
+            load_config(schema, "record", tmp_path)
+
+
+def _schema(stage: str) -> type:
+    return runpy.run_path(str(ROOT / "stages" / f"{stage}.py"), run_name=stage)["Config"]
+
+
+def _section(stage: str) -> dict:
+    params = OmegaConf.load(ROOT / "params.yaml")
+    return OmegaConf.to_container(params)[stage] or {}
+
+
+def _leaves(values: dict, prefix: str = "") -> set[str]:
+    """Dotted keys that have a value; `???` is none."""
+    found = set()
+    for key, value in values.items():
+        if isinstance(value, dict):
+            found |= _leaves(value, f"{prefix}{key}.")
+        elif value != "???":
+            found.add(f"{prefix}{key}")
+    return found
+
+
+def _nested(schema: type) -> list[tuple[str, ...]]:
+    """Paths of the nested settings classes of a schema."""
+    found = []
+    for field in fields(schema):
+        if is_dataclass(field.type):
+            found += [(field.name,), *((field.name, *rest) for rest in _nested(field.type))]
+    return found
+
+
+def test_a_rule_between_fields_names_the_key_and_the_file_that_set_it(tmp_path):
+    text = (ROOT / "params.yaml").read_text().replace("stiffness: {low: 0.3,", "stiffness: {low: -0.3,")
+    (tmp_path / "params.yaml").write_text(text)
+    expected = "params.yaml: identify_stiffness.parameters.stiffness.low: found -0.3, expected more than 0"
+    with pytest.raises(InputError, match=expected):
+        load_config(IdentificationSettings, "identify_stiffness", tmp_path)

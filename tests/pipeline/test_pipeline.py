@@ -1,0 +1,299 @@
+"""The pipeline: dvc.yaml agrees with the stages, their settings and their imports, and reruns what it must."""
+
+import ast
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+import yaml
+from dvc.repo import Repo
+from omegaconf import OmegaConf
+
+from tests.support.stub_pipeline import StubPipeline
+from trunkline.arm.tendons import CAD_MODEL
+from trunkline.pipeline import lock
+from trunkline.pipeline.config import SHARED, check_settings, group_options
+
+ROOT = Path(__file__).parents[2]
+STAGES = [
+    "ingest", "filter", "build_mjcf", "identify_stiffness", "identify_damping", "identify_control",
+    "fk_dataset", "train_ik", "reachability", "package_unity",
+]  # fmt: skip
+
+EXAMPLES = sorted(
+    f"{file.parent.relative_to(ROOT)}/dvc.yaml:{stage}"
+    for file in ROOT.glob("examples/*/dvc.yaml")
+    for stage in yaml.safe_load(file.read_text())["stages"]
+)
+
+# What surrounds every stage (load, show, refuse, write) and never changes a number: no reason to run again.
+INERT = {f"trunkline/{name}.py" for name in ("config", "errors", "plots", "progress", "stage", "threads")}
+INERT |= {"trunkline/pipeline/settings.py"}
+
+
+pytestmark = pytest.mark.xdist_group("pipeline")  # one worker, so that the stub pipeline runs once
+
+
+@pytest.fixture(scope="module")
+def repo():
+    with Repo(str(ROOT)) as repo:
+        yield repo
+
+
+@pytest.fixture(scope="module")
+def stages(repo):
+    return {stage.addressing: stage for stage in repo.index.stages}
+
+
+def test_one_name_everywhere():
+    written = yaml.safe_load((ROOT / "dvc.yaml").read_text())["stages"]
+    assert list(written) == STAGES
+    assert list(OmegaConf.load(ROOT / "params.yaml")) == STAGES
+    assert sorted(file.stem for file in (ROOT / "stages").glob("*.py")) == sorted(STAGES)
+    assert sorted(folder.name for folder in (ROOT / "conf").iterdir()) == sorted([*STAGES, SHARED])
+    for name, stage in written.items():
+        assert stage["cmd"] == f"python -m stages.{name}"
+        assert stage["desc"]
+
+
+@pytest.mark.parametrize("address", [*STAGES, *EXAMPLES])
+def test_a_stage_lists_its_settings(stages, address):
+    folder, name = _folder_and_name(address)
+    params = {_relative(dep): dep.params for dep in stages[address].deps if hasattr(dep, "params")}
+    section = OmegaConf.to_container(OmegaConf.load(ROOT / folder / "params.yaml"))[name] or {}
+    groups = group_options(ROOT / "conf" / name)
+    expected = {f"{folder}params.yaml": [name], f"conf/{name}/config.yaml": []}
+    expected |= {options[section[group]].relative_to(ROOT).as_posix(): [] for group, options in groups.items()}
+    assert params == expected
+
+
+@pytest.mark.parametrize("address", EXAMPLES)
+def test_an_example_is_the_pipeline_s_own_stages(stages, address):
+    """The same module, read, written and shown the same; beside its data no input that the other has not.
+
+    One that is skipped, for want of tendons, has no outputs, and reads nothing but what tells that.
+    """
+    folder, name = _folder_and_name(address)
+    example, stage = stages[address], stages[name]
+    assert (example.cmd, example.desc) == (stage.cmd, stage.desc)
+    if not example.outs:
+        read = {_relative(dep).removeprefix(folder) for dep in example.deps if not hasattr(dep, "params")}
+        assert read == {str(CAD_MODEL), f"stages/{name}.py", "trunkline/arm/tendons.py"}
+        return
+    for mine, others in ((example.outs, stage.outs), (example.deps, stage.deps)):
+        found, expected = ({_relative(entry).removeprefix(folder) for entry in entries} for entries in (mine, others))
+        chosen = {entry for entry in found | expected if entry.startswith(("data/raw/", "conf/"))}
+        assert found - chosen == expected - chosen
+
+
+@pytest.mark.parametrize("address", [stage for stage in EXAMPLES if not stage.endswith(":ingest")])
+def test_an_example_s_settings_are_checked(address):
+    folder, _ = _folder_and_name(address)
+    assert check_settings(ROOT / folder) == sorted(s.partition(":")[2] for s in EXAMPLES if s.startswith(folder))
+
+
+@pytest.mark.parametrize("name", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record"])
+def test_a_stage_depends_on_the_code_it_imports_and_no_other(stages, name):
+    if not stages[name].outs:
+        return  # skipped, see above
+    deps = {dep for dep in map(_relative, stages[name].deps) if dep.startswith(("stages", "trunkline", "demo"))}
+    deps = {dep for dep in deps if not dep.endswith(".yaml")}
+    modules = _imported(stages[name].cmd.split()[-1].replace(".", "/") + ".py")
+    covers = {dep: {m for m in modules if m == dep or m.startswith(f"{dep}/")} for dep in deps}
+    assert modules - set().union(*covers.values()) == set()
+    assert [dep for dep, covered in covers.items() if not covered] == []
+
+
+def test_what_a_stage_reads_another_writes_whole(repo):
+    """No dependency lies inside or around an output, where the lock could not be checked for consistency."""
+    outs = {_relative(out) for out in repo.index.outs}
+    for stage in repo.index.stages:
+        for dep in map(_relative, stage.deps):
+            nested = [out for out in outs if out.startswith(f"{dep}/") or dep.startswith(f"{out}/")]
+            assert not nested, f"{stage.addressing}: {dep} beside {nested}"
+            data = dep.startswith(("data/", "artifacts/", "examples/")) and "/raw/" not in f"{dep}/"
+            data = data and not dep.endswith(".yaml")
+            assert not data or dep in outs, f"{stage.addressing}: nothing writes {dep}"
+
+
+def test_git_holds_numbers_and_the_cache_holds_the_rest(repo):
+    for out in repo.index.outs:
+        path = _relative(out)
+        below = re.sub(r"^examples/\w+/", "", path)
+        assert path == "data/raw/demo" or below.split("/")[0] in ("artifacts", "data"), path
+        in_git = below.startswith("artifacts/") and path.endswith((".json", ".csv"))
+        assert out.use_cache != in_git, path
+        ignored = subprocess.run(["git", "check-ignore", "-q", path], cwd=ROOT, check=False).returncode == 0
+        assert ignored != in_git, path
+
+
+@pytest.mark.parametrize("name", STAGES)
+def test_a_stage_has_metrics_and_plots(stages, name):
+    outs = {_relative(out): out for out in stages[name].outs}
+    assert outs[f"artifacts/{name}/metrics.json"].metric
+    assert any(out.plot for out in outs.values())
+
+
+@pytest.fixture(scope="module")
+def pipeline(tmp_path_factory):
+    pipeline = StubPipeline(tmp_path_factory.mktemp("stub") / "project")
+    ran = pipeline.ran("dvc", "repro", "-q")
+    assert sorted(ran) == sorted(["demo.record", *(f"stages.{name}" for name in STAGES)])
+    pipeline.commit()
+    return pipeline
+
+
+def test_nothing_changed_runs_nothing(pipeline):
+    assert pipeline.ran("dvc", "repro", "-q") == []
+
+
+def test_a_comment_reruns_nothing(pipeline):
+    for file in ["params.yaml", "demo/params.yaml", *_relative_files(pipeline.folder, "conf")]:
+        pipeline.edit(file, lambda text: f"# a comment\n{text}\n# another\n")
+    assert pipeline.ran("dvc", "repro", "-q") == []
+    pipeline.restore()
+
+
+@pytest.mark.parametrize("name", ["filter", "identify_damping", "train_ik"])
+def test_an_edit_reruns_exactly_what_depends_on_it(pipeline, stages, name):
+    """And `dvc exp run -S` makes that edit without touching the comments of params.yaml."""
+    before = (pipeline.folder / "params.yaml").read_text()
+    key, value = pipeline.tunable(name)
+    ran = pipeline.ran("dvc", "exp", "run", "-q", "-S", f"{key}={value + 1}")
+    assert sorted(ran) == sorted(f"stages.{stage}" for stage in _and_below(stages, name))
+    after = (pipeline.folder / "params.yaml").read_text()
+    changed = [(a, b) for a, b in zip(before.splitlines(), after.splitlines(), strict=True) if a != b]
+    assert len(changed) == 1
+    assert changed[0][0].partition("#")[2].split() == changed[0][1].partition("#")[2].split()
+    pipeline.restore()
+
+
+def test_a_conf_file_reruns_its_stage_and_no_other(pipeline):
+    pipeline.edit("conf/package_unity/config.yaml", lambda text: f"{text}\nadded: 1\n")
+    assert pipeline.ran("dvc", "repro", "-q") == ["stages.package_unity"]
+    pipeline.restore()
+
+
+def test_another_session_leaves_the_stand_in_lab_alone(pipeline):
+    (pipeline.folder / "data" / "raw" / "mine").mkdir()
+    (pipeline.folder / "data" / "raw" / "mine" / "session.yaml").write_text("trials: []\n")
+    pipeline.edit("demo/params.yaml", lambda text: text.replace("record:", "record:\n  added: 1", 1))
+    pipeline.edit("params.yaml", lambda text: text.replace("session: demo", "session: mine"))
+    ran = pipeline.ran("dvc", "repro", "-q")
+    assert "stages.ingest" in ran
+    assert "demo.record" not in ran
+    pipeline.restore()
+
+
+def test_a_queued_sweep_runs_every_value(pipeline):
+    key, value = pipeline.tunable("train_ik")
+    before = (pipeline.folder / "params.yaml").read_text()
+    pipeline.run("dvc", "exp", "run", "-q", "--queue", "-S", f"{key}={value + 1},{value + 2}")
+    pipeline.run("dvc", "exp", "run", "-q", "--run-all")
+    shown = json.loads(pipeline.run("dvc", "exp", "show", "--json"))
+    found = [e["revs"][0]["data"]["params"]["params.yaml"]["data"] for e in shown[1]["experiments"]]
+    values = sorted(OmegaConf.select(OmegaConf.create(params), key) for params in found)[-2:]
+    assert values == [value + 1, value + 2]
+    assert (pipeline.folder / "params.yaml").read_text() == before
+
+
+@pytest.fixture
+def clone(pipeline, tmp_path):
+    """A fresh clone of the stub pipeline: no data, no cache."""
+    subprocess.run(["git", "clone", "-q", pipeline.folder, tmp_path / "clone"], check=True)
+    return tmp_path / "clone"
+
+
+def test_lock_of_a_fresh_clone_is_in_order(clone):
+    assert not (clone / ".dvc" / "cache").exists()
+    assert lock.mismatches(clone) == []
+    assert lock.main(clone) == 0
+
+
+def _set(name, old, new):
+    def change(clone):
+        text = (clone / name).read_text()
+        assert old in text
+        (clone / name).write_text(text.replace(old, new, 1))
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "problem"),
+    [
+        (_set("stages/filter.py", "import stub", "import stub  # edited"), "filter: changed deps: stages/filter.py"),
+        (_set("params.yaml", "fk_dataset:", "fk_dataset:\n  added: 1"), "fk_dataset: changed deps: params.yaml"),
+        (_set("conf/train_ik/config.yaml", "", "added: 1\n"), "train_ik: changed deps: conf/train_ik/config.yaml"),
+        (_set("artifacts/train_ik/metrics.json", "digest", "edited"), "train_ik: changed outs: artifacts/train_ik"),
+        (_set("dvc.yaml", "- stages/filter.py", "- LICENSE\n      - stages/filter.py"), "filter: not in the lock file"),
+        (_set("dvc.yaml", "-m stages.filter", "-m stages.filter --fast"), "filter: changed command"),
+        (lambda clone: (clone / "artifacts/fk_dataset/metrics.json").unlink(), "fk_dataset: changed outs: artifacts"),
+        (lambda clone: (clone / "dvc.lock").unlink(), "filter: never ran"),
+    ],
+)
+def test_lock_that_belongs_to_something_else_is_refused(clone, change, problem):
+    change(clone)
+    assert any(line.startswith(problem) for line in lock.mismatches(clone)), lock.mismatches(clone)
+    assert lock.main(clone) == 1
+
+
+def test_lock_whose_stages_disagree_is_refused(clone):
+    locked = yaml.safe_load((clone / "dvc.lock").read_text())
+    for out in locked["stages"]["build_mjcf"]["outs"]:
+        if out["path"].endswith("arm.xml"):
+            out["md5"] = "0" * 32
+    (clone / "dvc.lock").write_text(yaml.safe_dump(locked))
+    expected = "identify_stiffness: read another artifacts/build_mjcf/arm.xml than build_mjcf wrote"
+    assert expected in lock.mismatches(clone)
+
+
+def _folder_and_name(address: str) -> tuple[str, str]:
+    """("examples/x/", "filter") of examples/x/dvc.yaml:filter, ("", "filter") of filter."""
+    file, _, name = address.rpartition(":")
+    return file.removesuffix("dvc.yaml"), name
+
+
+def _relative(entry) -> str:
+    return os.path.relpath(entry.fs_path, entry.repo.root_dir)
+
+
+def _relative_files(folder: Path, below: str) -> list[str]:
+    return [str(path.relative_to(folder)) for path in (folder / below).rglob("*.yaml")]
+
+
+def _and_below(stages, name: str) -> set[str]:
+    """The stage and all that read, directly or not, what it writes."""
+    found, outs = {name}, {_relative(out) for out in stages[name].outs}
+    for other in stages.values():
+        if other.addressing != name and outs & {_relative(dep) for dep in other.deps}:
+            found |= _and_below(stages, other.addressing)
+    return found
+
+
+def _imported(file: str) -> set[str]:
+    """Files of this project that ``file`` imports, directly or not, itself included."""
+    found, todo = set(), [file]
+    while todo:
+        name = todo.pop()
+        if name in found or name in INERT or not (ROOT / name).is_file():
+            continue
+        tree = ast.parse((ROOT / name).read_text())
+        if [type(node) for node in tree.body] == [ast.Expr]:  # a docstring alone, as in most __init__.py
+            continue
+        found.add(name)
+        for node in ast.walk(tree):
+            modules = []
+            if isinstance(node, ast.Import):
+                modules = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                modules = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+            for module in modules:
+                parts = module.split(".")
+                if parts[0] in ("trunkline", "demo"):
+                    todo += ["/".join(parts) + ".py"]
+                    todo += ["/".join([*parts[:n], "__init__.py"]) for n in range(1, len(parts) + 1)]
+    return found

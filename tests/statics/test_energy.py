@@ -1,0 +1,100 @@
+"""The energy's derivatives are exact, and its pieces are those of MuJoCo."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.support.bent_chain import hardening_stump
+from trunkline.statics import energy
+from trunkline.statics.chain import read_chain
+
+GRAVITY = np.array([4.0, 1.5, -8.0])
+
+
+@pytest.fixture(scope="module")
+def model():
+    return hardening_stump()
+
+
+@pytest.fixture(scope="module")
+def chain(model):
+    return read_chain(model)
+
+
+def bent(chain, seed=0, reach=0.5):
+    return np.random.default_rng(seed).uniform(-reach, reach, 2 * chain.units)
+
+
+def pulls(chain):
+    """One tendon at a fixed tension, one on a spring, one at its ceiling."""
+    lengths = chain.straight_lengths
+    slope, ceiling = np.array([0.0, 800.0, 800.0]), np.array([np.inf, 1e4, 3.0])
+    return energy.Pull(np.array([4.0, 0.0, 1.0]), slope, lengths - [0.0, 0.05, 0.2], ceiling)
+
+
+def test_gradient_and_hessian_are_the_derivatives_of_the_energy(chain):
+    q, pull, state, step = bent(chain), pulls(chain), energy.new_state(chain.units, 3), 1e-6
+    energy.evaluate(chain, q, GRAVITY, pull, state)
+    energy.fill_hessian(chain, q, GRAVITY, pull, state)
+    gradient = state.gradient.copy()
+    hessian = np.triu(state.hessian) + np.triu(state.hessian, 1).T
+    assert (np.abs(q) > 0.35).any(), "no joint is beyond its limit: the test would miss the limits"
+    for j in range(len(q)):
+        ahead, behind = q.copy(), q.copy()
+        ahead[j] += step
+        behind[j] -= step
+        high = energy.evaluate(chain, ahead, GRAVITY, pull, state)
+        slope_high = state.gradient.copy()
+        low = energy.evaluate(chain, behind, GRAVITY, pull, state)
+        slope_low = state.gradient.copy()
+        np.testing.assert_allclose(gradient[j], (high - low) / (2 * step), rtol=1e-6, atol=1e-8)
+        np.testing.assert_allclose(hessian[j], (slope_high - slope_low) / (2 * step), rtol=1e-6, atol=1e-6)
+
+
+def test_lengths_and_their_gradients_are_mujocos(model, chain):
+    data, q = mujoco.MjData(model), bent(chain, seed=1)
+    data.qpos[:] = q
+    mujoco.mj_forward(model, data)
+    state = energy.new_state(chain.units, 3)
+    energy.place(chain, q, state)
+    np.testing.assert_allclose(state.lengths, data.ten_length, rtol=0, atol=1e-14)
+    jacobian = np.zeros((3, model.nv))
+    mujoco.mju_sparse2dense(jacobian, data.ten_J, model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind)
+    np.testing.assert_allclose(state.jacobian, jacobian, rtol=0, atol=1e-14)
+
+
+def test_passive_torques_are_mujocos(model, chain):
+    """Springs and gravity: minus the gradient without tendons, inside the limits."""
+    data, q = mujoco.MjData(model), bent(chain, seed=2, reach=0.25)
+    model.opt.gravity[:] = GRAVITY
+    data.qpos[:] = q
+    mujoco.mj_forward(model, data)
+    nothing = energy.Pull(*np.zeros((4, 3)))
+    state = energy.new_state(chain.units, 3)
+    energy.evaluate(chain, q, GRAVITY, nothing, state)
+    torque = data.qfrc_passive - data.qfrc_bias
+    np.testing.assert_allclose(-state.gradient, torque, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("depth", [1e-4, 0.015, 0.03, 0.2])
+def test_limit_torque_is_mujocos_constraint_force_at_rest(model, chain, depth):
+    """f = -R⁻¹ (0 - aref): what MuJoCo's solver returns where acceleration and velocity vanish."""
+    data, joint = mujoco.MjData(model), 5
+    data.qpos[joint] = chain.limit[joint // 2, joint % 2, 1] + depth
+    mujoco.mj_forward(model, data)
+    row = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT))
+    assert list(data.efc_id[row]) == [joint]
+    expected = data.efc_D[row[0]] * data.efc_aref[row[0]]
+    gain, impedance = chain.limit_gain[joint // 2, joint % 2], chain.limit_impedance[joint // 2, joint % 2]
+    assert energy.limit_torque(gain, impedance, depth)[0] == pytest.approx(expected, rel=1e-10)
+
+
+def test_limit_of_negative_solref_is_mujocos():
+    model = hardening_stump()
+    model.jnt_solref[:] = [-400.0, -5.0]
+    chain, data = read_chain(model), mujoco.MjData(model)
+    data.qpos[2] = chain.limit[1, 0, 0] - 0.03
+    mujoco.mj_forward(model, data)
+    row = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT))
+    found = energy.limit_torque(chain.limit_gain[1, 0], chain.limit_impedance[1, 0], 0.03)[0]
+    assert found == pytest.approx(data.efc_D[row[0]] * data.efc_aref[row[0]], rel=1e-10)

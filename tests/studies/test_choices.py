@@ -1,0 +1,74 @@
+"""The table of choices: each row changes what it says, and settings that a stage accepts."""
+
+from dataclasses import dataclass
+from importlib import import_module
+
+import pytest
+
+from benchmarks.identification.case import STAGES
+from studies.choices import CHOICES, quick
+from trunkline.identification.search import LeastSquares
+from trunkline.pipeline.config import load_config
+from trunkline.pipeline.identify import fit_of
+
+CHANGED = {  # name → stage → the settings that it changes
+    "committed": {},
+    "no-hardening": {"identify_stiffness": {"parameters"}},
+    "no-creep": {"identify_damping": {"parameters"}},
+    "joint-friction": {"identify_damping": {"parameters"}},
+    "mount": {"identify_stiffness": {"parameters"}, "identify_control": {"parameters"}},
+    "markers": {"identify_stiffness": {"markers"}},
+    "velocity": {},
+    "delay": {stage: {"command_delay"} for stage in STAGES},
+    "distances": {stage: {"loss"} for stage in STAGES},
+    "least-squares": {stage: {"optimizer"} for stage in STAGES},
+    "evolved-factors": {stage: {"fine"} for stage in STAGES},
+    "joint-damping": {"identify_damping": {"per_joint"}},
+    "no-factors": {"identify_stiffness": {"per_joint"}},
+}
+
+
+@pytest.fixture(scope="module")
+def settings():
+    return {stage: load_config(import_module(f"stages.{stage}").Config, stage) for stage in STAGES}
+
+
+@pytest.mark.parametrize("name", CHOICES)
+def test_a_choice_changes_what_it_says(name, settings):
+    change = CHOICES[name].settings
+    changed = {}
+    for stage, config in settings.items():
+        before, after = vars(config), vars(change(stage, config))
+        if keys := {key for key in before if before[key] != after[key]}:
+            changed[stage] = keys
+    assert changed == CHANGED[name]
+
+
+def test_a_choice_of_trials_starts_those_that_move_with_their_velocity():
+    @dataclass
+    class Trial:
+        experiment: str
+        in_motion: bool = False
+
+    trials = [Trial(kind) for kind in ("static_tilt", "release", "curl")]
+    assert [trial.in_motion for trial in CHOICES["velocity"].trials(trials)] == [False, True, True]
+    assert all(choice.trials(trials) is trials for name, choice in CHOICES.items() if name != "velocity")
+
+
+def test_least_squares_is_the_method_of_every_stage(settings):
+    for stage, config in settings.items():
+        method = fit_of(CHOICES["least-squares"].settings(stage, config), ()).method
+        assert isinstance(method.optimizer, LeastSquares)
+
+
+def test_a_parameter_left_out_is_not_searched(settings):
+    config = CHOICES["no-creep"].settings("identify_damping", settings["identify_damping"])
+    assert set(settings["identify_damping"].parameters) - set(config.parameters) == {"friction_time"}
+
+
+@pytest.mark.parametrize("name", CHOICES)
+def test_quick_settings_are_small_and_valid(name, settings):
+    for stage, config in settings.items():
+        small = quick(stage, CHOICES[name].settings(stage, config))
+        assert small.frames <= 60
+        assert fit_of(small, ()).method.optimizer.steps() <= 3

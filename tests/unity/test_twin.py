@@ -1,0 +1,340 @@
+"""The package, whole: reproducible, complete, described truly, and moving as the calibrated model does."""
+
+import hashlib
+import io
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import onnx
+import pytest
+import trimesh
+from onnx import TensorProto, helper
+
+from tests.support.small_arm import small_mjcf
+from trunkline.errors import InputError
+from trunkline.unity.importer import as_imported
+from trunkline.unity.linearize import JointLaw, compile_with
+from trunkline.unity.manifest import Manifest, Model
+from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.roundtrip import curl, simulate
+from trunkline.unity.twin import MANIFEST, MODEL, NETWORK, Label, Sources, Trajectory, assemble, compare
+
+ROOT = Path(__file__).parents[2]
+LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0", trunkline="0.1.0")
+TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts=[0.0, 1.0])
+
+
+def network(inputs: int = 8, opset: int = 15) -> bytes:
+    weights = helper.make_tensor("w", TensorProto.FLOAT, [inputs, 3], np.ones(3 * inputs))
+    ends = [
+        helper.make_tensor_value_info(n, TensorProto.FLOAT, ["n", w]) for n, w in (("x", inputs), ("l", 3))
+    ]
+    graph = helper.make_graph(
+        [helper.make_node("MatMul", ["x", "w"], ["l"])], "ik", ends[:1], ends[1:], [weights]
+    )
+    opsets = [helper.make_opsetid("", opset)]
+    return helper.make_model(graph, opset_imports=opsets, ir_version=8).SerializeToString()
+
+
+def grids() -> dict[str, np.ndarray]:
+    axes = [np.linspace(-0.5, 0.5, n) for n in (5, 7, 9)]
+    distance = np.linalg.norm(np.meshgrid(*axes, indexing="ij"), axis=0) - 0.3
+    spacing = [axis[1] - axis[0] for axis in axes]
+    return {
+        "soft_030": distance,
+        "soft_035": distance - 0.04,
+        "soft_angles": np.radians([30.0, 35.0]),
+        "soft_threshold": np.array(0.0),
+        "soft_tolerance": np.array(0.02),
+        "rigid": distance + 0.1,
+        "origin": np.full(3, -0.5),
+        "spacing": np.array(spacing),
+    }
+
+
+@pytest.fixture
+def sources(tmp_path) -> Sources:
+    (tmp_path / "ik.onnx").write_bytes(network())
+    np.savez(tmp_path / "grids.npz", **grids())
+    ball = trimesh.creation.icosphere(subdivisions=1, radius=0.3)
+    ball.export(tmp_path / "soft_030.obj")
+    ball.export(tmp_path / "rigid.stl")
+    return Sources(
+        mjcf=small_mjcf(),
+        network=tmp_path / "ik.onnx",
+        meshes=sorted([*tmp_path.glob("*.obj"), *tmp_path.glob("*.stl")]),
+        grids=tmp_path / "grids.npz",
+        metrics={"train_ik": {"opset": 15}},
+        texts={"README.md": b"twin", "LICENSE.md": b"free", "CHANGELOG.md": b"new"},
+    )
+
+
+@pytest.fixture
+def files(sources) -> dict[str, bytes]:
+    files, violations = assemble(LABEL, sources, TRAJECTORY)
+    assert violations == []
+    return files
+
+
+def test_the_model_from_the_finished_package_moves_as_the_calibrated_one(files, sources, tmp_path):
+    write_tarball(tmp_path / "twin.tgz", files)
+    packed = mujoco.MjModel.from_xml_string(read_tarball(tmp_path / "twin.tgz")[MODEL].decode())
+    calibrated = mujoco.MjModel.from_xml_string(sources.mjcf)
+    assert compare(calibrated, packed, TRAJECTORY) == (0.0, 0)
+    packed.actuator_gainprm[:, 0] *= 1.01
+    assert compare(calibrated, packed, TRAJECTORY)[0] > 0.1  # one percent of a gain is seen
+
+
+def test_the_curl_bends_the_arm_towards_the_pulled_tendon():
+    model = mujoco.MjModel.from_xml_string(small_mjcf())
+    positions = simulate(model, curl(model, TRAJECTORY.duration, TRAJECTORY.pull), tilt=0.0).positions
+    assert positions[:, -1, 0].max() > 0.05  # m, tendon 1 is over +x
+
+
+def test_the_same_inputs_give_the_same_bytes(sources, tmp_path):
+    for name in ("a.tgz", "b.tgz"):
+        write_tarball(tmp_path / name, assemble(LABEL, sources, TRAJECTORY)[0])
+    assert (tmp_path / "a.tgz").read_bytes() == (tmp_path / "b.tgz").read_bytes()
+
+
+def test_every_file_and_folder_has_a_meta_with_its_own_lasting_guid(files, sources):
+    contents = {path for path in files if not path.endswith(".meta")}
+    folders = {str(folder) for path in contents for folder in Path(path).parents} - {"."}
+    assert {path.removesuffix(".meta") for path in files if path.endswith(".meta")} == contents | folders
+    guids = {
+        path: re.search(rb"guid: ([0-9a-f]{32})\n", data)[1]
+        for path, data in files.items()
+        if path.endswith(".meta")
+    }
+    assert len(set(guids.values())) == len(guids)
+    later = Label(**vars(LABEL) | {"version": "2.0.0"})
+    again, _ = assemble(later, sources, TRAJECTORY)
+    assert all(again[path] == files[path] for path in guids)
+
+
+def test_the_manifest_is_valid_and_true(files, sources):
+    manifest = Manifest.model_validate_json(files[MANIFEST])
+    for path, digest in manifest.sha256.items():
+        assert hashlib.sha256(files[path]).hexdigest() == digest
+    assert set(manifest.sha256) == set(files) - {MANIFEST}
+    model = mujoco.MjModel.from_xml_string(sources.mjcf)
+    assert manifest.model.time_step == model.opt.timestep
+    assert manifest.model.gravity_unity == [0, model.opt.gravity[2], 0]
+    assert manifest.model.names.actuators == ["tendon_1_position", "tendon_2_position", "tendon_3_position"]
+    assert manifest.model.names.joints[:2] == ["unit_01_x", "unit_01_y"]
+    assert manifest.network.output_order == ["tendon_1", "tendon_2", "tendon_3"]
+    assert (manifest.network.input, manifest.network.output, manifest.network.opset) == ("x", "l", 15)
+    assert set(manifest.meshes) == {"rigid", "soft_030"}
+    with pytest.raises(ValueError, match="extra"):
+        Manifest.model_validate(json.loads(files[MANIFEST]) | {"surprise": 1})
+
+
+def test_meshes_stay_closed_and_outwards(files):
+    for mesh in Manifest.model_validate_json(files[MANIFEST]).meshes.values():
+        loaded = trimesh.load_mesh(io.BytesIO(files[mesh.file]), file_type="obj")
+        assert loaded.is_watertight
+        assert (len(loaded.faces), loaded.volume > 0) == (mesh.triangles, True)
+
+
+def test_a_grid_is_found_again_at_its_place(files):
+    grid = Manifest.model_validate_json(files[MANIFEST]).grids["soft_030"]
+    texture = np.frombuffer(files[grid.file], "<f2").reshape(grid.shape[::-1])  # z, y, x
+    for x, y, z in ((0, 0, 0), (4, 8, 6), (2, 3, 5)):
+        place = np.array(grid.origin) + np.array(grid.spacing) * (x, y, z)
+        assert texture[z, y, x] == pytest.approx(np.linalg.norm(place) - 0.3, abs=1e-3)
+
+
+def headset_signal(files: dict[str, bytes], base: np.ndarray, angle: float) -> float:
+    """How far a point of the arm's base frame is out of reach, m, from the package's files and manifest alone."""
+    manifest = json.loads(files[MANIFEST])
+    reach = manifest["reach"]
+    upper = int(np.clip(np.searchsorted(reach["angles"], angle), 1, len(reach["angles"]) - 1))
+    weight = (angle - reach["angles"][upper - 1]) / (reach["angles"][upper] - reach["angles"][upper - 1])
+    signal = 0.0
+    for name, share in ((reach["grids"][upper - 1], 1 - weight), (reach["grids"][upper], weight)):
+        grid = manifest["grids"][name]
+        texture = np.frombuffer(files[grid["file"]], "<f2").reshape(grid["shape"][::-1]).astype(float)  # z, y, x
+        place = (base[[0, 2, 1]] - grid["origin"]) / grid["spacing"]
+        first = np.floor(place).astype(int)
+        part = place - first
+        for corner in np.ndindex(2, 2, 2):
+            x, y, z = first + corner
+            signal += share * texture[z, y, x] * np.prod(np.where(corner, part, 1 - part))
+    return signal
+
+
+def test_the_headset_tells_what_is_out_of_reach(files):
+    """Balls of radius 0.3 m at 30° and 0.34 m at 35°: of 0.32 m half-way between."""
+    reach = Manifest.model_validate_json(files[MANIFEST]).reach
+    assert reach.grids == ["soft_030", "soft_035"]
+    assert (reach.threshold, reach.tolerance) == (0.0, 0.02)
+    direction = np.array([0.48, 0.6, -0.64])
+    for angle_deg, radius in ((30.0, 0.3), (32.5, 0.32), (35.0, 0.34)):
+        for gap in (-0.05, 0.05):
+            signal = headset_signal(files, (radius + gap) * direction, np.radians(angle_deg))
+            assert signal == pytest.approx(gap, abs=0.04)  # the grid is coarse
+            assert (signal > reach.threshold) == (gap > 0)
+
+
+@pytest.mark.parametrize("missing", ["soft_angles", "soft_threshold", "soft_tolerance"])
+def test_maps_that_do_not_say_what_is_out_of_reach_are_one_line(sources, missing):
+    np.savez(sources.grids, **{name: values for name, values in grids().items() if name != missing})
+    with pytest.raises(InputError, match=f"grids.npz: found no {missing}, expected"):
+        assemble(LABEL, sources, TRAJECTORY)
+
+
+def harden(mjcf: str) -> str:
+    """The model with springs and dampers that stiffen."""
+    spec = mujoco.MjSpec.from_string(mjcf)
+    for joint in spec.joints:
+        joint.stiffness = [joint.stiffness[0], 0, 4 * joint.stiffness[0]]
+        joint.damping = [joint.damping[0], 0, joint.damping[0] / 30]
+    spec.compile()
+    return spec.to_xml()
+
+
+def test_springs_that_stiffen_are_restored_from_the_manifest(sources):
+    sources.mjcf = harden(sources.mjcf)
+    files, violations = assemble(LABEL, sources, TRAJECTORY)
+    assert violations == []
+    model = Manifest.model_validate_json(files[MANIFEST]).model
+    calibrated, mjcf = mujoco.MjModel.from_xml_string(sources.mjcf), files[MODEL].decode()
+    linear = mujoco.MjModel.from_xml_string(mjcf)
+    assert compare(calibrated, compile_with(mjcf, model.springs, model.dampers), TRAJECTORY) == (0.0, 0)
+    assert model.import_max_deviation_mm < 0.01
+    assert model.changes_max_deviation_mm == compare(calibrated, linear, TRAJECTORY)[0] > 1
+    for laws, first, higher in (
+        (model.springs, calibrated.jnt_stiffness, calibrated.jnt_stiffnesspoly),
+        (model.dampers, calibrated.dof_damping, calibrated.dof_dampingpoly),
+    ):
+        assert [law.joint for law in laws] == model.names.joints
+        assert [law.coefficients for law in laws] == [(a, *rest) for a, rest in zip(first, higher, strict=True)]
+
+
+def test_a_linear_model_is_packed_as_it_is(files, sources):
+    model = Manifest.model_validate_json(files[MANIFEST]).model
+    assert (model.springs, model.dampers, model.changes_max_deviation_mm) == ([], [], 0)
+    assert files[MODEL].decode() == sources.mjcf
+
+
+def test_the_component_for_unity_reads_what_the_manifest_holds(files):
+    script = files["Runtime/CalibratedSprings.cs"].decode()
+    classes = re.findall(r"\[Serializable\]\s+public class (\w+) \{(.*?)\}", script, re.DOTALL)
+    read = {name: set(re.findall(r"public [\w[\]]+ (\w+);", body)) for name, body in classes}
+    assert read == {
+        "Manifest": {"model"},
+        "Model": {"springs", "dampers"},
+        "JointLaw": {"joint", "coefficients"},
+    }
+    for block in (Manifest, Model):
+        assert read[block.__name__] <= set(block.model_fields)
+    assert read["JointLaw"] <= set(JointLaw.__dataclass_fields__)
+    assert "public class CalibratedSprings : MonoBehaviour" in script  # Unity goes by the file's name
+    assembly = json.loads(files["Runtime/Trunkline.asmdef"])
+    assert assembly["references"] == ["Mujoco.Runtime"]
+    assert assembly["allowUnsafeCode"]
+    assert [version["define"] for version in assembly["versionDefines"]] == assembly["defineConstraints"]
+
+
+def test_what_unity_would_compile_loses_nothing_but_digits(files, sources):
+    calibrated = mujoco.MjModel.from_xml_string(sources.mjcf)
+    imported = mujoco.MjModel.from_xml_string(as_imported(sources.mjcf))
+    assert compare(calibrated, imported, TRAJECTORY)[0] < 0.01
+    for field in ("dof_armature", "dof_damping", "jnt_stiffness", "tendon_frictionloss", "actuator_biasprm"):
+        np.testing.assert_allclose(getattr(imported, field), getattr(calibrated, field), rtol=1e-6)
+    limited = sources.mjcf.replace("forcelimited", 'actlimited="true" actrange="0.48 0.5" forcelimited')
+    lossy = mujoco.MjModel.from_xml_string(as_imported(limited))
+    assert (
+        compare(mujoco.MjModel.from_xml_string(limited), lossy, TRAJECTORY)[0] > 1
+    )  # it drops what Unity drops
+
+
+def test_a_simulation_that_warns_breaks_a_rule(sources):
+    sources.mjcf = sources.mjcf.replace('armature="1e-05"', 'armature="0"').replace("-80 0", "-80000 0")
+    sources.mjcf = sources.mjcf.replace("-2000", "-2e7").replace('gainprm="2000"', 'gainprm="2e7"')
+    _, violations = assemble(LABEL, sources, TRAJECTORY)
+    assert [violation.element for violation in violations] == ["simulation"]
+
+
+def test_a_network_of_another_shape_is_one_line(sources):
+    sources.network.write_bytes(network(inputs=7))
+    with pytest.raises(
+        InputError, match=r"ik.onnx: found inputs of width \[7\].*expected one input \(theta_g"
+    ):
+        assemble(LABEL, sources, TRAJECTORY)
+    sources.network.write_bytes(b"not a network")
+    with pytest.raises(InputError, match="expected an ONNX file"):
+        assemble(LABEL, sources, TRAJECTORY)
+
+
+def test_a_grid_without_a_lattice_is_one_line(sources):
+    np.savez(sources.grids, soft_030=np.zeros((2, 2, 2)))
+    with pytest.raises(InputError, match="grids.npz: soft_030: found no origin"):
+        assemble(LABEL, sources, TRAJECTORY)
+
+
+@pytest.fixture
+def project(tmp_path, sources) -> Path:
+    """A folder with all that the stage reads."""
+    root = tmp_path / "project"
+    shutil.copytree(ROOT / "conf/package_unity", root / "conf/package_unity")
+    for name in ("pyproject.toml", "params.yaml", "LICENSE", "docs/unity.md"):
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(ROOT / name, root / name)
+    stages = (
+        "ingest filter build_mjcf identify_stiffness identify_damping identify_control fk_dataset train_ik"
+    )
+    for stage in [*stages.split(), "reachability"]:
+        (root / "artifacts" / stage).mkdir(parents=True)
+        (root / "artifacts" / stage / "metrics.json").write_text("{}")
+    for stage in ("build_mjcf", "identify_control"):
+        (root / "artifacts" / stage / "arm.xml").write_text(sources.mjcf)
+    shutil.copy(sources.network, root / "artifacts/train_ik/ik.onnx")
+    (root / "artifacts/reachability/meshes").mkdir()
+    for path in sources.meshes:
+        shutil.copy(path, root / "artifacts/reachability/meshes")
+    shutil.copy(sources.grids, root / "artifacts/reachability")
+    return root
+
+
+def run(project: Path) -> subprocess.CompletedProcess:
+    command = [sys.executable, str(ROOT / "stages/package_unity.py")]
+    return subprocess.run(command, cwd=project, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+
+
+@pytest.mark.parametrize("change", [str, harden])
+def test_the_stage_writes_package_manifest_and_metrics(project, change):
+    arm = project / "artifacts/identify_control/arm.xml"
+    arm.write_text(change(arm.read_text()))
+    done = run(project)
+    assert done.returncode == 0, done.stderr
+    out = project / "artifacts/package_unity"
+    (tarball,) = out.glob("*.tgz")
+    files, metrics = read_tarball(tarball), json.loads((out / "metrics.json").read_text())
+    assert metrics == {
+        "rule_violations": 0,
+        "roundtrip_max_deviation_mm": 0.0,
+        "files": len(files),
+        "bytes": tarball.stat().st_size,
+    }
+    assert (out / "manifest.json").read_bytes() == files[MANIFEST]
+    assert onnx.load_model_from_string(files[NETWORK]).graph.name == "ik"
+    assert json.loads(files["package.json"])["version"] in tarball.name
+
+
+@pytest.mark.parametrize(
+    "missing",
+    ["identify_control/arm.xml", "train_ik/ik.onnx", "reachability/grids.npz", "ingest/metrics.json"],
+)
+def test_a_missing_input_is_one_line_and_leaves_nothing(project, missing):
+    (project / "artifacts" / missing).unlink()
+    done = run(project)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert done.stderr.startswith(f"error: artifacts/{missing}: no such file")
+    assert not (project / "artifacts/package_unity").exists()

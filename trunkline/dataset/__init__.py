@@ -1,0 +1,1 @@
+"""The data set: equilibria of the calibrated arm, sampled evenly over its workspace."""

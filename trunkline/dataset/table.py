@@ -1,0 +1,152 @@
+"""The table of samples: gravity angle, tip pose, path lengths, tensions, and how they answer to each other."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import pandas as pd
+
+from trunkline.dataset.sampling import Candidates, crowding, sample_angle, thin
+from trunkline.errors import InputError
+from trunkline.frames import gravity_in_base
+from trunkline.simulation.rest import settle
+from trunkline.statics.chain import Chain
+from trunkline.statics.hysteresis import friction_band, model_friction
+from trunkline.statics.sensitivity import sensitivity
+
+POSE = ["x", "y", "z", "qw", "qx", "qy", "qz"]
+AXES = "xyz"
+GROUP = 64  # simulations that wait for the slowest among them to settle
+
+
+@dataclass
+class Density:
+    """Tips at one gravity angle before and after thinning.
+
+    Attributes:
+        tilt: θ_G, rad.
+        before, after: tip positions, m. Shapes (N, 3), (M, 3).
+        failed, snapped: candidates dropped, see `Candidates`.
+    """
+
+    tilt: float
+    before: np.ndarray
+    after: np.ndarray
+    failed: int
+    snapped: int
+
+    def unevenness(self) -> tuple[float, float]:
+        """Standard deviation over mean of the number of tips in occupied cells of 2 cm, before and after."""
+        counts = (crowding(self.before, 0.02), crowding(self.after, 0.02))
+        return tuple(float(n.std() / n.mean()) for n in counts)
+
+
+def sample_table(
+    chain: Chain, tilt: float, count: int, directions: int, steps: int, rng: np.random.Generator
+) -> tuple[pd.DataFrame, Density]:
+    """About `count` samples at one gravity angle, thinned in the space of tips.
+
+    Columns: theta_g (rad), x, y, z (m), qw, qx, qy, qz, l1… (m, path lengths), f1… (N, tensions), residual (N m),
+    iterations, set, and the derivatives by tension dx_df1… (tip, m/N), rx_df1… (turn of the tip as a rotation
+    vector in the base frame, rad/N) and dl1_df1… (path lengths, m/N).
+    The planar sets are kept beside the thinned samples, thinned along their own curves.
+
+    Args:
+        tilt: θ_G, rad.
+        directions, steps: of the candidates, see `sample_angle`.
+    """
+    candidates = sample_angle(chain, tilt, directions, steps, rng)
+    tips = candidates.equilibrium.position
+    planar = {kind: np.flatnonzero(candidates.kind == kind) for kind in ("dorsal", "ventral")}
+    on_curves = [rows[thin(tips[rows], max(1, count // 50), rng)] for rows in planar.values() if len(rows)]
+    general = np.flatnonzero(candidates.kind == "general")
+    share = count - sum(len(rows) for rows in on_curves)
+    kept = np.sort(np.concatenate([general[thin(tips[general], share, rng)], *on_curves]))
+    density = Density(tilt, tips, tips[kept], candidates.failed, candidates.snapped)
+    return _table(chain, tilt, candidates, kept), density
+
+
+def _table(chain: Chain, tilt: float, candidates: Candidates, kept: np.ndarray) -> pd.DataFrame:
+    rest = candidates.equilibrium[kept]
+    slopes = sensitivity(chain, rest.qpos, rest.tensions, candidates.gravity)
+    columns = {"theta_g": np.full(len(kept), tilt)}
+    columns |= dict(zip(POSE, np.concatenate([rest.position, rest.quaternion], axis=1).T, strict=True))
+    columns |= dict(zip(length_columns(chain.tendons), rest.lengths.T, strict=True))
+    columns |= dict(zip(tension_columns(chain.tendons), rest.tensions.T, strict=True))
+    columns |= {"residual": rest.residual, "iterations": rest.iterations, "set": candidates.kind[kept]}
+    for t in range(chain.tendons):
+        columns |= {f"d{axis}_df{t + 1}": slopes.tip_by_tension[:, k, t] for k, axis in enumerate(AXES)}
+        columns |= {f"r{axis}_df{t + 1}": slopes.turn_by_tension[:, k, t] for k, axis in enumerate(AXES)}
+        columns |= {f"dl{s + 1}_df{t + 1}": slopes.length_by_tension[:, s, t] for s in range(chain.tendons)}
+    return pd.DataFrame(columns)
+
+
+def length_columns(tendons: int) -> list[str]:
+    """l1, l2, …"""
+    return [f"l{t + 1}" for t in range(tendons)]
+
+
+def tension_columns(tendons: int) -> list[str]:
+    """f1, f2, …"""
+    return [f"f{t + 1}" for t in range(tendons)]
+
+
+def tip_by_tension(table: pd.DataFrame, tendons: int) -> np.ndarray:
+    """∂(tip position)/∂(tensions), m/N. Shape (N, 3, K)."""
+    names = [[f"d{axis}_df{t + 1}" for t in range(tendons)] for axis in AXES]
+    return np.stack([table[row].to_numpy() for row in names], axis=1)
+
+
+def turn_by_tension(table: pd.DataFrame, tendons: int) -> np.ndarray:
+    """∂(rotation vector of the tip)/∂(tensions), rad/N. Shape (N, 3, K)."""
+    names = [[f"r{axis}_df{t + 1}" for t in range(tendons)] for axis in AXES]
+    return np.stack([table[row].to_numpy() for row in names], axis=1)
+
+
+def length_by_tension(table: pd.DataFrame, tendons: int) -> np.ndarray:
+    """∂(path lengths)/∂(tensions), m/N. Shape (N, K, K)."""
+    names = [[f"dl{s + 1}_df{t + 1}" for t in range(tendons)] for s in range(tendons)]
+    return np.stack([table[row].to_numpy() for row in names], axis=1)
+
+
+def split(count: int, validate_share: float, rng: np.random.Generator) -> np.ndarray:
+    """ "train" or "validate" for each of `count` samples, at random. Shape (count,)."""
+    names = np.full(count, "train", dtype=object)
+    names[rng.permutation(count)[: round(validate_share * count)]] = "validate"
+    return names
+
+
+def mujoco_deviation(
+    model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, count: int, rng: np.random.Generator
+) -> pd.DataFrame:
+    """Distance of `count` random samples' tips from those of MuJoCo settled to rest under the same actuators.
+
+    Returns:
+        Columns theta_g (rad), largest_tension (N), deviation_mm, rested, and friction_band_mm: how far apart friction,
+        which is off in the comparison, may hold the tip (NaN where the ends of its band were not found).
+
+    Raises:
+        InputError: if there are fewer samples.
+    """
+    if count > len(table):
+        raise InputError(f"fk_dataset.check: found {len(table)} samples, expected at least the {count} to be checked")
+    rows = table.iloc[np.sort(rng.permutation(len(table))[:count])]
+    tensions = rows[tension_columns(chain.tendons)].to_numpy()
+    lengths = rows[length_columns(chain.tendons)].to_numpy()
+    by_actuator = model.actuator_trnid[:, 0]
+    commands = lengths - tensions / chain.gain  # f = kp (l - command), and no pull where they are equal
+    gravity = gravity_in_base(rows["theta_g"].to_numpy())
+    groups = np.array_split(np.arange(count), int(np.ceil(count / GROUP)))
+    settled = [settle(model, commands[group][:, by_actuator], gravity[group]) for group in groups]
+    position, rested = (np.concatenate([getattr(one, name) for one in settled]) for name in ("position", "rested"))
+    band = friction_band(chain, tensions, gravity, *model_friction(model))
+    deviation = np.linalg.norm(position - rows[["x", "y", "z"]].to_numpy(), axis=1)
+    return pd.DataFrame(
+        {
+            "theta_g": rows["theta_g"].to_numpy(),
+            "largest_tension": tensions.max(axis=1),
+            "deviation_mm": deviation * 1e3,
+            "rested": rested,
+            "friction_band_mm": band.width * 1e3,
+        }
+    )

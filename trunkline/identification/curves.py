@@ -1,0 +1,89 @@
+"""Tables of an identification stage: convergence, errors over time, distances, shapes. `dvc plots` shows them."""
+
+import numpy as np
+import pandas as pd
+from scipy.signal import butter, sosfiltfilt
+
+from trunkline.frames import tilt_of_gravity
+from trunkline.identification.evaluation import Replay
+from trunkline.identification.experiment import Experiment
+from trunkline.identification.identify import Identification
+from trunkline.identification.loss import distances
+
+ERROR_CUTOFF = 6.0  # Hz, of the low-pass over error curves, as the paper filters its figure
+SHOWN_SEGMENTS = 5
+
+
+def convergence_table(identification: Identification) -> pd.DataFrame:
+    """Columns phase, step, best, mean."""
+    return pd.DataFrame(
+        [
+            {"phase": phase, "step": step, "best": best, "mean": mean}
+            for phase, history in identification.convergence.items()
+            for step, (best, mean) in enumerate(zip(history.best, history.mean, strict=True))
+        ]
+    )
+
+
+def error_curves(experiments: list[Experiment], replays: dict[str, Replay]) -> pd.DataFrame:
+    """Over time, mean over trials and segments: columns time_s, model, position_error_mm, velocity_error_mm_s.
+
+    The errors of the paper's figure, of distances from the base and of their rate of change, low-pass filtered.
+    """
+    frames = min(e.frames for e in experiments)
+    step = experiments[0].frame_step
+    low_pass = butter(2, ERROR_CUTOFF, fs=1 / step, output="sos")
+    tables = []
+    unseen = np.stack([~e.measured[:frames] for e in experiments], axis=1)
+    for model, replayed in replays.items():
+        error = np.stack(
+            [
+                (distances(p) - distances(e.positions))[:frames]
+                for p, e in zip(replayed.positions, experiments, strict=True)
+            ],
+            axis=1,
+        )
+        rate = np.ma.array(np.gradient(error, step, axis=0), mask=unseen)
+        error = np.ma.array(error, mask=unseen)
+        tables.append(
+            pd.DataFrame(
+                {
+                    "time_s": np.arange(frames) * step,
+                    "model": model,
+                    "position_error_mm": _smooth(low_pass, error) * 1e3,
+                    "velocity_error_mm_s": _smooth(low_pass, rate) * 1e3,
+                }
+            )
+        )
+    return pd.concat(tables)
+
+
+def _smooth(low_pass: np.ndarray, errors: np.ma.MaskedArray) -> np.ndarray:
+    """Mean size of (T, trials, S) errors in each frame, low-pass filtered. Shape (T,)."""
+    return sosfiltfilt(low_pass, np.abs(errors).mean(axis=(1, 2)).filled(0.0))
+
+
+def distance_table(experiment: Experiment, index: int, replays: dict[str, Replay], segments) -> pd.DataFrame:
+    """Distances from the base of a few segments: columns time_s, segment, source, distance_mm."""
+    outer = len(segments) // 3  # nearer the base, distances hardly change
+    chosen = np.unique(np.linspace(outer, len(segments) - 1, SHOWN_SEGMENTS).astype(int))
+    sources = {"measured": experiment.positions} | {m: r.positions[index] for m, r in replays.items()}
+    time = np.arange(experiment.frames) * experiment.frame_step
+    return pd.concat(
+        pd.DataFrame(
+            {"time_s": time, "segment": segments[s], "source": source, "distance_mm": distances(positions)[:, s] * 1e3}
+        )
+        for source, positions in sources.items()
+        for s in chosen
+    )
+
+
+def shape_table(experiments: list[Experiment], replays: dict[str, Replay], segments) -> pd.DataFrame:
+    """Last shapes in the plane of the tilt: columns trial, tilt_deg, source, segment, x_mm, z_mm."""
+    rows = []
+    for index, experiment in enumerate(experiments):
+        sources = {"measured": experiment.positions} | {m: r.positions[index] for m, r in replays.items()}
+        for source, positions in sources.items():
+            for segment, (x, _, z) in zip(segments, positions[-1] * 1e3, strict=True):
+                rows.append((experiment.name, np.degrees(tilt_of_gravity(experiment.gravity)), source, segment, x, z))
+    return pd.DataFrame(rows, columns=["trial", "tilt_deg", "source", "segment", "x_mm", "z_mm"])

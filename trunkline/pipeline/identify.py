@@ -1,0 +1,264 @@
+"""The edge of the three identification stages: read model and trials, identify, write model, numbers, figures."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.figures import identification as plots
+from trunkline.figures.style import save_figure
+from trunkline.identification import curves
+from trunkline.identification.cross_validation import cross_validate
+from trunkline.identification.evaluation import Replay, replay, scores
+from trunkline.identification.experiment import Experiment, prepare
+from trunkline.identification.identify import Fit, Identification, Method, identify, with_parameters
+from trunkline.identification.loss import LossWeights, internal_error
+from trunkline.identification.markers import with_measured_markers
+from trunkline.identification.parameter_table import parameter_table, undetermined
+from trunkline.identification.parameters import PARAMETERS, save_model
+from trunkline.identification.problem import Bounds
+from trunkline.identification.resting import resting_shape
+from trunkline.identification.search import DifferentialEvolution, LeastSquares, Optimizer
+from trunkline.identification.settings import IdentificationSettings
+from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.trials.trial import Trial, read_trials
+
+CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
+TRIALS = Path("data/processed/filter")
+
+
+def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tuple[str, ...] = ()) -> None:
+    """Identify and write `artifacts/<stage>/`.
+
+    Args:
+        model_path: MJCF that the stage begins with.
+        whole: earlier stages whose scalars, with this stage's, make the whole arm: the CAD model and the one with all
+            scalars and no joint's own factor are then scored on the same trials too.
+    """
+    spec = read_spec(model_path)
+    model = spec.compile()
+    check_parameters(stage, config, model)
+    model, experiments, fit = set_up(config, read_reported(config), model)
+    fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
+    check_folds(stage, config.cross_validation_folds, fitted)
+    if "stiffness" in fit.parameters and "static_tilt" not in config.experiments:
+        print(f"{stage}: without static tilts, stiffness comes from the shape at rest and the ring-down of releases")
+    result = identify(stage, model, fitted, fit)
+    identified = save_model(spec, result.models["identified"])
+    # score what is written, not what was in memory: MJCF keeps six digits
+    models = result.models | {"identified": mujoco.MjModel.from_xml_string(identified)}
+    if whole:
+        models["cad"] = read_spec(CAD_MODEL).compile()
+        models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
+        for field in ("qpos_spring", "site_pos", "site_sameframe"):  # rest shape and markers are no matter of scalars
+            getattr(models["coarse"], field)[:] = getattr(model, field)
+    replays = {name: replay(m, experiments, segments) for name, m in models.items()}
+    metrics = {name: scores(r, experiments, fit.loss, fit.weights) for name, r in replays.items()}
+    metrics |= {
+        "evaluations": result.evaluations,
+        "diverged": result.diverged,
+        "at_bound": len(result.at_bound),
+        "undetermined": len(undetermined(result, fit.parameters)),
+        "converged": result.converged,
+        "start_fit": _start_fit(experiments),
+    }
+    if any(e.frames > 1 for e in experiments):
+        metrics["halved_step"] = _halved_step(
+            models["identified"], experiments, segments, replays["identified"], metrics
+        )
+    if result.factors or whole:
+        metrics["per_joint_gain"] = _gain(metrics)
+    if config.cross_validation_folds:
+        metrics["cross_validation"] = cross_validate(stage, result, fitted, fit, config.cross_validation_folds)
+    for doubt in doubts(result, fit.parameters):
+        print(f"{stage}: {doubt}")
+    artifacts = Path("artifacts") / stage
+    with output_folder(artifacts) as folder:
+        (folder / "arm.xml").write_text(identified)
+        write_json(folder / "parameters.json", parameter_table(result, fit.parameters))
+        write_json(folder / "metrics.json", metrics)
+        write_plots(folder, result, fit.parameters, experiments, segments, replays)
+
+
+def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
+    """Scalars that earlier stages identified, without any joint's own factor."""
+    values = {}
+    for stage in stages:
+        path = Path("artifacts") / stage / "parameters.json"
+        if not path.is_file():
+            raise InputError(f"{path}: no such file, expected the parameters of an earlier stage")
+        values |= {name: row["value"] for name, row in json.loads(path.read_text())["parameters"].items()}
+    return values
+
+
+def doubts(result: Identification, bounds: dict[str, Bounds]) -> list[str]:
+    """What a user should know before trusting the result, a line each."""
+    unfinished = [search.replace("_", " ") for search, converged in result.converged.items() if not converged]
+    return (
+        [f"the {search} search ended before it had converged" for search in unfinished]
+        + [f"{name} ended on a bound of its range" for name in result.at_bound]
+        + [f"{name} is not determined: its 95 % interval spans its range" for name in undetermined(result, bounds)]
+    )
+
+
+def _halved_step(model, experiments, segments, replayed: Replay, metrics: dict) -> dict[str, float]:
+    """By which share of itself half the time step moves E_internal, per split.
+
+    The measured E_internal hardly changes if errors of the step hide beside others, hence also the largest distance
+    between the two simulations of any segment, in mm.
+    """
+    halved = replay(model, experiments, segments, step_factor=0.5)
+    change = {}
+    for split in ("identify", "validate"):
+        before = metrics["identified"][split]["e_internal_mm"]
+        chosen = [(p, e) for p, e in zip(halved.positions, experiments, strict=True) if e.split == split]
+        after = np.mean([internal_error(p, e.positions, e.measured) for p, e in chosen]) * 1e3
+        change[split] = abs(float(after) - before) / before
+    furthest = max(
+        np.linalg.norm(a - b, axis=-1).max() for a, b in zip(halved.positions, replayed.positions, strict=True)
+    )
+    return change | {"max_mm": float(furthest) * 1e3}
+
+
+def _start_fit(experiments: list[Experiment]) -> dict[str, float]:
+    """How far the poses from which simulations start are from the measured ones."""
+    residuals = [e.fit.residuals[np.isfinite(e.fit.residuals)] * 1e3 for e in experiments]
+    return {
+        "mean_mm": float(np.mean([r.mean() for r in residuals])),
+        "max_mm": float(np.max([r.max() for r in residuals])),
+        "unconverged": sum(not e.fit.converged for e in experiments),
+    }
+
+
+def _gain(metrics: dict) -> dict[str, float]:
+    """Share of E_internal that per-joint tuning removes from the coarse result, per split."""
+    return {
+        split: 1 - metrics["identified"][split]["e_internal_mm"] / metrics["coarse"][split]["e_internal_mm"]
+        for split in metrics["coarse"]
+    }
+
+
+def write_plots(folder: Path, result: Identification, bounds, experiments, segments, replays) -> None:
+    """PNGs for people and CSV for `dvc plots`."""
+    first = {"CAD": replays["cad"]} if "cad" in replays else {"initial": replays["initial"]}
+    shown = first | {"identified": replays["identified"]}
+    curves.convergence_table(result).to_csv(folder / "convergence.csv", index=False, float_format="%.6g")
+    save_figure(plots.convergence_figure(result), folder / "convergence.png")
+    units = {name: PARAMETERS[name].unit for name in result.values}
+    save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
+    validate = [i for i, e in enumerate(experiments) if e.split == "validate"]
+    moving = [i for i in validate if experiments[i].frames > 1]
+    if "stiffness" in result.values:  # shapes at rest: static ones, or how releases end
+        table = curves.shape_table([experiments[i] for i in validate], _select(shown, validate), segments)
+        table.to_csv(folder / "shapes.csv", index=False, float_format="%.6g")
+        save_figure(plots.shape_figure(table), folder / "shapes.png")
+    elif moving:
+        errors = curves.error_curves([experiments[i] for i in moving], _select(shown, moving))
+        errors.to_csv(folder / "errors.csv", index=False, float_format="%.6g")
+        save_figure(plots.error_figure(errors), folder / "errors.png")
+        kinds = [i for i in moving if experiments[i].kind == experiments[moving[-1]].kind]
+        widest = max(kinds, key=lambda i: float(np.ptp(experiments[i].positions, axis=0).max()))
+        table = curves.distance_table(experiments[widest], widest, shown, segments)
+        table.to_csv(folder / "distances.csv", index=False, float_format="%.6g")
+        save_figure(plots.distance_figure(table, experiments[widest].name), folder / "distances.png")
+        save_figure(plots.path_figure(experiments[widest], widest, shown), folder / "paths.png")
+
+
+def _select(replays: dict[str, Replay], indices: list[int]) -> dict[str, Replay]:
+    return {name: replace(r, positions=[r.positions[i] for i in indices]) for name, r in replays.items()}
+
+
+def read_spec(path: Path) -> mujoco.MjSpec:
+    """The MJCF at `path`.
+
+    Raises:
+        InputError: if there is none, or MuJoCo refuses it.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected the model of an earlier stage")
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        raise InputError(f"{path}: not a model that MuJoCo reads: {str(error).splitlines()[0]}") from error
+
+
+def set_up(
+    config: IdentificationSettings, trials: list[Trial], model: mujoco.MjModel
+) -> tuple[mujoco.MjModel, list[Experiment], Fit]:
+    """What `identify` works on: the model to begin with, its markers where they were measured if that is asked for,
+    an experiment for each trial, and what to fit to those of the kinds to identify from."""
+    if config.markers == "measured":
+        model = with_measured_markers(model, [t for t in trials if t.experiment in config.experiments])
+    experiments = [prepare(trial, model, config.frames, config.command_delay) for trial in trials]
+    fit = fit_of(config, trials[0].segments)
+    if config.rest_shape == "measured":
+        fitted = [e for e in experiments if e.kind in config.experiments]
+        fit.rest = resting_shape(model, fitted, fit.segments)
+    return model, experiments, fit
+
+
+def read_reported(config: IdentificationSettings) -> list[Trial]:
+    """The session's trials of the reported kinds, which all track the same segments."""
+    trials = [t for t in read_trials(TRIALS) if t.experiment in config.reported]
+    for kind in config.experiments:
+        for split in ("identify", "validate"):
+            if not any(t.experiment == kind and t.split == split for t in trials):
+                raise InputError(f"session.yaml: found no {kind} trial with split {split}, expected at least one")
+    segments = trials[0].segments
+    for trial in trials:
+        if trial.segments != segments:
+            raise InputError(
+                f"trial {trial.name}: found {len(trial.segments)} segments, expected the {len(segments)} of "
+                f"{trials[0].name}"
+            )
+    return trials
+
+
+def fit_of(config: IdentificationSettings, segments: tuple[str, ...]) -> Fit:
+    """What a stage's settings ask for, with the shape at rest that the model has."""
+    return Fit(
+        segments=segments,
+        parameters={name: Bounds(r.low, r.high) for name, r in config.parameters.items()},
+        per_joint=tuple(config.per_joint),
+        loss=config.loss.kind,
+        weights=LossWeights(**{key: value for key, value in vars(config.loss).items() if key != "kind"}),
+        method=_method(config),
+    )
+
+
+def _method(config: IdentificationSettings) -> Method:
+    return Method(
+        optimizer=_optimizer(config.optimizer),
+        rough_step_factor=config.rough.step_factor,
+        rough_frames=config.rough.frames,
+        rough_trials=config.rough.trials,
+        polish_iterations=config.polish.iterations,
+        polish_tolerance=config.polish.tolerance,
+        fine=_optimizer(config.fine),
+        per_joint_range=config.per_joint_range,
+        per_joint_deviation=config.per_joint_deviation,
+        seed=config.seed,
+    )
+
+
+def _optimizer(config) -> Optimizer:
+    kind = {"least_squares": LeastSquares, "differential_evolution": DifferentialEvolution}[config.method]
+    return kind(**{key: value for key, value in vars(config).items() if key != "method"})
+
+
+def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
+    """Refuse parameters of tendons and motors that the arm has not got."""
+    for name in config.parameters:
+        if not model.ntendon and PARAMETERS[name].fields[0].startswith(("tendon_", "actuator_")):
+            found = "found it for an arm without tendons, expected parameters of joints alone"
+            raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}")
+
+
+def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:
+    """Refuse to leave out more groups of trials than there are trials to identify from."""
+    trials = sum(e.split == "identify" for e in fitted)
+    if folds > trials:
+        raise InputError(f"{stage}.cross_validation_folds: found {folds}, expected at most {trials}, one a trial")

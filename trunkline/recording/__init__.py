@@ -1,1 +1,0 @@
-"""From logs to filtered trials."""

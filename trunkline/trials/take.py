@@ -1,0 +1,137 @@
+"""A take: one trial as recorded, checked but not filtered, in the motion-capture frame, on its own clocks."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from trunkline.trials.tables import long_table, pose_table, read_tables, stack
+
+BASE = "base"  # the base body's name in poses.parquet
+
+
+@dataclass
+class Take:
+    """T frames, S segments, K tendons; the motors have Tc commands and Tm measured positions.
+
+    up: (3,) unit vector against gravity. time: (T,) s from the first frame.
+    positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None, base_positions (T, 3), base_quaternions (T, 4):
+    in the motion-capture frame, NaN where there is no good sample.
+    command_time (Tc,), tendon_time (Tm,): s on the motors' clock, which reads time - clock_offset.
+    commands (Tc, K), tendon_positions (Tm, K): m of pull.
+    """
+
+    name: str
+    experiment: str
+    split: str
+    level: float | None
+    up: np.ndarray
+    time: np.ndarray
+    segments: tuple[str, ...]
+    positions: np.ndarray
+    quaternions: np.ndarray | None
+    base_positions: np.ndarray
+    base_quaternions: np.ndarray
+    tendons: tuple[str, ...]
+    command_time: np.ndarray
+    commands: np.ndarray
+    tendon_time: np.ndarray
+    tendon_positions: np.ndarray
+    clock_offset: float = 0.0
+
+
+SCHEMA = pa.schema(
+    {
+        "trial": pa.string(),
+        "experiment": pa.string(),
+        "split": pa.string(),
+        "level": pa.float64(),
+        "up": pa.list_(pa.float64()),
+        "clock_offset": pa.float64(),
+        "frames": pa.int64(),
+        "commands": pa.int64(),
+        "tendon_positions": pa.int64(),
+        "segments": pa.list_(pa.string()),
+        "tendons": pa.list_(pa.string()),
+        "orientations": pa.bool_(),
+    }
+)
+
+
+def write_takes(folder: Path, takes: list[Take]) -> None:
+    """Write trials.parquet (a row a trial), poses.parquet (a row a frame and body, the base first) and
+    commands.parquet (a row a tendon and time; `stream` is "command" or "position")."""
+    rows, poses, commands = [], [], []
+    for take in takes:
+        rows.append(
+            {
+                "trial": take.name,
+                "experiment": take.experiment,
+                "split": take.split,
+                "level": take.level,
+                "up": take.up.tolist(),
+                "clock_offset": float(take.clock_offset),
+                "frames": len(take.time),
+                "commands": len(take.command_time),
+                "tendon_positions": len(take.tendon_time),
+                "segments": list(take.segments),
+                "tendons": list(take.tendons),
+                "orientations": take.quaternions is not None,
+            }
+        )
+        quaternions = take.quaternions
+        if quaternions is None:
+            quaternions = np.full((*take.positions.shape[:2], 4), np.nan)
+        positions = np.concatenate([take.base_positions[:, None], take.positions], axis=1)
+        quaternions = np.concatenate([take.base_quaternions[:, None], quaternions], axis=1)
+        poses.append(pose_table(take.name, take.time, (BASE, *take.segments), positions, quaternions))
+        for stream, time, values in (
+            ("command", take.command_time, take.commands),
+            ("position", take.tendon_time, take.tendon_positions),
+        ):
+            table = long_table(take.name, time, "tendon", take.tendons, {"pull": values})
+            commands.append(table.append_column("stream", pa.array([stream] * len(table), pa.string())))
+    folder = Path(folder)
+    pq.write_table(pa.Table.from_pylist(rows, SCHEMA), folder / "trials.parquet")
+    pq.write_table(pa.concat_tables(poses), folder / "poses.parquet")
+    pq.write_table(pa.concat_tables(commands), folder / "commands.parquet")
+
+
+def read_takes(folder: Path) -> list[Take]:
+    """The takes that `write_takes` wrote into `folder`, in the same order. Raises InputError as `read_tables`."""
+    rows, poses, pulls = read_tables(folder, "ingest")
+    takes, pose_row, pull_row = [], 0, 0
+    for row in rows:
+        shape = (row["frames"], 1 + len(row["segments"]))
+        pose = {key: column[pose_row : pose_row + shape[0] * shape[1]] for key, column in poses.items()}
+        pose_row += shape[0] * shape[1]
+        motors = []
+        for count in (row["commands"], row["tendon_positions"]):
+            size = (count, len(row["tendons"]))
+            span = slice(pull_row, pull_row + size[0] * size[1])
+            time = pulls["time"][span].reshape(size)[:, 0] if size[1] else np.empty(0)
+            motors += [time, pulls["pull"][span].reshape(size)]
+            pull_row = span.stop
+        positions = stack(pose, ("x", "y", "z"), shape)
+        quaternions = stack(pose, ("qw", "qx", "qy", "qz"), shape)
+        takes.append(
+            Take(
+                row["trial"],
+                row["experiment"],
+                row["split"],
+                row["level"],
+                np.array(row["up"]),
+                pose["time"].reshape(shape)[:, 0].copy(),
+                tuple(row["segments"]),
+                positions[:, 1:],
+                quaternions[:, 1:] if row["orientations"] else None,
+                positions[:, 0],
+                quaternions[:, 0],
+                tuple(row["tendons"]),
+                *motors,
+                row["clock_offset"],
+            )
+        )
+    return takes
