@@ -14,8 +14,9 @@ import numpy as np
 from trunkline.dataset.sampling import pull_directions, sample_angle
 from trunkline.frames import gravity_in_base
 from trunkline.ik.polish import polish
+from trunkline.pipeline.inputs import read_model
 from trunkline.simulation.rest import settle
-from trunkline.statics.chain import load_model, read_chain
+from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium, forward
 from trunkline.threads import thread_count
 
@@ -23,7 +24,7 @@ SETTLED, SOLVED, DIRECTIONS, STEPS = 48, 1000, 72, 100
 
 
 def main(path: Path) -> None:
-    model = load_model(path)
+    model = read_model(path)
     chain = read_chain(model)
     rng = np.random.default_rng(0)
     tensions = pull_directions(chain, rng.uniform(0, 2 * np.pi, SOLVED)) * rng.uniform(0, 1, (SOLVED, 1)) ** 2

@@ -15,7 +15,8 @@ import onnxruntime
 from trunkline.dataset.sampling import pull_directions
 from trunkline.frames import gravity_in_base
 from trunkline.ik.polish import polish
-from trunkline.statics.chain import load_model, read_chain
+from trunkline.pipeline.inputs import read_model
+from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium
 
 MODEL = Path("artifacts/identify_control/arm.xml")
@@ -23,7 +24,7 @@ TARGETS, SINGLE = 400, 5000
 
 
 def main(path: Path) -> None:
-    chain = read_chain(load_model(MODEL))
+    chain = read_chain(read_model(MODEL))
     rng = np.random.default_rng(0)
     angles = rng.uniform(0, np.radians(120), TARGETS)
     tensions = pull_directions(chain, rng.uniform(0, 2 * np.pi, TARGETS)) * rng.uniform(0, 1, (TARGETS, 1)) ** 2

@@ -6,14 +6,14 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from trunkline.arm.tendons import require_tendons
 from trunkline.dataset.table import Density, mujoco_deviation, sample_table, split
 from trunkline.figures.dataset import density_figure, deviation_figure
 from trunkline.figures.style import save_figure
+from trunkline.pipeline.inputs import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.settings import settings
-from trunkline.statics.chain import load_model, read_chain
+from trunkline.statics.chain import read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 DATA = Path("data/processed/fk_dataset")
@@ -36,8 +36,7 @@ class Config:
 
 
 def main(config: Config) -> None:
-    require_tendons()
-    model = load_model(MODEL)
+    model = read_model(MODEL)
     chain = read_chain(model)
     rng = np.random.default_rng(config.seed)
     angles = np.radians(sorted(config.angles_deg))

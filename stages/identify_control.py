@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-from trunkline.arm.tendons import require_tendons
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.identify import run
 from trunkline.pipeline.stage import run_stage
@@ -11,7 +10,6 @@ Config = IdentificationSettings
 
 
 def main(config: Config) -> None:
-    require_tendons()
     earlier = ("identify_stiffness", "identify_damping")
     run("identify_control", config, Path("artifacts/identify_damping/arm.xml"), whole=earlier)
 

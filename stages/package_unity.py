@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, PositiveFloat
 
-from trunkline.arm.tendons import require_tendons
 from trunkline.errors import InputError
 from trunkline.figures.package import roundtrip_figure
 from trunkline.figures.style import save_figure
+from trunkline.pipeline.inputs import existing
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.settings import settings
 from trunkline.unity.importer import as_imported
@@ -45,7 +45,6 @@ class Config:
 
 
 def main(config: Config) -> None:
-    require_tendons()
     trajectory = Trajectory(
         duration=config.roundtrip.duration,
         pull=config.roundtrip.pull,
@@ -57,7 +56,7 @@ def main(config: Config) -> None:
         config.display_name,
         config.description,
         config.unity,
-        trunkline=tomllib.loads(_existing("pyproject.toml").read_text())["project"]["version"],
+        trunkline=tomllib.loads(existing("pyproject.toml").read_text())["project"]["version"],
     )
     sources = read_sources(config.version)
     files, violations = assemble(label, sources, trajectory)
@@ -89,14 +88,14 @@ def read_sources(version: str) -> Sources:
     if not meshes:
         raise InputError(f"{reachability}/meshes: found no mesh, expected .obj files (run the reachability stage)")
     return Sources(
-        mjcf=_existing(ARTIFACTS / "identify_control/arm.xml").read_text(),
-        network=_existing(ARTIFACTS / "train_ik/ik.onnx"),
+        mjcf=existing(ARTIFACTS / "identify_control/arm.xml").read_text(),
+        network=existing(ARTIFACTS / "train_ik/ik.onnx"),
         meshes=meshes,
-        grids=_existing(reachability / "grids.npz"),
-        metrics={s: json.loads(_existing(ARTIFACTS / s / "metrics.json").read_text()) for s in MEASURED},
+        grids=existing(reachability / "grids.npz"),
+        metrics={s: json.loads(existing(ARTIFACTS / s / "metrics.json").read_text()) for s in MEASURED},
         texts={
-            "README.md": _existing("docs/unity.md").read_bytes(),
-            "LICENSE.md": _existing("LICENSE").read_bytes(),
+            "README.md": existing("docs/unity.md").read_bytes(),
+            "LICENSE.md": existing("LICENSE").read_bytes(),
             "CHANGELOG.md": f"# Changelog\n\n## [{version}]\n\nSee `Runtime/manifest.json`.\n".encode(),
         },
     )
@@ -125,12 +124,6 @@ def write_roundtrip(out: Path, models: dict[str, mujoco.MjModel], trajectory: Tr
     columns |= {f"{name}_{axis}": tip[:, "xyz".index(axis)] for name, tip in tips.items() for axis in "xyz"}
     pd.DataFrame(columns)[::10].to_csv(out / "roundtrip.csv", index=False, float_format="%.6g")
     save_figure(roundtrip_figure(time, tips, gaps_mm), out / "roundtrip.png")
-
-
-def _existing(path: str | Path) -> Path:
-    if not Path(path).is_file():
-        raise InputError(f"{path}: no such file, expected what an earlier stage writes (run `dvc repro`)")
-    return Path(path)
 
 
 if __name__ == "__main__":

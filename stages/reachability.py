@@ -6,12 +6,12 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, PositiveInt
 
-from trunkline.arm.tendons import require_tendons
 from trunkline.errors import InputError
 from trunkline.fields.mesh import Surface, write_obj
 from trunkline.figures.maps import heldout_figure, maps_figure, slices_figure
 from trunkline.figures.style import save_figure
 from trunkline.panda.mjcf import panda_spec
+from trunkline.pipeline.inputs import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.reachability.checks import Check, LabelSettings, SpotCheckSettings, check_maps
@@ -19,7 +19,7 @@ from trunkline.reachability.maps import HybridSettings, Maps, RigidSettings, ble
 from trunkline.reachability.soft import SoftShape
 from trunkline.reachability.tips import ArmTips, Tips
 from trunkline.settings import settings
-from trunkline.statics.chain import Chain, load_model, read_chain
+from trunkline.statics.chain import Chain, read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
@@ -89,8 +89,7 @@ class Config:
 
 
 def main(config: Config) -> None:
-    require_tendons()
-    chain = read_chain(load_model(MODEL))
+    chain = read_chain(read_model(MODEL))
     tips_at = read_tips(SAMPLES, chain, config)
     shape = SoftShape(config.soft.tolerance, config.soft.closing, config.soft.smoothing, config.soft.smallest)
     step = np.radians(config.soft.angle_step_deg)

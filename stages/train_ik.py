@@ -9,7 +9,6 @@ import pandas as pd
 import torch
 from pydantic import Field, PositiveFloat, PositiveInt
 
-from trunkline.arm.tendons import require_tendons
 from trunkline.dataset.table import (
     length_by_tension,
     length_columns,
@@ -26,10 +25,11 @@ from trunkline.ik.onnx import OPSET, to_onnx
 from trunkline.ik.polish import polish
 from trunkline.ik.score import TipErrors, beyond_range, outside_targets, tip_errors
 from trunkline.ik.tip_loss import tip_loss
+from trunkline.pipeline.inputs import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.settings import settings
-from trunkline.statics.chain import Chain, load_model, read_chain
+from trunkline.statics.chain import Chain, read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
@@ -63,8 +63,7 @@ class Config:
 
 
 def main(config: Config) -> None:
-    require_tendons()
-    model = load_model(MODEL)
+    model = read_model(MODEL)
     chain = read_chain(model)
     table = read_table(SAMPLES, chain.tendons)
     network, curve = fit(table, chain.tendons, config)

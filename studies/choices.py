@@ -33,7 +33,8 @@ from trunkline.identification.settings import (
     Range,
 )
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported, read_spec, set_up
+from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported, set_up
+from trunkline.pipeline.inputs import read_spec
 from trunkline.trials.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")

@@ -32,7 +32,7 @@ from trunkline.identification.pose_fit import PoseFit, fit_pose
 from trunkline.identification.search import descend
 from trunkline.identification.surrogate import surrogate
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import read_spec
+from trunkline.pipeline.inputs import read_spec
 from trunkline.progress import progress
 from trunkline.signals.smoothing import low_pass
 

@@ -17,8 +17,9 @@ import numpy as np
 from trunkline.dataset.sampling import pull_directions
 from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt, save_figure
 from trunkline.frames import gravity_in_base
+from trunkline.pipeline.inputs import read_model
 from trunkline.progress import progress
-from trunkline.statics.chain import Chain, load_model, read_chain
+from trunkline.statics.chain import Chain, read_chain
 from trunkline.statics.equilibria import equilibrium, equilibrium_paths
 from trunkline.statics.restart import restart
 
@@ -45,7 +46,7 @@ def main() -> None:
     parser.add_argument("--guesses", type=int, default=24)
     parser.add_argument("--figure", type=Path)
     arguments = parser.parse_args()
-    chain = read_chain(load_model(arguments.model))
+    chain = read_chain(read_model(arguments.model))
     rng = np.random.default_rng(0)
     tensions, gravity = random_loads(chain, arguments.targets, rng)
     rest = equilibrium(chain, tensions, gravity)

@@ -1,4 +1,4 @@
-"""The exceptions that end a stage in one line: a user's mistake, and nothing to do."""
+"""The exception that ends a stage or a command in one line: a user's mistake."""
 
 import sys
 from collections.abc import Callable
@@ -14,10 +14,6 @@ class InputError(Exception):
 
     def __str__(self) -> str:
         return " ".join(super().__str__().split())
-
-
-class Skipped(Exception):
-    """A stage that has nothing to do for this arm; the message, one line, says why."""
 
 
 def in_one_line(main: Callable[..., int]) -> Callable[..., int]:

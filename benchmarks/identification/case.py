@@ -21,7 +21,8 @@ from trunkline.identification.parameter_table import undetermined
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Problem
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported, read_spec, set_up
+from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported, set_up
+from trunkline.pipeline.inputs import read_spec
 
 # every stage, and the model that it begins with
 STAGES = {

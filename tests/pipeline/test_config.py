@@ -115,7 +115,7 @@ def whole_project(tmp_path):
         (tmp_path / "conf" / stage).mkdir(parents=True)
         (tmp_path / "conf" / stage / "config.yaml").write_text("{}\n")
         (tmp_path / "stages" / f"{stage}.py").write_text(
-            "from trunkline.pipeline.config import settings\n\n\n@settings\nclass Config:\n    count: int\n"
+            "from trunkline.settings import settings\n\n\n@settings\nclass Config:\n    count: int\n"
         )
 
     def check(params: str) -> None:

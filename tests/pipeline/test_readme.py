@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from trunkline.pipeline.readme import PICTURES, copy_pictures, generate, with_blocks
+from trunkline.pipeline.readme import generate, with_blocks
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -33,14 +33,3 @@ def test_a_block_is_replaced_and_a_missing_one_refused():
     assert with_blocks(text, {"x": "new \\1"}) == "a\n<!-- x -->\nnew \\1\n<!-- /x -->\nb\n"
     with pytest.raises(ValueError, match="<!-- y -->"):
         with_blocks(text, {"y": ""})
-
-
-def test_what_a_skipped_stage_left_in_place_of_a_picture_is_not_shown(tmp_path):
-    (skipped, shown), (drawn, copied), *_ = PICTURES.items()
-    contents = {skipped: b"skipped: the arm has no tendons\n", drawn: b"\x89PNG\r\n new", shown: b"\x89PNG\r\n old"}
-    for name, content in contents.items():
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_bytes(content)
-    copy_pictures(tmp_path)
-    assert (tmp_path / shown).read_bytes() == contents[shown]
-    assert (tmp_path / copied).read_bytes() == contents[drawn]

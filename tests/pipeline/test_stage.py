@@ -62,59 +62,6 @@ def test_a_stage_that_succeeds_writes_everything(run, tmp_path):
     assert "peak memory" in done.stdout
 
 
-SKIPPED = """
-from trunkline.settings import settings
-from trunkline.errors import Skipped
-from trunkline.pipeline.stage import run_stage
-
-@settings
-class Config:
-    count: int
-
-def main(config):
-    raise Skipped("the arm has no tendons")
-
-run_stage("fit", Config, main)
-"""
-PIPELINE = """
-stages:
-  fit:
-    cmd: {python} -c "import sys; sys.path[0:0] = ['{root}']; exec(open('fit.py').read())"
-    outs:
-      - artifacts/arm-${{fit.count}}.xml
-      - artifacts/meshes
-    metrics:
-      - artifacts/metrics.json:
-          cache: false
-    plots:
-      - artifacts/curve.csv:
-          x: a
-  use:
-    cmd: echo used
-    deps:
-      - artifacts/arm-${{fit.count}}.xml
-"""
-
-
-def test_a_skipped_stage_says_so_in_its_outputs_and_the_pipeline_goes_on(run, tmp_path):
-    run(1)  # settings and their folder
-    (tmp_path / "fit.py").write_text(SKIPPED)
-    (tmp_path / "stages").mkdir()
-    (tmp_path / "dvc.yaml").write_text(PIPELINE.format(python=sys.executable, root=ROOT))
-    (tmp_path / "artifacts/meshes").mkdir()
-    (tmp_path / "artifacts/meshes/old.obj").write_text("of another arm")
-    dvc = str(Path(sys.executable).with_name("dvc"))
-    subprocess.run([dvc, "init", "-q", "--no-scm"], cwd=tmp_path, check=True)
-    done = subprocess.run([dvc, "repro"], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "\nfit: skipped: the arm has no tendons\n" in done.stdout
-    assert "\nused\n" in done.stdout
-    assert json.loads((tmp_path / "artifacts/metrics.json").read_text()) == {"skipped": "the arm has no tendons"}
-    for name in ("arm-1.xml", "curve.csv", "meshes/skipped.txt"):
-        assert (tmp_path / "artifacts" / name).read_text() == "skipped: the arm has no tendons\n"
-    assert not (tmp_path / "artifacts/meshes/old.obj").exists()
-
-
 def test_blas_keeps_to_one_thread(run, monkeypatch):
     monkeypatch.setenv("OPENBLAS_NUM_THREADS", "4")
     assert "BLAS threads: {1}" in run(1).stdout

@@ -1,64 +1,60 @@
-"""An arm without tendons: the stages that need them are skipped in one line each, by what build_mjcf made."""
+"""An arm without tendons: its pipeline ends with identify_damping, and asking for more is an error of one line."""
 
 from importlib import import_module
 
-import mujoco
 import pytest
 
 from tests.support.small_arm import small_spec
 from tests.support.workbench import ROOT
-from trunkline.arm.tendons import CAD_MODEL
 from trunkline.pipeline.stage import run_stage
 
-STAGES = ["identify_control", "fk_dataset", "train_ik", "reachability", "package_unity"]
+MODELS = [f"artifacts/{stage}/arm.xml" for stage in ("build_mjcf", "identify_damping", "identify_control")]
 
 
 @pytest.fixture
 def arm(tmp_path, monkeypatch):
-    """A project with nothing but settings and the CAD model of a small arm."""
+    """A project with settings, and models of a small arm without tendons from every stage that makes one."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "conf").symlink_to(ROOT / "conf")
     (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
-    CAD_MODEL.parent.mkdir(parents=True)
     spec = small_spec()
-    CAD_MODEL.write_text(_xml(spec))
-    return spec
-
-
-def _xml(spec: mujoco.MjSpec) -> str:
+    for element in (*spec.actuators, *spec.tendons):
+        spec.delete(element)
     spec.compile()
-    return spec.to_xml()
+    for model in MODELS:
+        (tmp_path / model).parent.mkdir(parents=True)
+        (tmp_path / model).write_text(spec.to_xml())
+    return tmp_path
 
 
-@pytest.mark.parametrize("name", STAGES)
-def test_without_tendons_a_stage_is_skipped_in_one_line(arm, tmp_path, capsys, name):
-    for element in (*arm.actuators, *arm.tendons):
-        arm.delete(element)
-    CAD_MODEL.write_text(_xml(arm))
-    before = sorted(tmp_path.rglob("*"))
-    stage = import_module(f"stages.{name}")
-    run_stage(name, stage.Config, stage.main)
-    assert capsys.readouterr().out == f"{name}: skipped: {CAD_MODEL}: the arm has no tendons\n"
-    assert sorted(tmp_path.rglob("*")) == before
-
-
-@pytest.mark.parametrize("name", STAGES)
-def test_with_tendons_it_goes_on_to_what_it_reads(arm, capsys, name):
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("identify_control", "params.yaml: identify_control.parameters.kp: found it for an arm without tendons"),
+        ("fk_dataset", "model: found no tendons, expected at least one"),
+        ("train_ik", "model: found no tendons, expected at least one"),
+        ("reachability", "model: found no tendons, expected at least one"),
+    ],
+)
+def test_asking_for_more_is_an_error_of_one_line(arm, capsys, name, found):
+    before = sorted(arm.rglob("*"))
     stage = import_module(f"stages.{name}")
     with pytest.raises(SystemExit):
         run_stage(name, stage.Config, stage.main)
     said = capsys.readouterr()
-    assert "skipped" not in said.out
-    assert str(CAD_MODEL) not in said.err
+    assert said.err.startswith(f"error: {found}")
+    assert "identify_damping" in said.err
     assert said.err.count("\n") == 1
+    assert sorted(arm.rglob("*")) == before
 
 
 @pytest.mark.parametrize(("content", "found"), [(None, "no such file"), ("<mujoco>", "not a model that MuJoCo reads")])
 def test_without_a_model_that_is_said(arm, capsys, content, found):
-    CAD_MODEL.unlink()
+    model = arm / "artifacts/identify_control/arm.xml"
+    model.unlink()
     if content is not None:
-        CAD_MODEL.write_text(content)
+        model.write_text(content)
     stage = import_module("stages.fk_dataset")
     with pytest.raises(SystemExit):
         run_stage("fk_dataset", stage.Config, stage.main)
-    assert capsys.readouterr().err.startswith(f"error: {CAD_MODEL}: {found}")
+    assert capsys.readouterr().err.startswith(f"error: artifacts/identify_control/arm.xml: {found}")

@@ -5,7 +5,8 @@ import pytest
 
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
-from trunkline.statics.chain import load_model, read_chain
+from trunkline.pipeline.inputs import read_model
+from trunkline.statics.chain import read_chain
 
 
 def test_spiral_arm_reads_as_it_was_built():
@@ -85,7 +86,7 @@ def test_models_with_other_forces_are_refused_by_name(change, named):
 
 def test_missing_and_broken_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="no such file"):
-        load_model(tmp_path / "arm.xml")
+        read_model(tmp_path / "arm.xml")
     (tmp_path / "arm.xml").write_text("<mujoco><worldbody>")
     with pytest.raises(InputError, match=r"arm\.xml"):
-        load_model(tmp_path / "arm.xml")
+        read_model(tmp_path / "arm.xml")

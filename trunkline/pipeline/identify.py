@@ -23,6 +23,7 @@ from trunkline.identification.problem import Bounds
 from trunkline.identification.resting import resting_shape
 from trunkline.identification.search import DifferentialEvolution, LeastSquares, Optimizer
 from trunkline.identification.settings import IdentificationSettings
+from trunkline.pipeline.inputs import existing, read_spec
 from trunkline.pipeline.stage import output_folder, write_json
 from trunkline.trials.trial import Trial, read_trials
 
@@ -87,10 +88,8 @@ def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
     """Scalars that earlier stages identified, without any joint's own factor."""
     values = {}
     for stage in stages:
-        path = Path("artifacts") / stage / "parameters.json"
-        if not path.is_file():
-            raise InputError(f"{path}: no such file, expected the parameters of an earlier stage")
-        values |= {name: row["value"] for name, row in json.loads(path.read_text())["parameters"].items()}
+        table = json.loads(existing(Path("artifacts") / stage / "parameters.json").read_text())
+        values |= {name: row["value"] for name, row in table["parameters"].items()}
     return values
 
 
@@ -171,20 +170,6 @@ def _select(replays: dict[str, Replay], indices: list[int]) -> dict[str, Replay]
     return {name: replace(r, positions=[r.positions[i] for i in indices]) for name, r in replays.items()}
 
 
-def read_spec(path: Path) -> mujoco.MjSpec:
-    """The MJCF at `path`.
-
-    Raises:
-        InputError: if there is none, or MuJoCo refuses it.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, expected the model of an earlier stage")
-    try:
-        return mujoco.MjSpec.from_file(str(path))
-    except ValueError as error:
-        raise InputError(f"{path}: not a model that MuJoCo reads: {str(error).splitlines()[0]}") from error
-
-
 def set_up(
     config: IdentificationSettings, trials: list[Trial], model: mujoco.MjModel
 ) -> tuple[mujoco.MjModel, list[Experiment], Fit]:
@@ -254,7 +239,8 @@ def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.M
     for name in config.parameters:
         if not model.ntendon and PARAMETERS[name].fields[0].startswith(("tendon_", "actuator_")):
             found = "found it for an arm without tendons, expected parameters of joints alone"
-            raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}")
+            end = "; such an arm's pipeline ends with `dvc repro identify_damping`"
+            raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}{end}")
 
 
 def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:

@@ -20,7 +20,6 @@ PICTURES = {
     "artifacts/reachability/maps.png": "docs/maps.png",
     "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
 }
-PNG = b"\x89PNG"  # how such a file begins
 EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README and of its own README
 
 # E_internal of the paper's arm before and after, over 437 frames
@@ -173,9 +172,9 @@ def main(root: Path = Path(".")) -> int:
 
 
 def copy_pictures(root: Path) -> None:
-    """To where the READMEs show them; not what a skipped stage left in a picture's place, which is a line of text."""
+    """To where the READMEs show them."""
     for source, target in PICTURES.items():
-        if (root / source).is_file() and (root / source).read_bytes().startswith(PNG):
+        if (root / source).is_file():
             (root / target).parent.mkdir(exist_ok=True)
             shutil.copyfile(root / source, root / target)
 

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from trunkline.errors import InputError, Skipped
+from trunkline.errors import InputError
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.settings import check_once
 
@@ -25,8 +25,6 @@ def run_stage(
     name: str, schema: type[Config], main: Callable[[Config], None], root: str | Path = "."
 ) -> None:
     """Call ``main`` with the stage's settings; a user's mistake ends in one line and exit code 1.
-
-    A stage that has nothing to do ends in one line too, which is then all that its outputs hold.
 
     ``root`` holds the stage's ``params.yaml`` and ``conf/``. Meanwhile BLAS keeps to one thread, as its sums, and
     so the results, otherwise depend on how many cores there are; ``TRUNKLINE_THREADS`` is for what does not.
@@ -41,35 +39,8 @@ def run_stage(
         sys.stdout.flush()
         print(f"error: {error}", file=sys.stderr)
         sys.exit(1)
-    except Skipped as reason:
-        print(f"{name}: skipped: {reason}")
-        fill_outputs(name, str(reason), root)
-        return
     peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # Linux counts in KiB
     print(f"{name}: done in {time.monotonic() - started:.1f} s, peak memory {peak_mib:.0f} MiB")
-
-
-def fill_outputs(stage: str, reason: str, root: str | Path = ".") -> None:
-    """Write why the stage was skipped into every output that ``root / "dvc.yaml"`` declares for it.
-
-    DVC fails a stage without its outputs. With them, the pipeline goes on, and no results of another arm stay.
-    """
-    pipeline = Path(root) / "dvc.yaml"
-    if not pipeline.is_file():
-        return
-    from dvc.repo import Repo  # a second to import, which no other stage has to wait for
-
-    with Repo(str(root)) as repo:
-        paths = [Path(out.fs_path) for out in repo.stage.load_one(str(pipeline), name=stage).outs]
-    for path in paths:
-        if not path.suffix:  # a folder
-            shutil.rmtree(path, ignore_errors=True)
-            path = path / "skipped.txt"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if path.suffix == ".json":
-            write_json(path, {"skipped": reason})
-        else:
-            path.write_text(f"skipped: {reason}\n", encoding="utf-8")
 
 
 @contextmanager

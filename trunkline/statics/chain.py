@@ -4,7 +4,6 @@ Every vector is in the base frame (the body that carries the first unit) with al
 own frame is the base frame moved to its joint, and the rotation of unit i is the product of its hinges' rotations.
 """
 
-from pathlib import Path
 from typing import NamedTuple
 
 import mujoco
@@ -81,20 +80,6 @@ class Chain(NamedTuple):
         """Path length of each tendon in the reference configuration, m. Shape (K,)."""
         chords = np.linalg.norm(self.hole_out - self.hole_in, axis=2)
         return self.fixed_length + (self.crosses * chords).sum(axis=0)
-
-
-def load_model(path: str | Path) -> mujoco.MjModel:
-    """Compile an MJCF file.
-
-    Raises:
-        InputError: if there is none, or MuJoCo refuses it.
-    """
-    if not Path(path).is_file():
-        raise InputError(f"{path}: no such file, expected the calibrated model (run `dvc repro`)")
-    try:
-        return mujoco.MjModel.from_xml_path(str(path))
-    except ValueError as error:
-        raise InputError(f"{path}: {error}") from error
 
 
 def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:

@@ -1,0 +1,37 @@
+"""Files that a stage reads: there, and readable, or one line that says what was expected."""
+
+from pathlib import Path
+
+import mujoco
+
+from trunkline.errors import InputError
+
+
+def existing(path: str | Path) -> Path:
+    """`path`, which an earlier stage wrote.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file, expected what an earlier stage writes (run `dvc repro`)")
+    return Path(path)
+
+
+def read_spec(path: str | Path) -> mujoco.MjSpec:
+    """The MJCF at `path`, to be changed and compiled.
+
+    Raises:
+        InputError: there is none, or MuJoCo refuses it.
+    """
+    try:
+        spec = mujoco.MjSpec.from_file(str(existing(path)))
+        spec.compile()
+        return spec
+    except ValueError as error:
+        raise InputError(f"{path}: not a model that MuJoCo reads: {str(error).splitlines()[0]}") from error
+
+
+def read_model(path: str | Path) -> mujoco.MjModel:
+    """The MJCF at `path`, compiled. Raises InputError as `read_spec` does."""
+    return read_spec(path).compile()
