@@ -72,6 +72,12 @@ def test_its_lines_are_short(page):
     assert [line for line in text.splitlines() if len(line) > 120 and not line.startswith("|")] == []
 
 
+def test_nothing_cites_a_specification_that_readers_lack():
+    files = [f for folder in FOLDERS.split("|") for end in ("py", "yaml", "md") for f in ROOT.glob(f"{folder}/**/*.{end}")]
+    assert len(files) > 200
+    assert [f for f in files if re.search(r"\bSPE[C]\b", f.read_text(encoding="utf-8"))] == []
+
+
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
 

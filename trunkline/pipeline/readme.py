@@ -1,4 +1,4 @@
-"""`python -m trunkline.pipeline.readme`: write the READMEs' graph, tables of results and pictures anew.
+"""`python -m trunkline.pipeline.readme`: write the graph, the tables of results and the pictures anew.
 
 Generated blocks stand between `<!-- name -->` and `<!-- /name -->`.
 """
@@ -13,6 +13,7 @@ import networkx
 from dvc.repo import Repo
 
 from trunkline.pipeline.gate import Limit, Limits, lookup, read_limits
+from trunkline.pipeline.lab_table import lab_table
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
 PICTURES = {
@@ -156,7 +157,7 @@ def with_blocks(text: str, blocks: dict[str, str]) -> str:
 
 
 def generate(root: Path) -> dict[Path, str]:
-    """README.md and the examples' own, with their generated blocks as they should be."""
+    """README.md, the examples' own and the page on intervals, with their generated blocks as they should be."""
     examples = {}
     for name in EXAMPLES:
         folder = root / "examples" / name
@@ -165,6 +166,7 @@ def generate(root: Path) -> dict[Path, str]:
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
     blocks = {root / "README.md": own | examples}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
+    blocks[root / "docs" / "results" / "intervals.md"] = {"lab": lab_table(root)}
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}
 
 
