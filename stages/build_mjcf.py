@@ -1,4 +1,4 @@
-"""Build the CAD model of the arm, from geometry and material alone."""
+"""Build the initial arm from geometry and material alone."""
 
 import re
 from pathlib import Path
@@ -108,7 +108,7 @@ def uniform(arm: Uniform) -> tuple[ChainGeometry, UnitProperties]:
 
 
 def initial_spec(config: Config) -> tuple[mujoco.MjSpec, ChainGeometry, UnitProperties]:
-    """The CAD model, the chain that it was cut from, and what its units are made of."""
+    """The arm from geometry and material alone, and what it is made of."""
     arm, actuation = config.arm, config.actuation
     chain, properties = spiral(arm) if isinstance(arm, Spiral) else uniform(arm)
     mass = float(properties.masses.sum()) + arm.tip_load
