@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
+from omegaconf import OmegaConf
 
 from trunkline.logs.cdr import short_name
 from trunkline.logs.messages import JOINTS, POSES
@@ -81,6 +82,13 @@ def test_nothing_cites_a_specification_that_readers_lack():
 
 def test_the_readme_is_short():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
+def test_the_paper_is_cited_as_the_readme_names_it():
+    citation = OmegaConf.to_container(OmegaConf.load(ROOT / "CITATION.cff"))
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    titles = [reference["title"] for reference in citation["references"] if reference["type"] and reference["authors"]]
+    assert f"*{titles[0]}*" in " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
 
 
 def test_the_rooms_are_all_of_them_and_none_imports_a_later_one():
