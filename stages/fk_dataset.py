@@ -73,7 +73,7 @@ def unevenness_table(densities: list[Density]) -> pd.DataFrame:
 
 
 def metrics(table: pd.DataFrame, densities: list[Density], deviation: pd.DataFrame) -> dict:
-    """What SPEC section 11 asks for, what was dropped, and how even the samples are."""
+    """How many samples, how exact, what was dropped, and how even they are."""
     before, after = np.mean([density.unevenness() for density in densities], axis=0)
     return {
         "samples": len(table),

@@ -159,7 +159,7 @@ def read_tips(path: Path, chain: Chain, config: Config) -> ArmTips:
 
 
 def metrics(maps: Maps, check: Check) -> dict:
-    """What SPEC section 11 asks for, and how much it rests on."""
+    """How right the maps are, by map, and whether their meshes are closed and small."""
     soft = maps.soft.meshes
     space = {name: mesh_metrics(one.mesh, check.moved[name]) for name, one in maps.in_space().items()}
     found = {
