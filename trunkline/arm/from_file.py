@@ -52,7 +52,8 @@ def _missing(model: mujoco.MjModel) -> str | None:
     for kind, count in counts.items():
         for index in range(count):
             if not getattr(model, kind)(index).name:
-                return f"found a {kind} without a name (number {index + 1}), expected names for all"
+                article = "an" if kind == "actuator" else "a"
+                return f"found {article} {kind} without a name (number {index + 1}), expected names for all"
     if "base" not in [model.body(index).name for index in range(model.nbody)]:
         return "found no body `base`, expected one: the mount, which carries the first unit"
     sites = [model.site(index).name for index in range(model.nsite)]

@@ -18,9 +18,10 @@ from trunkline.identification.identify import Fit, Identification, identify, wit
 from trunkline.identification.loss import internal_error
 from trunkline.identification.markers import with_measured_markers
 from trunkline.identification.parameter_table import parameter_table, undetermined
-from trunkline.identification.parameters import PARAMETERS, save_model
+from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Bounds
 from trunkline.identification.resting import resting_shape
+from trunkline.identification.saving import save_model
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json
