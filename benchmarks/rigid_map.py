@@ -14,7 +14,7 @@ from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solv
 from trunkline.panda.kinematics import Q_MAX, Q_MIN, forward
 from trunkline.panda.mjcf import panda_spec
 from trunkline.pipeline.config import load_config
-from trunkline.reachability.maps import RigidSettings, build_rigid
+from trunkline.reachability.maps import build_rigid
 
 STARTS = 60
 MINK_STARTS = 10
@@ -28,7 +28,7 @@ def main() -> None:
     parser.add_argument("--single", type=int, default=200, help="targets solved one at a time")
     parser.add_argument("--mink", type=int, default=20, help="targets for mink")
     arguments = parser.parse_args()
-    settings = RigidSettings(**vars(load_config(Config, "reachability", Path(__file__).parents[1]).rigid))
+    settings = load_config(Config, "reachability", Path(__file__).parents[1]).rigid
 
     started = time.perf_counter()
     rigid = build_rigid(settings, 8000, seed=0)

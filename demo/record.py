@@ -1,6 +1,8 @@
 """Record the demo session: simulate the experiments, look at them through the lab's instruments, write the logs."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
@@ -19,24 +21,24 @@ from trunkline.settings import settings
 SESSION = Path("data/raw/demo")
 
 
-@settings
+@dataclass
 class Arm:
     length: PositiveFloat
     base_width: PositiveFloat
     tip_width: PositiveFloat
     units: PositiveInt
-    tendons: int = Field(ge=3)  # fewer cannot bend the arm to every side
-    tracked: list[PositiveInt] = Field(min_length=1)
+    tendons: Annotated[int, Field(ge=3)]  # fewer cannot bend the arm to every side
+    tracked: Annotated[list[PositiveInt], Field(min_length=1)]
 
 
 @settings
 class Config:
     seed: int
     arm: Arm
-    plant: settings(PlantSettings)
-    motors: settings(Motors)
-    experiments: settings(Experiments)
-    instruments: settings(InstrumentSettings)
+    plant: PlantSettings
+    motors: Motors
+    experiments: Experiments
+    instruments: InstrumentSettings
 
     def __post_init__(self):
         arm, tests = self.arm, self.experiments

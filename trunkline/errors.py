@@ -1,8 +1,9 @@
-"""The exception that ends a stage or a command in one line: a user's mistake."""
+"""The exception that ends a stage or a command in one line, a user's mistake; the commonest is a missing file."""
 
 import sys
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 
 
 class InputError(Exception):
@@ -29,3 +30,14 @@ def in_one_line(main: Callable[..., int]) -> Callable[..., int]:
             return 1
 
     return command
+
+
+def existing(path: str | Path) -> Path:
+    """`path`, which an earlier stage wrote.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file, expected what an earlier stage writes (run `dvc repro`)")
+    return Path(path)

@@ -9,9 +9,9 @@ import pandas as pd
 import pytest
 import torch
 
-from stages.train_ik import read_table
 from tests.support.bent_chain import stump
 from trunkline.dataset import sampling
+from trunkline.dataset.samples import read_samples
 from trunkline.dataset.table import (
     length_by_tension,
     length_columns,
@@ -190,4 +190,4 @@ def test_a_single_gravity_angle_is_refused_before_anything_is_trained(tmp_path):
     samples = pd.DataFrame(np.zeros((3, len(INPUTS) + 3)), columns=[*INPUTS, "l1", "l2", "split"])
     samples.to_parquet(tmp_path / "samples.parquet")
     with pytest.raises(InputError, match="samples.parquet: found 1 gravity angle, expected at least 2"):
-        read_table(tmp_path / "samples.parquet", 2)
+        read_samples(tmp_path / "samples.parquet", 2)

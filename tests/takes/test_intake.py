@@ -16,7 +16,7 @@ from trunkline.sessions.session import read_session
 from trunkline.takes.intake import Limits, align_clocks, take_in
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0)
+FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
 REAL = Path(__file__).parents[2] / "shared/data/asl_trunk"
 
 

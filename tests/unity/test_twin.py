@@ -26,8 +26,8 @@ from trunkline.unity.roundtrip import curl, simulate
 from trunkline.unity.twin import MANIFEST, MODEL, NETWORK, Label, Sources, Trajectory, assemble, compare
 
 ROOT = Path(__file__).parents[2]
-LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0", trunkline="0.1.0")
-TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts=[0.0, 1.0])
+LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0")
+TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts_deg=[0.0, 57.3])
 
 
 def network(inputs: int = 8, opset: int = 15) -> bytes:
@@ -72,6 +72,7 @@ def sources(tmp_path) -> Sources:
         grids=tmp_path / "grids.npz",
         metrics={"train_ik": {"opset": 15}},
         texts={"README.md": b"twin", "LICENSE.md": b"free", "CHANGELOG.md": b"new"},
+        trunkline="0.1.0",
     )
 
 

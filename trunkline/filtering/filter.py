@@ -1,8 +1,10 @@
 """A take becomes a trial: outliers out, gaps bridged, one uniform clock, filtered, in the base frame."""
 
 from dataclasses import dataclass
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 from scipy.ndimage import binary_dilation
 
 from trunkline.errors import InputError
@@ -19,16 +21,20 @@ class Filter:
     """rate: Hz of the uniform clock. cutoff: Hz, order: of the Butterworth low-pass.
 
     longest_bridge: s, longer gaps are filled and marked as not measured.
-    deviations: see `smoothing.outliers`.
+    outlier_deviations: see `smoothing.outliers`.
     release: where a release starts: at its "onset", or once the arm is "free" and moves already, see `start`.
     """
 
-    rate: float
-    cutoff: float
-    order: int
-    longest_bridge: float
-    deviations: float
-    release: str = "onset"
+    rate: PositiveFloat
+    cutoff: PositiveFloat
+    order: Annotated[int, Field(ge=1, le=10)]
+    longest_bridge: NonNegativeFloat
+    outlier_deviations: PositiveFloat
+    release: Literal["onset", "free"]
+
+    def __post_init__(self):
+        if self.cutoff >= self.rate / 2:
+            raise ValueError(f"cutoff: found {self.cutoff} Hz, expected less than half the rate of {self.rate} Hz")
 
 
 @dataclass
@@ -80,9 +86,9 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
         time, samples = take.time[good], samples[good]
         if width == 7:
             samples[:, 3:] = make_continuous(samples[:, 3:])
-        inliers = ~outliers(time, samples[:, :3], settings.deviations)
+        inliers = ~outliers(time, samples[:, :3], settings.outlier_deviations)
         if width == 7:
-            inliers &= ~outliers(time, samples[:, 3:], settings.deviations)
+            inliers &= ~outliers(time, samples[:, 3:], settings.outlier_deviations)
         dropped += int(np.sum(~inliers))
         time, samples = time[inliers], samples[inliers]
         if len(time) < 2 * settings.order:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 from torch import nn
 
 from trunkline.ik.tip_loss import TipLoss
@@ -67,11 +68,11 @@ class Training:
     """Attributes: width: of the hidden layers; epochs; batch: samples; learning_rate: at the start, falling along a
     cosine to a thousandth; seed: of weights and shuffling."""
 
-    width: int
-    epochs: int
-    batch: int
-    learning_rate: float
-    seed: int
+    width: PositiveInt
+    epochs: PositiveInt
+    batch: PositiveInt
+    learning_rate: PositiveFloat
+    seed: NonNegativeInt
 
 
 def train(

@@ -8,6 +8,7 @@ use it, named in config.yaml's defaults list) is chosen in params.yaml by its na
 
 import difflib
 import json
+import re
 import runpy
 from pathlib import Path
 from typing import Any, TypeVar
@@ -197,7 +198,16 @@ def _describe(problem: Any, adapter: TypeAdapter) -> str:
     expected = problem["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     if problem["type"] == "value_error":  # a rule between fields, in the schema's own words
         return expected
-    return f"found {problem['input']!r}, expected {expected}"
+    found = problem["input"]
+    if problem["type"] == "union_tag_not_found":  # which of several classes: a key of theirs says it
+        return f"{problem['ctx']['discriminator']}: missing, expected a value".replace("'", "", 2)
+    if problem["type"] == "union_tag_invalid":
+        key, found = problem["ctx"]["discriminator"].strip("'"), problem["ctx"]["tag"]
+        expected = f"one of {problem['ctx']['expected_tags']}"
+        valid = re.findall(r"'([^']*)'", expected)
+        return f"{key}: found {found!r}, expected {expected}" + _nearest(found, valid)
+    valid = re.findall(r"'([^']*)'", expected) if problem["type"] == "literal_error" else []
+    return f"found {found!r}, expected {expected}" + _nearest(str(found), valid)
 
 
 def _nearest(found: str, valid: list[str]) -> str:

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 from trunkline.errors import in_one_line
-from trunkline.pipeline.config import check_settings, own_or_project
+from trunkline.pipeline.config import PROJECT, check_settings, own_or_project
 
 
 def check_once(root: Path = Path(".")) -> None:
@@ -22,6 +22,7 @@ def check_once(root: Path = Path(".")) -> None:
         return
     conf, stages = own_or_project(root, "conf"), own_or_project(root, "stages")
     files = [root / "params.yaml", root / "dvc.yaml", *conf.glob("**/*.yaml"), *stages.glob("*.py")]
+    files += (PROJECT / "trunkline").glob("**/*.py")  # what stages nest in their settings, and its ranges
     digest = hashlib.sha256()
     for file in sorted(file for file in files if file.is_file()):
         digest.update(str(file).encode() + b"\0" + file.read_bytes() + b"\0")

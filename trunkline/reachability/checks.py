@@ -3,9 +3,11 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, PositiveInt
 
 from trunkline.fields.grid import Lattice
 from trunkline.fields.mesh import Surface, contains, unsimplified
@@ -23,18 +25,18 @@ from trunkline.statics.chain import Chain
 class LabelSettings:
     """See conf/reachability/config.yaml; margin in m."""
 
-    count: int
-    starts: int
-    starts_in_doubt: int
-    margin: float
+    count: Annotated[int, Field(ge=100, le=1_000_000)]
+    starts: PositiveInt
+    starts_in_doubt: PositiveInt
+    margin: Annotated[float, Field(gt=0, le=1)]
 
 
 @dataclass(frozen=True)
 class SpotCheckSettings:
     """See conf/reachability/config.yaml; outside in m."""
 
-    count: int
-    outside: float
+    count: Annotated[int, Field(ge=1, le=10_000)]
+    outside: Annotated[float, Field(gt=0, le=0.2)]
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, PositiveInt
 
 from trunkline.fields.grid import Lattice
 from trunkline.fields.mesh import Surface, surface
@@ -21,25 +23,34 @@ from trunkline.reachability.tips import TipSource
 class RigidSettings:
     """See conf/reachability/config.yaml; lengths in m, smoothing in lattice steps."""
 
-    mount_offset: float
+    mount_offset: Annotated[float, Field(ge=0, le=0.5)]
     self_collision: bool
-    poses: int
-    profile_voxel: float
-    voxel: float
-    closing: float
-    smoothing: float
-    smallest: int
+    poses: Annotated[int, Field(ge=1000, le=2**24)]
+    profile_voxel: Annotated[float, Field(ge=0.001, le=0.1)]
+    voxel: Annotated[float, Field(ge=0.005, le=0.1)]
+    closing: Annotated[float, Field(gt=0, le=0.2)]
+    smoothing: Annotated[float, Field(ge=0, le=5)]
+    smallest: PositiveInt
 
 
 @dataclass(frozen=True)
 class HybridSettings:
-    """See conf/reachability/config.yaml; voxel in m, smoothing in lattice steps, tilts in rad."""
+    """See conf/reachability/config.yaml; voxel in m, smoothing in lattice steps."""
 
-    voxel: float
-    smoothing: float
-    smallest: int
-    tilts: list[float]
-    tilted_poses: int
+    voxel: Annotated[float, Field(ge=0.007, le=0.1)]
+    smoothing: Annotated[float, Field(ge=0, le=5)]
+    smallest: PositiveInt
+    tilts_deg: list[float]
+    tilted_poses: Annotated[int, Field(ge=1000, le=2**22)]
+
+    def __post_init__(self) -> None:
+        if any(not 0 < tilt <= 120 for tilt in self.tilts_deg) or len(set(self.tilts_deg)) < len(self.tilts_deg):
+            raise ValueError(f"tilts_deg: found {self.tilts_deg}, expected different angles above 0, up to 120")
+
+    @property
+    def tilts(self) -> list[float]:
+        """Of the end effector off straight down, rad."""
+        return np.radians(self.tilts_deg).tolist()
 
 
 @dataclass(frozen=True)

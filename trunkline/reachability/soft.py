@@ -6,9 +6,11 @@ third hardly. The map is the set of points within ``tolerance`` of a sampled tip
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field, PositiveInt
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
@@ -26,10 +28,25 @@ class SoftShape:
     ``smallest``: islands and cavities of fewer cells vanish.
     """
 
-    tolerance: float
-    closing: float
-    smoothing: float
-    smallest: int
+    tolerance: Annotated[float, Field(gt=0, le=0.2)]
+    closing: Annotated[float, Field(gt=0, le=0.2)]
+    smoothing: Annotated[float, Field(ge=0, le=5)]
+    smallest: PositiveInt
+
+
+@dataclass(frozen=True)
+class SoftSettings(SoftShape):
+    """The shape, and for what: see conf/reachability/config.yaml; voxel in m."""
+
+    voxel: Annotated[float, Field(ge=0.003, le=0.1)]
+    angle_step_deg: Annotated[float, Field(ge=0.5, le=180)]
+    directions: Annotated[int, Field(ge=8)]
+    steps: Annotated[int, Field(ge=8)]
+
+    @property
+    def angle_step(self) -> float:
+        """Between the fields, at most, rad."""
+        return np.radians(self.angle_step_deg)
 
 
 def soft_lattice(tips: list[NDArray], shape: SoftShape, spacing: float) -> Lattice:
