@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 from scipy.optimize import brentq
 
+from trunkline.arm.cad import Chain
 from trunkline.arm.geometry import ChainGeometry
-from trunkline.arm.initial import Chain
 from trunkline.arm.material import UnitProperties, unit_properties
 from trunkline.errors import InputError
 

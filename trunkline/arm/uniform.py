@@ -6,8 +6,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, PositiveFloat
 
+from trunkline.arm.cad import Chain
 from trunkline.arm.geometry import ChainGeometry
-from trunkline.arm.initial import Chain
 from trunkline.arm.material import UnitProperties, joint_damping
 
 
