@@ -1,6 +1,6 @@
 """A take becomes a trial: outliers out, gaps bridged, one uniform clock, filtered, in the base frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.ndimage import binary_dilation
@@ -105,20 +105,19 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
     commands, wound = _on_pose_clock(take, grid)
     gravity = gravity_from_up(base, take.up)
     trial = Trial(
-        take.name,
-        take.experiment,
-        take.split,
-        take.level,
-        gravity,
-        grid,
-        take.segments,
-        columns[..., :3],
-        None if quaternions is None else columns[..., 3:],
-        measured,
-        take.tendons,
-        commands,
-        wound,
-        0.0,
+        name=take.name,
+        experiment=take.experiment,
+        split=take.split,
+        level=take.level,
+        gravity=gravity,
+        time=grid,
+        segments=take.segments,
+        positions=columns[..., :3],
+        quaternions=None if quaternions is None else columns[..., 3:],
+        measured=measured,
+        tendons=take.tendons,
+        commands=commands,
+        tendon_positions=wound,
     )
     motion = None
     if take.experiment == "static_tilt":
@@ -182,21 +181,14 @@ def average_static(trial: Trial) -> Trial:
     if quaternions is not None:
         quaternions = np.einsum("ts,tsi->si", weight, quaternions)[None]
         quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
-    return Trial(
-        trial.name,
-        trial.experiment,
-        trial.split,
-        trial.level,
-        trial.gravity,
-        trial.time[:1],
-        trial.segments,
-        positions,
-        quaternions,
-        trial.measured.any(axis=0)[None],
-        trial.tendons,
-        trial.commands.mean(axis=0, keepdims=True),
-        trial.tendon_positions.mean(axis=0, keepdims=True),
-        0.0,
+    return replace(
+        trial,
+        time=trial.time[:1],
+        positions=positions,
+        quaternions=quaternions,
+        measured=trial.measured.any(axis=0)[None],
+        commands=trial.commands.mean(axis=0, keepdims=True),
+        tendon_positions=trial.tendon_positions.mean(axis=0, keepdims=True),
     )
 
 

@@ -196,20 +196,24 @@ def _take(
     tendons, motors = read_motors(source, session, epoch, logged, time, limits, where, findings)
     if trial.experiment == "curl":
         check_curl(source, session, joint_topics, motors, epoch, logged, time, limits, where)
+    command_time, commands, tendon_time, tendon_positions = motors
     take = Take(
-        trial.name,
-        trial.experiment,
-        trial.split,
-        trial.level,
-        session.frame.up_direction(),
-        time,
-        tuple(segments.values()),
-        positions,
-        quaternions,
-        base_positions,
-        base_quaternions,
-        tendons,
-        *motors,
+        name=trial.name,
+        experiment=trial.experiment,
+        split=trial.split,
+        level=trial.level,
+        up=session.frame.up_direction(),
+        time=time,
+        segments=tuple(segments.values()),
+        positions=positions,
+        quaternions=quaternions,
+        base_positions=base_positions,
+        base_quaternions=base_quaternions,
+        tendons=tendons,
+        command_time=command_time,
+        commands=commands,
+        tendon_time=tendon_time,
+        tendon_positions=tendon_positions,
     )
     wound = (take.tendon_time, take.tendon_positions)
     motion = wound if len(take.tendon_time) else (take.command_time, take.commands)
