@@ -1,6 +1,7 @@
 """Pictures of the data: the quality page of a session, and what the filter did to it."""
 
 import textwrap
+from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -11,13 +12,14 @@ from matplotlib.patches import Patch
 from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE
 from trunkline.signals.base_frame import average_base, to_base_frame
 from trunkline.takes.quality import Quality
+from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
 
 BIN = 1 / 30  # s, of the coverage picture
 LEAST_JITTER = 0.1  # ms, of the axis: less is none
 UNSEEN, PARTLY, SEEN = INITIAL, VALIDATE, "#d7e3ea"
-COLORS = {"static_tilt": MEASURED, "release": IDENTIFIED, "curl": VALIDATE}
+COLORS = dict(zip(EXPERIMENTS, cycle((MEASURED, IDENTIFIED, VALIDATE, INITIAL)), strict=False))
 
 
 def quality_figure(

@@ -9,7 +9,7 @@ from trunkline.errors import InputError
 from trunkline.frames import make_continuous, tilt_of_gravity
 from trunkline.signals.base_frame import average_base, gravity_from_up, to_base_frame
 from trunkline.signals.smoothing import bridged, fill_gaps, low_pass, outliers, resample
-from trunkline.trials.start import cycle_time, free_time, release_time
+from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
 
@@ -119,16 +119,14 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
         commands=commands,
         tendon_positions=wound,
     )
-    motion = None
-    if take.experiment == "static_tilt":
+    kind, motion = EXPERIMENTS[take.experiment], None
+    if kind.static:
         motion = float(np.sqrt(np.mean(np.var(trial.positions, axis=0))))
         trial = average_static(trial)
-    elif take.experiment == "release":
-        trial.start = release_time(grid, trial.positions)
-        if settings.release == "free":
-            trial.start, trial.in_motion = free_time(grid, trial.positions, trial.start), True
-    else:
-        trial.start = cycle_time(grid, commands)
+    if kind.start is not None:
+        trial.start = kind.start(trial)
+        if kind.free is not None and settings.release == "free":
+            trial.start, trial.in_motion = kind.free(trial, trial.start), True
     findings = Findings(
         frames * count,
         1 - float(measured.mean()),
@@ -149,9 +147,10 @@ def summary(trials: list[Trial], findings: list[Findings]) -> dict:
     """The filtered session in a few numbers, for metrics.json. Shares are of all samples."""
     static, moving = {}, {}
     for trial, found in zip(trials, findings, strict=True):
-        if trial.experiment == "static_tilt":
-            static[trial.name] = {
-                "level_deg": trial.level,
+        kind = EXPERIMENTS[trial.experiment]
+        if kind.static:
+            level = {} if kind.level is None else {f"level_{kind.level.unit}": trial.level}
+            static[trial.name] = level | {
                 "tilt_deg": float(np.degrees(found.tilt)),
                 "motion_mm": 1e3 * found.motion,
             }

@@ -6,6 +6,7 @@ from pydantic import Field, FiniteFloat, NonNegativeFloat, NonNegativeInt, Posit
 
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.settings import settings
+from trunkline.trials.experiments import ExperimentName
 
 ParameterName = Literal[
     "stiffness", "hardening", "joint_friction", "damping", "tendon_friction", "friction_time",
@@ -73,8 +74,8 @@ class IdentificationSettings:
     seed: NonNegativeInt
     frames: PositiveInt
     command_delay: float = Field(ge=0, le=1)
-    experiments: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
-    reported: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
+    experiments: list[ExperimentName] = Field(min_length=1)
+    reported: list[ExperimentName] = Field(min_length=1)
     rest_shape: Literal["unchanged", "measured"]
     markers: Literal["unchanged", "measured"]
     loss: Loss

@@ -26,9 +26,10 @@ from trunkline.signals.units import extent, likely_unit
 from trunkline.takes.checks import Findings, Limits, in_order
 from trunkline.takes.frozen import frozen
 from trunkline.takes.lost import find_lost, put_back
-from trunkline.takes.motors import check_curl, read_motors
+from trunkline.takes.motors import check_motors, read_motors
 from trunkline.takes.swaps import find_swaps, usual_distances
 from trunkline.takes.vertical import check_vertical
+from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.take import Take
 
 UNIT = {"m": 1.0, "mm": 1e-3}
@@ -194,8 +195,8 @@ def _take(
     time = _with_lost_time(time, positions, bool(source.joint_topics), findings)
     logged = poses.log_times[rows[0]]
     tendons, motors = read_motors(source, session, epoch, logged, time, limits, where, findings)
-    if trial.experiment == "curl":
-        check_curl(source, session, joint_topics, motors, epoch, logged, time, limits, where)
+    if EXPERIMENTS[trial.experiment].needs_motors:
+        check_motors(source, session, joint_topics, motors, epoch, logged, time, limits, where)
     command_time, commands, tendon_time, tendon_positions = motors
     take = Take(
         name=trial.name,

@@ -54,7 +54,7 @@ def read_motors(
     return tuple(tendons), arrays
 
 
-def check_curl(
+def check_motors(
     source: Source,
     session: Session,
     joint_topics: tuple[str, ...],
@@ -65,7 +65,7 @@ def check_curl(
     limits: Limits,
     where: str,
 ) -> None:
-    """A curl needs commands or tendon positions: raises InputError with what there is instead.
+    """Where nothing pulls within reach of the poses: raises InputError with what there is instead.
 
     Args: joint_topics: of all logs of the session. motors: from `read_motors`.
     """
