@@ -9,7 +9,8 @@ from demo.instruments import measure
 from tests.support.sessions import SEGMENTS, instruments, release_truth
 from trunkline.preparation.motive import main, read_export
 from trunkline.sessions.session import read_session
-from trunkline.takes.intake import Limits, take_in
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
 
 BODIES = ("base", *SEGMENTS)
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
