@@ -12,7 +12,8 @@ from mcap.writer import CompressionType, Writer
 
 from tests.support.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
-from trunkline.logs.log import MAGIC, read_log
+from trunkline.logs.log import read_log
+from trunkline.logs.records import MAGIC
 from trunkline.sessions.session import read_session
 from trunkline.takes.checks import Limits
 from trunkline.takes.intake import take_in

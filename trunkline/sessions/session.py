@@ -22,7 +22,7 @@ class Entry(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class Frame(Entry):
+class MocapFrame(Entry):
     """The motion-capture frame: which way is up in it, and the unit of its positions.
 
     name: for logs of transforms between several frames, the one that the poses are wanted in; by default the nearest
@@ -97,7 +97,7 @@ class Session(Entry):
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
     """
 
-    frame: Frame
+    frame: MocapFrame
     base: str | FixedBase
     segments: dict[str, str] | None = Field(default=None, min_length=1)
     tendons: dict[str, str] | None = Field(default=None, min_length=1)
