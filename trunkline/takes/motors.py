@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.logs.joint_stream import JointStream
 from trunkline.logs.messages import JOINTS
-from trunkline.logs.streams import JointStream
 from trunkline.sessions.session import Session
 from trunkline.sessions.source import Source
 from trunkline.takes.checks import Findings, Limits, in_order

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
-from trunkline.logs.streams import PoseStream
+from trunkline.logs.pose_stream import PoseStream
 from trunkline.sessions.session import FixedBase, Session, TrialEntry
 from trunkline.sessions.source import Source
 from trunkline.signals.clock import FrameFit, fit_frames

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trunkline.logs.streams import PoseStream
+from trunkline.logs.pose_stream import PoseStream
 from trunkline.logs.transforms import is_rotation
 from trunkline.signals.smoothing import noise_level
 from trunkline.takes.checks import Findings
