@@ -6,7 +6,8 @@ import numpy as np
 
 from trunkline.figures.data import filter_figure
 from trunkline.figures.style import save_figure
-from trunkline.filtering.filter import Filter, filter_take, summary
+from trunkline.filtering.effect import summary
+from trunkline.filtering.filter import Filter, filter_take
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.settings import settings
@@ -20,16 +21,16 @@ Config = settings(Filter)
 
 def main(config: Config) -> None:
     takes = read_takes(INGEST)
-    trials, findings = [], []
+    trials, effects = [], []
     with progress(len(takes), "filter", "trials") as bar:
         for take in takes:
-            trial, found = filter_take(take, config)
+            trial, effect = filter_take(take, config)
             trials.append(trial)
-            findings.append(found)
+            effects.append(effect)
             bar.update(1, trial=take.name)
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
         write_trials(processed, trials)
-        write_json(artifacts / "metrics.json", summary(trials, findings))
+        write_json(artifacts / "metrics.json", summary(trials, effects))
         shown = max(range(len(trials)), key=lambda i: np.ptp(trials[i].positions, axis=0).sum())
         save_figure(filter_figure(takes[shown], trials[shown]), artifacts / "filter.png")
 

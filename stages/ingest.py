@@ -12,8 +12,9 @@ from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.sessions.session import read_session
 from trunkline.settings import settings
+from trunkline.takes.agreement import align_clocks, settle_vertical
 from trunkline.takes.checks import Limits
-from trunkline.takes.intake import align_clocks, settle_vertical, take_in
+from trunkline.takes.intake import take_in
 from trunkline.takes.quality import judge, report, summary
 from trunkline.trials.take import write_takes
 

@@ -32,6 +32,7 @@ from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported, set_up
 from trunkline.pipeline.inputs import read_spec
+from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")
@@ -80,7 +81,7 @@ def with_command_delay(stage: str, config: IdentificationSettings) -> Identifica
 
 def in_motion(trials: list[Trial]) -> list[Trial]:
     """With the velocity that the arm has in the frame of its start pose, in place of none."""
-    return [replace(trial, in_motion=trial.experiment != "static_tilt") for trial in trials]
+    return [replace(trial, in_motion=not is_static(trial.experiment)) for trial in trials]
 
 
 def with_distances(stage: str, config: IdentificationSettings) -> IdentificationSettings:

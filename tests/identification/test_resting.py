@@ -62,8 +62,9 @@ def release(truth, x: float, y: float, split="identify", frames=FRAMES) -> Trial
         mujoco.mj_step(truth, data, 8)
     nothing = np.zeros((frames, 0))
     return Trial(
-        f"release_{x}_{y}", "release", split, None, gravity_in_base(0.0), np.arange(frames) * FRAME, SEGMENTS,
-        positions, None, np.ones((frames, 3), bool), (), nothing, nothing, 0.0,
+        name=f"release_{x}_{y}", experiment="release", split=split, level=None, gravity=gravity_in_base(0.0),
+        time=np.arange(frames) * FRAME, segments=SEGMENTS, positions=positions, quaternions=None,
+        measured=np.ones((frames, 3), bool), tendons=(), commands=nothing, tendon_positions=nothing, start=0.0,
     )  # fmt: skip
 
 

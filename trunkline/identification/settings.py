@@ -9,8 +9,8 @@ from trunkline.identification.loss import Loss
 from trunkline.identification.parameters import PARAMETERS, PER_JOINT_FIELDS
 from trunkline.identification.problem import Bounds
 from trunkline.settings import settings
+from trunkline.trials.experiments import ExperimentName
 
-ExperimentName = Literal["static_tilt", "release", "curl"]
 Experiments = Annotated[list[ExperimentName], Field(min_length=1)]
 
 

@@ -25,6 +25,7 @@ from trunkline.identification.saving import save_model
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial, read_trials
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
@@ -45,7 +46,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     model, experiments, fit = set_up(config, read_reported(config), model)
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)
-    if "stiffness" in fit.parameters and "static_tilt" not in config.experiments:
+    if "stiffness" in fit.parameters and not any(map(is_static, config.experiments)):
         print(f"{stage}: without static tilts, stiffness comes from the shape at rest and the ring-down of releases")
     result = identify(stage, model, fitted, fit)
     identified = save_model(spec, result.models["identified"])
