@@ -9,7 +9,7 @@ from omegaconf import OmegaConf
 
 from trunkline.logs.cdr import short_name
 from trunkline.logs.messages import JOINTS, POSES
-from trunkline.sessions.session import FixedBase, Frame, Session, Topics, TrialEntry
+from trunkline.sessions.session import FixedBase, MocapFrame, Session, Topics, TrialEntry
 
 ROOT = Path(__file__).parents[2]
 DOCS = sorted(
@@ -108,7 +108,7 @@ def test_the_rooms_are_all_of_them_and_none_imports_a_later_one():
 def test_the_reference_of_sessions_has_every_key_and_schema():
     text = (ROOT / "data/raw/README.md").read_text(encoding="utf-8")
     keys = [f"`{key}`" for key in Session.model_fields if key not in ("frame", "trials")]
-    keys += [f"`frame.{key}`" for key in Frame.model_fields]
+    keys += [f"`frame.{key}`" for key in MocapFrame.model_fields]
     keys += [f"`trials[].{key}`" for key in TrialEntry.model_fields]
     words = [*Topics.model_fields, *FixedBase.model_fields]
     words += [re.split(r"[./]", short_name(schema))[-1] for schema in (*POSES, *JOINTS)]
