@@ -1,7 +1,6 @@
 """Pack the twin for Unity: calibrated MJCF, IK network, reachability maps and a manifest, in one tarball."""
 
 import json
-import tomllib
 from pathlib import Path
 
 import mujoco
@@ -21,6 +20,7 @@ from trunkline.unity.manifest import Manifest
 from trunkline.unity.package import read_tarball, write_tarball
 from trunkline.unity.roundtrip import curl, deviation, simulate
 from trunkline.unity.twin import MANIFEST, MODEL, Label, Sources, Trajectory, assemble, compare
+from trunkline.version import __version__
 
 ARTIFACTS = Path("artifacts")
 MEASURED = ["ingest", "filter", "build_mjcf", "identify_stiffness", "identify_damping", "identify_control"]
@@ -56,7 +56,7 @@ def main(config: Config) -> None:
         config.display_name,
         config.description,
         config.unity,
-        trunkline=tomllib.loads(existing("pyproject.toml").read_text())["project"]["version"],
+        trunkline=__version__,
     )
     sources = read_sources(config.version)
     files, violations = assemble(label, sources, trajectory)
