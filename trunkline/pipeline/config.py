@@ -115,7 +115,7 @@ def own_or_project(root: Path, name: str) -> Path:
     for folder in (root / name, PROJECT / name):
         if folder.is_dir():
             return folder
-    raise InputError(f"{root / name}: no such folder, expected a checkout of Trunkline's repository around the stages")
+    raise InputError(f"{root / name}: no such folder, expected a checkout of Trunkline")
 
 
 def _read_section(path: Path, stage: str) -> dict[str, Any]:
