@@ -1,5 +1,6 @@
 """The exception that ends a stage or a command in one line, a user's mistake; the commonest is a missing file."""
 
+import os
 import sys
 from collections.abc import Callable
 from functools import wraps
@@ -18,12 +19,20 @@ class InputError(Exception):
 
 
 def in_one_line(main: Callable[..., int]) -> Callable[..., int]:
-    """A command's `main`, whose InputError becomes its last line, on stderr, and exit code 1."""
+    """A command's `main`, whose InputError becomes its last line, on stderr, and exit code 1.
+
+    Where a reader such as `head` has had enough, the command ends quietly with exit code 1.
+    """
 
     @wraps(main)
     def command(*args) -> int:
         try:
-            return main(*args)
+            code = main(*args)
+            sys.stdout.flush()
+            return code
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left to flush at exit
+            return 1
         except InputError as error:
             sys.stdout.flush()
             print(f"error: {error}", file=sys.stderr)

@@ -108,8 +108,15 @@ def group_options(folder: Path) -> dict[str, dict[str, Path]]:
 
 
 def own_or_project(root: Path, name: str) -> Path:
-    """``root / name``; the project's where ``root`` is another pipeline of the same stages."""
-    return root / name if (root / name).is_dir() else PROJECT / name
+    """``root / name``; the project's where ``root`` is another pipeline of the same stages.
+
+    Raises:
+        InputError: neither is there, as where the library is installed without its repository.
+    """
+    for folder in (root / name, PROJECT / name):
+        if folder.is_dir():
+            return folder
+    raise InputError(f"{root / name}: no such folder, expected a checkout of Trunkline")
 
 
 def _read_section(path: Path, stage: str) -> dict[str, Any]:

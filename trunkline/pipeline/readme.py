@@ -12,6 +12,8 @@ from pathlib import Path
 import networkx
 from dvc.repo import Repo
 
+from trunkline.errors import in_one_line
+from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.gate import Limit, Limits, lookup, read_limits
 from trunkline.pipeline.lab_table import lab_table
 
@@ -170,8 +172,10 @@ def generate(root: Path) -> dict[Path, str]:
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}
 
 
+@in_one_line
 def main(root: Path = Path(".")) -> int:
     """Write what `generate` says, and the pictures."""
+    require_checkout(root)
     for path, text in generate(root).items():
         path.write_text(text, encoding="utf-8")
     copy_pictures(root)

@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 
 from trunkline.errors import in_one_line
+from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.config import PROJECT, check_settings, own_or_project
 
 
@@ -36,6 +37,7 @@ def check_once(root: Path = Path(".")) -> None:
 
 @in_one_line
 def main() -> int:
+    require_checkout(Path("."))
     stages = check_settings()
     print(f"settings: {len(stages)} stages checked")
     return 0

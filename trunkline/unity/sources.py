@@ -1,11 +1,11 @@
 """What the earlier stages wrote, gathered for the package."""
 
 import json
-import tomllib
 from pathlib import Path
 
 from trunkline.errors import InputError, existing
 from trunkline.unity.twin import Sources
+from trunkline.version import __version__
 
 STAGES = ["ingest", "filter", "build_mjcf", "identify_stiffness", "identify_damping", "identify_control"]
 STAGES += ["fk_dataset", "train_ik", "reachability"]
@@ -33,5 +33,5 @@ def read_sources(root: Path, version: str) -> Sources:
             "LICENSE.md": existing(root / "LICENSE").read_bytes(),
             "CHANGELOG.md": f"# Changelog\n\n## [{version}]\n\nSee `Runtime/manifest.json`.\n".encode(),
         },
-        trunkline=tomllib.loads(existing(root / "pyproject.toml").read_text())["project"]["version"],
+        trunkline=__version__,
     )
