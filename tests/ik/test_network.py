@@ -11,15 +11,9 @@ import torch
 
 from tests.support.bent_chain import stump
 from trunkline.dataset import sampling
+from trunkline.dataset.columns import length_columns, tension_columns
 from trunkline.dataset.samples import read_samples
-from trunkline.dataset.table import (
-    length_by_tension,
-    length_columns,
-    mujoco_deviation,
-    sample_table,
-    tension_columns,
-    tip_by_tension,
-)
+from trunkline.dataset.table import length_by_tension, mujoco_deviation, sample_table, tip_by_tension
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.ik.network import INPUTS, InverseKinematics, Training, train

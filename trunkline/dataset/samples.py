@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from trunkline.dataset.table import POSE, length_columns
+from trunkline.dataset.columns import POSE, length_columns
 from trunkline.errors import InputError
 
 

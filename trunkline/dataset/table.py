@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pandas as pd
 
+from trunkline.dataset.columns import AXES, POSE, length_columns, tension_columns
 from trunkline.dataset.sampling import Candidates, crowding, sample_angle, thin
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
@@ -14,8 +15,6 @@ from trunkline.statics.chain import Chain
 from trunkline.statics.hysteresis import friction_band, model_friction
 from trunkline.statics.sensitivity import sensitivity
 
-POSE = ["x", "y", "z", "qw", "qx", "qy", "qz"]
-AXES = "xyz"
 GROUP = 64  # simulations that wait for the slowest among them to settle
 
 
@@ -79,16 +78,6 @@ def _table(chain: Chain, tilt: float, candidates: Candidates, kept: np.ndarray) 
         columns |= {f"r{axis}_df{t + 1}": slopes.turn_by_tension[:, k, t] for k, axis in enumerate(AXES)}
         columns |= {f"dl{s + 1}_df{t + 1}": slopes.length_by_tension[:, s, t] for s in range(chain.tendons)}
     return pd.DataFrame(columns)
-
-
-def length_columns(tendons: int) -> list[str]:
-    """l1, l2, …"""
-    return [f"l{t + 1}" for t in range(tendons)]
-
-
-def tension_columns(tendons: int) -> list[str]:
-    """f1, f2, …"""
-    return [f"f{t + 1}" for t in range(tendons)]
 
 
 def tip_by_tension(table: pd.DataFrame, tendons: int) -> np.ndarray:

@@ -10,14 +10,8 @@ import pandas as pd
 import torch
 from pydantic import Field, NonNegativeFloat, PositiveInt
 
-from trunkline.dataset.table import (
-    length_by_tension,
-    length_columns,
-    sample_table,
-    tension_columns,
-    tip_by_tension,
-    turn_by_tension,
-)
+from trunkline.dataset.columns import length_columns, tension_columns
+from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension, turn_by_tension
 from trunkline.ik.network import INPUTS, InverseKinematics, Training, train
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.polish import polish

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.dataset.columns import length_columns
 from trunkline.dataset.samples import read_samples
-from trunkline.dataset.table import length_columns
 from trunkline.errors import InputError
 from trunkline.reachability.soft import SoftSettings
 from trunkline.reachability.tips import ArmTips, Tips
