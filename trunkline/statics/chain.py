@@ -11,7 +11,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.statics.limits import limit_angles, limit_gains, limit_impedances
+from trunkline.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances
 from trunkline.statics.supported import require_supported, unit_bodies
 from trunkline.statics.tendon_paths import tendon_crossings, tendon_holes
 
@@ -32,6 +32,7 @@ class Chain(NamedTuple):
         limit: lower and upper angle at which a limit starts to push, rad (infinite if none). Shape (n, 2, 2).
         limit_gain: k / dof_invweight0, N m/rad: see `limits.limit_torque`. Shape (n, 2).
         limit_impedance: solimp. Shape (n, 2, 5).
+        limit_energy: of a limit at the depth from which its impedance is constant, J. Shape (n, 2).
         hole_in: site on the unit before, from the unit's joint, m. Shape (n, K, 3).
         hole_out: site on the unit, from its joint, m. Shape (n, K, 3).
         crosses: 1 where the tendon crosses the unit's joint, else 0. Shape (n, K).
@@ -52,6 +53,7 @@ class Chain(NamedTuple):
     limit: np.ndarray
     limit_gain: np.ndarray
     limit_impedance: np.ndarray
+    limit_energy: np.ndarray
     hole_in: np.ndarray
     hole_out: np.ndarray
     crosses: np.ndarray
@@ -105,6 +107,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
     mass, center = _unit_inertials(model, data, units)
     holes = tendon_holes(model, data, units)
     hole_in, hole_out, crosses, fixed_length = tendon_crossings(holes, data, base, to_base, anchors)
+    gains, impedances = limit_gains(model, joints), limit_impedances(model, joints)
     order = [int(np.flatnonzero(model.actuator_trnid[:, 0] == t)[0]) for t in range(model.ntendon)]
     tip, tip_quaternion = _tip(model, data, tip_site, units, base, to_base)
     return Chain(
@@ -116,8 +119,9 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         stiffness=np.concatenate([model.jnt_stiffness[joints][..., None], model.jnt_stiffnesspoly[joints]], axis=2),
         rest=model.qpos_spring[joints],
         limit=limit_angles(model, joints),
-        limit_gain=limit_gains(model, joints),
-        limit_impedance=limit_impedances(model, joints),
+        limit_gain=gains,
+        limit_impedance=impedances,
+        limit_energy=limit_energies(gains, impedances),
         hole_in=hole_in,
         hole_out=hole_out,
         crosses=crosses,

@@ -15,7 +15,7 @@ from trunkline.statics.factor import Hessian
 from trunkline.statics.kernel import kernel
 from trunkline.statics.limits import limit_energy, limit_torque
 from trunkline.statics.placement import place
-from trunkline.statics.vectors import cross, turned
+from trunkline.statics.vectors import cross, dot, plus, turned, vector
 
 
 class Pull(NamedTuple):
@@ -54,104 +54,93 @@ def pull_tensions(state, pull):
 
 @kernel
 def evaluate(chain, q, gravity, pull, state):
-    """Fill `state` but for its Hessian; return the energy E(q), J.
+    """Fill `state`, all but the room for the Hessian; return the energy E(q), J.
 
     Args:
         q: joint angles, rad. Shape (nq,).
         gravity: in the base frame, m/s². Shape (3,).
         pull: how the tendons pull, a `Pull`.
     """
-    n = chain.mass.shape[0]
     place(chain, q, state)
     energy = pull_tensions(state, pull)
-    for i in range(n):
-        for h in range(2):
-            j = 2 * i + h
-            x = q[j] - chain.rest[i, h]
-            a, b, c = chain.stiffness[i, h, 0], chain.stiffness[i, h, 1], chain.stiffness[i, h, 2]
-            energy += x * (x * (a / 2 + x * (b / 3 + x * c / 4)) - pull.torque[i, h])
-            torque = x * (a + x * (b + x * c)) - pull.torque[i, h]
-            if q[j] < chain.limit[i, h, 0]:
-                depth = chain.limit[i, h, 0] - q[j]
-                energy += limit_energy(chain.limit_gain[i, h], chain.limit_impedance[i, h], depth)
-                torque -= limit_torque(chain.limit_gain[i, h], chain.limit_impedance[i, h], depth)[0]
-            elif q[j] > chain.limit[i, h, 1]:
-                depth = q[j] - chain.limit[i, h, 1]
-                energy += limit_energy(chain.limit_gain[i, h], chain.limit_impedance[i, h], depth)
-                torque += limit_torque(chain.limit_gain[i, h], chain.limit_impedance[i, h], depth)[0]
-            for t in range(state.tensions.shape[0]):
-                torque += state.tensions[t] * state.jacobian[t, j]
-            state.gradient[j] = torque
+    rest, stiffness, limit, extra = chain.rest, chain.stiffness, chain.limit, pull.torque
+    tensions, jacobian, gradient = state.tensions, state.jacobian, state.gradient
+    for j in range(q.shape[0]):
+        i, h = j // 2, j % 2
+        x = q[j] - rest[i, h]
+        a, b, c = stiffness[i, h, 0], stiffness[i, h, 1], stiffness[i, h, 2]
+        energy += x * (x * (a / 2 + x * (b / 3 + x * c / 4)) - extra[i, h])
+        torque = x * (a + x * (b + x * c)) - extra[i, h]
+        state.stiffness[j] = a + x * (2 * b + 3 * x * c)
+        depth = max(limit[i, h, 0] - q[j], q[j] - limit[i, h, 1])
+        if depth > 0:
+            energy += limit_energy(chain, i, h, depth)
+            push, slope = limit_torque(chain.limit_gain[i, h], chain.limit_impedance[i, h], depth)
+            state.stiffness[j] += slope
+            torque += push if q[j] > limit[i, h, 1] else -push
+        for t in range(tensions.shape[0]):
+            torque += tensions[t] * jacobian[t, j]
+        gradient[j] = torque
     return energy + _add_gravity(chain, gravity, state)
 
 
 @kernel
 def _add_gravity(chain, gravity, state):
     """Add gravity's torques -g·(axis x moment) to the gradient; return its energy, J."""
-    n = chain.mass.shape[0]
+    rotations, positions, hinges, moments = state.rotation, state.position, state.hinge, state.moment
+    masses, centers, gradient = chain.mass, chain.center, state.gradient
+    g = gravity[0], gravity[1], gravity[2]
     energy, mass = 0.0, 0.0
-    moment, center = np.zeros(3), np.empty(3)
-    gx, gy, gz = gravity[0], gravity[1], gravity[2]
-    for i in range(n - 1, -1, -1):
-        if i < n - 1:
-            for k in range(3):
-                moment[k] += mass * (state.position[i + 1, k] - state.position[i, k])
-        turned(state.rotation[i], chain.center[i], center)
-        mass += chain.mass[i]
-        for k in range(3):
-            moment[k] += chain.mass[i] * center[k]
-            energy -= chain.mass[i] * gravity[k] * (state.position[i, k] + center[k])
-        state.moment[i] = moment
-        tx, ty, tz = cross(moment[0], moment[1], moment[2], gx, gy, gz)
+    moment = 0.0, 0.0, 0.0
+    for i in range(masses.shape[0] - 1, -1, -1):
+        here = vector(positions, i)
+        if i < masses.shape[0] - 1:
+            moment = plus(moment, mass, plus(vector(positions, i + 1), -1.0, here))
+        rotation = vector(rotations[i], 0), vector(rotations[i], 1), vector(rotations[i], 2)
+        center = turned(rotation, vector(centers, i))
+        moment = plus(moment, masses[i], center)
+        mass += masses[i]
+        energy -= masses[i] * dot(g, plus(here, 1.0, center))
+        moments[i, 0], moments[i, 1], moments[i, 2] = moment
+        turning = cross(moment, g)
         for h in range(2):
-            axis = state.hinge[i, h]
-            state.gradient[2 * i + h] -= axis[0] * tx + axis[1] * ty + axis[2] * tz
+            gradient[2 * i + h] -= dot(vector(hinges[i], h), turning)
     return energy
 
 
 @kernel
-def find_hessian(chain, q, gravity, pull, state):
-    """The Hessian for the q, gravity and pull of the last `evaluate`, in the room that `state` has for it."""
-    units, tendons = chain.mass.shape[0], state.tensions.shape[0]
-    left, right, block = state.left, state.right, state.block
+def find_hessian(gravity, pull, state):
+    """The Hessian at the last `evaluate`, of the same gravity and pull, in the room that `state` has for it."""
+    tensions, jacobian, chord_hessian, stiffness = state.tensions, state.jacobian, state.chord_hessian, state.stiffness
+    hinges, moments, left, right, block = state.hinge, state.moment, state.left, state.right, state.block
     # gravity: ∂²E/∂q_h∂q_h' = -(g x a_h)·(a_h' x moment of h'), h the hinge nearer to the base
-    gx, gy, gz = gravity[0], gravity[1], gravity[2]
-    for j in range(2 * units):
-        axis, moment = state.hinge[j // 2, j % 2], state.moment[j // 2]
-        left[0, j], left[1, j], left[2, j] = cross(axis[0], axis[1], axis[2], gx, gy, gz)
-        right[0, j], right[1, j], right[2, j] = cross(axis[0], axis[1], axis[2], moment[0], moment[1], moment[2])
+    g = gravity[0], gravity[1], gravity[2]
+    for i in range(block.shape[0]):
+        moment = vector(moments, i)
+        for h in range(2):
+            axis, j = vector(hinges[i], h), 2 * i + h
+            left[0, j], left[1, j], left[2, j] = cross(axis, g)
+            right[0, j], right[1, j], right[2, j] = cross(axis, moment)
     rank = 3
-    for t in range(tendons):
+    for t in range(tensions.shape[0]):
         if is_elastic(state, pull, t):
-            for j in range(2 * units):
-                left[rank, j] = pull.slope[t] * state.jacobian[t, j]
-                right[rank, j] = state.jacobian[t, j]
+            for j in range(jacobian.shape[1]):
+                left[rank, j] = pull.slope[t] * jacobian[t, j]
+                right[rank, j] = jacobian[t, j]
             rank += 1
-    for i in range(units):
+    for i in range(block.shape[0]):
         a, b = 2 * i, 2 * i + 1
-        aa, ab, bb = _joint_stiffness(chain, q, i, 0), 0.0, _joint_stiffness(chain, q, i, 1)
-        for t in range(tendons):
-            aa += state.tensions[t] * state.chord_hessian[i, t, 0]
-            ab += state.tensions[t] * state.chord_hessian[i, t, 1]
-            bb += state.tensions[t] * state.chord_hessian[i, t, 2]
+        aa, ab, bb = stiffness[a], 0.0, stiffness[b]
+        for t in range(tensions.shape[0]):
+            aa += tensions[t] * chord_hessian[i, t, 0]
+            ab += tensions[t] * chord_hessian[i, t, 1]
+            bb += tensions[t] * chord_hessian[i, t, 2]
         for m in range(rank):
             aa += left[m, a] * right[m, a]
             ab += left[m, a] * right[m, b]
             bb += left[m, b] * right[m, b]
         block[i, 0], block[i, 1], block[i, 2] = aa, ab, bb
     return Hessian(left[:rank], right[:rank], block)
-
-
-@kernel
-def _joint_stiffness(chain, q, i, h):
-    """Second derivative of the elastic energy and the limit of hinge h of unit i, N m/rad."""
-    angle = q[2 * i + h]
-    x = angle - chain.rest[i, h]
-    stiffness = chain.stiffness[i, h, 0] + x * (2 * chain.stiffness[i, h, 1] + 3 * x * chain.stiffness[i, h, 2])
-    depth = max(chain.limit[i, h, 0] - angle, angle - chain.limit[i, h, 1])
-    if depth > 0:
-        stiffness += limit_torque(chain.limit_gain[i, h], chain.limit_impedance[i, h], depth)[1]
-    return stiffness
 
 
 @kernel

@@ -42,6 +42,7 @@ def over_rows(rows: Callable, count: int, *arguments) -> None:
     pieces = min(count, PIECES * threads)
     edges = [count * piece // pieces for piece in range(pieces + 1)] if pieces else []
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        running = [pool.submit(rows, first, last, *arguments) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+        edged = zip(edges[:-1], edges[1:], strict=True)
+        running = [pool.submit(rows, first, last, *arguments) for first, last in edged]
         for piece in running:
             piece.result()

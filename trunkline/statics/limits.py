@@ -6,6 +6,7 @@ import numpy as np
 from trunkline.statics.kernel import kernel
 
 MIN_IMPEDANCE, MAX_IMPEDANCE = mujoco.mjMINIMP, mujoco.mjMAXIMP
+NARROW = 1e-15  # rad, width below which MuJoCo takes the impedance as constant
 # Gauss-Legendre nodes and weights on [0, 1], exact to polynomials of degree 19.
 _NODES = 0.5 * (np.polynomial.legendre.leggauss(10)[0] + 1)
 _WEIGHTS = 0.5 * np.polynomial.legendre.leggauss(10)[1]
@@ -62,7 +63,7 @@ def limit_torque(gain, impedance, depth):
     """
     d0, dw, width = impedance[0], impedance[1], impedance[2]
     slope = 0.0
-    if d0 == dw or width <= 1e-15:
+    if d0 == dw or width <= NARROW:
         d = 0.5 * (d0 + dw)
     elif depth >= width:
         d = dw
@@ -76,24 +77,32 @@ def limit_torque(gain, impedance, depth):
 
 
 @kernel
-def _limit_piece(gain, impedance, start, end):
+def limit_energy(chain, i, h, depth):
+    """Integral of `limit_torque` from 0 to `depth`, J, of hinge h of unit i; by quadrature where the impedance varies."""
+    gain, impedance, width = chain.limit_gain[i, h], chain.limit_impedance[i, h], chain.limit_impedance[i, h, 2]
+    if impedance[0] == impedance[1] or width <= NARROW:
+        return 0.5 * limit_torque(gain, impedance, depth)[0] * depth
+    if depth >= width:
+        stiffness = limit_torque(gain, impedance, depth)[0] / depth
+        return chain.limit_energy[i, h] + 0.5 * stiffness * (depth * depth - width * width)
+    if depth <= impedance[3] * width:
+        return _energy_between(gain, impedance, 0.0, depth)
+    return chain.limit_energy[i, h] - _energy_between(gain, impedance, depth, width)
+
+
+@kernel
+def _energy_between(gain, impedance, start, end):
     energy = 0.0
     for k in range(_NODES.shape[0]):
         energy += _WEIGHTS[k] * limit_torque(gain, impedance, start + (end - start) * _NODES[k])[0]
     return energy * (end - start)
 
 
-@kernel
-def limit_energy(gain, impedance, depth):
-    """Integral of `limit_torque` from 0 to `depth`, J; by quadrature where the impedance varies."""
-    width = impedance[2]
-    knee = impedance[3] * width
-    if impedance[0] == impedance[1] or width <= 1e-15:
-        return 0.5 * limit_torque(gain, impedance, depth)[0] * depth
-    if depth <= knee:
-        return _limit_piece(gain, impedance, 0.0, depth)
-    energy = _limit_piece(gain, impedance, 0.0, knee) + _limit_piece(gain, impedance, knee, min(depth, width))
-    if depth > width:
-        stiffness = limit_torque(gain, impedance, depth)[0] / depth
-        energy += 0.5 * stiffness * (depth * depth - width * width)
-    return energy
+def limit_energies(gains: np.ndarray, impedances: np.ndarray) -> np.ndarray:
+    """Energy (J) at the depth from which on the impedance is constant. Shapes (n, 2), (n, 2, 5) and (n, 2)."""
+    energies = np.zeros(gains.shape)
+    for joint in np.ndindex(gains.shape):
+        gain, impedance = gains[joint], impedances[joint]
+        width, knee = impedance[2], impedance[3] * impedance[2]
+        energies[joint] = _energy_between(gain, impedance, 0.0, knee) + _energy_between(gain, impedance, knee, width)
+    return energies

@@ -74,7 +74,7 @@ def find_equilibrium(chain, q, gravity, pull, cables, work):
     energy = evaluate(chain, q, gravity, pull, state)
     residual, stretch = _imbalance(state, pull, cables)
     for iteration in range(MAX_ITERATIONS):
-        hessian = find_hessian(chain, q, gravity, pull, state)
+        hessian = find_hessian(gravity, pull, state)
         stable = _factorize_shifted(hessian, work.factor)
         if residual <= TORQUE_TOLERANCE and stretch <= LENGTH_TOLERANCE:
             return residual, stretch, iteration, stable

@@ -5,16 +5,17 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.statics.kernel import kernel
-from trunkline.statics.vectors import cross, product, turn_about, turned
+from trunkline.statics.vectors import cross, dot, plus, product, turn_about, turned, vector
 
 
 class State(NamedTuple):
     """Everything that is computed from the joint angles; one per thread, filled in place.
 
     Shapes: rotation (n, 3, 3), position (n, 3), hinge (n, 2, 3), moment (n, 3), lengths (K,), tensions (K,),
-    jacobian (K, nq), chord_hessian (n, K, 3), gradient (nq,), left and right (3 + K, nq), block (n, 3).
+    jacobian (K, nq), chord_hessian (n, K, 3), gradient, stiffness (nq,), left and right (3 + K, nq), block (n, 3).
     rotation, position and hinge are in the base frame; moment is the first moment Σ m (x - position) of the unit and
-    all after it; left, right and block are room for the `factor.Hessian`.
+    all after it; stiffness is that of
+    each joint by itself, springs and limit, N m/rad; left, right and block are room for the `factor.Hessian`.
     """
 
     rotation: np.ndarray
@@ -26,6 +27,7 @@ class State(NamedTuple):
     jacobian: np.ndarray
     chord_hessian: np.ndarray
     gradient: np.ndarray
+    stiffness: np.ndarray
     left: np.ndarray
     right: np.ndarray
     block: np.ndarray
@@ -45,6 +47,7 @@ def new_state(units, tendons):
         np.zeros((tendons, nq)),
         np.zeros((units, tendons, 3)),
         np.zeros(nq),
+        np.zeros(nq),
         np.zeros((3 + tendons, nq)),
         np.zeros((3 + tendons, nq)),
         np.zeros((units, 3)),
@@ -54,54 +57,43 @@ def new_state(units, tendons):
 @kernel
 def place(chain, q, state):
     """Rotations, joint positions, hinge axes, tendon lengths and their first and second derivatives at q."""
-    n, tendons = chain.mass.shape[0], chain.gain.shape[0]
-    first, second, local = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    axis_b, x, moved = np.empty(3), np.empty(3), np.empty(3)
-    for t in range(tendons):
-        state.lengths[t] = chain.fixed_length[t]
-    for i in range(n):
-        axis_a = chain.axes[i, 0]
-        turn_about(axis_a, q[2 * i] - chain.zero[i, 0], first)
-        turn_about(chain.axes[i, 1], q[2 * i + 1] - chain.zero[i, 1], second)
-        product(first, second, local)
-        turned(first, chain.axes[i, 1], axis_b)
-        if i == 0:
-            state.rotation[0] = local
-            state.position[0] = chain.offset[0]
-            state.hinge[0, 0] = axis_a
-            state.hinge[0, 1] = axis_b
-        else:
-            parent = state.rotation[i - 1]
-            product(parent, local, state.rotation[i])
-            turned(parent, chain.offset[i], moved)
-            for k in range(3):
-                state.position[i, k] = state.position[i - 1, k] + moved[k]
-            turned(parent, axis_a, state.hinge[i, 0])
-            turned(parent, axis_b, state.hinge[i, 1])
-        for t in range(tendons):
-            if chain.crosses[i, t] == 0:
-                continue
-            # chord d from the hole before the joint to the hole after it, in the frame before the joint
-            turned(local, chain.hole_out[i, t], x)
-            h = chain.hole_in[i, t]
-            dx, dy, dz = x[0] - h[0], x[1] - h[1], x[2] - h[2]
-            chord = np.sqrt(dx * dx + dy * dy + dz * dz)
-            ax, ay, az = axis_a[0], axis_a[1], axis_a[2]
-            bx, by, bz = axis_b[0], axis_b[1], axis_b[2]
-            d1x, d1y, d1z = cross(ax, ay, az, x[0], x[1], x[2])
-            d2x, d2y, d2z = cross(bx, by, bz, x[0], x[1], x[2])
-            e11x, e11y, e11z = cross(ax, ay, az, d1x, d1y, d1z)
-            e12x, e12y, e12z = cross(ax, ay, az, d2x, d2y, d2z)
-            e22x, e22y, e22z = cross(bx, by, bz, d2x, d2y, d2z)
-            inverse = 1 / chord
-            j1 = (dx * d1x + dy * d1y + dz * d1z) * inverse
-            j2 = (dx * d2x + dy * d2y + dz * d2z) * inverse
-            h11 = d1x * d1x + d1y * d1y + d1z * d1z + dx * e11x + dy * e11y + dz * e11z - j1 * j1
-            h12 = d1x * d2x + d1y * d2y + d1z * d2z + dx * e12x + dy * e12y + dz * e12z - j1 * j2
-            h22 = d2x * d2x + d2y * d2y + d2z * d2z + dx * e22x + dy * e22y + dz * e22z - j2 * j2
-            state.lengths[t] += chord
-            state.jacobian[t, 2 * i] = j1
-            state.jacobian[t, 2 * i + 1] = j2
-            state.chord_hessian[i, t, 0] = h11 * inverse
-            state.chord_hessian[i, t, 1] = h12 * inverse
-            state.chord_hessian[i, t, 2] = h22 * inverse
+    axes, zero, offset = chain.axes, chain.zero, chain.offset
+    rotations, positions, hinges = state.rotation, state.position, state.hinge
+    state.lengths[:] = chain.fixed_length
+    rotation = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    position = (0.0, 0.0, 0.0)
+    for i in range(axes.shape[0]):
+        first_axis = vector(axes[i], 0)
+        first = turn_about(first_axis, q[2 * i] - zero[i, 0])
+        second = turn_about(vector(axes[i], 1), q[2 * i + 1] - zero[i, 1])
+        second_axis = turned(first, vector(axes[i], 1))
+        local = product(first, second)
+        position = plus(position, 1.0, turned(rotation, vector(offset, i)))
+        first_hinge, second_hinge = turned(rotation, first_axis), turned(rotation, second_axis)
+        rotation = product(rotation, local)
+        for k in range(3):
+            positions[i, k] = position[k]
+            hinges[i, 0, k], hinges[i, 1, k] = first_hinge[k], second_hinge[k]
+            for m in range(3):
+                rotations[i, k, m] = rotation[k][m]
+        _place_chords(chain, i, local, first_axis, second_axis, state)
+
+
+@kernel
+def _place_chords(chain, i, local, first_axis, second_axis, state):
+    """The tendons' chords d from the hole before joint i to the hole after it, all in the frame before the joint."""
+    crosses, hole_in, hole_out = chain.crosses, chain.hole_in[i], chain.hole_out[i]
+    lengths, jacobian, chord_hessian = state.lengths, state.jacobian, state.chord_hessian
+    for t in range(crosses.shape[1]):
+        if crosses[i, t] == 0:
+            continue
+        x, h = turned(local, vector(hole_out, t)), vector(hole_in, t)
+        d = plus(x, -1.0, h)
+        length = np.sqrt(dot(d, d))
+        d1, d2 = cross(first_axis, x), cross(second_axis, x)
+        j1, j2 = dot(d, d1) / length, dot(d, d2) / length
+        lengths[t] += length
+        jacobian[t, 2 * i], jacobian[t, 2 * i + 1] = j1, j2
+        chord_hessian[i, t, 0] = (dot(d1, d1) + dot(d, cross(first_axis, d1)) - j1 * j1) / length
+        chord_hessian[i, t, 1] = (dot(d1, d2) + dot(d, cross(first_axis, d2)) - j1 * j2) / length
+        chord_hessian[i, t, 2] = (dot(d2, d2) + dot(d, cross(second_axis, d2)) - j2 * j2) / length

@@ -13,7 +13,7 @@ from trunkline.statics.equilibria import plain
 from trunkline.statics.factor import factorize, solve
 from trunkline.statics.kernel import kernel, over_rows
 from trunkline.statics.newton import new_work
-from trunkline.statics.vectors import cross, turned
+from trunkline.statics.vectors import cross, plus, turned, vector
 
 
 @dataclass
@@ -40,9 +40,7 @@ def sensitivity(chain: Chain, qpos: np.ndarray, tensions: np.ndarray, gravity: n
     count, tendons = tensions.shape
     tip, turn = np.zeros((count, 3, tendons)), np.zeros((count, 3, tendons))
     length = np.zeros((count, tendons, tendons))
-    over_rows(
-        _sensitivities, count, chain, plain(qpos), plain(tensions), plain(gravity, (count, 3)), tip, turn, length
-    )
+    over_rows(_sensitivities, count, chain, plain(qpos), plain(tensions), plain(gravity, (count, 3)), tip, turn, length)
     return Sensitivity(tip, turn, length)
 
 
@@ -57,25 +55,23 @@ def _sensitivity(chain, q, tensions, gravity, tip, turn, length):
     """Fill tip (3, K), turn (3, K) and length (K, K) for one equilibrium."""
     units, tendons = chain.mass.shape[0], tensions.shape[0]
     work = new_work(units, tendons)
-    state, step, end = work.state, work.step, np.empty(3)
+    state, step = work.state, work.step
     free = np.zeros(tendons)
     pull = Pull(tensions, free, free, free, np.zeros((units, 2)))
     evaluate(chain, q, gravity, pull, state)
-    hessian = find_hessian(chain, q, gravity, pull, state)
+    hessian = find_hessian(gravity, pull, state)
     factorize(hessian, work.factor)
-    turned(state.rotation[-1], chain.tip, end)
-    end += state.position[-1]
+    last = state.rotation[-1]
+    arm = turned((vector(last, 0), vector(last, 1), vector(last, 2)), (chain.tip[0], chain.tip[1], chain.tip[2]))
+    end = plus(vector(state.position, units - 1), 1.0, arm)
     for t in range(tendons):
         step[:] = -state.jacobian[t]
         solve(hessian, work.factor, step)
         for j in range(2 * units):
-            axis, joint = state.hinge[j // 2, j % 2], state.position[j // 2]
-            x, y, z = end[0] - joint[0], end[1] - joint[1], end[2] - joint[2]
-            dx, dy, dz = cross(axis[0], axis[1], axis[2], x, y, z)
-            tip[0, t] += step[j] * dx
-            tip[1, t] += step[j] * dy
-            tip[2, t] += step[j] * dz
+            axis = vector(state.hinge[j // 2], j % 2)
+            moved = cross(axis, plus(end, -1.0, vector(state.position, j // 2)))
             for k in range(3):
+                tip[k, t] += step[j] * moved[k]
                 turn[k, t] += step[j] * axis[k]
             for s in range(tendons):
                 length[s, t] += step[j] * state.jacobian[s, j]

@@ -1,4 +1,4 @@
-"""Products of vectors in space and 3 x 3 matrices, written out so that the compiler keeps them in registers."""
+"""Vectors in space as tuples of three numbers, matrices as tuples of three rows: both stay in registers."""
 
 import numpy as np
 
@@ -6,32 +6,58 @@ from trunkline.statics.kernel import kernel
 
 
 @kernel
-def cross(ax, ay, az, bx, by, bz):
-    """a x b, by components."""
-    return ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+def vector(array, i):
+    """Row i of an array (N, 3)."""
+    return array[i, 0], array[i, 1], array[i, 2]
 
 
 @kernel
-def turn_about(axis, angle, out):
-    """Rodrigues' formula: the rotation by `angle` (rad) about the unit vector `axis`, into `out` (3, 3)."""
+def dot(a, b):
+    """a · b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def cross(a, b):
+    """a x b."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def plus(a, factor, b):
+    """a + factor b."""
+    return a[0] + factor * b[0], a[1] + factor * b[1], a[2] + factor * b[2]
+
+
+@kernel
+def turn_about(axis, angle):
+    """Rodrigues' formula: the rotation by `angle` (rad) about the unit vector `axis`."""
     c, s = np.cos(angle), np.sin(angle)
-    x, y, z = axis[0], axis[1], axis[2]
+    x, y, z = axis
     t = 1 - c
-    out[0, 0], out[0, 1], out[0, 2] = t * x * x + c, t * x * y - s * z, t * x * z + s * y
-    out[1, 0], out[1, 1], out[1, 2] = t * x * y + s * z, t * y * y + c, t * y * z - s * x
-    out[2, 0], out[2, 1], out[2, 2] = t * x * z - s * y, t * y * z + s * x, t * z * z + c
+    return (
+        (t * x * x + c, t * x * y - s * z, t * x * z + s * y),
+        (t * x * y + s * z, t * y * y + c, t * y * z - s * x),
+        (t * x * z - s * y, t * y * z + s * x, t * z * z + c),
+    )
 
 
 @kernel
-def product(a, b, out):
-    """a b into `out`, all (3, 3)."""
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
+def turned(matrix, v):
+    """The matrix times a vector."""
+    return dot(matrix[0], v), dot(matrix[1], v), dot(matrix[2], v)
 
 
 @kernel
-def turned(a, v, out):
-    """a v into `out` (3,)."""
-    for i in range(3):
-        out[i] = a[i, 0] * v[0] + a[i, 1] * v[1] + a[i, 2] * v[2]
+def product(a, b):
+    """The matrix a b."""
+    return _row_times(a[0], b), _row_times(a[1], b), _row_times(a[2], b)
+
+
+@kernel
+def _row_times(row, b):
+    return (
+        row[0] * b[0][0] + row[1] * b[1][0] + row[2] * b[2][0],
+        row[0] * b[0][1] + row[1] * b[1][1] + row[2] * b[2][1],
+        row[0] * b[0][2] + row[1] * b[1][2] + row[2] * b[2][2],
+    )
