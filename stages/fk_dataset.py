@@ -6,7 +6,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field
 
-from trunkline.dataset.table import Density, mujoco_deviation, sample_table, split
+from trunkline.dataset.deviation import mujoco_deviation
+from trunkline.dataset.table import Density, sample_table, split
 from trunkline.figures.dataset import density_figure, deviation_figure
 from trunkline.figures.style import save_figure
 from trunkline.pipeline.inputs import read_model

@@ -12,10 +12,10 @@ import torch
 from stages.train_ik import read_table
 from tests.support.bent_chain import stump
 from trunkline.dataset import sampling
+from trunkline.dataset.deviation import mujoco_deviation
 from trunkline.dataset.table import (
     length_by_tension,
     length_columns,
-    mujoco_deviation,
     sample_table,
     tension_columns,
     tip_by_tension,

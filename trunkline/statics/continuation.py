@@ -7,8 +7,10 @@ import numpy as np
 from trunkline.statics.energy import Pull
 from trunkline.statics.kernel import kernel
 from trunkline.statics.newton import find_equilibrium, new_work
+from trunkline.statics.vectors import copy
 
 BRANCH_STEP = 1.0  # rad: a corrector that moves a joint further than its whole range has left the branch
+SLACK = 1e3  # m, a length that no arm's tendon has: it does not pull
 MIN_SHARE = 1 / 4096  # smallest step of the continuation, as a share of the load
 
 
@@ -37,22 +39,26 @@ def solve_paths(
         gravity, torque = gravities[path], torques[path]
         work = new_work(chain.mass.shape[0], tendons)
         q = chain.rest.copy().reshape(-1)
-        nothing = Pull(np.zeros(tendons), np.zeros(tendons), np.zeros(tendons), ceiling, torque)
+        slack = Pull(np.zeros(tendons), slope, np.full(tendons, SLACK), ceiling, torque)
         here = Pull(np.zeros(tendons), slope, np.zeros(tendons), ceiling, torque)
-        loss, total, good, jumped = _follow(chain, q, np.zeros(3), gravity, nothing, nothing, False, work)
-        here.length[:] = work.state.lengths
+        loss, total, good, jumped = _follow(chain, q, np.zeros(3), gravity, slack, slack, cables, work)
+        copy(work.state.lengths, here.length)
         if cables:
-            here.length[:] = all_lengths[path, 0] + max(0.0, np.max(here.length - all_lengths[path, 0]))
+            spare = 0.0
+            for t in range(tendons):
+                spare = max(spare, here.length[t] - all_lengths[path, 0, t])
+            for t in range(tendons):
+                here.length[t] = all_lengths[path, 0, t] + spare
         for step in range(steps):
             goal = Pull(all_tensions[path, step].copy(), slope, all_lengths[path, step].copy(), ceiling, torque)
             if good:
                 loss, more, good, snap = _follow(chain, q, gravity, gravity, here, goal, cables, work)
                 total += more
                 jumped = jumped or snap
-                here.tension[:] = goal.tension
-                here.length[:] = goal.length
+                copy(goal.tension, here.tension)
+                copy(goal.length, here.length)
             row = path * steps + step
-            found.qpos[row] = q
+            copy(q, found.qpos[row])
             record(found, row, work.state, loss, total, good)
             found.snapped[row] = jumped
             total = 0
@@ -61,10 +67,11 @@ def solve_paths(
 @kernel
 def record(found, row, state, residual, iterations, converged):
     """Write what is known of one equilibrium beside its joint angles into its row."""
-    found.rotation[row] = state.rotation[-1]
-    found.position[row] = state.position[-1]
-    found.lengths[row] = state.lengths
-    found.tensions[row] = state.tensions
+    for k in range(3):
+        copy(state.rotation[-1, k], found.rotation[row, k])
+    copy(state.position[-1], found.position[row])
+    copy(state.lengths, found.lengths[row])
+    copy(state.tensions, found.tensions[row])
     found.residual[row] = residual
     found.iterations[row] = iterations
     found.converged[row] = converged
@@ -96,19 +103,21 @@ def _follow(chain, q, start_gravity, gravity, start, pull, cables, work):
             now.length[t] = start.length[t] + target * (pull.length[t] - start.length[t])
         residual, stretch, iterations, converged = find_equilibrium(chain, q, loads, now, cables, work)
         total += iterations
-        moved = np.max(np.abs(q - known))
+        moved = 0.0
+        for j in range(q.shape[0]):
+            moved = max(moved, abs(q[j] - known[j]))
         if not converged or moved > BRANCH_STEP:
             if share > MIN_SHARE:
-                q[:] = known
-                now.tension[:] = begin
+                copy(known, q)
+                copy(begin, now.tension)
                 share *= 0.5 if converged else 0.25
                 continue
             if not converged:
                 return residual, total, False, snapped
             snapped = True
-        known[:] = q
+        copy(q, known)
         done = target
         share *= 2
     if cables:
-        pull.tension[:] = now.tension
+        copy(now.tension, pull.tension)
     return residual, total, True, snapped

@@ -43,7 +43,9 @@ def factorize(hessian, factor):
     """Fill `factor`; False if the Hessian is not positive definite."""
     right, row, total = hessian.right, factor.row, factor.total
     rank = right.shape[0]
-    total[:rank, :rank] = 0.0
+    for m in range(rank):
+        for k in range(rank):
+            total[m, k] = 0.0
     for i in range(hessian.block.shape[0]):
         a, b = 2 * i, 2 * i + 1
         aa, ab, bb = hessian.block[i, 0], hessian.block[i, 1], hessian.block[i, 2]
@@ -91,7 +93,8 @@ def solve(hessian, factor, x):
         x[b] = (at_b - block[i, 1] * x[a]) / block[i, 2]
         for m in range(rank):
             sums[m] += row[m, a] * x[a] + row[m, b] * x[b]
-    sums[:] = 0.0
+    for m in range(rank):
+        sums[m] = 0.0
     for i in range(units - 1, -1, -1):
         a, b = 2 * i, 2 * i + 1
         at_a, at_b = x[a], x[b]

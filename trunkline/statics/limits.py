@@ -78,7 +78,7 @@ def limit_torque(gain, impedance, depth):
 
 @kernel
 def limit_energy(chain, i, h, depth):
-    """Integral of `limit_torque` from 0 to `depth`, J, of hinge h of unit i; by quadrature where the impedance varies."""
+    """Integral of `limit_torque` from 0 to `depth`, J, hinge h of unit i; by quadrature where the impedance varies."""
     gain, impedance, width = chain.limit_gain[i, h], chain.limit_impedance[i, h], chain.limit_impedance[i, h, 2]
     if impedance[0] == impedance[1] or width <= NARROW:
         return 0.5 * limit_torque(gain, impedance, depth)[0] * depth

@@ -9,6 +9,7 @@ from trunkline.statics.energy import evaluate, find_hessian, is_elastic
 from trunkline.statics.factor import Factor, factorize, new_factor, solve
 from trunkline.statics.kernel import kernel
 from trunkline.statics.placement import State, new_state
+from trunkline.statics.vectors import largest
 
 TORQUE_TOLERANCE = 1e-9  # N m; the softest joint of the arm, 0.02 N m/rad, turns by 5e-8 rad under it
 LENGTH_TOLERANCE = 1e-9  # m
@@ -52,8 +53,9 @@ def _factorize_shifted(hessian, factor):
         return True
     shift = SHIFT
     while shift < LARGEST_SHIFT:
-        hessian.block[:, 0] += shift
-        hessian.block[:, 2] += shift
+        for i in range(hessian.block.shape[0]):
+            hessian.block[i, 0] += shift
+            hessian.block[i, 2] += shift
         if factorize(hessian, factor):
             break
         shift *= 4
@@ -98,7 +100,7 @@ def _imbalance(state, pull, cables):
         for t in range(pull.tension.shape[0]):
             if is_elastic(state, pull, t):
                 stretch = max(stretch, abs(state.lengths[t] - pull.length[t]))
-    return np.max(np.abs(state.gradient)), stretch
+    return largest(state.gradient), stretch
 
 
 @kernel
@@ -106,8 +108,8 @@ def _line_search(chain, q, gravity, pull, work, energy):
     """Backtrack along work.step from q, overwriting it; return the energy there and whether a step was found."""
     state, nq = work.state, q.shape[0]
     slope = np.dot(state.gradient, work.step)
-    largest = np.max(np.abs(work.step))
-    share = min(1.0, MAX_STEP / largest) if largest > 0 else 1.0
+    longest = largest(work.step)
+    share = min(1.0, MAX_STEP / longest) if longest > 0 else 1.0
     rounding = 1e-13 * max(1.0, abs(energy))
     for _ in range(40):
         for j in range(nq):

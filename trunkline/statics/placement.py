@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.statics.kernel import kernel
-from trunkline.statics.vectors import cross, dot, plus, product, turn_about, turned, vector
+from trunkline.statics.vectors import copy, cross, dot, plus, product, turn_about, turned, vector
 
 
 class State(NamedTuple):
@@ -59,7 +59,7 @@ def place(chain, q, state):
     """Rotations, joint positions, hinge axes, tendon lengths and their first and second derivatives at q."""
     axes, zero, offset = chain.axes, chain.zero, chain.offset
     rotations, positions, hinges = state.rotation, state.position, state.hinge
-    state.lengths[:] = chain.fixed_length
+    copy(chain.fixed_length, state.lengths)
     rotation = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     position = (0.0, 0.0, 0.0)
     for i in range(axes.shape[0]):

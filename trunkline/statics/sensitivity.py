@@ -65,7 +65,8 @@ def _sensitivity(chain, q, tensions, gravity, tip, turn, length):
     arm = turned((vector(last, 0), vector(last, 1), vector(last, 2)), (chain.tip[0], chain.tip[1], chain.tip[2]))
     end = plus(vector(state.position, units - 1), 1.0, arm)
     for t in range(tendons):
-        step[:] = -state.jacobian[t]
+        for j in range(2 * units):
+            step[j] = -state.jacobian[t, j]
         solve(hessian, work.factor, step)
         for j in range(2 * units):
             axis = vector(state.hinge[j // 2], j % 2)

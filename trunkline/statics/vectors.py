@@ -12,6 +12,22 @@ def vector(array, i):
 
 
 @kernel
+def copy(source, target):
+    """target[:] = source for arrays of shape (N,); numba takes seconds to compile the slices' own checks."""
+    for k in range(source.shape[0]):
+        target[k] = source[k]
+
+
+@kernel
+def largest(values):
+    """Largest magnitude in an array of shape (N,)."""
+    most = 0.0
+    for value in values:
+        most = max(most, abs(value))
+    return most
+
+
+@kernel
 def dot(a, b):
     """a · b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
