@@ -12,8 +12,9 @@ import torch
 from tests.support.bent_chain import stump
 from trunkline.dataset import sampling
 from trunkline.dataset.columns import length_columns, tension_columns
+from trunkline.dataset.deviation import mujoco_deviation
 from trunkline.dataset.samples import read_samples
-from trunkline.dataset.table import length_by_tension, mujoco_deviation, sample_table, tip_by_tension
+from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.ik.network import INPUTS, InverseKinematics, Training, train

@@ -9,7 +9,8 @@ import numpy as np
 import pandas as pd
 from pydantic import Field, NonNegativeInt, PositiveInt
 
-from trunkline.dataset.table import Density, mujoco_deviation, sample_table, split
+from trunkline.dataset.deviation import mujoco_deviation
+from trunkline.dataset.table import Density, sample_table, split
 from trunkline.statics.chain import Chain
 
 
