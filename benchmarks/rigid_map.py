@@ -6,12 +6,11 @@ from pathlib import Path
 
 import mink
 import numpy as np
-from numpy.typing import NDArray
 
 from stages.reachability import Config
 from trunkline.panda.downward import sample_downward
 from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
-from trunkline.panda.kinematics import Q_MAX, Q_MIN, forward
+from trunkline.panda.kinematics import Q_MAX, Q_MIN, mount_pose
 from trunkline.panda.mjcf import panda_spec
 from trunkline.pipeline.config import load_config
 from trunkline.reachability.maps import RigidSettings, build_rigid
@@ -37,7 +36,7 @@ def main() -> None:
           f"closed: {rigid.mesh.is_closed()}")
 
     q = sample_downward(arguments.targets, 1, settings.mount_offset)[:arguments.targets]
-    positions, rotations = forward(q, settings.mount_offset)
+    positions, rotations = mount_pose(q, settings.mount_offset)
     started = time.perf_counter()
     result = solve(positions, rotations, seed=0, starts=STARTS, mount_offset=settings.mount_offset)
     seconds = time.perf_counter() - started
@@ -65,7 +64,7 @@ def _timed(call) -> float:
     return time.perf_counter() - started
 
 
-def _mink_solves(configuration: mink.Configuration, position: NDArray, rotation: NDArray, rng) -> bool:
+def _mink_solves(configuration: mink.Configuration, position: np.ndarray, rotation: np.ndarray, rng) -> bool:
     """Whether mink, with the same kind of restarts, brings the mount to a pose."""
     task = mink.FrameTask("mount", "site", position_cost=1.0, orientation_cost=1.0, lm_damping=1e-3)
     task.set_target(mink.SE3.from_rotation_and_translation(mink.SO3.from_matrix(rotation), position))

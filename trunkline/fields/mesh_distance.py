@@ -2,14 +2,13 @@
 
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 CANDIDATES = 6  # triangles near a point to which its distance is worked out exactly
 
 
-def mesh_distance(first: tuple[NDArray, NDArray], second: tuple[NDArray, NDArray], step: float) -> float:
-    """Two-sided (Hausdorff) distance in m, from above by less than a tenth of ``step``.
+def mesh_distance(first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray], step: float) -> float:
+    """Two-sided (Hausdorff) distance in m, from above by less than a tenth of `step`.
 
     Args:
         first, second: vertices (V, 3) in m and faces (F, 3).
@@ -22,8 +21,8 @@ def mesh_distance(first: tuple[NDArray, NDArray], second: tuple[NDArray, NDArray
     )
 
 
-def surface_points(vertices: NDArray, faces: NDArray, step: float) -> tuple[NDArray, NDArray]:
-    """Points (P, 3) on every triangle, corners included, no further apart than ``step`` m, and whose they are (P,)."""
+def surface_points(vertices: np.ndarray, faces: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (P, 3) on every triangle, corners included, no further apart than `step` m, and whose they are (P,)."""
     corners = vertices[faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     parts = np.maximum(1, np.ceil(longest / step)).astype(int)
@@ -38,7 +37,7 @@ def surface_points(vertices: NDArray, faces: NDArray, step: float) -> tuple[NDAr
     return np.concatenate(points), np.concatenate(owners)
 
 
-def _farthest(points: NDArray, near: NDArray, owners: NDArray, mesh: tuple[NDArray, NDArray]) -> float:
+def _farthest(points: np.ndarray, near: np.ndarray, owners: np.ndarray, mesh: tuple[np.ndarray, np.ndarray]) -> float:
     vertices, faces = mesh
     distance, index = cKDTree(near).query(points, k=CANDIDATES)
     # The nearest sample bounds the distance from above: only points that it leaves in doubt need their triangles.

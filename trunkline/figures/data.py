@@ -8,7 +8,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE
+from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, PARTLY, SEEN, UNSEEN, VALIDATE
 from trunkline.signals.base_frame import average_base, to_base_frame
 from trunkline.takes.quality import Quality
 from trunkline.trials.take import Take
@@ -16,7 +16,6 @@ from trunkline.trials.trial import Trial
 
 BIN = 1 / 30  # s, of the coverage picture
 LEAST_JITTER = 0.1  # ms, of the axis: less is none
-UNSEEN, PARTLY, SEEN = INITIAL, VALIDATE, "#d7e3ea"
 COLORS = {"static_tilt": MEASURED, "release": IDENTIFIED, "curl": VALIDATE}
 
 

@@ -9,10 +9,9 @@ directions.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunkline.panda.collision import clearance
-from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, Frame, cross, jacobian, joint_frames
+from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, JointFrame, cross, jacobian, joint_frames
 
 POSITION_TOLERANCE = 1e-5  # m
 ROTATION_TOLERANCE = 1e-4  # rad
@@ -25,20 +24,20 @@ LARGEST_STEP = 0.5  # rad, per joint and iteration
 class InverseResult(NamedTuple):
     """Outcome for N targets.
 
-    ``q`` (N, 7) in rad; ``position_error`` (N,) in m and ``rotation_error`` (N,) in rad of the best start;
-    ``starts`` (N,) used; ``success`` (N,): within tolerance, limits and, if asked, free of collisions.
+    `q` (N, 7) in rad; `position_error` (N,) in m and `rotation_error` (N,) in rad of the best start;
+    `starts` (N,) used; `success` (N,): within tolerance, limits and, if asked, free of collisions.
     """
 
-    q: NDArray
-    position_error: NDArray
-    rotation_error: NDArray
-    starts: NDArray
-    success: NDArray
+    q: np.ndarray
+    position_error: np.ndarray
+    rotation_error: np.ndarray
+    starts: np.ndarray
+    success: np.ndarray
 
 
 def solve(
-    positions: NDArray,
-    rotations: NDArray | None = None,
+    positions: np.ndarray,
+    rotations: np.ndarray | None = None,
     *,
     seed: int,
     starts: int,
@@ -49,7 +48,7 @@ def solve(
 
     Args:
         positions: of the mount, (N, 3) in m.
-        rotations: of the mount, (N, 3, 3); ``None``: straight down, with any yaw.
+        rotations: of the mount, (N, 3, 3); `None`: straight down, with any yaw.
         seed: of the random starts; target i meets the same starts whatever the other targets are.
         starts: most starts per target.
         mount_offset: from the flange to the mount, in m.
@@ -78,7 +77,7 @@ def solve(
     return best
 
 
-def _descend(q: NDArray, positions: NDArray, rotations: NDArray | None, mount_offset: float):
+def _descend(q: np.ndarray, positions: np.ndarray, rotations: np.ndarray | None, mount_offset: float):
     """One start per target: joint angles (N, 7), position errors and rotation errors (N,) at its end."""
     q = q.copy()
     joints = 7 if rotations is not None else 6  # joint 7 changes neither position nor pointing direction
@@ -103,8 +102,8 @@ def _descend(q: NDArray, positions: NDArray, rotations: NDArray | None, mount_of
     return q, position_error, rotation_error
 
 
-def _step(q: NDArray, J: NDArray, error: NDArray) -> NDArray:
-    """One damped step from ``q`` (N, n) with Jacobians (N, 6, n) and errors (N, 6), inside the limits."""
+def _step(q: np.ndarray, J: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """One damped step from `q` (N, n) with Jacobians (N, 6, n) and errors (N, 6), inside the limits."""
     n = q.shape[1]
     # A joint at its limit that the error pushes outwards is left out of the step.
     gradient = np.einsum("nij,ni->nj", J, error)
@@ -117,7 +116,7 @@ def _step(q: NDArray, J: NDArray, error: NDArray) -> NDArray:
     return np.clip(q + scale[:, None] * step, Q_MIN[:n], Q_MAX[:n])
 
 
-def _rotation_error(last: Frame, rotations: NDArray | None) -> NDArray:
+def _rotation_error(last: JointFrame, rotations: np.ndarray | None) -> np.ndarray:
     """Rotation that remains, (3, N) in rad (small angles: exactly; large ones: in the right direction)."""
     if rotations is None:
         down = np.array([[0.0], [0.0], [-1.0]])
@@ -128,8 +127,8 @@ def _rotation_error(last: Frame, rotations: NDArray | None) -> NDArray:
     return _unsaturated(axis, cosine)
 
 
-def _unsaturated(axis: NDArray, cosine: NDArray) -> NDArray:
-    """``axis`` (3, N), of length sin(angle), rescaled to length angle, so that half a turn is not an end."""
+def _unsaturated(axis: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+    """`axis` (3, N), of length sin(angle), rescaled to length angle, so that half a turn is not an end."""
     sine = np.sqrt((axis**2).sum(axis=0))
     angle = np.arctan2(sine, cosine)
     return axis * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)
