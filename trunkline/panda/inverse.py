@@ -18,6 +18,7 @@ ROTATION_TOLERANCE = 1e-4  # rad
 ITERATIONS = 60  # per start; a start that needs more is rarely worth it against a fresh one
 DAMPING = 0.3  # lambda^2 per squared task error
 DAMPING_FLOOR = 1e-10
+TOGETHER = 1000  # descents at once: with fewer, calls cost more than the arithmetic in them
 LARGEST_STEP = 0.5  # rad, per joint and iteration
 
 
@@ -58,22 +59,27 @@ def solve(
     n = len(positions)
     best = InverseResult(np.tile((Q_MIN + Q_MAX) / 2, (n, 1)), np.full(n, np.inf), np.full(n, np.inf),
                          np.zeros(n, int), np.zeros(n, bool))
-    left = np.arange(n)
-    for start in range(starts):
-        if not left.size:
-            break
-        first = np.random.default_rng([seed, start]).uniform(Q_MIN, Q_MAX, size=(n, 7))[left]
-        target = None if rotations is None else rotations[left]
-        q, position_error, rotation_error = _descend(first, positions[left], target, mount_offset)
+    left, done = np.arange(n), 0
+    while left.size and done < starts:
+        # As many starts at once as there were before: at most twice as many descents as one start after the other.
+        count = min(max(1, done), max(1, TOGETHER // left.size), starts - done)
+        first = [np.random.default_rng([seed, done + k]).uniform(Q_MIN, Q_MAX, size=(n, 7))[left] for k in range(count)]
+        rows = np.tile(left, count)
+        target = None if rotations is None else rotations[rows]
+        q, position_error, rotation_error = _descend(np.concatenate(first), positions[rows], target, mount_offset)
         success = (position_error <= POSITION_TOLERANCE) & (rotation_error <= ROTATION_TOLERANCE)
         if avoid_collisions:
             success[success] = clearance(q[success], mount_offset) > 0.0
-        better = success | (position_error + rotation_error < best.position_error[left] + best.rotation_error[left])
-        at = left[better]
-        best.q[at], best.position_error[at] = q[better], position_error[better]
-        best.rotation_error[at], best.success[at] = rotation_error[better], success[better]
-        best.starts[left] += 1
-        left = left[~success]
+        for part in np.split(np.arange(len(rows)), count):  # one start each, in order: the first success counts
+            part = part[~best.success[rows[part]]]
+            best.starts[rows[part]] += 1
+            total = position_error[part] + rotation_error[part]
+            at = rows[part]
+            part = part[success[part] | (total < best.position_error[at] + best.rotation_error[at])]
+            at = rows[part]
+            best.q[at], best.position_error[at] = q[part], position_error[part]
+            best.rotation_error[at], best.success[at] = rotation_error[part], success[part]
+        left, done = left[~best.success[left]], done + count
     return best
 
 
