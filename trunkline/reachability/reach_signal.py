@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from trunkline.fields.grid import Lattice, blend, overlap
 from trunkline.reachability.soft import SoftShape, soft_field
+from trunkline.threads import thread_count
 
 THRESHOLD = 0.0  # m; a signal above it means out of reach
 THICKNESS = 0.1  # of the distance of points outside: they are drawn from as much more
@@ -81,5 +82,5 @@ def points_beyond(tips: np.ndarray, distance: float, count: int, rng: np.random.
     directions = rng.normal(size=around.shape)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     points = around + (1 + THICKNESS) * distance * directions
-    nearest, _ = cKDTree(tips).query(points)
+    nearest, _ = cKDTree(tips).query(points, workers=thread_count())
     return points[(nearest >= distance) & (nearest <= (1 + THICKNESS) * distance)][:count]

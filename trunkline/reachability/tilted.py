@@ -73,7 +73,9 @@ def find_tilted(
 ) -> Poses:
     """Rigid pose and soft tip for each of `points` (N, 3), as `hybrid_check.find_poses`, near drawn `pairs`."""
     plane = np.column_stack([np.hypot(pairs.points[:, 0], pairs.points[:, 1]), pairs.points[:, 2]])
-    _, near = cKDTree(plane).query(np.column_stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]]), k=NEAREST)
+    # Millions of pairs and a few hundred targets: what counts is how fast the tree is built.
+    tree = cKDTree(plane, balanced_tree=False, compact_nodes=False)
+    _, near = tree.query(np.column_stack([np.hypot(points[:, 0], points[:, 1]), points[:, 2]]), k=NEAREST)
     turn = np.arctan2(points[:, 1], points[:, 0])[:, None]
     turn = turn - np.arctan2(pairs.points[near, 1], pairs.points[near, 0])  # (N, NEAREST), of joint 1
     joint_1 = pairs.q[pairs.pose[near], 0]

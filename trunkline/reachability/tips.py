@@ -9,6 +9,8 @@ import numpy as np
 from trunkline.dataset.sampling import sample_angle
 from trunkline.statics.chain import Chain
 
+LOOK_EVERY = 4  # rays: along those between, a sample is at most a twentieth of the way from where it would else be
+
 
 class Tips(NamedTuple):
     """`positions` (N, 3) in the arm's base frame and the tendons' path `lengths` (N, K), in m."""
@@ -40,5 +42,5 @@ class ArmTips:
         if sampled.size:
             return self.samples[sampled[0]]
         rng = np.random.default_rng([self.seed, round(1e6 * angle)])
-        found = sample_angle(self.chain, angle, self.directions, self.steps, rng).equilibrium
+        found = sample_angle(self.chain, angle, self.directions, self.steps, rng, LOOK_EVERY).equilibrium
         return Tips(found.position, found.lengths)
