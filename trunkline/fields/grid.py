@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage
+from skimage.morphology import isotropic_closing, remove_small_holes, remove_small_objects
 
 from trunkline.errors import InputError
 
@@ -50,21 +51,13 @@ class Lattice:
 
 def close_gaps(cells: np.ndarray, radius: float) -> np.ndarray:
     """Morphological closing with a ball of `radius` cells: gaps narrower than its diameter fill up."""
-    pad = int(np.ceil(radius)) + 1
-    padded = np.pad(cells, pad)
-    grown = ndimage.distance_transform_edt(~padded) <= radius
-    shrunk = ndimage.distance_transform_edt(grown) > radius
-    return shrunk[(slice(pad, -pad),) * cells.ndim] | cells
+    pad = int(np.ceil(radius)) + 1  # or what grows beyond the border is cut off, and shrinks back too far
+    return isotropic_closing(np.pad(cells, pad), radius)[(slice(pad, -pad),) * cells.ndim]
 
 
 def drop_specks(cells: np.ndarray, smallest: int) -> np.ndarray:
-    """`cells` without islands, and without holes, of fewer than `smallest` cells."""
-    for value in (True, False):
-        labels, count = ndimage.label(cells == value)
-        small = np.bincount(labels.ravel(), minlength=count + 1) < smallest
-        small[0] = False
-        cells = np.where(small[labels], not value, cells)
-    return cells
+    """`cells` without islands, and then without holes, of fewer than `smallest` cells."""
+    return remove_small_holes(remove_small_objects(cells, max_size=smallest - 1), max_size=smallest - 1)
 
 
 def without_specks(field: np.ndarray, spacing: float, smallest: int) -> np.ndarray:

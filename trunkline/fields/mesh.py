@@ -7,6 +7,7 @@ import fast_simplification
 import numpy as np
 import trimesh
 from skimage.measure import marching_cubes
+from trimesh.exchange.obj import export_obj
 
 from trunkline.errors import InputError
 from trunkline.fields.grid import Lattice
@@ -102,6 +103,5 @@ def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 def write_obj(path: str | Path, shape: Surface, title: str) -> None:
     """Write a Wavefront OBJ in m, to a micrometre; `title` goes into its first line."""
-    lines = [f"# {title}; m", *(f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in shape.vertices),
-             *(f"f {a} {b} {c}" for a, b, c in shape.faces + 1)]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="ascii")
+    text = export_obj(shape.mesh, include_normals=False, include_color=False, header=f"{title}; m", digits=6)
+    Path(path).write_text(text.rstrip() + "\n", encoding="ascii")
