@@ -4,6 +4,9 @@ Each step solves (J J^T + lambda^2 I) y = e with lambda^2 proportional to |e|^2 
 moves by J^T y and clips to the joint limits. The task error e is the position error and either the rotation
 vector of the orientation error or, for a target that leaves the yaw free, the cross product of the pointing
 directions.
+
+Many targets at once take 0.6 ms of processor each, against mink's 21 ms; a single one takes 62 ms, three times
+mink's (`python -m benchmarks.rigid_map`). The maps ask for hundreds at once.
 """
 
 from typing import NamedTuple
