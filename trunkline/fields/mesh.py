@@ -6,6 +6,7 @@ from pathlib import Path
 import fast_simplification
 import numpy as np
 import trimesh
+from point_cloud_utils import signed_distance_to_mesh
 from skimage.measure import marching_cubes
 from trimesh.exchange.obj import export_obj
 
@@ -81,24 +82,11 @@ def unsimplified(field: np.ndarray, lattice: Lattice) -> tuple[np.ndarray, np.nd
 
 
 def contains(shape: Surface, points: np.ndarray) -> np.ndarray:
-    """Whether each of `points` (N, 3) lies inside, by counting how often the line up from it leaves the mesh."""
-    corners = shape.vertices[shape.faces]
-    a, b, c = (corners[:, i, :2] for i in range(3))
-    area = _cross(b - a, c - a)
-    corners, a, b, c, area = (part[area != 0] for part in (corners, a, b, c, area))  # upright faces are never crossed
-    inside = np.empty(len(points), dtype=bool)
-    for start in range(0, len(points), 256):
-        here = points[start:start + 256, None, :]
-        weights = np.stack([_cross(c - b, here[..., :2] - b), _cross(a - c, here[..., :2] - c),
-                            _cross(b - a, here[..., :2] - a)], axis=-1) / area[:, None]
-        height = (weights * corners[:, :, 2]).sum(axis=-1)
-        crossed = (weights >= 0).all(axis=-1) & (height > here[..., 2])
-        inside[start:start + 256] = crossed.sum(axis=1) % 2 == 1
-    return inside
-
-
-def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+    """Whether each of `points` (N, 3), m, lies inside."""
+    distance, _, _ = signed_distance_to_mesh(
+        np.asarray(points, float), np.asarray(shape.vertices, float), np.asarray(shape.faces, np.int32)
+    )
+    return distance < 0
 
 
 def write_obj(path: str | Path, shape: Surface, title: str) -> None:
