@@ -9,7 +9,7 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE
+from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, PARTLY, SEEN, UNSEEN, VALIDATE
 from trunkline.signals.base_frame import average_base, to_base_frame
 from trunkline.signals.runs import stretches
 from trunkline.takes.quality import Quality
@@ -19,7 +19,6 @@ from trunkline.trials.trial import Trial
 
 BIN = 1 / 30  # s, of the coverage picture
 LEAST_JITTER = 0.1  # ms, of the axis: less is none
-UNSEEN, PARTLY, SEEN = INITIAL, VALIDATE, "#d7e3ea"
 COLORS = dict(zip(EXPERIMENTS, cycle((MEASURED, IDENTIFIED, VALIDATE, INITIAL)), strict=False))
 
 
