@@ -23,7 +23,7 @@ from trunkline.figures.style import save_figure
 from trunkline.ik.network import INPUTS, InverseKinematics, Training, train
 from trunkline.ik.onnx import OPSET, to_onnx
 from trunkline.ik.polish import polish
-from trunkline.ik.score import TipErrors, beyond_range, outside_targets, tip_errors
+from trunkline.ik.score import TipErrors, beyond_range, largest_difference, outside_targets, tip_errors
 from trunkline.ik.tip_loss import tip_loss
 from trunkline.pipeline.inputs import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
@@ -77,7 +77,7 @@ def main(config: Config) -> None:
         lengths = answers(runtime, inputs)
         with torch.no_grad():
             torch_lengths = network(torch.tensor(inputs, dtype=torch.float32)).numpy()
-        difference = max(difference, float(np.abs(lengths - torch_lengths).max()))
+        difference = max(difference, largest_difference(lengths, torch_lengths))
         print(f"train_ik: forward kinematics of {len(inputs)} answers, {name}", flush=True)
         errors[name] = tip_errors(chain, inputs, lengths.astype(float))
     exact = polished(chain, held_out, runtime, config)
