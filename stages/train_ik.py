@@ -20,11 +20,12 @@ from trunkline.dataset.table import (
 from trunkline.errors import InputError
 from trunkline.figures.network import error_map_figure, learning_figure, tip_error_figure
 from trunkline.figures.style import save_figure
-from trunkline.ik.network import INPUTS, InverseKinematics, Training, train
+from trunkline.ik.network import INPUTS, InverseKinematics
 from trunkline.ik.onnx import OPSET, to_onnx
 from trunkline.ik.polish import polish
 from trunkline.ik.score import TipErrors, beyond_range, largest_difference, outside_targets, tip_errors
 from trunkline.ik.tip_loss import tip_loss
+from trunkline.ik.training import Training, train
 from trunkline.pipeline.inputs import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
