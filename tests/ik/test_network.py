@@ -17,10 +17,11 @@ from trunkline.dataset.samples import read_samples
 from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
-from trunkline.ik.network import INPUTS, InverseKinematics, Training, train
+from trunkline.ik.network import INPUTS, InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.score import tip_errors
 from trunkline.ik.tip_loss import tip_loss
+from trunkline.ik.training import Training, train
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import forward
 
@@ -169,16 +170,24 @@ def test_onnx_file_is_the_network_and_says_what_it_takes(trained, samples):
     assert (out <= lengths.max(axis=0) + 1e-6).all()
 
 
-def test_same_seed_gives_the_same_file(samples):
+def test_same_seed_gives_the_same_file_on_one_core_and_on_two(samples, monkeypatch):
     inputs, lengths = samples[INPUTS].to_numpy(), samples[length_columns(3)].to_numpy()
     is_train = np.arange(len(samples)) % 5 > 0
     files = []
     for threads in (1, 2):
+        monkeypatch.setenv("TRUNKLINE_THREADS", str(threads))
         torch.set_num_threads(threads)
         network = train(inputs, lengths, loss_of(samples), is_train, Training(16, 2, 64, 1e-3, 3), lambda *_: None)
         files.append(to_onnx(network, ["a", "b", "c"]).SerializeToString())
     assert files[0] == files[1]
     assert isinstance(network, InverseKinematics)
+
+
+def test_a_learning_rate_that_diverges_is_an_error_of_one_line(samples):
+    inputs, lengths = samples[INPUTS].to_numpy(), samples[length_columns(3)].to_numpy()
+    is_train = np.arange(len(samples)) % 5 > 0
+    with pytest.raises(InputError, match=r"learning_rate: found 1e\+30, by which .* is not finite in epoch 1"):
+        train(inputs, lengths, loss_of(samples), is_train, Training(16, 2, 64, 1e30, 3), lambda *_: None)
 
 
 def test_a_single_gravity_angle_is_refused_before_anything_is_trained(tmp_path):

@@ -8,10 +8,11 @@ from tests.support.bent_chain import stump
 from trunkline.dataset.columns import length_columns
 from trunkline.dataset.sampling import pull_directions
 from trunkline.dataset.table import sample_table
+from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.ik.network import INPUTS
-from trunkline.ik.polish import _bounded, polish
-from trunkline.ik.score import beyond_range, outside_targets
+from trunkline.ik.polish import polish
+from trunkline.ik.score import beyond_range, largest_difference, outside_targets
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium, forward
 from trunkline.statics.restart import restart
@@ -55,19 +56,6 @@ def test_exact_lengths_need_no_step(chain, samples):
     assert found.position_error.max() < 1e-6
 
 
-def test_bounded_least_squares_by_brute_force():
-    rng = np.random.default_rng(0)
-    matrix, wanted, most = rng.normal(size=(40, 6, 2)), rng.normal(size=(40, 6)), np.array([0.4, 0.7])
-    grid = np.stack(np.meshgrid(*(np.linspace(0, m, 201) for m in most)), axis=-1).reshape(-1, 2)
-    cost = np.linalg.norm(wanted[:, None] - np.einsum("nki,gi->ngk", matrix, grid), axis=2).min(axis=1)
-    found = _bounded(matrix, wanted, most)
-    assert (found >= 0).all()
-    assert (found <= most).all()
-    left = np.linalg.norm(wanted - np.einsum("nki,ni->nk", matrix, found), axis=1)
-    assert (left <= cost + 1e-12).all()
-    np.testing.assert_allclose(left, cost, atol=5e-3)
-
-
 def test_restart_finds_the_equilibrium_that_the_loads_lead_to(chain):
     rng = np.random.default_rng(2)
     tensions = pull_directions(chain, rng.uniform(0, 2 * np.pi, 20)) * rng.uniform(0.05, 0.5, (20, 1))
@@ -87,3 +75,15 @@ def test_far_targets_are_far_and_what_is_beyond_the_range_is_seen():
     known = np.array([[0.3, 0.4], [0.5, 0.6]])
     assert beyond_range(np.array([[0.3, 0.6]]), known) == 0
     assert beyond_range(np.array([[0.31, 0.62], [0.29, 0.5]]), known) == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_an_answer_that_is_not_finite_is_an_error_of_one_line(value):
+    known = np.array([[0.3, 0.4], [0.5, 0.6]])
+    broken = np.array([[0.3, 0.6], [0.4, value], [0.4, 0.5]])
+    with pytest.raises(InputError, match="found 1 of 3 answers of the network that are not finite"):
+        beyond_range(broken, known)
+    for one, other in ((broken, known[[0, 0, 1]]), (known[[0, 0, 1]], broken), (broken, broken)):
+        with pytest.raises(InputError, match="found 1 of 3 answers"):
+            largest_difference(one, other)
+    assert largest_difference(known, known + [[0, 0], [0, -2e-3]]) == pytest.approx(2e-3)

@@ -18,6 +18,7 @@ from onnx import TensorProto, helper
 
 from tests.support.small_arm import small_mjcf
 from trunkline.errors import InputError
+from trunkline.ik.network import INPUTS
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, compile_with
 from trunkline.unity.manifest import Manifest, Model
@@ -30,7 +31,7 @@ LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0")
 TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts_deg=[0.0, 57.3])
 
 
-def network(inputs: int = 8, opset: int = 15) -> bytes:
+def network(inputs: int = 8, opset: int = 15, outputs: list[str] | None = None) -> bytes:
     weights = helper.make_tensor("w", TensorProto.FLOAT, [inputs, 3], np.ones(3 * inputs))
     ends = [
         helper.make_tensor_value_info(n, TensorProto.FLOAT, ["n", w]) for n, w in (("x", inputs), ("l", 3))
@@ -39,7 +40,10 @@ def network(inputs: int = 8, opset: int = 15) -> bytes:
         [helper.make_node("MatMul", ["x", "w"], ["l"])], "ik", ends[:1], ends[1:], [weights]
     )
     opsets = [helper.make_opsetid("", opset)]
-    return helper.make_model(graph, opset_imports=opsets, ir_version=8).SerializeToString()
+    model = helper.make_model(graph, opset_imports=opsets, ir_version=8)
+    names = {"inputs": INPUTS, "outputs": outputs or ["tendon_1", "tendon_2", "tendon_3"]}
+    helper.set_model_props(model, {key: json.dumps(value) for key, value in names.items()})
+    return model.SerializeToString()
 
 
 def grids() -> dict[str, np.ndarray]:
@@ -271,6 +275,17 @@ def test_a_network_of_another_shape_is_one_line(sources):
         assemble(LABEL, sources, TRAJECTORY)
     sources.network.write_bytes(b"not a network")
     with pytest.raises(InputError, match="expected an ONNX file"):
+        assemble(LABEL, sources, TRAJECTORY)
+
+
+def test_a_network_that_does_not_say_what_it_gives_or_gives_other_tendons_is_one_line(sources):
+    sources.network.write_bytes(network(outputs=["tendon_2", "tendon_1", "tendon_3"]))
+    with pytest.raises(InputError, match=r"ik.onnx: found outputs \['tendon_2', .* expected .* \['tendon_1', "):
+        assemble(LABEL, sources, TRAJECTORY)
+    silent = onnx.load_model_from_string(network())
+    del silent.metadata_props[:]
+    sources.network.write_bytes(silent.SerializeToString())
+    with pytest.raises(InputError, match="ik.onnx: found no 'inputs' in the file's metadata"):
         assemble(LABEL, sources, TRAJECTORY)
 
 

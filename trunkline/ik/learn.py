@@ -12,11 +12,12 @@ from pydantic import Field, NonNegativeFloat, PositiveInt
 
 from trunkline.dataset.columns import length_columns, tension_columns
 from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension, turn_by_tension
-from trunkline.ik.network import INPUTS, InverseKinematics, Training, train
+from trunkline.ik.network import INPUTS, InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.polish import polish
-from trunkline.ik.score import TipErrors, beyond_range, outside_targets, tip_errors
+from trunkline.ik.score import TipErrors, beyond_range, largest_difference, outside_targets, tip_errors
 from trunkline.ik.tip_loss import tip_loss
+from trunkline.ik.training import Training, train
 from trunkline.progress import progress
 from trunkline.statics.chain import Chain
 
@@ -89,7 +90,7 @@ def learn(chain: Chain, tendons: list[str], table: pd.DataFrame, learning: Learn
         lengths = answers(runtime, inputs)
         with torch.no_grad():
             torch_lengths = network(torch.tensor(inputs, dtype=torch.float32)).numpy()
-        difference = max(difference, float(np.abs(lengths - torch_lengths).max()))
+        difference = max(difference, largest_difference(lengths, torch_lengths))
         print(f"train_ik: forward kinematics of {len(inputs)} answers, {name}", flush=True)
         errors[name] = tip_errors(chain, inputs, lengths.astype(float))
     polished = polished_errors(chain, held_out, runtime, learning.polish, learning.seed)

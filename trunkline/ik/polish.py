@@ -15,6 +15,7 @@ from itertools import combinations
 import numpy as np
 
 from trunkline.frames import gravity_in_base, rotation_from_wxyz
+from trunkline.ik.bounded_least_squares import bounded_least_squares
 from trunkline.statics.chain import Chain
 from trunkline.statics.equilibria import Equilibrium, forward
 from trunkline.statics.restart import restart
@@ -96,33 +97,9 @@ def _step(chain, here: Equilibrium, error, gravity, lever) -> tuple[np.ndarray, 
     wanted = error + np.einsum("nkt,nt->nk", pose, here.tensions)  # pose missing if nothing pulled, to first order
     for taut in combinations(range(chain.tendons), min(2, chain.tendons)):
         trial = np.zeros_like(tensions)
-        trial[:, taut] = _bounded(pose[:, :, taut], wanted, chain.max_tension[list(taut)])
+        trial[:, taut] = bounded_least_squares(pose[:, :, taut], wanted, chain.max_tension[list(taut)])
         left = np.linalg.norm(wanted - np.einsum("nkt,nt->nk", pose, trial), axis=1)
         nearer = left < least
         tensions[nearer], least[nearer] = trial[nearer], left[nearer]
     lengths = here.lengths + np.einsum("nst,nt->ns", slopes.length_by_tension, tensions - here.tensions)
     return tensions, lengths + np.where(tensions > 0, 0.0, SPARE)
-
-
-def _bounded(matrix: np.ndarray, wanted: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """x (N, k), k at most 2, that minimises |wanted - matrix x| with 0 ≤ x ≤ `most`.
-
-    Inside the box if the plain solution is there, else the best on its edges.
-    """
-    square = np.einsum("nki,nkj->nij", matrix, matrix)
-    ridge = 1e-12 * np.trace(square, axis1=1, axis2=2)[:, None, None] + 1e-300
-    right = np.einsum("nki,nk->ni", matrix, wanted)
-    best = np.linalg.solve(square + ridge * np.eye(len(most)), right[:, :, None])[:, :, 0]
-    outside = ((best < 0) | (best > most)).any(axis=1)
-    least = np.where(outside, np.inf, -np.inf)
-    for fixed in range(len(most)):
-        for value in (0.0, most[fixed]):
-            trial = np.empty_like(best)
-            trial[:, fixed] = value
-            for free in set(range(len(most))) - {fixed}:
-                slope = right[:, free] - square[:, free, fixed] * value
-                trial[:, free] = np.clip(slope / (square[:, free, free] + 1e-300), 0, most[free])
-            cost = np.einsum("ni,nij,nj->n", trial, square, trial) - 2 * np.einsum("ni,ni->n", trial, right)
-            nearer = cost < least
-            best[nearer], least[nearer] = trial[nearer], cost[nearer]
-    return best

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.statics.chain import FORCE_ROUNDING, Chain
 from trunkline.statics.equilibria import forward
@@ -73,6 +74,31 @@ def outside_targets(count: int, length: float, rng: np.random.Generator) -> np.n
 
 
 def beyond_range(lengths: np.ndarray, known: np.ndarray) -> float:
-    """How far any of `lengths` (N, K) lies beyond the shortest and longest of `known` (M, K), m; zero if none does."""
+    """How far any of `lengths` (N, K) lies beyond the shortest and longest of `known` (M, K), m; zero if none does.
+
+    Raises:
+        InputError: an answer is not finite.
+    """
+    _check_finite(lengths)
     low, high = known.min(axis=0), known.max(axis=0)
     return float(max(0.0, (low - lengths).max(), (lengths - high).max()))
+
+
+def largest_difference(lengths: np.ndarray, others: np.ndarray) -> float:
+    """Between the answers of two forms of one network, m. Shapes (N, K).
+
+    Raises:
+        InputError: an answer is not finite, so that no difference says anything.
+    """
+    _check_finite(lengths)
+    _check_finite(others)
+    return float(np.abs(lengths - others).max())
+
+
+def _check_finite(lengths: np.ndarray) -> None:
+    """Raise InputError if the network has no finite answer for some target: `max` would pass over a NaN in silence."""
+    bad = int((~np.isfinite(lengths)).any(axis=1).sum())
+    if bad:
+        raise InputError(
+            f"train_ik: found {bad} of {len(lengths)} answers of the network that are not finite, expected lengths in m"
+        )

@@ -1,5 +1,7 @@
 """What the inverse kinematics network's file says about itself."""
 
+import json
+
 import onnx
 from google.protobuf.message import DecodeError
 from onnx.external_data_helper import uses_external_data
@@ -7,8 +9,6 @@ from onnx.external_data_helper import uses_external_data
 from trunkline.errors import InputError
 from trunkline.unity.manifest import Network
 from trunkline.unity.rules import Violation, lint_network
-
-INPUTS = ["theta_g", "x", "y", "z", "qw", "qx", "qy", "qz"]
 
 
 def describe_network(
@@ -19,29 +19,43 @@ def describe_network(
     Args:
         data: contents of the ONNX file. file: its path in the package.
         tendons: the model's, in the order of its actuators. source: where it is from, for messages.
+
+    Raises:
+        InputError: no ONNX file, or one that does not say what its inputs and outputs are, or other tendons.
     """
     try:
         model = onnx.load_model_from_string(data)
     except DecodeError as error:
         raise InputError(f"{source}: found {error}, expected an ONNX file") from error
+    inputs, outputs = _names(model, "inputs", source), _names(model, "outputs", source)
+    if outputs != tendons:
+        raise InputError(f"{source}: found outputs {outputs}, expected those of the model's actuators, {tendons}")
     widths = [_widths(values) for values in (model.graph.input, model.graph.output)]
-    if widths != [[len(INPUTS)], [len(tendons)]]:
+    if widths != [[len(inputs)], [len(outputs)]]:
         raise InputError(
             f"{source}: found inputs of width {widths[0]} and outputs of width {widths[1]}, expected one"
-            f" input ({', '.join(INPUTS)}) and one output ({', '.join(tendons)})"
+            f" input ({', '.join(inputs)}) and one output ({', '.join(outputs)})"
         )
     opset = max(entry.version for entry in model.opset_import)
     block = Network(
         file=file,
         opset=opset,
-        input_order=INPUTS,
+        input_order=inputs,
         input=model.graph.input[0].name,
         output=model.graph.output[0].name,
-        output_order=tendons,
+        output_order=outputs,
         operators=sorted({node.op_type for node in model.graph.node}),
     )
     external = any(uses_external_data(tensor) for tensor in model.graph.initializer)
     return block, lint_network(opset, external)
+
+
+def _names(model: onnx.ModelProto, key: str, source: str) -> list[str]:
+    """What the network's training wrote on the columns of its inputs or outputs."""
+    texts = [entry.value for entry in model.metadata_props if entry.key == key]
+    if not texts:
+        raise InputError(f"{source}: found no {key!r} in the file's metadata, expected a network of train_ik")
+    return json.loads(texts[0])
 
 
 def _widths(values) -> list[int]:

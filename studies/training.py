@@ -1,0 +1,89 @@
+"""What width, epochs, batch and learning rate of the network's training are worth: a Markdown table.
+
+    python -m studies.training [--targets N] WIDTH,EPOCHS,BATCH,LEARNING_RATE ... > training.md
+
+for instance `256,100,512,2e-3 256,45,512,5e-3`. Needs the samples and the calibrated arm (`make demo`). Tip errors are
+those after forward kinematics, of held-out samples and of targets between the gravity angles of the data set. Times
+are of the training alone: CPU time of all threads, and wall time, which tells something on an idle machine only.
+Progress goes to stderr.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import torch
+
+from trunkline.dataset.table import (
+    length_by_tension,
+    length_columns,
+    sample_table,
+    tension_columns,
+    tip_by_tension,
+    turn_by_tension,
+)
+from trunkline.errors import in_one_line
+from trunkline.ik.network import INPUTS
+from trunkline.ik.score import tip_errors
+from trunkline.ik.tip_loss import tip_loss
+from trunkline.ik.training import Training, train
+from trunkline.pipeline.inputs import existing, read_model
+from trunkline.statics.chain import read_chain
+
+MODEL = Path("artifacts/identify_control/arm.xml")
+SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
+LEVER = 0.02  # m, as conf/train_ik/config.yaml has it
+UNSEEN = {"directions": 24, "steps": 12}  # as well
+TITLES = ["width", "epochs", "batch", "learning rate", "CPU (s)", "wall (s)"]
+TITLES += [f"{name}, {what} (mm)" for name in ("held out", "unseen angles") for what in ("median", "95 % below")]
+TITLES += ["turn, median (°)"]
+
+
+def setting(text: str) -> Training:
+    """From four numbers, WIDTH,EPOCHS,BATCH,LEARNING_RATE."""
+    width, epochs, batch, rate = text.split(",")
+    return Training(int(width), int(epochs), int(batch), float(rate), seed=1)
+
+
+@in_one_line
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("settings", type=setting, nargs="+")
+    parser.add_argument("--targets", type=int, default=2000, help="of each kind (default: %(default)s)")
+    arguments = parser.parse_args()
+    chain = read_chain(read_model(MODEL))
+    table = pd.read_parquet(existing(SAMPLES))
+    tendons, rng = chain.tendons, np.random.default_rng(1)
+    pose = np.concatenate([tip_by_tension(table, tendons), LEVER * turn_by_tension(table, tendons)], axis=1)
+    loss = tip_loss(table[tension_columns(tendons)].to_numpy(), pose, length_by_tension(table, tendons))
+    angles = np.unique(table["theta_g"])
+    between = (angles[1:] + angles[:-1]) / 2
+    each = arguments.targets // len(between)
+    unseen = [sample_table(chain, tilt, each, rng=rng, **UNSEEN)[0] for tilt in between]
+    held_out = table[table["split"] == "validate"]
+    targets = [held_out.sample(min(arguments.targets, len(held_out)), random_state=1), pd.concat(unseen)]
+    data = (table[INPUTS].to_numpy(), table[length_columns(tendons)].to_numpy(), loss, table["split"] == "train")
+
+    print("| " + " | ".join(TITLES) + " |\n" + "|---" * len(TITLES) + "|")
+    for training in arguments.settings:
+        cpu, wall = time.process_time(), time.perf_counter()
+        network = train(*data, training, lambda epoch, train_error, validate_error: print(
+            f"{epoch:4d}: {1e3 * train_error:.3f} mm, {1e3 * validate_error:.3f} mm", file=sys.stderr))
+        cells = [training.width, training.epochs, training.batch, f"{training.learning_rate:g}"]
+        cells += [f"{time.process_time() - cpu:.0f}", f"{time.perf_counter() - wall:.0f}"]
+        for rows in targets:
+            inputs = rows[INPUTS].to_numpy()
+            with torch.no_grad():
+                lengths = network(torch.tensor(inputs, dtype=torch.float32)).double().numpy()
+            errors = tip_errors(chain, inputs, lengths).metrics(chain.length)
+            cells += [f"{errors['position_error_mm'][key]:.3f}" for key in ("median", "p95")]
+        cells.append(f"{errors['orientation_error_deg']['median']:.2f}")
+        print("| " + " | ".join(map(str, cells)) + " |", flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

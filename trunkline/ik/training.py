@@ -1,0 +1,98 @@
+"""Training of the network on the tip error to first order: Adam, each batch in parts that cores share."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
+
+from trunkline.errors import InputError
+from trunkline.ik.network import InverseKinematics
+from trunkline.ik.tip_loss import TipLoss
+from trunkline.threads import thread_count
+
+ROUNDING = 0.5e-3  # m, tip errors well under this count by their square, larger ones by their size
+TIE = 0.02  # weight of plain length errors, which alone tie down how long a slack tendon is
+PARTS = 2  # of a batch, whose gradients are summed in this order whatever thread found them: more cores, same network
+
+
+@dataclass
+class Training:
+    """Attributes: width: of the hidden layers; epochs; batch: samples; learning_rate: at the start, falling along a
+    cosine to a thousandth; seed: of weights and shuffling."""
+
+    width: PositiveInt
+    epochs: PositiveInt
+    batch: PositiveInt
+    learning_rate: PositiveFloat
+    seed: NonNegativeInt
+
+
+def train(
+    inputs: np.ndarray,
+    lengths: np.ndarray,
+    loss: TipLoss,
+    is_train: np.ndarray,
+    training: Training,
+    report: Callable[[int, float, float], None],
+) -> InverseKinematics:
+    """Train on the samples where `is_train`, with Adam, on the tip error to first order.
+
+    One thread a part of a batch: sums in another order would give other last digits, and then other networks.
+
+    Args:
+        inputs: Shape (N, 8).
+        lengths: m. Shape (N, K).
+        report: called with epoch, mean tip error in m of the training and of the other samples.
+
+    Raises:
+        InputError: the error is no longer finite.
+    """
+    torch.set_num_threads(1)
+    torch.manual_seed(training.seed)
+    network = InverseKinematics(training.width, inputs[is_train], lengths[is_train])
+    parameters = list(network.parameters())
+    x = network.normalise(torch.tensor(inputs, dtype=torch.float32))
+    y = torch.tensor(lengths, dtype=torch.float32)
+    rows = torch.tensor(np.flatnonzero(is_train))
+    others = torch.tensor(np.flatnonzero(~is_train))
+    shuffle = torch.Generator().manual_seed(training.seed)
+    optimizer = torch.optim.Adam(parameters, lr=training.learning_rate, fused=True)
+    batches = len(rows) // training.batch
+    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
+        optimizer, training.epochs * batches, training.learning_rate / 1000
+    )
+
+    def slopes(part: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
+        """Gradient of the objective on these rows, summed over them, and their tip errors, m."""
+        delta = network.unclipped(x[part]) - y[part]
+        moved = loss(part, delta)
+        size = (moved.square().sum(dim=1) + ROUNDING**2).sqrt()
+        objective = size.sum() + TIE * delta.abs().mean(dim=1).sum()
+        return torch.autograd.grad(objective, parameters), moved.detach()[:, :3].norm(dim=1)
+
+    @torch.no_grad()
+    def tip_error(part: torch.Tensor) -> torch.Tensor:
+        return loss(part, network.unclipped(x[part]) - y[part])[:, :3].norm(dim=1)
+
+    with ThreadPoolExecutor(min(PARTS, thread_count()), initializer=torch.set_num_threads, initargs=(1,)) as pool:
+        for epoch in range(1, training.epochs + 1):
+            total = 0.0
+            order = rows[torch.randperm(len(rows), generator=shuffle)]
+            for batch in order[: batches * training.batch].split(training.batch):
+                gradients, errors = zip(*pool.map(slopes, batch.chunk(PARTS)), strict=True)
+                for parameter, *parts in zip(parameters, *gradients, strict=True):
+                    parameter.grad = sum(parts) / len(batch)
+                optimizer.step()
+                schedule.step()
+                total += float(torch.cat(errors).mean())
+            if not np.isfinite(total):
+                raise InputError(
+                    f"train_ik.learning_rate: found {training.learning_rate}, by which the tip error is not finite in"
+                    f" epoch {epoch}, expected a smaller one"
+                )
+            validate = torch.cat(list(pool.map(tip_error, others.split(4096))))
+            report(epoch, total / batches, float(validate.mean()))
+    return network.eval()
