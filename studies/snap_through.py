@@ -30,7 +30,7 @@ VENTRAL_DEG = (0, 60, 120)  # gravity angles for the two ventral tendons
 LEAN = (-0.1, -0.02, 0.02, 0.1)  # of one ventral tension over the other, where first guesses beside the plane come from
 
 
-class Found(NamedTuple):
+class Branches(NamedTuple):
     """Of N targets: whether it has an equilibrium within the motors' force (N,), how many (N,), and how far their
     tips are apart, m (N,)."""
 
@@ -76,7 +76,7 @@ def random_loads(chain: Chain, count: int, rng: np.random.Generator) -> tuple[np
     return around * rng.uniform(0.02, 1, (count, 1)) ** 2, gravity_in_base(rng.uniform(0, LARGEST_ANGLE, count))
 
 
-def search(chain: Chain, lengths, gravity, known, guesses: int, rng: np.random.Generator) -> Found:
+def search(chain: Chain, lengths, gravity, known, guesses: int, rng: np.random.Generator) -> Branches:
     """Stable equilibria of `lengths` (N, K), m, under `gravity` (N, 3), from `known` (N, nq) and `guesses` shapes."""
     count = len(lengths)
     tips, good = np.empty((guesses + 1, count, 3)), np.empty((guesses + 1, count), bool)
@@ -96,7 +96,7 @@ def search(chain: Chain, lengths, gravity, known, guesses: int, rng: np.random.G
         counts[row] = len(different)
         if different:
             apart[row] = np.linalg.norm(np.array(different)[:, None] - different, axis=2).max()
-    return Found(good.any(axis=0), counts, apart)
+    return Branches(good.any(axis=0), counts, apart)
 
 
 def first_guesses(chain: Chain, count: int, rng: np.random.Generator, random_bend: bool) -> np.ndarray:
@@ -129,7 +129,7 @@ def ventral_pull(chain: Chain, angle: float, steps: int = 80) -> tuple[np.ndarra
     return chain.straight_lengths[1] - both[good], found.position[good, 1]
 
 
-def figure(results: dict[float, Found], ventral: dict[int, tuple[np.ndarray, np.ndarray]]):
+def figure(results: dict[float, Branches], ventral: dict[int, tuple[np.ndarray, np.ndarray]]):
     """Share of lengths with several equilibria, and how far apart these are, over how far the tendon is drawn in;
     where the tip goes when both ventral tendons are drawn in alike."""
     figure, (left, right, plane) = plt.subplots(1, 3, figsize=(13, 3.9))

@@ -17,6 +17,7 @@ BASE = "base"  # the base body's name in poses.parquet
 class Take(Recording):
     """T frames, S segments, K tendons; the motors have Tc commands and Tm measured positions.
 
+    name, experiment, split, level: as planned, see `Planned`. segments: S names, tendons: K names, as in the model.
     up: (3,) unit vector against gravity. time: (T,) s from the first frame.
     positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None, base_positions (T, 3), base_quaternions (T, 4):
     in the motion-capture frame, NaN where there is no good sample.

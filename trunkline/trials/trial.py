@@ -19,6 +19,7 @@ from trunkline.trials.tables import long_table, pose_table, read_tables, stack
 class Trial(Recording):
     """One experiment of T frames, S segments and K tendons.
 
+    name, experiment, split, level: as planned, see `Planned`. segments: S names, tendons: K names, as in the model.
     gravity: (3,) m/s² in the base frame, measured from the base body.
     time: (T,) s, uniform. A static trial is averaged over time and has T = 1.
     positions: (T, S, 3) m. quaternions: (T, S, 4) wxyz, hemisphere-continuous; None where the log has none.
