@@ -5,6 +5,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import NDArray
 
@@ -43,7 +44,7 @@ def maps_figure(maps: Maps, tips: list[NDArray]) -> Figure:
 
     nearest = [int(np.abs(maps.soft.mesh_angles - np.radians(d)).argmin()) for d in SHOWN_DEG]
     b = _space(figure, 222, f"(b) Soft arm, gravity at {np.degrees(maps.soft.mesh_angles[nearest[0]]):.0f}°")
-    b.yaxis.set_major_locator(plt.MaxNLocator(3))
+    b.yaxis.set_major_locator(MaxNLocator(3))
     _add_surface(b, maps.soft.meshes[nearest[0]], SOFT, 0.35)
     _add_line(b, np.array([[0, 0, 0], [0, 0, -length]]), MEASURED, 4)
     _frame(b, [maps.soft.meshes[nearest[0]].vertices, np.zeros((1, 3))])
@@ -51,7 +52,7 @@ def maps_figure(maps: Maps, tips: list[NDArray]) -> Figure:
     c = _space(figure, 223, "(c) Soft arm, gravity at " + ", ".join(
         f"{np.degrees(maps.soft.mesh_angles[i]):.0f}°" for i in sorted(set(nearest))))
     c.view_init(elev=12, azim=-80)
-    c.yaxis.set_major_locator(plt.MaxNLocator(2))
+    c.yaxis.set_major_locator(MaxNLocator(2))
     for index, color in zip(sorted(set(nearest)), (SOFT, VALIDATE, IDENTIFIED), strict=False):
         _add_surface(c, maps.soft.meshes[index], color, 0.40)
         _add_gravity(c, maps.soft.mesh_angles[index], length, color)
@@ -87,7 +88,7 @@ def slices_figure(maps: Maps, tips: list[NDArray], check: Check) -> Figure:
     x, y, z = maps.soft.lattice.axes()
     middle = int(np.abs(y).argmin())
     for index, color in zip(shown, colors, strict=True):
-        angle = maps.soft.mesh_angles[index]
+        angle = float(maps.soft.mesh_angles[index])
         soft.contour(x, z, maps.soft.at(angle)[:, middle].T, levels=[0.0], colors=[color], linewidths=1.4)
         near = tips[index][np.abs(tips[index][:, 1]) < maps.soft.lattice.spacing / 2]
         soft.scatter(near[:, 0], near[:, 2], s=2, color=color, label=f"{np.degrees(angle):.0f}°")
@@ -114,7 +115,7 @@ def slices_figure(maps: Maps, tips: list[NDArray], check: Check) -> Figure:
     rigid.set_xlim(-WIDEST_SHOWN, WIDEST_SHOWN)
     for axes in (rigid, soft, hybrid):
         axes.set_aspect("equal")
-        axes.xaxis.set_major_locator(plt.MaxNLocator(5))
+        axes.xaxis.set_major_locator(MaxNLocator(5))
     return figure
 
 
@@ -160,7 +161,7 @@ def _space(figure: Figure, position: int, title: str):
     axes.set_zlabel("z (m)", labelpad=10)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.pane.set_facecolor("white")
-        axis.set_major_locator(plt.MaxNLocator(5))
+        axis.set_major_locator(MaxNLocator(5))
     return axes
 
 
