@@ -15,7 +15,7 @@ demo: setup          ## run the whole pipeline, from recording the demo logs to 
 	dvc repro
 	@ls -lh artifacts/package_unity/*.tgz
 
-test: setup types    ## run every test, then lint
+test: setup          ## run every test, then lint
 	python -m pytest -n auto --dist loadgroup
 	ruff check --output-format concise .
 

@@ -4,6 +4,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from trunkline.fields.mesh import Surface
 from trunkline.figures.panda import POSE, panda_line
@@ -48,7 +49,7 @@ def maps_figure(maps: Maps, tips: list[np.ndarray]) -> Figure:
 
     nearest = [int(np.abs(maps.soft.mesh_angles - np.radians(d)).argmin()) for d in SHOWN_DEG]
     b = space(figure, 222, f"(b) Soft arm, gravity at {np.degrees(maps.soft.mesh_angles[nearest[0]]):.0f}°")
-    b.yaxis.set_major_locator(plt.MaxNLocator(3))
+    b.yaxis.set_major_locator(MaxNLocator(3))
     add_surface(b, maps.soft.meshes[nearest[0]], SOFT, 0.35)
     add_line(b, np.array([[0, 0, 0], [0, 0, -length]]), MEASURED, 4)
     frame(b, [maps.soft.meshes[nearest[0]].vertices, np.zeros((1, 3))])
@@ -56,7 +57,7 @@ def maps_figure(maps: Maps, tips: list[np.ndarray]) -> Figure:
     c = space(figure, 223, "(c) Soft arm, gravity at " + ", ".join(
         f"{np.degrees(maps.soft.mesh_angles[i]):.0f}°" for i in sorted(set(nearest))))
     c.view_init(elev=12, azim=-80)
-    c.yaxis.set_major_locator(plt.MaxNLocator(2))
+    c.yaxis.set_major_locator(MaxNLocator(2))
     for index, color in zip(sorted(set(nearest)), (SOFT, VALIDATE, IDENTIFIED), strict=False):
         add_surface(c, maps.soft.meshes[index], color, 0.40)
         _add_gravity(c, maps.soft.mesh_angles[index], length, color)
@@ -92,7 +93,7 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
     x, y, z = maps.soft.lattice.axes()
     middle = int(np.abs(y).argmin())
     for index, color in zip(shown, colors, strict=True):
-        angle = maps.soft.mesh_angles[index]
+        angle = float(maps.soft.mesh_angles[index])
         soft.contour(x, z, maps.soft.at(angle)[:, middle].T, levels=[0.0], colors=[color], linewidths=1.4)
         near = tips[index][np.abs(tips[index][:, 1]) < maps.soft.lattice.spacing / 2]
         soft.scatter(near[:, 0], near[:, 2], s=2, color=color, label=f"{np.degrees(angle):.0f}°")
@@ -119,7 +120,7 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
     rigid.set_xlim(-WIDEST_SHOWN, WIDEST_SHOWN)
     for axes in (rigid, soft, hybrid):
         axes.set_aspect("equal")
-        axes.xaxis.set_major_locator(plt.MaxNLocator(5))
+        axes.xaxis.set_major_locator(MaxNLocator(5))
     return figure
 
 
