@@ -5,7 +5,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import differential_evolution, least_squares
-from scipy.stats import qmc
 
 from trunkline.identification.problem import Problem
 
@@ -241,4 +240,6 @@ def _evolve(
 
 def _latin_hypercube(rng: np.random.Generator, count: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """`count` candidates, one in each of as many slices of every axis. Shape (count, P)."""
+    from scipy.stats import qmc  # half of a stage's time to import, so not before its first line
+
     return low + qmc.LatinHypercube(len(low), rng=rng).random(count) * (high - low)
