@@ -4,10 +4,10 @@ Everything is simulated in the base frame with gravity turned, then placed in th
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import mujoco
 import numpy as np
-from mujoco.batch import Batch
 from pydantic import NonNegativeFloat, PositiveFloat
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
@@ -16,7 +16,7 @@ from demo.experiments import Experiments, curl_trials, release_trials, tilt_tria
 from demo.truth import Truth
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.progress import progress
-from trunkline.threads import thread_count
+from trunkline.simulation.motion import batch_of, move
 from trunkline.trials.recording import Planned
 
 SAMPLE_RATE = 500.0  # Hz, of the truth that the instruments see
@@ -155,23 +155,23 @@ def _simulate(
 
     For the first `steady` seconds all damping is `steady_factor` times as large.
     """
-    batch = Batch(plant, len(mounts), nthread=thread_count())
+    batch = batch_of(plant, len(mounts))
     gravity = batch.expand("opt.gravity")
     for index, mount in enumerate(mounts):
         gravity[index] = mount.inv().apply([0, 0, -STANDARD_GRAVITY])
     damping = batch.expand("dof_damping")
     damping *= steady_factor
     stride = round(1 / (SAMPLE_RATE * plant.opt.timestep))
-    angles = np.empty((len(mounts), controls.shape[1] // stride, plant.nq))
-    with progress(angles.shape[1], f"record {label}", "instants") as bar:
-        for start in range(angles.shape[1]):
-            if start == round(steady * SAMPLE_RATE):
+    instants = controls.shape[1] // stride
+    parts = [batch.bind("qpos")[:, None].copy()]
+    with progress(instants, f"record {label}", "instants") as bar:
+        for start, end in pairwise((0, round(steady * SAMPLE_RATE), instants)):
+            if start or not steady:
                 damping[:] = plant.dof_damping
-            angles[:, start] = batch.bind("qpos")
-            commanded = controls[:, start * stride : (start + 1) * stride]
-            batch.rollout(stride, control=np.ascontiguousarray(commanded), record=())
-            bar.update(1)
-    return angles
+            rows = controls[:, start * stride : end * stride]
+            if len(rows[0]):
+                parts.append(move(batch, rows, ("qpos",), stride, at=stride - 1, moved=bar.update)["qpos"])
+    return np.concatenate(parts, axis=1)[:, :instants]
 
 
 @dataclass

@@ -34,7 +34,7 @@ class _Bar:
 
 
 class _Lines:
-    """Plain lines, one every few seconds and one at the end."""
+    """Plain lines: one at once, one every few seconds and one at the end."""
 
     def __init__(self, total: int, label: str, unit: str):
         self._total, self._label, self._unit = total, label, unit
@@ -88,5 +88,6 @@ def progress(total: int, label: str, unit: str = "steps") -> Iterator[_Bar | _Li
             yield _Bar(bar, total, label, unit)
     else:
         lines = _Lines(total, label, unit)
+        lines.line()
         yield lines
         lines.line()

@@ -128,12 +128,12 @@ def test_a_bad_thread_count_is_refused(monkeypatch, bad):
         thread_count()
 
 
-def test_the_last_line_of_progress_comes_once(capsys, monkeypatch):
+def test_the_first_and_the_last_line_of_progress_come_once(capsys, monkeypatch):
     monkeypatch.setattr("trunkline.progress.PLAIN_INTERVAL", 0.0)
     with progress(2, "fit", "generations") as bar:
         bar.update(1)
         bar.update(1)
-    assert [line.split()[1] for line in capsys.readouterr().out.splitlines()] == ["1/2", "2/2"]
+    assert [line.split()[1] for line in capsys.readouterr().out.splitlines()] == ["0/2", "1/2", "2/2"]
 
 
 def test_without_a_terminal_progress_ends_in_a_plain_line(capsys):
@@ -141,6 +141,6 @@ def test_without_a_terminal_progress_ends_in_a_plain_line(capsys):
         for loss in (3.0, 2.0, 1.0, 0.51239):
             bar.update(1, best=loss)
     out = capsys.readouterr().out
-    assert out.startswith("fit: 4/4 generations (100 %)  best 0.5124  generations/s")
-    assert out.count("\n") == 1
+    assert out.startswith("fit: 0/4 generations (0 %)\nfit: 4/4 generations (100 %)  best 0.5124  generations/s")
+    assert out.count("\n") == 2
     assert "\x1b" not in out

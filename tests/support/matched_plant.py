@@ -1,4 +1,7 @@
-"""A plant that is the model: trials simulated step by step with plain mj_step, to be identified again."""
+"""A plant that is the model: trials simulated to be identified again.
+
+On purpose with plain `mj_step` and not with trunkline.simulation, which these trials are to check.
+"""
 
 import mujoco
 import numpy as np

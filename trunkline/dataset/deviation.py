@@ -11,8 +11,6 @@ from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain
 from trunkline.statics.hysteresis import friction_band, model_friction
 
-GROUP = 64  # simulations that wait for the slowest among them to settle
-
 
 def mujoco_deviation(
     model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, count: int, rng: np.random.Generator
@@ -34,17 +32,15 @@ def mujoco_deviation(
     by_actuator = model.actuator_trnid[:, 0]
     commands = lengths - tensions / chain.gain  # f = kp (l - command), and no pull where they are equal
     gravity = gravity_in_base(rows["theta_g"].to_numpy())
-    groups = np.array_split(np.arange(count), int(np.ceil(count / GROUP)))
-    settled = [settle(model, commands[group][:, by_actuator], gravity[group]) for group in groups]
-    position, rested = (np.concatenate([getattr(one, name) for one in settled]) for name in ("position", "rested"))
+    settled = settle(model, commands[:, by_actuator], gravity)
     band = friction_band(chain, tensions, gravity, *model_friction(model))
-    deviation = np.linalg.norm(position - rows[["x", "y", "z"]].to_numpy(), axis=1)
+    deviation = np.linalg.norm(settled.position - rows[["x", "y", "z"]].to_numpy(), axis=1)
     return pd.DataFrame(
         {
             "theta_g": rows["theta_g"].to_numpy(),
             "largest_tension": tensions.max(axis=1),
             "deviation_mm": deviation * 1e3,
-            "rested": rested,
+            "rested": settled.rested,
             "friction_band_mm": band.width * 1e3,
         }
     )

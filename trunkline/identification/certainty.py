@@ -4,8 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import ndtr, stdtrit
 
 from trunkline.identification.search import Linearisation
 
@@ -67,7 +66,7 @@ def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves 
     singular, directions = np.linalg.eigh(normal * scaling)
     return Certainty(
         standard_error=error,
-        half_width=error * float(student.ppf(0.975, max(trials - 1, 1))),
+        half_width=error * float(stdtrit(max(trials - 1, 1), 0.975)),
         correlation=covariance / np.outer(safe, safe),
         condition=float(np.sqrt(singular[-1] / max(singular[0], 1e-300))),
         weakest=directions[:, 0],
@@ -99,7 +98,7 @@ def bootstrap(linear: Linearisation, seed: int, moves: Moves | None = None) -> n
     trials = len(normals)
     weights = np.random.default_rng(seed).standard_exponential((RESAMPLINGS, trials))
     degrees = max(trials - 1, 1)
-    tail = norm.cdf(-np.sqrt((trials + 1) / degrees) * student.ppf(0.975, degrees))
+    tail = ndtr(-np.sqrt((trials + 1) / degrees) * stdtrit(degrees, 0.975))
     interval = linear.vector + np.quantile((moves or linear.moves)(weights), [tail, 1 - tail], axis=0)
     return np.where(_told_by_one(normals.sum(axis=0), normals), [[-np.inf], [np.inf]], interval)
 

@@ -130,7 +130,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
-    linear, moves = found.linear, surrogate(exact, found.vector).moves
+    linear, moves = found.linear, surrogate(exact, found.vector, found.linear.residuals).moves
     problems = [rough, exact]
 
     factors: dict[str, np.ndarray] = {}

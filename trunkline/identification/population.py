@@ -1,7 +1,7 @@
 """All candidates times all trials as one batch of simulations."""
 
-import copy
 from dataclasses import dataclass
+from itertools import pairwise
 
 import mujoco
 import numpy as np
@@ -9,14 +9,12 @@ from mujoco.batch import Batch
 
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
-from trunkline.simulation.rest import longest_step
-from trunkline.threads import thread_count
+from trunkline.simulation.motion import batch_of, move
+from trunkline.simulation.rest import come_to_rest, relax
 from trunkline.trials.experiments import is_static
 
-RELAXATION = 0.4  # s, damping over stiffness while a static shape settles: quick, without swinging
-SETTLE_CHUNK = 0.2  # s between looks at whether a shape rests
 SETTLE_TIME = 10.0  # s, the most; a shape that does not rest by then counts as diverged
-REST_SPEED = 2e-5  # rad/s of the fastest hinge; with the relaxation above some 1e-5 rad are left then
+REST_SPEED = 2e-5  # rad/s of the fastest hinge: some 1e-5 rad are left then
 
 
 @dataclass
@@ -75,9 +73,7 @@ class Population:
         """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start."""
         key = (kind, count)
         if key not in self._batches:
-            model = copy.copy(self._model)
-            model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a diverged run must look like one
-            self._batches = {key: Batch(model, count * len(experiments), nthread=thread_count())}
+            self._batches = {key: batch_of(self._model, count * len(experiments))}
         batch = self._batches[key]
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         for name, values in fields.items():
@@ -85,6 +81,11 @@ class Population:
         batch.expand("opt.gravity")[:] = np.repeat([e.gravity for e in experiments], count, axis=0)
         batch.bind("qpos")[:] = np.repeat([e.start for e in experiments], count, axis=0)
         batch.bind("qvel")[:] = np.repeat([e.velocity for e in experiments], count, axis=0)
+        if self._model.nu:
+            controls = np.repeat([e.controls[0] for e in experiments], count, axis=0)
+            batch.bind("ctrl")[:] = controls
+            if self._model.na:
+                batch.bind("act")[:] = controls
         return batch
 
     def _sites(self) -> list[int]:
@@ -93,57 +94,38 @@ class Population:
     def _settle(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
         """Static shapes: friction off, heavily damped, until each is at rest."""
         batch = self._batch("static", experiments, fields, count)
-        timestep = self._step_factor * longest_step(self._model)
-        chunk = round(SETTLE_CHUNK / timestep)
-        batch.expand("opt.timestep")[:] = timestep
-        for name in ("dof_frictionloss", "tendon_frictionloss", "dof_dampingpoly"):
-            batch.expand(name)[:] = 0
-        stiffness = batch.expand("jnt_stiffness")
-        hinge_of_dof = self._model.dof_jntid
-        batch.expand("dof_damping")[:] = RELAXATION * stiffness[:, hinge_of_dof]
-        if self._model.nu:
-            controls = np.repeat([e.controls[0] for e in experiments], count, axis=0)
-            batch.bind("ctrl")[:] = controls
-            if self._model.na:
-                batch.bind("act")[:] = controls
-        seen, speed = batch.bind("site_xpos"), batch.bind("qvel")
-        moving, steps = np.arange(batch.nsim, dtype=np.int32), 0
-        for _ in range(round(SETTLE_TIME / SETTLE_CHUNK)):
-            if not len(moving):
-                break
-            batch.step(ids=moving, nstep=chunk, stage=mujoco.mjtStage.mjSTAGE_POS)
-            steps += chunk * len(moving)
-            moving = moving[~(np.abs(speed[moving]).max(axis=1) < REST_SPEED)]
+        timestep = relax(batch, self._model, self._step_factor)
+        seen = batch.bind("site_xpos")
+        moving, steps = come_to_rest(batch, timestep, SETTLE_TIME, REST_SPEED)
         shapes = seen[:, None, self._sites()]
         shapes[moving] = np.nan
         shapes[batch.warning.any(axis=(1, 2))] = np.nan
-        results = [shapes[t * count : (t + 1) * count] for t in range(len(experiments))]
-        return results, steps
+        return list(shapes.reshape(len(experiments), count, *shapes.shape[1:])), steps
 
     def _run(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
         """Releases and curls: from the start to the first frame, then frame by frame."""
         batch = self._batch("dynamic", experiments, fields, count)
-        frame_step = experiments[0].frame_step
+        frame_step, sites = experiments[0].frame_step, self._sites()
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))
         timestep = batch.expand("opt.timestep")
         timestep[:] = np.repeat([e.lead / substeps for e in experiments], count)
-        sites = self._sites()
+        batch.step(nstep=substeps)
+        timestep[:] = frame_step / substeps
         lengths = [e.frames for e in experiments]
         results = [np.empty((count, frames, len(sites), 3)) for frames in lengths]
-        seen, control = batch.bind("site_xpos"), batch.bind("ctrl")
-        if self._model.na:
-            batch.bind("act")[:] = np.repeat([e.controls[0] for e in experiments], count, axis=0)
-        steps = 0
-        for frame in range(max(lengths)):
-            running = sum(frames > frame for frames in lengths)
-            control[: running * count] = np.repeat([e.controls[frame] for e in experiments[:running]], count, axis=0)
-            ids = np.arange(running * count, dtype=np.int32)
-            batch.step(ids=ids, nstep=substeps, stage=mujoco.mjtStage.mjSTAGE_POS)
-            steps += substeps * len(ids)
-            timestep[:] = frame_step / substeps
-            for t in range(running):
-                results[t][:, frame] = seen[t * count : (t + 1) * count, sites]
+        for start, end in pairwise(sorted({1, *lengths})):  # trials that are over stay behind
+            running = [e for e in experiments if e.frames >= end]
+            controls = np.repeat([e.controls[start:end] for e in running], count, axis=0)
+            ids = np.arange(len(controls), dtype=np.int32)
+            # a step sees the sites where they are before it: the first of a frame, where the last frame ended
+            seen = move(batch, np.repeat(controls, substeps, axis=1), ("site_xpos",), every=substeps, ids=ids)
+            positions = seen["site_xpos"][:, :, sites].reshape(len(running), count, end - start, len(sites), 3)
+            for result, found in zip(results, positions, strict=False):
+                result[:, start - 1 : end - 1] = found
+        last = batch.bind("site_xpos")
+        batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
         warned = batch.warning.any(axis=(1, 2)).reshape(len(experiments), count)
-        for result, which in zip(results, warned, strict=True):
-            result[which] = np.nan
-        return results, steps
+        for t, result in enumerate(results):
+            result[:, -1] = last[t * count : (t + 1) * count, sites]
+            result[warned[t]] = np.nan
+        return results, substeps * sum(lengths) * count

@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 from scipy.optimize import differential_evolution, least_squares
-from scipy.stats import qmc
 
 from trunkline.identification.problem import Problem
 
@@ -147,25 +146,25 @@ def _best_descent(problem: Problem, starts, iterations: int, tolerance: float, r
 
 
 def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report) -> Found:
-    """Least squares on the loss's residuals. A step and the Jacobian that it will need are one batch."""
+    """Least squares on the loss's residuals. Only a step that is taken costs a Jacobian."""
     convergence = Convergence()
-    known: dict[bytes, Linearisation] = {}
+    known: dict[bytes, list[np.ndarray]] = {}
     accepted: list[Linearisation] = []
     low, high = problem.bounds()
 
-    def linear(vector: np.ndarray) -> Linearisation:
+    def blocks_at(vector: np.ndarray) -> list[np.ndarray]:
         key = vector.tobytes()
         if key not in known:
-            while len(known) > 1:  # the iterate and the step tried from it
-                known.pop(next(iter(known)))
-            known[key] = linearise(problem, vector)
+            known[key] = [block[0] for block in problem.residuals(vector[None])]
         return known[key]
 
     def residuals(vector: np.ndarray) -> np.ndarray:
-        return np.concatenate([*linear(vector).residuals, problem.prior(vector[None])[0]])
+        return np.concatenate([*blocks_at(vector), problem.prior(vector[None])[0]])
 
     def derivatives(vector: np.ndarray) -> np.ndarray:
-        found = linear(vector)
+        found = linearise(problem, vector, blocks_at(vector))
+        known.clear()  # steps before this iterate are not tried again
+        known[vector.tobytes()] = found.residuals
         accepted[:] = [found]  # scipy asks for derivatives at its iterates alone
         blocks = [*found.residuals, problem.prior(vector[None])[0]]
         loss = 0.5 * sum(float(block @ block) for block in blocks)
@@ -182,19 +181,29 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
     if result.cost != convergence.best[-1]:
         convergence.best.append(float(result.cost))
         convergence.mean.append(float(result.cost))
-    last = accepted[0] if np.array_equal(accepted[0].vector, result.x) else linearise(problem, result.x)
+    last = accepted[0]
+    if not np.array_equal(last.vector, result.x):
+        last = linearise(problem, result.x, blocks_at(result.x))
     return Found(result.x, float(result.cost), convergence, result.status > 0, last)
 
 
-def linearise(problem: Problem, vector: np.ndarray) -> Linearisation:
-    """Derivatives of all residuals by differences towards the inside of the bounds, all columns in one batch."""
+def linearise(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] | None = None) -> Linearisation:
+    """Derivatives of all residuals by differences towards the inside of the bounds, all columns in one batch.
+
+    Args:
+        residuals: those at `vector`, where they are known. Per trial (R,).
+    """
     high = problem.bounds()[1]
     steps = np.where(vector + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
-    candidates = np.concatenate([vector[None], vector + np.diag(steps)])
-    blocks = problem.residuals(candidates)
-    columns = [((block[1:] - block[0]) / steps[:, None]).T for block in blocks]
+    candidates = vector + np.diag(steps)
+    if residuals is None:
+        blocks = problem.residuals(np.concatenate([vector[None], candidates]))
+        residuals, blocks = [block[0] for block in blocks], [block[1:] for block in blocks]
+    else:
+        blocks = problem.residuals(candidates)
+    columns = [((moved - base) / steps[:, None]).T for moved, base in zip(blocks, residuals, strict=True)]
     weights = problem.prior(np.full((1, len(vector)), 2.0))[0]  # of f - 1 = 1
-    return Linearisation(vector, [block[0] for block in blocks], columns, weights if weights.any() else None)
+    return Linearisation(vector, residuals, columns, weights if weights.any() else None)
 
 
 def _evolve(
@@ -235,4 +244,6 @@ def _evolve(
 
 def _latin_hypercube(rng: np.random.Generator, count: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """`count` candidates, one in each of as many slices of every axis. Shape (count, P)."""
+    from scipy.stats import qmc  # half of a stage's time to import, so not before its first line
+
     return low + qmc.LatinHypercube(len(low), rng=rng).random(count) * (high - low)

@@ -68,13 +68,20 @@ class Surrogate:
         return place
 
 
-def surrogate(problem: Problem, vector: np.ndarray) -> Surrogate:
-    """Of the scalars `vector` (P,) of `problem`, from (P + 1)(P + 2) / 2 candidates in one batch."""
+def surrogate(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] | None = None) -> Surrogate:
+    """Of the scalars `vector` (P,) of `problem`, from (P + 1)(P + 2) / 2 candidates.
+
+    Args:
+        residuals: those at `vector`, where they are known. Per trial (R,).
+    """
     reach = np.diag([SIGNED_REACH if PARAMETERS[name].signed else REACH for name in problem.parameters])
     rows, columns = np.tril_indices(len(vector), -1)
     places = np.concatenate([np.zeros((1, len(vector))), reach, -reach, reach[rows] + reach[columns]])
     coefficients = np.linalg.inv(features_at(places))
-    blocks = problem.residuals(vector + places)
+    if residuals is None:
+        residuals = [block[0] for block in problem.residuals(vector[None])]
+    others = problem.residuals(vector + places[1:])
+    blocks = [np.concatenate([base[None], block]) for base, block in zip(residuals, others, strict=True)]
     return Surrogate(np.stack([coefficients @ (block @ block.T) @ coefficients.T for block in blocks]))
 
 

@@ -8,9 +8,6 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError, existing
-from trunkline.figures import identification as plots
-from trunkline.figures.style import save_figure
-from trunkline.identification import curves
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import Replay, replay, scores
 from trunkline.identification.experiment import Experiment, prepare
@@ -40,6 +37,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         whole: earlier stages whose scalars, with this stage's, make the whole arm: the CAD model and the one with all
             scalars and no joint's own factor are then scored on the same trials too.
     """
+    print(f"{stage}: reading the model and the trials", flush=True)
     spec = read_spec(model_path)
     model = spec.compile()
     check_parameters(stage, config, model)
@@ -143,6 +141,11 @@ def _gain(metrics: dict) -> dict[str, float]:
 
 def write_plots(folder: Path, result: Identification, bounds, experiments, segments, replays) -> None:
     """PNGs for people and CSV for `dvc plots`."""
+    # pyplot and scipy.signal take long to import, so not before the first line
+    from trunkline.figures import identification as plots
+    from trunkline.figures.style import save_figure
+    from trunkline.identification import curves
+
     first = {"CAD": replays["cad"]} if "cad" in replays else {"initial": replays["initial"]}
     shown = first | {"identified": replays["identified"]}
     curves.convergence_table(result).to_csv(folder / "convergence.csv", index=False, float_format="%.6g")

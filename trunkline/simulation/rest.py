@@ -1,18 +1,23 @@
-"""The reference for the statics: MuJoCo stepped until it rests, friction off."""
+"""Settling: heavily damped and without friction, MuJoCo is stepped until every joint rests.
+
+Friction is off and damping is what settles soonest: neither moves the shape at rest, though which of several shapes
+an arm comes to may depend on its way there.
+"""
 
 import copy
 from dataclasses import dataclass
 
 import mujoco
-import mujoco.batch
 import numpy as np
+from mujoco.batch import Batch
 
-from trunkline.threads import thread_count
+from trunkline.simulation.motion import batch_of
 
 LONGEST_STEP = 0.005  # s
-RETARDATION = 0.25  # s, damping over stiffness of each joint while settling: about critical for the arm's slowest swing
-CHUNK = 0.5  # s between looks at whether all simulations rest
-REST_SPEED = 5e-6  # rad/s, of the fastest joint: at this retardation it has about as many rad still to go
+RELAXATION = 0.3  # s, damping over stiffness of each joint: about critical for the slowest swing of an arm
+CHUNK = 0.1  # s between looks at which simulations rest
+FINE_SPEED = 5e-7  # rad/s of the fastest joint, where MuJoCo is the reference: tips are some 1e-7 m from rest
+RAMP, RAMP_STEPS = 1.0, 50  # s in which tendons are drawn in, and in how many steps
 
 
 @dataclass
@@ -27,65 +32,73 @@ class Settled:
 
 
 def settle(
-    model: mujoco.MjModel,
-    commands: np.ndarray,
-    gravity: np.ndarray,
-    seconds: float = 40.0,
-    ramp: float = 2.0,
-    tip_site: str = "tip",
+    model: mujoco.MjModel, commands: np.ndarray, gravity: np.ndarray, seconds: float = 40.0, tip_site: str = "tip"
 ) -> Settled:
-    """Let the model hang, draw its tendons in over `ramp` seconds, and step until every joint rests.
-
-    Friction is off, and damping is what settles soonest: neither moves the rest position.
+    """Let the model hang, draw its tendons in, and step until it rests: the reference for the statics.
 
     Args:
         commands: target path lengths of the position actuators, m. Shape (B, K), K in the order of the actuators.
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
-        seconds: longest time to simulate.
-        ramp: time over which the commands go from the straight arm's path lengths to `commands`, s.
+        seconds: longest time to simulate once the tendons are drawn in.
     """
-    model = _frictionless(model)
-    count = len(commands)
-    simulation = mujoco.batch.Batch(model, nsim=count, nthread=thread_count())
+    model = copy.copy(model)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    batch = batch_of(model, len(commands))
     base = model.body_parentid[np.flatnonzero(model.body_jntnum)[0]]
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     to_world = data.xmat[base].reshape(3, 3)  # an identified mount may be turned
-    simulation.expand("opt.gravity")[:] = gravity @ to_world.T
-    slack = _straight_commands(model)
-    qvel, ctrl = simulation.bind("qvel"), simulation.bind("ctrl")
-    site = simulation.bind("site_xpos")
-    force, qpos = simulation.bind("actuator_force"), simulation.bind("qpos")
+    batch.expand("opt.gravity")[:] = gravity @ to_world.T
+    straight = model.tendon_length0[model.actuator_trnid[:, 0]]
     if model.na:
-        simulation.bind("act")[:] = slack
-    ramp_steps = 50
-    for step in range(ramp_steps):
-        ctrl[:] = slack + (step + 1) / ramp_steps * (commands - slack)
-        simulation.step(nstep=int(np.ceil(ramp / ramp_steps / model.opt.timestep)))
-    for _ in range(int(np.ceil((seconds - ramp) / CHUNK))):
-        simulation.step(nstep=int(np.ceil(CHUNK / model.opt.timestep)))
-        if np.abs(qvel).max() < REST_SPEED:
+        batch.bind("act")[:] = straight
+    timestep = relax(batch, model)
+    control = batch.bind("ctrl")
+    for share in np.arange(1, RAMP_STEPS + 1) / RAMP_STEPS:
+        control[:] = straight + share * (commands - straight)
+        batch.step(nstep=int(np.ceil(RAMP / RAMP_STEPS / timestep)))
+    moving, _ = come_to_rest(batch, timestep, seconds, FINE_SPEED)
+    site, force = batch.bind("site_xpos"), batch.bind("actuator_force")
+    position = batch.bind("xpos")
+    batch.forward()
+    tips = (site[:, model.site(tip_site).id] - position[:, base]) @ to_world
+    rested = np.ones(len(commands), dtype=bool)
+    rested[moving] = False
+    return Settled(tips, batch.bind("qpos").copy(), -force.copy(), rested)
+
+
+def relax(batch: Batch, model: mujoco.MjModel, step_factor: float = 1.0) -> float:
+    """Take friction from all simulations, damp them so that they settle soon; returns their time step, s.
+
+    Args:
+        model: the one of the batch, whose fields each simulation may have changed before.
+        step_factor: how much longer a step than `longest_step`.
+    """
+    timestep = step_factor * longest_step(model)
+    batch.expand("opt.timestep")[:] = timestep
+    for name in ("dof_frictionloss", "tendon_frictionloss", "dof_dampingpoly"):
+        batch.expand(name)[:] = 0
+    batch.expand("dof_damping")[:] = RELAXATION * batch.expand("jnt_stiffness")[:, model.dof_jntid]
+    return timestep
+
+
+def come_to_rest(batch: Batch, timestep: float, seconds: float, rest_speed: float) -> tuple[np.ndarray, int]:
+    """Step relaxed simulations, each until its fastest joint is slower than `rest_speed`, rad/s; positions then hold.
+
+    A mode that relaxes in RELAXATION has about that time times `rest_speed` still to go.
+
+    Returns:
+        Which simulations still move after `seconds`, and how many steps were taken.
+    """
+    moving, steps = np.arange(batch.nsim, dtype=np.int32), 0
+    speed, chunk = batch.bind("qvel"), round(CHUNK / timestep)
+    for _ in range(round(seconds / CHUNK)):
+        if not len(moving):
             break
-    simulation.forward()
-    position = (site[:, model.site(tip_site).id] - simulation.bind("xpos")[:, base]) @ to_world
-    return Settled(position, qpos.copy(), -force.copy(), np.abs(qvel).max(axis=1) < REST_SPEED)
-
-
-def _frictionless(model: mujoco.MjModel) -> mujoco.MjModel:
-    model = copy.copy(model)
-    model.dof_frictionloss[:] = 0
-    model.tendon_frictionloss[:] = 0
-    joints = model.dof_jntid
-    model.dof_damping[:] = RETARDATION * model.jnt_stiffness[joints]
-    model.dof_dampingpoly[:] = 0
-    model.opt.timestep = longest_step(model)
-    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    return model
-
-
-def _straight_commands(model: mujoco.MjModel) -> np.ndarray:
-    """Path length of each actuator's tendon when the arm is straight, m. Shape (K,)."""
-    return model.tendon_length0[model.actuator_trnid[:, 0]]
+        batch.step(ids=moving, nstep=chunk, stage=mujoco.mjtStage.mjSTAGE_POS)
+        steps += chunk * len(moving)
+        moving = moving[~(np.abs(speed[moving]).max(axis=1) < rest_speed)]
+    return moving, steps
 
 
 def longest_step(model: mujoco.MjModel) -> float:

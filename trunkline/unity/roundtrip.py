@@ -7,6 +7,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
+from trunkline.simulation.motion import batch_of, move
 
 
 @dataclass
@@ -45,20 +46,12 @@ def simulate(model: mujoco.MjModel, controls: np.ndarray, tilt: float) -> Motion
     Args:
         controls: shape (steps, nu). tilt: gravity angle, rad.
     """
-    data = mujoco.MjData(model)
-    gravity = model.opt.gravity.copy()
-    model.opt.gravity = gravity_in_base(tilt)
-    data.act[:] = controls[0, model.actuator_actadr >= 0]  # the motors' filters start at rest
-    motion = Motion(
-        *(np.empty((len(controls), *shape)) for shape in ((model.nbody, 3), (model.nq,), (model.nv,)))
-    )
-    for step, control in enumerate(controls):
-        data.ctrl[:] = control
-        mujoco.mj_step(model, data)
-        motion.positions[step], motion.angles[step], motion.speeds[step] = data.xpos, data.qpos, data.qvel
-    model.opt.gravity = gravity
-    motion.warnings = int(sum(warning.number for warning in data.warning))
-    return motion
+    batch = batch_of(model, 1)
+    batch.expand("opt.gravity")[:] = gravity_in_base(tilt)
+    if model.na:
+        batch.bind("act")[:] = controls[0, model.actuator_actadr >= 0]  # the motors' filters start at rest
+    found = move(batch, controls[None], ("xpos", "qpos", "qvel"))
+    return Motion(*(found[name][0] for name in ("xpos", "qpos", "qvel")), warnings=int(batch.warning.sum()))
 
 
 def deviation(first: Motion, second: Motion) -> np.ndarray:

@@ -1,0 +1,62 @@
+"""The one stepper: batches of simulations moved by rows of controls, MuJoCo's own loop over the steps."""
+
+import copy
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+
+from trunkline.threads import thread_count
+
+CHUNK = 128  # steps a call: few calls, and records of some MB
+
+
+def batch_of(model: mujoco.MjModel, count: int) -> Batch:
+    """`count` simulations of a copy of `model`, on as many threads as `thread_count` says; results do not depend on it.
+
+    What costs time and changes no bit is off: contacts where nothing can touch, and the search for islands where all
+    joints hang together in one tree. A simulation that diverges stays so: MuJoCo would start it anew by itself.
+    """
+    model = copy.copy(model)
+    off = mujoco.mjtDisableBit
+    model.opt.disableflags |= off.mjDSBL_AUTORESET
+    if not model.geom_contype.any() and not model.geom_conaffinity.any() and not model.npair:
+        model.opt.disableflags |= off.mjDSBL_CONTACT
+    if model.ntree <= 1:
+        model.opt.disableflags |= off.mjDSBL_ISLAND
+    return Batch(model, count, nthread=thread_count())
+
+
+def move(
+    batch: Batch,
+    controls: np.ndarray,
+    record: tuple[str, ...],
+    every: int = 1,
+    at: int = 0,
+    ids: np.ndarray | None = None,
+    moved=lambda rows: None,
+) -> dict[str, np.ndarray]:
+    """Take one step with each row of `controls`.
+
+    As with `mj_step`, what a step computes on its way, positions of sites for one, belongs to the state before it;
+    `qpos` and `qvel` are those after it. A simulation about which MuJoCo warns stands still for the rest of a chunk.
+
+    Args:
+        controls: of the actuators. Shape (n, T, nu), T a multiple of `every`.
+        record: names of fields of MjData.
+        every, at: of every `every` steps the one that is recorded.
+        ids: which n simulations of the batch, all by default.
+        moved: called with the number of new rows of the record.
+
+    Returns:
+        A record for each name. Shape (n, T / every, ...).
+    """
+    length = max(CHUNK // every, 1) * every
+    parts: dict[str, list[np.ndarray]] = {name: [] for name in record}
+    for start in range(0, controls.shape[1], length):
+        rows = np.ascontiguousarray(controls[:, start : start + length])
+        found = batch.rollout(rows.shape[1], control=rows, record=record, ids=ids)
+        for name, part in parts.items():
+            part.append(found[name][:, at::every].copy())
+        moved(rows.shape[1] // every)
+    return {name: np.concatenate(part, axis=1) for name, part in parts.items()}
