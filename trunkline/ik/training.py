@@ -15,13 +15,14 @@ from trunkline.threads import thread_count
 
 ROUNDING = 0.5e-3  # m, tip errors well under this count by their square, larger ones by their size
 TIE = 0.02  # weight of plain length errors, which alone tie down how long a slack tendon is
+WARM_UP = 0.1  # share of the steps in which the learning rate rises from zero, while Adam learns each weight's scale
 PARTS = 2  # of a batch, whose gradients are summed in this order whatever thread found them: more cores, same network
 
 
 @dataclass
 class Training:
-    """Attributes: width: of the hidden layers; epochs; batch: samples; learning_rate: at the start, falling along a
-    cosine to a thousandth; seed: of weights and shuffling."""
+    """Attributes: width: of the hidden layers; epochs; batch: samples; learning_rate: the largest, after a warm-up,
+    from which a cosine takes it to a thousandth; seed: of weights and shuffling."""
 
     width: PositiveInt
     epochs: PositiveInt
@@ -61,9 +62,8 @@ def train(
     shuffle = torch.Generator().manual_seed(training.seed)
     optimizer = torch.optim.Adam(parameters, lr=training.learning_rate, fused=True)
     batches = len(rows) // training.batch
-    schedule = torch.optim.lr_scheduler.CosineAnnealingLR(
-        optimizer, training.epochs * batches, training.learning_rate / 1000
-    )
+    steps = training.epochs * batches
+    schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, lambda step: rate(step / max(1, steps)))
 
     def slopes(part: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
         """Gradient of the objective on these rows, summed over them, and their tip errors, m."""
@@ -96,3 +96,10 @@ def train(
             validate = torch.cat(list(pool.map(tip_error, others.split(4096))))
             report(epoch, total / batches, float(validate.mean()))
     return network.eval()
+
+
+def rate(done: float) -> float:
+    """The learning rate over the largest, when a share `done` of all steps is: up evenly, down along a cosine."""
+    if done < WARM_UP:
+        return done / WARM_UP
+    return 0.001 + 0.999 * (1 + np.cos(np.pi * (done - WARM_UP) / (1 - WARM_UP))) / 2
