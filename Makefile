@@ -3,24 +3,29 @@
 # The first Python that runs and is new enough; set PYTHON to choose another.
 PYTHON := $(or $(PYTHON),$(shell for python in python3.11 python3 python3.12 python3.13; do \
   $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$python && break; done))
-STAMP := .venv/requirements.txt
+STAMP := .venv/requirements.lock
+REQUIREMENTS := requirements.lock requirements-torch.txt
+PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: demo test gate lock readme setup clean
+.PHONY: demo test types gate lock readme setup stale requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
 	dvc repro
 	@ls -lh artifacts/package_unity/*.tgz
 
-test: setup          ## run every test, then lint
+test: setup types    ## run every test, then lint
 	python -m pytest -n auto --dist loadgroup
 	ruff check --output-format concise .
+
+types: setup         ## check the types of the library and the stages
+	pyright
 
 gate: setup          ## compare the metrics with tests/limits.yaml
 	python -m trunkline.pipeline.gate
 
-lock: setup          ## check that dvc.lock belongs to the code, params.yaml and the metrics
+lock: setup          ## check that dvc.lock belongs to the code, params.yaml, the libraries and the metrics
 	python -m trunkline.pipeline.lock
 
 readme: setup        ## regenerate the README's graph, table and picture
@@ -28,19 +33,26 @@ readme: setup        ## regenerate the README's graph, table and picture
 
 setup: $(STAMP)
 
-# The stamp is a copy of requirements.txt, made last: an interrupted set-up starts again. The .pth file puts this
-# folder on the path of the virtual environment's Python, as an editable install would.
-$(STAMP): requirements.txt
+# The stamp is made last: an interrupted set-up starts again. It is compared by content: to another branch and back
+# installs nothing. The lock is complete, so pip need not resolve anything; torch comes by itself (requirements-torch.txt
+# says why). The editable install puts this folder on the path of the virtual environment's Python, with the setuptools
+# of the lock, so that nothing unlocked is fetched to build.
+$(STAMP): $(shell cat $(REQUIREMENTS) | cmp -s - $(STAMP) || echo stale)
 	@test -n "$(PYTHON)" || { echo "error: found no Python 3.11 or newer" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
 	  { apt-get update -qq && apt-get install -qq -y python3-venv; } || \
 	  { echo "error: Python has no venv module; install Debian's python3-venv" >&2; exit 1; }
 	$(PYTHON) -m venv --clear .venv
-	@echo "installing the packages of requirements.txt into .venv (some minutes, once)"
-	@.venv/bin/python -m pip install -qq --no-compile --disable-pip-version-check -r requirements.txt
-	@.venv/bin/python -c 'import pathlib, sysconfig; \
-	  pathlib.Path(sysconfig.get_path("purelib"), "trunkline.pth").write_text(str(pathlib.Path.cwd()) + "\n")'
-	@cp requirements.txt $(STAMP)
+	@echo "installing the packages of requirements.lock into .venv (some minutes, once)"
+	@$(PIP) install --no-compile --no-deps --require-hashes -r requirements.lock
+	@$(PIP) install --no-compile -r requirements-torch.txt
+	@$(PIP) install --no-compile --no-deps --no-build-isolation -e .
+	@cat $(REQUIREMENTS) > $(STAMP)
+
+requirements:        ## renew requirements.lock after an edit of pyproject.toml; needs uv, keeps what still fits
+	uv pip compile pyproject.toml --extra dev --universal --generate-hashes --no-emit-package torch \
+	  --custom-compile-command "make requirements" -q -o requirements.lock
+	python -m trunkline.pipeline.versions
 
 clean:               ## remove the virtual environment
 	rm -rf .venv

@@ -1,9 +1,12 @@
 """The experiments of the paper's table, as a plan: which trials there are, and which are kept for validation."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+
+from trunkline.trials.recording import Planned
 
 Tilt = Annotated[float, Field(ge=0, le=180)]
 Azimuth = Annotated[float, Field(ge=0, lt=360)]
@@ -48,40 +51,54 @@ class Experiments:
     validate_every: Annotated[int, Field(ge=2)]
 
 
-class Trial(NamedTuple):
-    """A trial to be recorded; `level` as the session names it, None where it has none."""
-
-    name: str
-    experiment: str
-    level: float | None
-    split: str
-
-
-def tilt_trials(experiments: Experiments) -> list[Trial]:
+def tilt_trials(experiments: Experiments) -> list[Planned]:
     """All tilts, once a repeat; every repeat leaves out another tilt, so that each is validated in turn."""
     return [
-        Trial(f"tilt_{tilt:03.0f}_{chr(ord('a') + repeat)}", "static_tilt", tilt, _split(repeat, index, experiments))
+        Planned(
+            name=f"tilt_{tilt:03.0f}_{chr(ord('a') + repeat)}",
+            experiment="static_tilt",
+            split=_split(repeat, index, experiments),
+            level=tilt,
+        )
         for repeat in range(experiments.tilt_repeats)
         for index, tilt in enumerate(experiments.tilts)
     ]
 
 
-def release_trials(experiments: Experiments) -> list[Trial]:
+def release_trials(experiments: Experiments) -> list[Planned]:
     """One a direction."""
     last = experiments.validate_every - 1
     return [
-        Trial(f"release_{azimuth:03.0f}", "release", None, _split(last, index, experiments))
+        Planned(
+            name=f"release_{azimuth:03.0f}",
+            experiment="release",
+            split=_split(last, index, experiments),
+            level=None,
+        )
         for index, azimuth in enumerate(experiments.release_directions)
     ]
 
 
-def curl_trials(experiments: Experiments) -> list[Trial]:
+def curl_trials(experiments: Experiments) -> list[Planned]:
     """All levels, once a group of tendons; every group leaves out other levels, so that all are identified from."""
     return [
-        Trial(f"curl_{'_'.join(map(str, group))}_{level:03.0f}", "curl", level, _split(row, index, experiments))
+        Planned(
+            name=f"curl_{'_'.join(map(str, group))}_{level:03.0f}",
+            experiment="curl",
+            split=_split(row, index, experiments),
+            level=level,
+        )
         for row, group in enumerate(experiments.curl_tendons)
         for index, level in enumerate(experiments.curl_levels)
     ]
+
+
+# name of the experiment to (the setting that plans it, the trials that it plans)
+PLANS: dict[str, tuple[str, Callable[[Experiments], list[Planned]]]] = {
+    "static_tilt": ("tilts", tilt_trials),
+    "release": ("release_directions", release_trials),
+    "curl": ("curl_levels", curl_trials),
+}
 
 
 def _split(row: int, index: int, experiments: Experiments) -> str:

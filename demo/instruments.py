@@ -9,6 +9,7 @@ from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
 from scipy.spatial.transform import Rotation
 
 from demo.truth import Truth
+from trunkline.trials.recording import Planned
 
 BASE = "base"
 
@@ -50,8 +51,8 @@ class InstrumentSettings:
     pause_s: PositiveFloat
 
 
-@dataclass
-class Measurement:
+@dataclass(kw_only=True)
+class Measurement(Planned):
     """A trial as the instruments saw it: F frames of B bodies, the base first; K tendons.
 
     frames (F,): frame numbers. stamps, logged (F,): ns, by the cameras' and by the recorder's clock.
@@ -60,10 +61,6 @@ class Measurement:
     commands (C, K), tendon_positions (M, K): m of pull.
     """
 
-    name: str
-    experiment: str
-    level: float | None
-    split: str
     bodies: tuple[str, ...]
     frames: np.ndarray
     stamps: np.ndarray
@@ -114,24 +111,24 @@ def measure(
     wound += rng.normal(scale=settings.tendon_noise_mm * 1e-3, size=wound.shape)
     jitter = rng.normal(scale=settings.stamp_jitter_ms * 1e-3, size=len(time))
     frame_number = round(start_s * settings.frame_rate)
-    return Measurement(
-        truth.name,
-        truth.experiment,
-        truth.level,
-        truth.split,
-        (BASE, *truth.segments),
-        frame_number + numbers,
-        _nanoseconds(epoch, time + jitter),
-        _logged(epoch, time, settings, rng),
-        positions,
-        quaternions,
-        truth.tendons,
-        _nanoseconds(epoch, truth.command_time + settings.clock_offset_s),
-        _logged(epoch, truth.command_time, settings, rng),
-        truth.commands,
-        _nanoseconds(epoch, motor_time + settings.clock_offset_s),
-        _logged(epoch, motor_time, settings, rng),
-        wound,
+    return Measurement(  # `_logged` draws: their order is part of a seed's session
+        name=truth.name,
+        experiment=truth.experiment,
+        split=truth.split,
+        level=truth.level,
+        bodies=(BASE, *truth.segments),
+        frames=frame_number + numbers,
+        stamps=_nanoseconds(epoch, time + jitter),
+        logged=_logged(epoch, time, settings, rng),
+        positions=positions,
+        quaternions=quaternions,
+        tendons=truth.tendons,
+        command_stamps=_nanoseconds(epoch, truth.command_time + settings.clock_offset_s),
+        command_logged=_logged(epoch, truth.command_time, settings, rng),
+        commands=truth.commands,
+        tendon_stamps=_nanoseconds(epoch, motor_time + settings.clock_offset_s),
+        tendon_logged=_logged(epoch, motor_time, settings, rng),
+        tendon_positions=wound,
     )
 
 

@@ -12,11 +12,12 @@ from pydantic import NonNegativeFloat, PositiveFloat
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
-from demo.experiments import Experiments, Trial, curl_trials, release_trials, tilt_trials
+from demo.experiments import Experiments, curl_trials, release_trials, tilt_trials
 from demo.truth import Truth
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.progress import progress
 from trunkline.threads import thread_count
+from trunkline.trials.recording import Planned
 
 SAMPLE_RATE = 500.0  # Hz, of the truth that the instruments see
 LOOSE = 0.3  # m of cable paid out, far more than any bend takes up
@@ -181,7 +182,7 @@ class _View:
     mount_position: tuple[float, float, float]
     tracked: list[str]
 
-    def truth(self, trial: Trial, mount: Rotation, angles: np.ndarray) -> Truth:
+    def truth(self, trial: Planned, mount: Rotation, angles: np.ndarray) -> Truth:
         """The trial with joint angles (T, nq), under a mount turned by `mount` (world ← base)."""
         data = mujoco.MjData(self.plant)
         sites = [self.plant.site(f"{segment}_center").id for segment in self.tracked]
@@ -194,7 +195,7 @@ class _View:
         local = Rotation.from_matrix(matrices.reshape(-1, 3, 3))
         origin = np.array(self.mount_position)
         return Truth(
-            *trial,
+            **vars(trial),
             time=np.arange(len(angles)) / SAMPLE_RATE,
             base_position=origin,
             base_quaternion=wxyz_from_rotation(mount),

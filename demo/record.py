@@ -1,11 +1,13 @@
 """Record the demo session: simulate the experiments, look at them through the lab's instruments, write the logs."""
 
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field, PositiveFloat, PositiveInt
 
-from demo.experiments import Experiments, Trial, curl_trials, release_trials, tilt_trials
+from demo.experiments import PLANS, Experiments
 from demo.instruments import InstrumentSettings, measure
 from demo.laboratory import SAMPLE_RATE, Motors, record
 from demo.plant import PlantSettings, build_plant
@@ -15,28 +17,29 @@ from trunkline.arm.spiral import spiral_chain
 from trunkline.pipeline.stage import output_folder, run_stage
 from trunkline.progress import progress
 from trunkline.settings import settings
+from trunkline.trials.recording import Planned
 
 SESSION = Path("data/raw/demo")
 
 
-@settings
+@dataclass
 class Arm:
     length: PositiveFloat
     base_width: PositiveFloat
     tip_width: PositiveFloat
     units: PositiveInt
-    tendons: int = Field(ge=3)  # fewer cannot bend the arm to every side
-    tracked: list[PositiveInt] = Field(min_length=1)
+    tendons: Annotated[int, Field(ge=3)]  # fewer cannot bend the arm to every side
+    tracked: Annotated[list[PositiveInt], Field(min_length=1)]
 
 
 @settings
 class Config:
     seed: int
     arm: Arm
-    plant: settings(PlantSettings)
-    motors: settings(Motors)
-    experiments: settings(Experiments)
-    instruments: settings(InstrumentSettings)
+    plant: PlantSettings
+    motors: Motors
+    experiments: Experiments
+    instruments: InstrumentSettings
 
     def __post_init__(self):
         arm, tests = self.arm, self.experiments
@@ -52,12 +55,11 @@ class Config:
         shortest, longest = self.instruments.occlusion_ms
         _expect(shortest <= longest, "instruments.occlusion_ms", [shortest, longest], "the shortest first")
         _expect(any(self.instruments.up), "instruments.up", list(self.instruments.up), "a direction")
-        _check_trials("experiments.tilts", tilt_trials(tests), tests)
-        _check_trials("experiments.release_directions", release_trials(tests), tests)
-        _check_trials("experiments.curl_levels", curl_trials(tests), tests)
+        for key, plan in PLANS.values():
+            _check_trials(f"experiments.{key}", plan(tests), tests)
 
 
-def _check_trials(key: str, trials: list[Trial], experiments: Experiments) -> None:
+def _check_trials(key: str, trials: list[Planned], experiments: Experiments) -> None:
     names = [trial.name for trial in trials]
     _expect(_distinct(names), key, _repeated(names), "a log of its own for each trial (names hold whole numbers)")
     splits = {trial.split for trial in trials}

@@ -4,9 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trunkline.trials.recording import Recording
 
-@dataclass
-class Truth:
+
+@dataclass(kw_only=True)
+class Truth(Recording):
     """One trial of T instants, S segments, K tendons and Tc commands. The world is z-up, in metres.
 
     time: (T,) s, uniform at 480 Hz or more, from 0.
@@ -15,17 +17,6 @@ class Truth:
     command_time (Tc,) s, commands (Tc, K): m of pull, as sent. tendon_positions (T, K): m of pull, as wound.
     """
 
-    name: str
-    experiment: str
-    level: float | None
-    split: str
-    time: np.ndarray
     base_position: np.ndarray
     base_quaternion: np.ndarray
-    segments: tuple[str, ...]
-    positions: np.ndarray
-    quaternions: np.ndarray
-    tendons: tuple[str, ...]
     command_time: np.ndarray
-    commands: np.ndarray
-    tendon_positions: np.ndarray

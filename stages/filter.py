@@ -1,62 +1,36 @@
 """Filter every trial: gaps, outliers, noise; one clock, the base frame, and when each trial begins."""
 
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-from pydantic import Field, PositiveFloat
 
 from trunkline.figures.data import filter_figure
 from trunkline.figures.style import save_figure
-from trunkline.filtering.filter import Filter, filter_take, summary
+from trunkline.filtering.effect import summary
+from trunkline.filtering.filter import Filter, filter_take
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.settings import settings
 from trunkline.trials.take import read_takes
 from trunkline.trials.trial import write_trials
 
-INGEST, PROCESSED, ARTIFACTS = (
-    Path("data/processed/ingest"),
-    Path("data/processed/filter"),
-    Path("artifacts/filter"),
-)
+INGEST, PROCESSED, ARTIFACTS = Path("data/processed/ingest"), Path("data/processed/filter"), Path("artifacts/filter")
 
-
-@settings
-class Config:
-    rate: PositiveFloat
-    cutoff: PositiveFloat
-    order: int = Field(ge=1, le=10)
-    longest_bridge: float = Field(ge=0)
-    outlier_deviations: PositiveFloat
-    release: Literal["onset", "free"]
-
-    def __post_init__(self):
-        if self.cutoff >= self.rate / 2:
-            raise ValueError(
-                f"cutoff: found {self.cutoff} Hz, expected less than half the rate of {self.rate} Hz"
-            )
-
-
-def filter_of(config: Config) -> Filter:
-    return Filter(
-        config.rate, config.cutoff, config.order, config.longest_bridge, config.outlier_deviations, config.release
-    )
+Config = settings(Filter)
 
 
 def main(config: Config) -> None:
-    chosen = filter_of(config)
     takes = read_takes(INGEST)
-    trials, findings = [], []
+    trials, effects = [], []
     with progress(len(takes), "filter", "trials") as bar:
         for take in takes:
-            trial, found = filter_take(take, chosen)
+            trial, effect = filter_take(take, config)
             trials.append(trial)
-            findings.append(found)
+            effects.append(effect)
             bar.update(1, trial=take.name)
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
         write_trials(processed, trials)
-        write_json(artifacts / "metrics.json", summary(trials, findings))
+        write_json(artifacts / "metrics.json", summary(trials, effects))
         shown = max(range(len(trials)), key=lambda i: np.ptp(trials[i].positions, axis=0).sum())
         save_figure(filter_figure(takes[shown], trials[shown]), artifacts / "filter.png")
 

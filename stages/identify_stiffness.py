@@ -1,4 +1,4 @@
-"""Identify bending stiffness from static shapes under tilt."""
+"""Identify bending stiffness from static shapes, or from releases where there are none."""
 
 from pathlib import Path
 

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.figures.data import quality_figure
@@ -12,7 +12,9 @@ from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.sessions.session import read_session
 from trunkline.settings import settings
-from trunkline.takes.intake import Limits, align_clocks, settle_vertical, take_in
+from trunkline.takes.agreement import align_clocks, settle_vertical
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
 from trunkline.takes.quality import judge, report, summary
 from trunkline.trials.take import write_takes
 
@@ -23,21 +25,15 @@ RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Pat
 class Config:
     session: str = Field(min_length=1)
     refused_trials: Literal["stop", "leave_out"]
-    min_duration: PositiveFloat
-    min_coverage: float = Field(gt=0, le=1)
-    max_disorder: PositiveFloat
-    max_clock_offset: PositiveFloat
+    limits: Limits
 
 
 def main(config: Config) -> None:
     folder = RAW / config.session
     session = read_session(folder)
-    limits = Limits(
-        config.min_duration, config.min_coverage, config.max_disorder, config.max_clock_offset
-    )
     takes, findings, refused = [], [], {}
     with progress(len(session.trials), "ingest", "trials") as bar:
-        for trial, take, found in take_in(folder, session, limits):
+        for trial, take, found in take_in(folder, session, config.limits):
             if isinstance(take, InputError):
                 if config.refused_trials == "stop":
                     raise take
@@ -47,9 +43,7 @@ def main(config: Config) -> None:
                 findings.append(found)
             bar.update(1, trial=trial.name)
     if not takes:
-        raise InputError(
-            f"{folder}: all {len(refused)} trials refused, the first: {next(iter(refused.values()))}"
-        )
+        raise InputError(f"{folder}: all {len(refused)} trials refused, the first: {next(iter(refused.values()))}")
     settle_vertical(takes, findings, session)
     offset, spread = align_clocks(takes, [found.offset for found in findings])
     qualities = [judge(take, found) for take, found in zip(takes, findings, strict=True)]

@@ -26,21 +26,19 @@ from trunkline.errors import in_one_line
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Fit, identify
-from trunkline.identification.settings import (
-    DifferentialEvolutionSettings,
-    IdentificationSettings,
-    LeastSquaresSettings,
-    Range,
-)
+from trunkline.identification.problem import Bounds
+from trunkline.identification.search import DifferentialEvolution, LeastSquares
+from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported, set_up
 from trunkline.pipeline.inputs import read_spec
+from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")
 FINE_EVOLUTION = Path("conf/shared/fine/differential_evolution.yaml")
-JOINT_FRICTION = Range(low=1e-4, high=0.1)  # rad of a joint's own spring
-MOUNT = Range(low=-0.1, high=0.1)  # rad by which the mount is turned in the tracked base frame
+JOINT_FRICTION = Bounds(low=1e-4, high=0.1)  # rad of a joint's own spring
+MOUNT = Bounds(low=-0.1, high=0.1)  # rad by which the mount is turned in the tracked base frame
 COMMAND_DELAY = 0.02  # s
 KINDS = ("release", "curl")
 QUICK_TRIALS = 2  # of each kind and split
@@ -61,7 +59,7 @@ def without(name: str, stage: str, config: IdentificationSettings) -> Identifica
 
 
 def with_parameter(
-    name: str, span: Range, in_stage: str, stage: str, config: IdentificationSettings
+    name: str, span: Bounds, in_stage: str, stage: str, config: IdentificationSettings
 ) -> IdentificationSettings:
     return replace(config, parameters=config.parameters | {name: span}) if stage == in_stage else config
 
@@ -83,7 +81,7 @@ def with_command_delay(stage: str, config: IdentificationSettings) -> Identifica
 
 def in_motion(trials: list[Trial]) -> list[Trial]:
     """With the velocity that the arm has in the frame of its start pose, in place of none."""
-    return [replace(trial, in_motion=trial.experiment != "static_tilt") for trial in trials]
+    return [replace(trial, in_motion=not is_static(trial.experiment)) for trial in trials]
 
 
 def with_distances(stage: str, config: IdentificationSettings) -> IdentificationSettings:
@@ -96,11 +94,11 @@ def variant(schema: type, file: Path):
 
 
 def with_least_squares(stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    return replace(config, optimizer=variant(LeastSquaresSettings, LEAST_SQUARES))
+    return replace(config, optimizer=variant(LeastSquares, LEAST_SQUARES))
 
 
 def with_evolved_factors(stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    return replace(config, fine=variant(DifferentialEvolutionSettings, FINE_EVOLUTION))
+    return replace(config, fine=variant(DifferentialEvolution, FINE_EVOLUTION))
 
 
 def with_factors_of_damping(stage: str, config: IdentificationSettings) -> IdentificationSettings:
@@ -133,7 +131,7 @@ CHOICES: dict[str, Choice] = {
 def quick(stage: str, config: IdentificationSettings) -> IdentificationSettings:
     """A small size that shows that it runs; its numbers say nothing."""
     optimizer = config.optimizer
-    if isinstance(optimizer, DifferentialEvolutionSettings):
+    if isinstance(optimizer, DifferentialEvolution):
         optimizer = replace(optimizer, generations=3)
     else:
         optimizer = replace(optimizer, starts=2, descents=1, iterations=2)
@@ -142,7 +140,7 @@ def quick(stage: str, config: IdentificationSettings) -> IdentificationSettings:
         frames=min(config.frames, 60),
         optimizer=optimizer,
         polish=replace(config.polish, iterations=2),
-        fine=LeastSquaresSettings(method="least_squares", starts=0, descents=1, iterations=2, tolerance=0.1),
+        fine=LeastSquares(starts=0, descents=1, iterations=2, tolerance=0.1),
     )
 
 

@@ -19,7 +19,7 @@ from trunkline.errors import in_one_line
 from trunkline.filtering.filter import filter_take
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.identify import identify
-from trunkline.identification.settings import Range
+from trunkline.identification.problem import Bounds
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import set_up
 from trunkline.trials.take import Take, read_takes
@@ -36,7 +36,7 @@ class Case:
     """
 
     arm: dict = field(default_factory=dict)
-    parameters: dict[str, Range] = field(default_factory=dict)
+    parameters: dict[str, Bounds] = field(default_factory=dict)
     filtered: dict = field(default_factory=dict)
     settings: dict = field(default_factory=dict)
     quadratic_damping: float = 0.0
@@ -50,8 +50,8 @@ def cases() -> dict[str, Case]:
         "started at rest when the arm begins to move": Case(filtered={"release": "onset"}),
         "straight at rest": Case(settings={"rest_shape": "unchanged"}),
         "lost frames left lost": Case(as_stamped=True),
-        "with hardening": Case(parameters={"hardening": Range(low=0.02, high=50.0)}),
-        "with joint friction": Case(parameters={"joint_friction": Range(low=1e-4, high=0.1)}),
+        "with hardening": Case(parameters={"hardening": Bounds(low=0.02, high=50.0)}),
+        "with joint friction": Case(parameters={"joint_friction": Bounds(low=1e-4, high=0.1)}),
         "with quadratic damping": Case(quadratic_damping=1.0),
         "with factors of every joint's stiffness": Case(settings={"per_joint": ["stiffness"]}),
         "with markers where they were measured": Case(settings={"markers": "measured"}),
@@ -64,7 +64,7 @@ def cases() -> dict[str, Case]:
 
 def error(case: Case, takes: list[Take]) -> tuple[float, float, float]:
     """Mean position error on the identify and on the validate releases, mm, and the latter over the arm's length."""
-    chosen = filter.filter_of(replace(load_config(filter.Config, "filter", EXAMPLE), **case.filtered))
+    chosen = replace(load_config(filter.Config, "filter", EXAMPLE), **case.filtered)
     trials = [filter_take(as_stamped(take) if case.as_stamped else take, chosen)[0] for take in takes]
     config = load_config(identify_stiffness.Config, "identify_stiffness", EXAMPLE)
     config = replace(config, parameters=config.parameters | case.parameters, **case.settings)
@@ -79,7 +79,7 @@ def error(case: Case, takes: list[Take]) -> tuple[float, float, float]:
 def arm(case: Case) -> mujoco.MjModel:
     """The example's initial arm, changed."""
     config = load_config(build_mjcf.Config, "build_mjcf", EXAMPLE)
-    model = build_mjcf.initial_spec(replace(config, arm=replace(config.arm, **case.arm)))[0].compile()
+    model = build_mjcf.cad_arm(replace(config, arm=replace(config.arm, **case.arm))).spec.compile()
     model.dof_dampingpoly[:, 0] = case.quadratic_damping * model.dof_damping
     return model
 

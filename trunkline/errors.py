@@ -1,8 +1,10 @@
-"""The exception that ends a stage or a command in one line: a user's mistake."""
+"""The exception that ends a stage or a command in one line, a user's mistake; the commonest is a missing file."""
 
+import os
 import sys
 from collections.abc import Callable
 from functools import wraps
+from pathlib import Path
 
 
 class InputError(Exception):
@@ -17,15 +19,34 @@ class InputError(Exception):
 
 
 def in_one_line(main: Callable[..., int]) -> Callable[..., int]:
-    """A command's `main`, whose InputError becomes its last line, on stderr, and exit code 1."""
+    """A command's `main`, whose InputError becomes its last line, on stderr, and exit code 1.
+
+    Where a reader such as `head` has had enough, the command ends quietly with exit code 1.
+    """
 
     @wraps(main)
     def command(*args) -> int:
         try:
-            return main(*args)
+            code = main(*args)
+            sys.stdout.flush()
+            return code
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left to flush at exit
+            return 1
         except InputError as error:
             sys.stdout.flush()
             print(f"error: {error}", file=sys.stderr)
             return 1
 
     return command
+
+
+def existing(path: str | Path) -> Path:
+    """`path`, which an earlier stage wrote.
+
+    Raises:
+        InputError: there is no such file.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"{path}: no such file, expected what an earlier stage writes (run `dvc repro`)")
+    return Path(path)

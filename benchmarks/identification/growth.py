@@ -50,8 +50,7 @@ def _evaluation_time(case: Case, count: int, trials: int, repeats: int) -> Spent
 def _case_of_units(case: Case, units: int) -> Case:
     first = case.experiments[0]
     config = load_config(build_mjcf.Config, "build_mjcf")
-    spec, *_ = build_mjcf.initial_spec(replace(config, arm=replace(config.arm, units=units)))
-    model = spec.compile()
+    model = build_mjcf.cad_arm(replace(config, arm=replace(config.arm, units=units))).spec.compile()
     experiment, segments = bent_release(model, first.frames, first.frame_step)
     return replace(case, model=model, experiments=[experiment], fit=replace(case.fit, segments=segments))
 

@@ -21,7 +21,7 @@ CANDIDATES = 12
 def report(read_case: ReadCase, size: Size) -> None:
     case = read_case("identify_damping", replace(size, trials=99, frames=size.rate_frames))
     print(f"(1) steps: {CANDIDATES} candidates x {len(case.experiments)} releases of {size.rate_frames} frames")
-    for factor in sorted({1.0, case.fit.method.rough_step_factor}):
+    for factor in sorted({1.0, case.fit.method.rough.step_factor}):
         times = rate(case, CANDIDATES, factor, size.repeats)
         bare = times["bare Batch.step"]
         print(f"    {case.model.opt.timestep * factor * 1e3:.2f} ms a step   steps/s  of bare   CPU us/step  of bare")

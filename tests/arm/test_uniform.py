@@ -20,9 +20,8 @@ SEGMENTS = {"1": 0.1, "2": 0.175, "end": 0.3}
 def model_of(tip_load=0.0, masses=(0.02,), stiffness=0.5, tendons=0) -> mujoco.MjModel:
     properties = uniform_properties(CHAIN, masses, stiffness, 5.0)
     solver = Solver(0.002, 1e-5, *LIMIT, *LIMIT)
-    return build_spec(
-        CHAIN, properties, Tendons(tendons, 0.8, 0.1, 200, 10, 20, 0.1), solver, tip_load, SEGMENTS
-    ).compile()
+    cables = Tendons(0.1, 200, 20, 0.1, count=tendons, radius_ratio=0.8, kv=10)
+    return build_spec(CHAIN, properties, cables, solver, tip_load, SEGMENTS).compile()
 
 
 def test_one_diameter_has_equal_joints():
@@ -75,7 +74,8 @@ def test_a_bent_rod_deflects_as_a_beam():
     units, bending = 60, 0.5
     chain = uniform_chain(0.3, 0.05, units, 0.5)
     properties = uniform_properties(chain, [1e-6], bending / chain.lengths[0], 0.3)
-    spec = build_spec(chain, properties, Tendons(0, 0.8, 0, 1, 1, 1, 1), Solver(0.001, 1e-5, *LIMIT, *LIMIT))
+    tendons = Tendons(0, 1, 1, 1, count=0, radius_ratio=0.8, kv=1)
+    spec = build_spec(chain, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT))
     model = spec.compile()
     jacobian, data = np.zeros((3, model.nv)), mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

@@ -11,7 +11,7 @@ from benchmarks.identification.recipe import as_first_written, by_recipe
 from benchmarks.identification.sysid import by_sysid, stalled
 from tests.support.matched_plant import release, segments_of, small_model
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Fit, Method
+from trunkline.identification.identify import Fit, Method, Polish, Rough
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.parameters import candidate_fields, set_fields
 from trunkline.identification.population import Population
@@ -31,7 +31,9 @@ def case():
     trials = [release(truth, 0.3, frames=20), release(truth, -0.25, frames=20), release(truth, 0.2, "validate", 20)]
     experiments = [prepare(trial, model, 20) for trial in trials]
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-    method = Method(LeastSquares(4, 1, 4, 1e-3), 2.0, 20, 2, 8, 1e-9, LeastSquares(0, 1, 1, 1.0), 0.1, 1)
+    method = Method(
+        LeastSquares(4, 1, 4, 1e-3), Rough(2.0, 20, 2), Polish(8, 1e-9), LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1
+    )
     fit = Fit(segments_of(model), bounds, (), "positions", weights, method)
     return Case(model, experiments[:2], experiments[2:], fit)
 

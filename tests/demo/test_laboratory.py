@@ -131,7 +131,7 @@ def test_a_quarter_of_each_experiment_is_for_validation():
 
 
 def test_the_arm_is_fully_bent_when_it_is_let_go():
-    """By SPEC the whole arm turns by 270° or more; here with the weakest of the pulls."""
+    """The whole arm turns by 270° or more; here with the weakest of the pulls."""
     tests = replace(
         CONFIG.experiments, release_directions=[0.0], release_factors=CONFIG.experiments.release_factors[:1],
         release_duration=0.05,

@@ -105,7 +105,13 @@ def test_overlap_of_balls_is_the_ratio_of_volumes():
     lattice = lattice_around(0.2)
     assert overlap(ball(lattice, 0.1), ball(lattice, 0.2)) == pytest.approx(1 / 8, rel=0.02)
     assert overlap(ball(lattice, 0.1), ball(lattice, 0.1)) == 1.0
-    assert overlap(ball(lattice, -1), ball(lattice, -1)) == 1.0
+    assert overlap(ball(lattice, -1), ball(lattice, 0.1)) == 0.0
+
+
+def test_two_empty_sets_are_no_match():
+    nothing = ball(lattice_around(0.2), -1)
+    with pytest.raises(InputError, match="overlap of two maps: found both empty"):
+        overlap(nothing, nothing)
 
 
 @pytest.mark.parametrize("most", [20_000, 2_000])

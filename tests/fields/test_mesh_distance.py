@@ -26,6 +26,21 @@ def test_one_dent_counts_from_either_side():
         assert mesh_distance(*map(parts, pair), 0.02) == pytest.approx(0.07, abs=2e-3)
 
 
+def test_every_triangle_around_a_vertex_counts():
+    """A disc cut into forty sectors, and the same disc with a small ring around its middle."""
+    count, step = 40, 0.1
+    angles = 2 * np.pi * np.arange(count) / count
+    rim = np.column_stack([np.cos(angles), np.sin(angles), np.zeros(count)])
+    i, j = np.arange(count), np.roll(np.arange(count), -1)
+    sectors = np.column_stack([np.zeros(count, int), i + 1, j + 1])
+    outer = np.concatenate([np.column_stack([i + 1, i + 1 + count, j + 1 + count]),
+                            np.column_stack([i + 1, j + 1 + count, j + 1])])
+    middle = np.zeros((1, 3))
+    plain = np.concatenate([middle, rim]), sectors
+    ringed = np.concatenate([middle, 0.3 * step * rim, rim]), np.concatenate([sectors, outer])
+    assert mesh_distance(plain, ringed, step) < 1e-12
+
+
 def test_points_lie_dense_on_every_triangle():
     vertices, faces = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.1]]), np.array([[0, 1, 2], [0, 1, 3]])
     points, owners = surface_points(vertices, faces, 0.1)

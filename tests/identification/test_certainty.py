@@ -10,7 +10,7 @@ from scipy.stats import t as student
 from tests.support.matched_plant import curl, segments_of, small_model
 from trunkline.identification.certainty import bootstrap, certainty, weakest_in_words
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Fit, Method, identify
+from trunkline.identification.identify import Fit, Method, Polish, Rough, identify
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.parameter_table import parameter_table, undetermined
 from trunkline.identification.parameters import PARAMETERS
@@ -119,7 +119,10 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
     bounds = {name: Bounds(0.8 * PARAMETERS[name].read(model), 2 * PARAMETERS[name].read(model)) for name in names}
     trials = [curl(model, level, frames=60, noise=3e-4, seed=k, tendon=k) for k, level in enumerate((4, 6, 8))]
     experiments = [prepare(trial, model, 437) for trial in trials]
-    method = Method(LeastSquares(0, 1, 4, 1e-3), 1.0, 437, 99, 4, 1e-6, LeastSquares(0, 1, 1, 1.0), 0.1, seed=1)
+    method = Method(
+        LeastSquares(0, 1, 4, 1e-3), Rough(1.0, 437, 99), Polish(4, 1e-6),
+        LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
+    )
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     found = identify(
         "test", model, experiments, Fit(segments_of(model), bounds, (), "positions", weights, method)
@@ -140,7 +143,9 @@ def test_factors_that_one_trial_alone_determines_have_no_width(tmp_path):
     experiments = [prepare(curl(model, 6, frames=5), model, 5)]
     own = PARAMETERS["stiffness"].read(model)
     bounds = {"stiffness": Bounds(0.5 * own, 2 * own)}
-    method = Method(LeastSquares(0, 1, 1, 1.0), 1.0, 5, 1, 1, 1.0, LeastSquares(0, 1, 1, 1.0), 0.1, seed=1)
+    method = Method(
+        LeastSquares(0, 1, 1, 1.0), Rough(1.0, 5, 1), Polish(1, 1.0), LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1
+    )
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     found = identify(
         "test", model, experiments, Fit(segments_of(model), bounds, ("stiffness",), "positions", weights, method)

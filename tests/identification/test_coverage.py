@@ -91,7 +91,11 @@ class Repetitions:
     resampled: np.ndarray
 
 
-@pytest.fixture(scope="module", params=STAGES)
+# a stage's repetitions take a minute: its tests go to one worker, so that they run once
+ONCE = [pytest.param(name, marks=pytest.mark.xdist_group(f"coverage {name}")) for name in STAGES]
+
+
+@pytest.fixture(scope="module", params=ONCE)
 def repetitions(request) -> Repetitions:
     stage, model = STAGES[request.param], small_model(4)
     truth = model.__copy__()

@@ -7,14 +7,16 @@ from tests.support.matched_plant import segments_of, small_model, tilt
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Fit, Method, identify
+from trunkline.identification.identify import Fit, Method, Polish, Rough, identify
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import Bounds
 from trunkline.identification.search import LeastSquares
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-METHOD = Method(LeastSquares(0, 1, 3, 1e-2), 1.0, 1, 99, 4, 1e-4, LeastSquares(0, 1, 3, 1e-2), 0.2, seed=1)
+METHOD = Method(
+    LeastSquares(0, 1, 3, 1e-2), Rough(1.0, 1, 99), Polish(4, 1e-4), LeastSquares(0, 1, 3, 1e-2), 0.2, np.inf, seed=1
+)
 
 
 PATTERN = np.array([0.012, -0.15, 0.15, 0.15])  # in sum it leaves the stiffness of the whole arm where it is

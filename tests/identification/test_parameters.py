@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_spec
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, save_model, set_fields, unit_of_hinge
+from trunkline.identification.parameters import PARAMETERS, Parameter, candidate_fields, set_fields, unit_of_hinge
+from trunkline.identification.saving import save_model
 
 VALUES = {
     "stiffness": 2.5, "hardening": 0.7, "joint_friction": 0.01, "damping": 0.02, "tendon_friction": 0.8,
@@ -87,6 +88,27 @@ def test_a_longer_friction_time_lets_a_hook_creep_straight_sooner():
             hooks.append(np.abs(data.ten_length - model.tendon_length0).max())
         left.append(hooks[1] / hooks[0])
     assert 1 > left[0] > 1.1 * left[1] > 2 * left[2] > 0
+
+
+@pytest.mark.parametrize("name", PARAMETERS)
+def test_every_parameter_survives_saving(name):
+    """Also one that is declared tomorrow: what it writes has a place in MJCF, alone or beside others."""
+    spec = small_spec()
+    model = spec.compile()
+    value = 1.3 * PARAMETERS[name].read(model) or 0.02
+    set_fields(model, candidate_fields(model, {name: np.array([value])}))
+    loaded = mujoco.MjModel.from_xml_string(save_model(spec, model))
+    assert PARAMETERS[name].read(loaded) == pytest.approx(value, rel=1e-5)
+    for field in PARAMETERS[name].fields:
+        np.testing.assert_allclose(getattr(loaded, field), getattr(model, field), rtol=1e-5, atol=1e-9)
+
+
+def test_a_parameter_without_a_place_in_mjcf_is_refused(monkeypatch):
+    lost = Parameter("kg/m³", ("opt_density",), lambda model: 0.0, lambda *_: None)
+    monkeypatch.setitem(PARAMETERS, "air", lost)
+    spec = small_spec()
+    with pytest.raises(ValueError, match="opt_density: found no place for it in MJCF"):
+        save_model(spec, spec.compile())
 
 
 def test_a_saved_model_has_the_parameters():

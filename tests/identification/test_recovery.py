@@ -5,7 +5,7 @@ import pytest
 
 from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Fit, Method, identify
+from trunkline.identification.identify import Fit, Method, Polish, Rough, identify
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import DIVERGED_LOSS, Bounds, Problem
@@ -17,7 +17,7 @@ WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3)):  # noqa: B008
     experiments = [prepare(trial, model, 437) for trial in trials]
     bounds = {name: Bounds(*span) for name, span in parameters.items()}
-    method = Method(optimizer, 1.0, 437, 99, 8, 1e-9, LeastSquares(0, 1, 30, 1e-9), 0.1, seed=3)
+    method = Method(optimizer, Rough(1.0, 437, 99), Polish(8, 1e-9), LeastSquares(0, 1, 30, 1e-9), 0.1, np.inf, seed=3)
     fit = Fit(segments_of(model), bounds, per_joint, "positions", WEIGHTS, method)
     return identify("test", model, experiments, fit)
 

@@ -12,7 +12,7 @@ from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Fit, Method, identify
+from trunkline.identification.identify import Fit, Method, Polish, Rough, identify
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.parameters import candidate_fields, set_fields
 from trunkline.identification.problem import Bounds
@@ -31,8 +31,9 @@ def straight_arm() -> mujoco.MjSpec:
     """An arm without tendons, of four units."""
     chain = uniform_chain(0.3, 0.05, 4, 1.0)
     return build_spec(
-        chain, uniform_properties(chain, [0.02], 1.0, 2.0), Tendons(0, 0.8, 0.1, 200, 10, 20, 0.1),
-        Solver(FRAME / 8, 1e-5, *LIMIT, *LIMIT), 0.1, {"1": 0.1, "2": 0.2, "3": 0.3},
+        chain, uniform_properties(chain, [0.02], 1.0, 2.0),
+        Tendons(0.1, 200, 20, 0.1, count=0, radius_ratio=0.8, kv=10), Solver(FRAME / 8, 1e-5, *LIMIT, *LIMIT),
+        0.1, {"1": 0.1, "2": 0.2, "3": 0.3},
     )  # fmt: skip
 
 
@@ -61,8 +62,9 @@ def release(truth, x: float, y: float, split="identify", frames=FRAMES) -> Trial
         mujoco.mj_step(truth, data, 8)
     nothing = np.zeros((frames, 0))
     return Trial(
-        f"release_{x}_{y}", "release", split, None, gravity_in_base(0.0), np.arange(frames) * FRAME, SEGMENTS,
-        positions, None, np.ones((frames, 3), bool), (), nothing, nothing, 0.0,
+        name=f"release_{x}_{y}", experiment="release", split=split, level=None, gravity=gravity_in_base(0.0),
+        time=np.arange(frames) * FRAME, segments=SEGMENTS, positions=positions, quaternions=None,
+        measured=np.ones((frames, 3), bool), tendons=(), commands=nothing, tendon_positions=nothing, start=0.0,
     )  # fmt: skip
 
 
@@ -84,7 +86,10 @@ def test_the_shape_is_that_of_the_releases_ends(model, truth, experiments):
 def test_stiffness_and_damping_come_back_without_static_tilts(model, truth, experiments):
     bounds = {"stiffness": Bounds(0.3, 10.0), "damping": Bounds(0.005, 1.0)}
     rest = resting_shape(model, experiments, SEGMENTS)
-    method = Method(LeastSquares(5, 1, 6, 1e-2), 1.0, 200, 2, 8, 1e-6, LeastSquares(0, 1, 1, 1e-2), 0.1, 3)
+    method = Method(
+        LeastSquares(5, 1, 6, 1e-2), Rough(1.0, 200, 2), Polish(8, 1e-6),
+        LeastSquares(0, 1, 1, 1e-2), 0.1, np.inf, seed=3,
+    )
     fit = Fit(SEGMENTS, bounds, (), "positions", WEIGHTS, method, rest)
     found = identify("test", model, experiments, fit)
     assert found.values["stiffness"] == pytest.approx(1.7, rel=0.05)

@@ -9,16 +9,13 @@ import pytest
 from tests.support.matched_plant import curl, release, small_model, tilt
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, save_model, set_fields
-from trunkline.identification.settings import (
-    DifferentialEvolutionSettings,
-    IdentificationSettings,
-    LeastSquaresSettings,
-    Loss,
-    PolishSettings,
-    Range,
-    RoughSettings,
-)
+from trunkline.identification.identify import Polish, Rough
+from trunkline.identification.loss import Loss
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.problem import Bounds
+from trunkline.identification.saving import save_model
+from trunkline.identification.search import DifferentialEvolution, LeastSquares
+from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.identify import run
 from trunkline.trials.trial import write_trials
 
@@ -32,12 +29,12 @@ def settings(experiments, reported, parameters, per_joint=(), iterations=8, **ch
     return IdentificationSettings(**{
         "seed": 1, "frames": 437, "rest_shape": "unchanged", "markers": "unchanged", "command_delay": 0.0,
         "experiments": experiments, "reported": reported, "loss": LOSS,
-        "parameters": {name: Range(low=low, high=high) for name, (low, high) in parameters.items()},
-        "optimizer": LeastSquaresSettings(method="least_squares", starts=4, descents=1, iterations=4, tolerance=1e-3),
-        "rough": RoughSettings(step_factor=1.0, frames=437, trials=99),
-        "polish": PolishSettings(iterations=iterations, tolerance=1e-8),
+        "parameters": {name: Bounds(low=low, high=high) for name, (low, high) in parameters.items()},
+        "optimizer": LeastSquares(starts=4, descents=1, iterations=4, tolerance=1e-3),
+        "rough": Rough(step_factor=1.0, frames=437, trials=99),
+        "polish": Polish(iterations=iterations, tolerance=1e-8),
         "per_joint": list(per_joint), "per_joint_range": 0.1, "per_joint_deviation": 1.0,
-        "fine": LeastSquaresSettings(method="least_squares", starts=0, descents=1, iterations=3, tolerance=1e-2),
+        "fine": LeastSquares(starts=0, descents=1, iterations=3, tolerance=1e-2),
         "cross_validation_folds": 0,
     } | changed)  # fmt: skip
 
@@ -101,7 +98,7 @@ def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
     write([*trials, curl(truth, 50, "validate", frames=110), release(truth, 0.2, "validate", frames=30)])
     ranges = {name: (0.2 * value, 5 * value) for name, value in
               {n: PARAMETERS[n].read(truth) for n in ("kp", "kv", "force_range", "time_constant")}.items()}  # fmt: skip
-    evolution = DifferentialEvolutionSettings(
+    evolution = DifferentialEvolution(
         method="differential_evolution", population=6, population_per_parameter=2, generations=12, tolerance=1e-2
     )
     config = settings(["curl"], ["release", "curl"], ranges, iterations=25, optimizer=evolution)

@@ -9,17 +9,12 @@ import pandas as pd
 import pytest
 import torch
 
-from stages.train_ik import read_table
 from tests.support.bent_chain import stump
 from trunkline.dataset import sampling
-from trunkline.dataset.table import (
-    length_by_tension,
-    length_columns,
-    mujoco_deviation,
-    sample_table,
-    tension_columns,
-    tip_by_tension,
-)
+from trunkline.dataset.columns import length_columns, tension_columns
+from trunkline.dataset.deviation import mujoco_deviation
+from trunkline.dataset.samples import read_samples
+from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.ik.network import INPUTS, InverseKinematics
@@ -199,4 +194,4 @@ def test_a_single_gravity_angle_is_refused_before_anything_is_trained(tmp_path):
     samples = pd.DataFrame(np.zeros((3, len(INPUTS) + 3)), columns=[*INPUTS, "l1", "l2", "split"])
     samples.to_parquet(tmp_path / "samples.parquet")
     with pytest.raises(InputError, match="samples.parquet: found 1 gravity angle, expected at least 2"):
-        read_table(tmp_path / "samples.parquet", 2)
+        read_samples(tmp_path / "samples.parquet", 2)

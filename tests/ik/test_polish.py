@@ -5,8 +5,9 @@ import pandas as pd
 import pytest
 
 from tests.support.bent_chain import stump
+from trunkline.dataset.columns import length_columns
 from trunkline.dataset.sampling import pull_directions
-from trunkline.dataset.table import length_columns, sample_table
+from trunkline.dataset.table import sample_table
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.ik.network import INPUTS

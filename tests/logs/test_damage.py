@@ -13,8 +13,10 @@ from tests.support.sessions import SEGMENTS, all_truths, curl_truth, instruments
 from tests.support.workbench import ROOT
 from trunkline.pipeline.stage import run_stage
 from trunkline.sessions.session import read_session
+from trunkline.takes.agreement import settle_vertical
+from trunkline.takes.checks import Limits
 from trunkline.takes.frozen import frozen
-from trunkline.takes.intake import Limits, settle_vertical, take_in
+from trunkline.takes.intake import take_in
 from trunkline.takes.swaps import find_swaps, usual_distances
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)

@@ -12,9 +12,11 @@ from mcap.writer import CompressionType, Writer
 
 from tests.support.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
-from trunkline.logs.log import MAGIC, read_log
+from trunkline.logs.log import read_log
+from trunkline.logs.records import MAGIC
 from trunkline.sessions.session import read_session
-from trunkline.takes.intake import Limits, take_in
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 FOOTER = b"\x02" + (20).to_bytes(8, "little") + bytes(20) + MAGIC

@@ -21,7 +21,8 @@ from trunkline.errors import InputError
 from trunkline.logs.definitions import HEADER, MARKERS, RIGID_BODIES, SEPARATOR
 from trunkline.sessions.session import Session, read_session
 from trunkline.sessions.source import open_log
-from trunkline.takes.intake import Limits, take_in
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
 
 BODIES = ("base", "unit_1", "unit_2")
 COUNT, START = 40, 1_760_000_000_123_456_789

@@ -7,7 +7,7 @@ import pytest
 from trunkline.panda.collision import clearance, segment_distance
 from trunkline.panda.downward import sample_downward, sample_tilted
 from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
-from trunkline.panda.kinematics import DH_A, FLANGE, Q_MAX, Q_MIN, forward, jacobian, joint_frames, within_limits
+from trunkline.panda.kinematics import DH_A, FLANGE, Q_MAX, Q_MIN, jacobian, joint_frames, mount_pose, within_limits
 from trunkline.panda.mjcf import panda_spec
 
 OFFSET = 0.05  # m
@@ -31,7 +31,7 @@ def placed(model, q):
 
 def test_forward_kinematics_is_mujocos(model):
     q = random_poses(50)
-    positions, rotations = forward(q, OFFSET)
+    positions, rotations = mount_pose(q, OFFSET)
     for i in range(len(q)):
         site = placed(model, q[i]).site("mount")
         np.testing.assert_allclose(positions[i], site.xpos, atol=1e-12)
@@ -40,7 +40,7 @@ def test_forward_kinematics_is_mujocos(model):
 
 def test_known_poses():
     stretched = np.zeros((1, 7))  # straight up: all offsets along z add up, the hand hangs from its last offset
-    position, rotation = forward(stretched)
+    position, rotation = mount_pose(stretched)
     np.testing.assert_allclose(position[0], [DH_A[6], 0, 0.333 + 0.316 + 0.384 - FLANGE], atol=1e-12)
     np.testing.assert_allclose(rotation[0][:, 2], [0, 0, -1], atol=1e-12)
 
@@ -52,12 +52,12 @@ def test_model_has_the_limits(model):
 def test_jacobian_by_finite_differences():
     q, step = random_poses(20), 1e-6
     frames = joint_frames(q)
-    position, rotation = forward(q)
+    position, rotation = mount_pose(q)
     J = jacobian(frames, position.T)
     for joint in range(7):
         moved = q.copy()
         moved[:, joint] += step
-        p, r = forward(moved)
+        p, r = mount_pose(moved)
         np.testing.assert_allclose(J[:3, joint].T, (p - position) / step, atol=1e-5)
         turn = (r - rotation) / step @ rotation.transpose(0, 2, 1)
         np.testing.assert_allclose(J[3:, joint].T, turn[:, [2, 0, 1], [1, 2, 0]], atol=1e-5)
@@ -91,7 +91,7 @@ def test_segment_distance_by_brute_force():
 
 def test_downward_poses_point_down_within_limits():
     q = sample_downward(20_000, seed=0, mount_offset=OFFSET)
-    _, rotations = forward(q)
+    _, rotations = mount_pose(q)
     assert len(q) >= 20_000
     assert np.abs(rotations[:, :, 2] - [0, 0, -1]).max() < 1e-9
     assert within_limits(q).all()
@@ -100,7 +100,7 @@ def test_downward_poses_point_down_within_limits():
 
 def test_tilted_poses_point_every_way_around_at_their_tilt():
     q = sample_tilted(20_000, 0, 0.5, OFFSET, avoid_collisions=True)
-    _, rotations = forward(q)
+    _, rotations = mount_pose(q)
     pointing = rotations[:, :, 2]
     np.testing.assert_allclose(pointing[:, 2], -np.cos(0.5), atol=1e-9)
     headings = np.histogram(np.arctan2(pointing[:, 1], pointing[:, 0]), bins=12, range=(-np.pi, np.pi))[0]
@@ -112,7 +112,7 @@ def test_tilted_poses_point_every_way_around_at_their_tilt():
 def test_downward_poses_are_the_ones_that_rejection_finds():
     """Poses that happen to point almost down, drawn blindly, all lie near an exact sample."""
     q = random_poses(400_000, seed=2)
-    _, rotations = forward(q)
+    _, rotations = mount_pose(q)
     blind = q[rotations[:, 2, 2] < -0.9995]
     exact = sample_downward(200_000, seed=0, avoid_collisions=False)
     features = slice(1, 6)  # q1 and q7 are free
@@ -131,10 +131,10 @@ def test_sampling_is_reproducible_at_any_thread_count(monkeypatch):
 
 def test_inverse_kinematics_reaches_what_forward_kinematics_made():
     q = sample_downward(400, seed=1, mount_offset=OFFSET)[:400]
-    positions, rotations = forward(q, OFFSET)
+    positions, rotations = mount_pose(q, OFFSET)
     result = solve(positions, rotations, seed=0, starts=40, mount_offset=OFFSET)
     assert result.success.mean() >= 0.995
-    p, r = forward(result.q[result.success], OFFSET)
+    p, r = mount_pose(result.q[result.success], OFFSET)
     assert np.linalg.norm(p - positions[result.success], axis=1).max() <= POSITION_TOLERANCE
     turn = np.einsum("nij,nij->n", r, rotations[result.success])
     assert np.arccos(np.clip((turn - 1) / 2, -1, 1)).max() <= 2 * ROTATION_TOLERANCE
@@ -149,7 +149,7 @@ def test_inverse_kinematics_says_when_it_fails():
 
 
 def test_a_target_meets_the_same_starts_alone_and_in_company():
-    positions, rotations = forward(sample_downward(5, seed=3)[:5])
+    positions, rotations = mount_pose(sample_downward(5, seed=3)[:5])
     together = solve(positions, rotations, seed=0, starts=20)
     first = solve(positions[:1], rotations[:1], seed=0, starts=1)
     if together.starts[0] == 1:

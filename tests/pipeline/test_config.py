@@ -1,9 +1,9 @@
 """Settings: what people type is composed, checked, and refused in one line that names the key."""
 
 import runpy
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import pytest
 from omegaconf import OmegaConf
@@ -19,10 +19,28 @@ ROOT = Path(__file__).parents[2]
 STAGES = sorted(file.stem for file in (ROOT / "stages").glob("*.py"))
 
 
-@settings
+@dataclass
 class Arm:
-    length: float = Field(gt=0)
+    """A library's own dataclass: plain, with its ranges in its types."""
+
+    length: Annotated[float, Field(gt=0)]
     tip: float
+
+    def __post_init__(self):
+        if self.tip == self.length:
+            raise ValueError(f"tip: found {self.tip}, expected another than the length")
+
+
+@dataclass
+class Rod:
+    kind: Literal["rod"]
+    width: float
+
+
+@dataclass
+class Hose:
+    kind: Literal["hose"]
+    width: float
 
 
 @settings
@@ -32,6 +50,8 @@ class Config:
     loss: Literal["distance", "position"]
     weights: tuple[float, float]
     level: float | None
+    part: Annotated[Rod | Hose, Field(discriminator="kind")] | None
+    spans: dict[Literal["low", "high"], Arm]
 
     def __post_init__(self):
         if self.weights[0] > self.weights[1]:
@@ -45,6 +65,7 @@ def project(tmp_path):
     (folder / "arm").mkdir(parents=True)
     (folder / "config.yaml").write_text(
         "defaults:\n  - arm: ???\n  - _self_\ncount: ???\nloss: distance\nweights: [1, 2]\nlevel: null\n"
+        "part: null\nspans: {}\n"
     )
     (folder / "arm" / "spiral.yaml").write_text("length: 0.5\ntip: ${count}\n")
     (folder / "arm" / "straight.yaml").write_text("length: 0.3\ntip: 0.01\n")
@@ -83,6 +104,18 @@ def test_groups_values_and_interpolations_compose(project):
         ("{arm: {length: 1}, count: 3}", "fit.arm: found {'length': 1}, expected one of spiral, straight"),
         ("[1, 2]", "fit: found [1, 2], expected a section"),
         ("{arm: spiral, count: 3", "params.yaml: not readable as YAML"),
+        ("{arm: spiral, count: 3, spans: {low: {length: 1, tip: 0, tpyo: 1}}}", "fit.spans.low.tpyo: unknown key"),
+        ("{arm: spiral, count: 3, spans: {low: {length: '1', tip: 0}}}", "fit.spans.low.length: found '1', expected a"),
+        ("{arm: spiral, count: 3, spans: {low: {length: 0, tip: 0}}}", "fit.spans.low.length: found 0, expected great"),
+        ("{arm: spiral, count: 3, spans: {low: {length: .nan, tip: 0}}}", "low.length: found nan, expected a finite"),
+        ("{arm: spiral, count: 3, spans: {low: {length: 1}}}", "fit.spans.low.tip: missing, expected a value"),
+        ("{arm: spiral, count: 3, spans: {low: {length: 1, tip: 1}}}", "fit.spans.low: tip: found 1.0, expected anoth"),
+        ("{arm: spiral, count: 3, spans: {lwo: {length: 1, tip: 0}}}", "found 'lwo', expected 'low' or 'high', did "),
+        ("{arm: spiral, count: 3, part: {kind: rod, width: 1, tpyo: 1}}", "fit.part.tpyo: unknown key"),
+        ("{arm: spiral, count: 3, part: {kind: rdo, width: 1}}", "fit.part: kind: found 'rdo', expected one of 'rod'"),
+        ("{arm: spiral, count: 3, part: {width: 1}}", "fit.part: kind: missing, expected a value"),
+        ("{arm: spiral, count: 3, level: .inf}", "fit.level: found inf, expected a finite number"),
+        ("{arm: spiral, count: 3, level: .nan}", "fit.level: found nan, expected a finite number"),
         ("{arm: spiral, count: '${nothing}'}", "Interpolation key 'nothing' not found"),
     ],
 )
@@ -133,6 +166,34 @@ def test_a_stage_checks_the_settings_of_all(whole_project):
     whole_project("{fit: {count: 1}, train: {count: 2}}")
     with pytest.raises(InputError, match="fit.count: found 'x', expected a valid integer"):
         whole_project("{fit: {count: x}, train: {count: 2}}")
+
+
+def test_a_changed_range_in_the_library_is_checked_again(whole_project, tmp_path, monkeypatch):
+    """What has passed is noted with the files that hold the ranges, the library's among them."""
+    checked = []
+    monkeypatch.setattr("trunkline.pipeline.settings.PROJECT", tmp_path)
+    monkeypatch.setattr("trunkline.pipeline.settings.check_settings", checked.append)
+    for text, times in (("low = 0", 1), ("low = 0", 1), ("low = 1", 2)):
+        (tmp_path / "trunkline").mkdir(exist_ok=True)
+        (tmp_path / "trunkline" / "ranges.py").write_text(text)
+        whole_project("{fit: {count: 1}, train: {count: 2}}")
+        assert len(checked) == times
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("    stiffness:", "    stifness:", "found 'stifness', expected 'stiffness', 'hardening', "),
+        ("{low: 0.3,", "{low: 30.0,", "parameters.stiffness: low: found 30.0, expected less than high, 12.0"),
+        ("{low: 0.3,", "{lwo: 0.3,", "parameters.stiffness.lwo: unknown key, did you mean 'low'?"),
+        ("{low: 0.3,", "{low: .nan,", "parameters.stiffness.low: found nan, expected a finite number"),
+    ],
+)
+def test_a_mistaken_range_of_a_parameter(tmp_path, old, new, message):
+    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text().replace(old, new))
+    with pytest.raises(InputError) as caught:
+        load_config(IdentificationSettings, "identify_stiffness", tmp_path)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize("stage", STAGES)

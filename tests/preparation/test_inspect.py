@@ -7,7 +7,8 @@ from tests.logs.test_schemas import CASES, write_foxglove, write_ros
 from tests.support.sessions import SEGMENTS, all_truths, instruments, record
 from trunkline.preparation.inspect import main
 from trunkline.sessions.session import read_session
-from trunkline.takes.intake import Limits, take_in
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
 
 LIMITS = Limits(duration=0.2, coverage=0.3, disorder=0.1, clock_offset=1.0)
 

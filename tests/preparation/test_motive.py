@@ -7,9 +7,11 @@ import pytest
 
 from demo.instruments import measure
 from tests.support.sessions import SEGMENTS, instruments, release_truth
-from trunkline.preparation.motive import main, read_export
+from trunkline.preparation.export import read_export
+from trunkline.preparation.motive import main
 from trunkline.sessions.session import read_session
-from trunkline.takes.intake import Limits, take_in
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
 
 BODIES = ("base", *SEGMENTS)
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
@@ -76,9 +78,8 @@ def test_decimal_commas_between_semicolons(tmp_path, measured):
     (tmp_path / "german.csv").write_text(text.replace(",", ";").replace(".", ","), encoding="utf-8-sig")
     expected, found = read_export(path), read_export(tmp_path / "german.csv")
     assert found.names == expected.names
-    assert found.start == expected.start
     np.testing.assert_array_equal(found.positions, expected.positions)
-    np.testing.assert_array_equal(found.time, expected.time)
+    np.testing.assert_array_equal(found.stamps, expected.stamps)
 
 
 def test_markers_alone_become_positions_alone(tmp_path, measured):
@@ -94,7 +95,7 @@ def test_markers_alone_become_positions_alone(tmp_path, measured):
 
 
 def test_the_start_of_the_capture_dates_the_log(tmp_path, measured):
-    assert read_export(write(tmp_path / "a.csv", measured)).start == 1_763_647_785_344_000_000
+    assert read_export(write(tmp_path / "a.csv", measured)).stamps[0] == 1_763_647_785_344_000_000
 
 
 def spoil(path, old, new):

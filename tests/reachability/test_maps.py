@@ -9,10 +9,10 @@ from trunkline.errors import InputError
 from trunkline.fields.grid import Lattice, overlap
 from trunkline.fields.mesh import contains
 from trunkline.panda.downward import sample_downward
-from trunkline.panda.kinematics import Q_MAX, forward
+from trunkline.panda.kinematics import Q_MAX, mount_pose
 from trunkline.panda.labels import agreement, beyond_links, draw_points, label
 from trunkline.reachability.hybrid import minkowski_field, swept_cells
-from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, verified
+from trunkline.reachability.hybrid_check import Poses, draw_inside_and_outside, find_poses, verified
 from trunkline.reachability.maps import RigidSettings, angle_name, build_rigid, build_soft
 from trunkline.reachability.reach_signal import held_out, packed, points_beyond, reach_signal
 from trunkline.reachability.rigid import profile, rigid_field
@@ -83,7 +83,7 @@ def test_a_profile_of_specks_is_refused_by_its_key(poses):
 
 def test_further_starts_go_to_every_point_not_reached(poses):
     """One start reaches some points; with further ones all that can be reached are, wherever a map puts them."""
-    position, _ = forward(poses[5::8000], OFFSET)
+    position, _ = mount_pose(poses[5::8000], OFFSET)
     where = {"seed": 0, "starts": 1, "mount_offset": OFFSET, "avoid_collisions": True}
     once, more = (label(position, starts_in_doubt=n, **where) for n in (1, 100))
     assert once.mean() < 0.9 <= more.mean()
@@ -91,7 +91,7 @@ def test_further_starts_go_to_every_point_not_reached(poses):
 
 
 def test_samples_lie_inside_the_rigid_map(rigid):
-    position, _ = forward(sample_downward(4000, seed=9, mount_offset=OFFSET), OFFSET)
+    position, _ = mount_pose(sample_downward(4000, seed=9, mount_offset=OFFSET), OFFSET)
     depth = rigid.lattice.sample(rigid.field, position)
     assert np.quantile(depth, 0.99) < 0.005
     assert depth.max() < rigid.lattice.spacing
@@ -104,7 +104,7 @@ def test_profile_knows_where_joint_1_ends():
     q[:, [1, 3]] = [0.3, -1.5] + near
     q[:, 5] = 0.3  # a profile looks at positions only
     shape = profile(q, OFFSET, spacing=0.004, closing=0.012, smallest=1)
-    position, _ = forward(q.mean(axis=0)[None], OFFSET)
+    position, _ = mount_pose(q.mean(axis=0)[None], OFFSET)
     radius, height = np.hypot(*position[0, :2]), position[0, 2]
     azimuths = np.array([0.0, Q_MAX[0] - 0.02, Q_MAX[0] + 0.02, np.pi])
     points = np.column_stack([radius * np.cos(azimuths), radius * np.sin(azimuths), np.full(4, height)])
@@ -113,13 +113,13 @@ def test_profile_knows_where_joint_1_ends():
 
 
 def test_no_sample_is_beyond_the_links(poses):
-    position, _ = forward(poses, OFFSET)
+    position, _ = mount_pose(poses, OFFSET)
     assert not beyond_links(position, OFFSET).any()
     assert beyond_links(np.array([[0.9, 0, 0.1]]), OFFSET).all()
 
 
 def test_labels_find_samples_and_refuse_the_impossible(poses):
-    position, _ = forward(poses[::4000], OFFSET)
+    position, _ = mount_pose(poses[::4000], OFFSET)
     impossible = np.array([[0.0, 0.0, 0.1], [0.0, 0.0, -0.2], [2.0, 0.0, 0.0]])
     points = np.concatenate([position, impossible])
     reached = label(points, seed=0, starts=30, starts_in_doubt=100, mount_offset=OFFSET,
@@ -269,7 +269,7 @@ def test_points_of_the_hybrid_map_are_reached_and_points_beside_it_are_not(rigid
     where = {"seed": 0, "mount_offset": OFFSET, "avoid_collisions": True}
     reach = find_poses(inside, tips, rigid.field, rigid.lattice, **where)
     assert reach.found.mean() >= 0.97
-    mount, rotation = forward(reach.q[reach.found], OFFSET)
+    mount, rotation = mount_pose(reach.q[reach.found], OFFSET)
     assert np.abs(rotation[:, :, 2] - [0, 0, -1]).max() < 1e-3
     reached = tip_position(mount, rotation, tips[reach.tip[reach.found]])
     assert np.linalg.norm(reached - inside[reach.found], axis=1).max() < 1e-3
@@ -280,10 +280,10 @@ def test_a_pose_is_verified_by_joint_angles_and_tendon_lengths_alone(arm):
     source = ArmTips(arm, np.zeros(0), [], directions=12, steps=8, seed=0)
     tips = source(0.0)
     q = sample_downward(5, seed=3, mount_offset=OFFSET)[:5]
-    mount, rotation = forward(q, OFFSET)
+    mount, rotation = mount_pose(q, OFFSET)
     index = np.array([40, 50, 60, 70, 80])
     points = tip_position(mount, rotation, tips.positions[index])
-    reach = Reach(np.array([1, 1, 1, 1, 0], bool), q, index, np.zeros(5))
+    reach = Poses(np.array([1, 1, 1, 1, 0], bool), q, index, np.zeros(5))
     assert list(verified(points, reach, tips.lengths, arm, OFFSET)) == [True] * 4 + [False]
     assert not verified(points + [0, 0, 0.005], reach, tips.lengths, arm, OFFSET).any()
     q[:, 5] += 0.1  # no longer straight down: gravity pulls another way

@@ -5,7 +5,7 @@ import pytest
 
 from tests.support.bent_chain import stump
 from trunkline.frames import gravity_in_base
-from trunkline.panda.kinematics import forward
+from trunkline.panda.kinematics import mount_pose
 from trunkline.reachability.hybrid_check import draw_inside_and_outside, verified
 from trunkline.reachability.rigid import azimuth_from_joint_1
 from trunkline.reachability.tilted import draw_pairs, find_tilted, soft_base, tilted_field
@@ -44,10 +44,10 @@ def test_gravity_pulls_on_the_soft_arm_as_in_the_data_set():
 
 def test_joint_1_turns_points_without_changing_their_azimuth(pairs):
     q = pairs.q[:50].copy()
-    mount, _ = forward(q, OFFSET)
+    mount, _ = mount_pose(q, OFFSET)
     before = azimuth_from_joint_1(mount, q[:, 0])
     q[:, 0] = np.random.default_rng(0).uniform(-2.5, 2.5, 50)
-    mount, _ = forward(q, OFFSET)
+    mount, _ = mount_pose(q, OFFSET)
     np.testing.assert_allclose(azimuth_from_joint_1(mount, q[:, 0]), before, atol=1e-9)
 
 
@@ -56,7 +56,7 @@ def test_points_inside_are_reached_at_the_tilt_and_points_outside_are_not(chain,
     inside, outside = draw_inside_and_outside(field, lattice, 0.04, 20, seed=0)
     reach = find_tilted(inside, pairs, tips.positions, seed=0, **HOW)
     assert verified(inside, reach, tips.lengths, chain, OFFSET).mean() >= 0.95
-    pointing = forward(reach.q[reach.found], OFFSET)[1][:, 2, 2]
+    pointing = mount_pose(reach.q[reach.found], OFFSET)[1][:, 2, 2]
     np.testing.assert_allclose(pointing, -np.cos(TILT), atol=1e-3)
     reach = find_tilted(outside, pairs, tips.positions, seed=0, **HOW)
     assert verified(outside, reach, tips.lengths, chain, OFFSET).mean() <= 0.05

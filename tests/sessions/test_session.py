@@ -68,6 +68,12 @@ def test_good_session(tmp_path):
             r"trials.0: level: missing, expected the nominal level of a static_tilt",
         ),
         (("trials", 0, "level"), float("nan"), r"trials.0.level: found nan, expected a finite number"),
+        (("trials", 0, "level"), 200, r"trials.0: level: found 200, expected 0 to 180, the degrees of tilt"),
+        (
+            ("trials", 0),
+            {"file": "tilt.mcap", "experiment": "curl", "level": 0.02, "split": "identify"},
+            r"trials.0: level: found 0.02, expected 1 to 10000, the mm of pull of a curl",
+        ),
         (
             ("trials", 1, "window"),
             [2, 1],

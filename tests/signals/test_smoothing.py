@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trunkline.signals.smoothing import bridged, low_pass, noise_level, outliers, resample
+from trunkline.signals.smoothing import bridged, fill_gaps, low_pass, noise_level, outliers, resample
 
 RATE = 120.0
 TIME = np.arange(600) / RATE
@@ -68,3 +68,10 @@ def test_noise_level_sees_through_motion_and_gaps():
     columns = swing(TIME) + rng.normal(scale=[3e-4, 6e-4], size=(600, 2))
     columns[100:120] = np.nan
     np.testing.assert_allclose(noise_level(columns), [3e-4, 6e-4], rtol=0.15)
+
+
+def test_gaps_are_filled_by_time_held_at_the_ends_and_zero_where_nothing_was_seen():
+    time = np.array([0.0, 1.0, 3.0, 4.0, 9.0])
+    columns = np.array([[np.nan, 1, 3, np.nan, np.nan], [5, np.nan, np.nan, 9, np.nan], [np.nan] * 5]).T
+    expected = np.array([[1, 1, 3, 3, 3], [5, 6, 8, 9, 9], [0] * 5]).T
+    np.testing.assert_array_equal(fill_gaps(time, columns), expected)

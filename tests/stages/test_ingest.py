@@ -132,7 +132,7 @@ def test_a_trial_can_be_left_out_and_is_reported(project, capsys):
         ("session: demo", "sesion: demo", "ingest.sesion: unknown key, did you mean 'session'?"),
         ("session: demo", "session: 3", "ingest.session: found 3"),
         ("session: demo", "session: nowhere", "data/raw/nowhere: no such folder"),
-        ("session: demo", "session: demo\n  min_coverage: 1.5", "ingest.min_coverage: found 1.5"),
+        ("session: demo", "session: demo\n  limits: {coverage: 1.5}", "ingest.limits.coverage: found 1.5"),
     ],
 )
 def test_bad_settings_are_one_line(project, capsys, old, new, message):

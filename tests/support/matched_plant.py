@@ -48,8 +48,9 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
         mujoco.mj_step(model, data, round(FRAME / model.opt.timestep))
     positions = positions + rng.normal(0, noise, positions.shape)
     return Trial(
-        name, experiment, split, level, gravity, np.arange(frames) * FRAME, segments, positions, quaternions,
-        np.ones(positions.shape[:2], bool), ("tendon_1", "tendon_2", "tendon_3"), pulls, pulls, 0.0,
+        name=name, experiment=experiment, split=split, level=level, gravity=gravity, time=np.arange(frames) * FRAME,
+        segments=segments, positions=positions, quaternions=quaternions, measured=np.ones(positions.shape[:2], bool),
+        tendons=("tendon_1", "tendon_2", "tendon_3"), commands=pulls, tendon_positions=pulls, start=0.0,
     )  # fmt: skip
 
 

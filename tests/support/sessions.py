@@ -64,20 +64,20 @@ def bent_truth(
     turns = base * Rotation.from_rotvec(np.stack([0 * angle, -angle, 0 * angle], axis=-1).reshape(-1, 3))
     position = np.array([0.2, -0.1, 1.5])
     return Truth(
-        name,
-        experiment,
-        level,
-        split,
-        time,
-        position,
-        base.as_quat(scalar_first=True),
-        SEGMENTS,
-        base.apply(local.reshape(-1, 3)).reshape(local.shape) + position,
-        turns.as_quat(scalar_first=True).reshape(*angle.shape, 4),
-        TENDONS if pulls.any() else (),
-        time[::5],
-        pulls[::5] if pulls.any() else np.empty((len(time[::5]), 0)),
-        pulls if pulls.any() else np.empty((len(time), 0)),
+        name=name,
+        experiment=experiment,
+        split=split,
+        level=level,
+        time=time,
+        base_position=position,
+        base_quaternion=base.as_quat(scalar_first=True),
+        segments=SEGMENTS,
+        positions=base.apply(local.reshape(-1, 3)).reshape(local.shape) + position,
+        quaternions=turns.as_quat(scalar_first=True).reshape(*angle.shape, 4),
+        tendons=TENDONS if pulls.any() else (),
+        command_time=time[::5],
+        commands=pulls[::5] if pulls.any() else np.empty((len(time[::5]), 0)),
+        tendon_positions=pulls if pulls.any() else np.empty((len(time), 0)),
     )
 
 

@@ -13,10 +13,12 @@ from tests.support.sessions import SEGMENTS, curl_truth, instruments, record, re
 from trunkline.errors import InputError
 from trunkline.filtering.filter import Filter, filter_take
 from trunkline.sessions.session import read_session
-from trunkline.takes.intake import Limits, align_clocks, take_in
+from trunkline.takes.agreement import align_clocks
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0)
+FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
 REAL = Path(__file__).parents[2] / "shared/data/asl_trunk"
 
 

@@ -10,7 +10,7 @@ from tests.support.sessions import curl_truth
 from tests.takes.test_intake import edit_session, one_trial, taken
 from trunkline.errors import InputError
 from trunkline.signals.clock import OffsetFit
-from trunkline.takes.intake import align_clocks
+from trunkline.takes.agreement import align_clocks
 
 
 def curl(folder, change=lambda m: None):

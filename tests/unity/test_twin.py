@@ -27,8 +27,8 @@ from trunkline.unity.roundtrip import curl, simulate
 from trunkline.unity.twin import MANIFEST, MODEL, NETWORK, Label, Sources, Trajectory, assemble, compare
 
 ROOT = Path(__file__).parents[2]
-LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0", trunkline="0.1.0")
-TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts=[0.0, 1.0])
+LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0")
+TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts_deg=[0.0, 57.3])
 
 
 def network(inputs: int = 8, opset: int = 15, outputs: list[str] | None = None) -> bytes:
@@ -76,6 +76,7 @@ def sources(tmp_path) -> Sources:
         grids=tmp_path / "grids.npz",
         metrics={"train_ik": {"opset": 15}},
         texts={"README.md": b"twin", "LICENSE.md": b"free", "CHANGELOG.md": b"new"},
+        trunkline="0.1.0",
     )
 
 
@@ -299,7 +300,7 @@ def project(tmp_path, sources) -> Path:
     """A folder with all that the stage reads."""
     root = tmp_path / "project"
     shutil.copytree(ROOT / "conf/package_unity", root / "conf/package_unity")
-    for name in ("pyproject.toml", "params.yaml", "LICENSE", "docs/unity.md"):
+    for name in ("params.yaml", "LICENSE", "docs/unity.md"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, root / name)
     stages = (

@@ -6,9 +6,11 @@ that an arm tracks elsewhere than in its units' centres have their own names: si
 """
 
 from dataclasses import dataclass
+from typing import Annotated
 
 import mujoco
 import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import UnitProperties
@@ -20,25 +22,35 @@ LOAD_RGBA = (0.4, 0.4, 0.45, 1)
 
 
 @dataclass
-class Tendons:
+class Actuation:
+    """What pulls each tendon.
+
+    Attributes:
+        friction: friction loss of the tendon, N.
+        kp: position gain, N/m.
+        max_force: largest pull F, N; a tendon cannot push.
+        time_constant: of the first-order filter on the commanded length, s.
+    """
+
+    friction: NonNegativeFloat
+    kp: PositiveFloat
+    max_force: PositiveFloat
+    time_constant: PositiveFloat
+
+
+@dataclass(kw_only=True)
+class Tendons(Actuation):
     """Tendons through one hole a unit, evenly spread around the arm, tendon 1 over +x.
 
     Attributes:
         count: number of tendons.
         radius_ratio: distance of the holes from the axis over the unit's outer radius.
-        friction: friction loss of each tendon, N.
-        kp: position gain, N/m. kv: velocity gain, N s/m.
-        max_force: largest pull F, N; a tendon cannot push.
-        time_constant: of the first-order filter on the commanded length, s.
+        kv: velocity gain, N s/m.
     """
 
     count: int
     radius_ratio: float
-    friction: float
-    kp: float
     kv: float
-    max_force: float
-    time_constant: float
 
 
 @dataclass
@@ -52,12 +64,12 @@ class Solver:
             limits and of tendon friction, fixed because they are part of what "friction" means.
     """
 
-    timestep: float
-    armature: float
-    limit_solref: list[float]
-    limit_solimp: list[float]
-    friction_solref: list[float]
-    friction_solimp: list[float]
+    timestep: Annotated[float, Field(gt=0, le=0.01)]
+    armature: NonNegativeFloat
+    limit_solref: tuple[float, float]
+    limit_solimp: tuple[float, float, float, float, float]
+    friction_solref: tuple[float, float]
+    friction_solimp: tuple[float, float, float, float, float]
 
 
 def unit_name(index: int) -> str:

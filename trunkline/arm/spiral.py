@@ -1,12 +1,36 @@
 """The logarithmic spiral ρ = a e^{bθ} of SpiRobs (Wang et al. 2024), unrolled into a chain of similar units."""
 
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
 import numpy as np
+from pydantic import Field, PositiveFloat
 from scipy.optimize import brentq
 
+from trunkline.arm.cad import Chain
 from trunkline.arm.geometry import ChainGeometry
+from trunkline.arm.material import UnitProperties, unit_properties
 from trunkline.errors import InputError
 
 GROWTH_BRACKET = (1e-3, 10.0)  # b of any arm that one could print: 1e-3 is nearly a circle
+
+
+@dataclass
+class Spiral(Chain):
+    """base_width, tip_width: m. modulus: Pa. density: kg/m³. core_ratio: core diameter over the unit's."""
+
+    kind: Literal["spiral"]
+    base_width: PositiveFloat
+    tip_width: PositiveFloat
+    modulus: PositiveFloat
+    density: PositiveFloat
+    core_ratio: Annotated[float, Field(gt=0, lt=1)]
+
+    def chain(self) -> ChainGeometry:
+        return spiral_chain(self.length, self.base_width, self.tip_width, self.units)
+
+    def properties(self, chain: ChainGeometry) -> UnitProperties:
+        return unit_properties(chain, self.modulus, self.density, self.core_ratio, self.damping_ratio)
 
 
 def _length(growth: float, base_width: float, tip_width: float) -> float:

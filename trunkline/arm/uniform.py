@@ -1,9 +1,45 @@
 """A chain of equal units: a hose, a rod or a stack of discs, straight when cut, of one diameter."""
 
-import numpy as np
+from dataclasses import dataclass
+from typing import Annotated, Literal
 
+import numpy as np
+from pydantic import Field, PositiveFloat
+
+from trunkline.arm.cad import Chain
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import UnitProperties, joint_damping
+
+
+@dataclass
+class Uniform(Chain):
+    """width: m. unit_masses: kg, one for all units or one each. joint_range_deg: how far a joint bends.
+
+    Either bending_stiffness, EI in N m², or joint_stiffness, K of every joint in N m/rad.
+    """
+
+    kind: Literal["uniform"]
+    width: PositiveFloat
+    unit_masses: list[PositiveFloat]
+    joint_range_deg: Annotated[float, Field(gt=0, le=180)]
+    bending_stiffness: PositiveFloat | None = None
+    joint_stiffness: PositiveFloat | None = None
+
+    def __post_init__(self):
+        super().__post_init__()
+        if (self.bending_stiffness is None) == (self.joint_stiffness is None):
+            found = "neither" if self.joint_stiffness is None else "both"
+            raise ValueError(f"found {found}, expected either bending_stiffness (EI) or joint_stiffness (K)")
+        if len(self.unit_masses) not in (1, self.units):
+            raise ValueError(f"unit_masses: found {len(self.unit_masses)}, expected one for all units, or "
+                             f"one for each of the {self.units}")
+
+    def chain(self) -> ChainGeometry:
+        return uniform_chain(self.length, self.width, self.units, np.radians(self.joint_range_deg))
+
+    def properties(self, chain: ChainGeometry) -> UnitProperties:
+        stiffness = self.joint_stiffness or self.bending_stiffness / chain.lengths[0]
+        return uniform_properties(chain, self.unit_masses, stiffness, self.damping_ratio)
 
 
 def uniform_chain(length: float, width: float, units: int, joint_range: float) -> ChainGeometry:

@@ -39,18 +39,21 @@ class Candidates:
     snapped: int
 
 
-def sample_angle(chain: Chain, tilt: float, directions: int, steps: int, rng: np.random.Generator) -> Candidates:
+def sample_angle(
+    chain: Chain, tilt: float, directions: int, steps: int, rng: np.random.Generator, look_every: int = 1
+) -> Candidates:
     """Follow the arm along rays of growing tension, samples evenly spaced along the tip's way on each.
 
     Args:
         tilt: gravity angle θ_G, rad.
         directions: rays, their bending moments evenly spread around the arm.
         steps: samples on each ray, at random in equal shares of its length; four times as many on the planar rays.
+        look_every: the first look goes along one ray in so many; between them, the tip's way is interpolated.
     """
     gravity = gravity_in_base(tilt)
     rays = pull_directions(chain, (np.arange(directions) + rng.random()) / directions * 2 * np.pi)
     planar, kinds = planar_directions(chain)
-    parts = [_follow(chain, gravity, rays, steps, rng), _follow(chain, gravity, planar, 4 * steps, rng)]
+    parts = [_follow(chain, gravity, rays, steps, rng, look_every), _follow(chain, gravity, planar, 4 * steps, rng)]
     kind = np.repeat(np.array(["general", *kinds]), [directions * steps] + [4 * steps] * len(planar))
     whole = Equilibrium(
         **{name: np.concatenate([values, vars(parts[1])[name]]) for name, values in vars(parts[0]).items()}
@@ -100,13 +103,19 @@ def _first_holes(chain: Chain) -> np.ndarray:
     return across / np.linalg.norm(across, axis=1, keepdims=True)
 
 
-def _follow(chain: Chain, gravity: np.ndarray, rays: np.ndarray, steps: int, rng: np.random.Generator) -> Equilibrium:
+def _follow(
+    chain: Chain, gravity: np.ndarray, rays: np.ndarray, steps: int, rng: np.random.Generator, look_every: int = 1
+) -> Equilibrium:
     """`steps` equilibria on each ray, from no tension to the whole of it, evenly spaced along the tip's way."""
     shares = np.linspace(0, 1, COARSE_STEPS) ** COARSE_POWER
-    coarse = equilibrium_paths(chain, rays[:, None, :] * shares[:, None], gravity)
-    tips = coarse.position.reshape(len(rays), COARSE_STEPS, 3)
+    looked = np.arange(0, len(rays), look_every)
+    coarse = equilibrium_paths(chain, rays[looked, None, :] * shares[:, None], gravity)
+    tips = coarse.position.reshape(len(looked), COARSE_STEPS, 3)
     way = np.linalg.norm(np.diff(tips, axis=1), axis=2).cumsum(axis=1)
-    way = np.concatenate([np.zeros((len(rays), 1)), way], axis=1)
+    way = np.concatenate([np.zeros((len(looked), 1)), way], axis=1)
+    if look_every > 1:  # rays go around the arm: the last one is beside the first
+        every = np.arange(len(rays))
+        way = np.stack([np.interp(every, looked, column, period=len(rays)) for column in way.T], axis=1)
     places = (np.arange(steps) + rng.random((len(rays), steps))) / steps
     fine = np.stack([np.interp(p * w[-1], w, shares) for p, w in zip(places, way, strict=True)])
     return equilibrium_paths(chain, rays[:, None, :] * fine[..., None], gravity)

@@ -6,23 +6,25 @@ from pathlib import Path
 import fast_simplification
 import numpy as np
 import trimesh
-from numpy.typing import NDArray
+from point_cloud_utils import signed_distance_to_mesh
 from skimage.measure import marching_cubes
+from trimesh.exchange.obj import export_obj
 
 from trunkline.errors import InputError
 from trunkline.fields.grid import Lattice
 
 # Lattice points at exactly the level make marching cubes emit degenerate triangles and open edges.
 LEVEL = 1e-3  # voxels outside zero
-HASTE = range(3, 10)  # of the simplifier: the least that comes down to the triangles asked for moves the surface least
+# Of the simplifier: the lowest that comes down to the triangles asked for moves the surface least.
+AGGRESSIVENESS = range(3, 10)
 
 
-@dataclass(frozen=True)
+@dataclass
 class Surface:
-    """A closed triangle mesh: ``vertices`` (V, 3) in m, ``faces`` (F, 3), outward by the right-hand rule."""
+    """A closed triangle mesh: `vertices` (V, 3) in m, `faces` (F, 3), outward by the right-hand rule."""
 
-    vertices: NDArray
-    faces: NDArray
+    vertices: np.ndarray
+    faces: np.ndarray
 
     @property
     def mesh(self) -> trimesh.Trimesh:
@@ -34,26 +36,26 @@ class Surface:
         return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
 
 
-def surface(field: NDArray, lattice: Lattice, most_triangles: int, settings: str) -> Surface:
-    """Closed mesh of the zero level of ``field`` on a 3-D ``lattice``, with at most ``most_triangles``.
+def surface(field: np.ndarray, lattice: Lattice, most_triangles: int, settings: str) -> Surface:
+    """Closed mesh of the zero level of `field` on a 3-D `lattice`, with at most `most_triangles`.
 
-    ``settings`` is the section of params.yaml in which the field's ``voxel`` is set, for errors.
+    `settings` is the section of params.yaml in which the field's `voxel` is set, for errors.
 
     Edges are collapsed by quadric error (Garland, Heckbert 1997). That may leave a mesh that is not closed; such a one
     is not taken.
 
     Raises:
-        InputError: if nothing is inside, or no closed mesh of at most ``most_triangles`` comes out.
+        InputError: if nothing is inside, or no closed mesh of at most `most_triangles` comes out.
     """
     if not (field < 0).any():
         raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and an empty map, "
                          f"expected less, or a smaller {settings}.smallest")
     whole = unsimplified(field, lattice)
     shape = Surface(*whole)
-    for haste in HASTE:
+    for aggressiveness in AGGRESSIVENESS:
         if _is_small(shape, most_triangles):
             break
-        shape = _simplified(*whole, most_triangles, haste)
+        shape = _simplified(*whole, most_triangles, aggressiveness)
     if not _is_small(shape, most_triangles):
         raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and {len(shape.faces)} "
                          f"triangles, expected a closed mesh of at most reachability.most_triangles, {most_triangles}")
@@ -64,44 +66,30 @@ def _is_small(shape: Surface, most_triangles: int) -> bool:
     return len(shape.faces) <= most_triangles and shape.is_closed()
 
 
-def _simplified(vertices: NDArray, faces: NDArray, triangles: int, haste: int) -> Surface:
-    """Edges collapsed until ``triangles`` are left, or ``haste`` allows no more."""
+def _simplified(vertices: np.ndarray, faces: np.ndarray, triangles: int, aggressiveness: int) -> Surface:
+    """Edges collapsed until `triangles` are left, or `aggressiveness` allows no more."""
     return Surface(*fast_simplification.simplify(
-        vertices.astype(np.float32), faces.astype(np.int32), target_count=triangles, agg=haste
+        vertices.astype(np.float32), faces.astype(np.int32), target_count=triangles, agg=aggressiveness
     ))  # fmt: skip
 
 
-def unsimplified(field: NDArray, lattice: Lattice) -> tuple[NDArray, NDArray]:
-    """Vertices (V, 3) in m and faces (F, 3) of the zero level of ``field``, as marching cubes leaves them."""
+def unsimplified(field: np.ndarray, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (V, 3) in m and faces (F, 3) of the zero level of `field`, as marching cubes leaves them."""
     # The border counts as outside, so that a set that leaves the lattice is closed there.
     padded = np.pad(np.asarray(field, dtype=np.float32), 1, constant_values=lattice.spacing)
     vertices, faces, _, _ = marching_cubes(padded, LEVEL * lattice.spacing, spacing=(lattice.spacing,) * 3)
     return vertices + (lattice.origin - lattice.spacing), faces
 
 
-def contains(shape: Surface, points: NDArray) -> NDArray:
-    """Whether each of ``points`` (N, 3) lies inside, by counting how often the line up from it leaves the mesh."""
-    corners = shape.vertices[shape.faces]
-    a, b, c = (corners[:, i, :2] for i in range(3))
-    area = _cross(b - a, c - a)
-    corners, a, b, c, area = (part[area != 0] for part in (corners, a, b, c, area))  # upright faces are never crossed
-    inside = np.empty(len(points), dtype=bool)
-    for start in range(0, len(points), 256):
-        here = points[start:start + 256, None, :]
-        weights = np.stack([_cross(c - b, here[..., :2] - b), _cross(a - c, here[..., :2] - c),
-                            _cross(b - a, here[..., :2] - a)], axis=-1) / area[:, None]
-        height = (weights * corners[:, :, 2]).sum(axis=-1)
-        crossed = (weights >= 0).all(axis=-1) & (height > here[..., 2])
-        inside[start:start + 256] = crossed.sum(axis=1) % 2 == 1
-    return inside
-
-
-def _cross(u: NDArray, v: NDArray) -> NDArray:
-    return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
+def contains(shape: Surface, points: np.ndarray) -> np.ndarray:
+    """Whether each of `points` (N, 3), m, lies inside."""
+    distance, _, _ = signed_distance_to_mesh(
+        np.asarray(points, float), np.asarray(shape.vertices, float), np.asarray(shape.faces, np.int32)
+    )
+    return distance < 0
 
 
 def write_obj(path: str | Path, shape: Surface, title: str) -> None:
-    """Write a Wavefront OBJ in m, to a micrometre; ``title`` goes into its first line."""
-    lines = [f"# {title}; m", *(f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in shape.vertices),
-             *(f"f {a} {b} {c}" for a, b, c in shape.faces + 1)]
-    Path(path).write_text("\n".join(lines) + "\n", encoding="ascii")
+    """Write a Wavefront OBJ in m, to a micrometre; `title` goes into its first line."""
+    text = export_obj(shape.mesh, include_normals=False, include_color=False, header=f"{title}; m", digits=6)
+    Path(path).write_text(text.rstrip() + "\n", encoding="ascii")

@@ -1,29 +1,23 @@
 """How far apart two triangle meshes are: the largest distance from a point of either to the other."""
 
 import numpy as np
-import trimesh
-from numpy.typing import NDArray
-from scipy.spatial import cKDTree
-
-CANDIDATES = 6  # triangles near a point to which its distance is worked out exactly
+from point_cloud_utils import closest_points_on_mesh
 
 
-def mesh_distance(first: tuple[NDArray, NDArray], second: tuple[NDArray, NDArray], step: float) -> float:
-    """Two-sided (Hausdorff) distance in m, from above by less than a tenth of ``step``.
+def mesh_distance(
+    first: tuple[np.ndarray, np.ndarray], second: tuple[np.ndarray, np.ndarray], step: float
+) -> float:
+    """Two-sided (Hausdorff) distance in m, from below by less than 0.6 `step`.
 
     Args:
         first, second: vertices (V, 3) in m and faces (F, 3).
         step: m, between the points of each mesh that are looked at, at most.
     """
-    sides = [surface_points(*mesh, step) for mesh in (first, second)]
-    return max(
-        _farthest(sides[0][0], *sides[1], second),
-        _farthest(sides[1][0], *sides[0], first),
-    )
+    return max(_farthest(surface_points(*first, step)[0], second), _farthest(surface_points(*second, step)[0], first))
 
 
-def surface_points(vertices: NDArray, faces: NDArray, step: float) -> tuple[NDArray, NDArray]:
-    """Points (P, 3) on every triangle, corners included, no further apart than ``step`` m, and whose they are (P,)."""
+def surface_points(vertices: np.ndarray, faces: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points (P, 3) on every triangle, corners included, no further apart than `step` m, and whose they are (P,)."""
     corners = vertices[faces]
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
     parts = np.maximum(1, np.ceil(longest / step)).astype(int)
@@ -38,18 +32,7 @@ def surface_points(vertices: NDArray, faces: NDArray, step: float) -> tuple[NDAr
     return np.concatenate(points), np.concatenate(owners)
 
 
-def _farthest(points: NDArray, near: NDArray, owners: NDArray, mesh: tuple[NDArray, NDArray]) -> float:
+def _farthest(points: np.ndarray, mesh: tuple[np.ndarray, np.ndarray]) -> float:
     vertices, faces = mesh
-    distance, index = cKDTree(near).query(points, k=CANDIDATES)
-    # The nearest sample bounds the distance from above: only points that it leaves in doubt need their triangles.
-    best = distance[:, 0]
-    doubtful = np.argsort(-best)
-    farthest = 0.0
-    for rows in np.array_split(doubtful, max(1, len(doubtful) // 4096)):
-        if best[rows[0]] <= farthest:
-            break
-        triangles = vertices[faces[owners[index[rows]]]].reshape(-1, 3, 3)
-        closest = trimesh.triangles.closest_point(triangles, np.repeat(points[rows], CANDIDATES, axis=0))
-        gap = np.linalg.norm(closest.reshape(len(rows), CANDIDATES, 3) - points[rows, None], axis=2).min(axis=1)
-        farthest = max(farthest, float(gap.max()))
-    return farthest
+    distance, _, _ = closest_points_on_mesh(points, np.asarray(vertices, float), np.asarray(faces, np.int32))
+    return float(distance.max())

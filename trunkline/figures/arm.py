@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 from matplotlib.figure import Figure
 
-from trunkline.figures.style import IDENTIFIED, INITIAL
+from trunkline.figures.style import IDENTIFIED, INITIAL, TENDON, UNIT, UNIT_EDGE
 
 
 def arm_figure(model: mujoco.MjModel) -> Figure:
@@ -18,11 +18,11 @@ def arm_figure(model: mujoco.MjModel) -> Figure:
         half = half or radius  # a ball
         x, z = data.geom_xpos[geom][[0, 2]]
         corners = np.array([[-radius, -half], [radius, -half], [radius, half], [-radius, half]])
-        side.fill(*(corners + [x, z]).T * 1000, facecolor="#f3d9bd", edgecolor="#8a5a2b", linewidth=0.6)
+        side.fill(*(corners + [x, z]).T * 1000, facecolor=UNIT, edgecolor=UNIT_EDGE, linewidth=0.6)
     for tendon in range(model.ntendon):
         path = slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
         sites = data.site_xpos[model.wrap_objid[path]]
-        side.plot(sites[:, 0] * 1000, sites[:, 2] * 1000, color="#333333", linewidth=0.8)
+        side.plot(sites[:, 0] * 1000, sites[:, 2] * 1000, color=TENDON, linewidth=0.8)
     side.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Side view")
     side.grid(False)
     jointed = np.flatnonzero(model.body_jntnum)

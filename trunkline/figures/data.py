@@ -1,6 +1,7 @@
 """Pictures of the data: the quality page of a session, and what the filter did to it."""
 
 import textwrap
+from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -8,16 +9,17 @@ from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE
+from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, PARTLY, SEEN, UNSEEN, VALIDATE
 from trunkline.signals.base_frame import average_base, to_base_frame
+from trunkline.signals.runs import stretches
 from trunkline.takes.quality import Quality
+from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
 
 BIN = 1 / 30  # s, of the coverage picture
 LEAST_JITTER = 0.1  # ms, of the axis: less is none
-UNSEEN, PARTLY, SEEN = INITIAL, VALIDATE, "#d7e3ea"
-COLORS = {"static_tilt": MEASURED, "release": IDENTIFIED, "curl": VALIDATE}
+COLORS = dict(zip(EXPERIMENTS, cycle((MEASURED, IDENTIFIED, VALIDATE, INITIAL)), strict=False))
 
 
 def quality_figure(
@@ -146,7 +148,7 @@ def filter_figure(take: Take, trial: Trial) -> Figure:
         axes[1].plot(take.time, 1e3 * rest, ".", ms=2, color=color)
     for panel in axes:
         panel.axvline(trial.start, color=INITIAL, lw=1)
-        for begin, end in _stretches(~trial.measured[:, last]):
+        for begin, end in stretches(~trial.measured[:, last]):
             panel.axvspan(trial.time[begin], trial.time[end], color=INITIAL, alpha=0.15, lw=0)
     axes[0].set(
         title=f"{trial.name}, {trial.segments[last]}: measured and filtered", ylabel="position (mm)"
@@ -156,9 +158,3 @@ def filter_figure(take: Take, trial: Trial) -> Figure:
         xlabel="time (s), line: detected start, shaded: not measured", ylabel="removed (mm)", ylim=(-2, 2)
     )
     return figure
-
-
-def _stretches(flags: np.ndarray) -> list[tuple[int, int]]:
-    """First and last index of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(begin), int(end) - 1) for begin, end in zip(edges[::2], edges[1::2], strict=True)]

@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from trunkline.dataset.table import Density
-from trunkline.figures.style import IDENTIFIED, INITIAL, VALIDATE, plt
+from trunkline.figures.style import BASE, IDENTIFIED, INITIAL, VALIDATE, plt
 
 SLICE = 0.008  # m, half thickness of the slices shown
 GOAL_MM = 0.02  # median distance of the statics from MuJoCo at rest
@@ -35,7 +35,7 @@ def density_figure(densities: list[Density]) -> Figure:
         ):
             near = tips[np.abs(tips[:, 1]) < SLICE] * 1e3
             ax.scatter(near[:, 0], near[:, 2], s=2, color=color, linewidths=0)
-            ax.plot(0, 0, "k^", markersize=5)
+            ax.plot(0, 0, "^", color=BASE, markersize=5)
             ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x (mm)")
             ax.set_title(f"θ_G = {np.degrees(density.tilt):.0f}°, {label}\n{len(tips)} tips", fontsize=9)
         for tips, color, label in ((density.before, INITIAL, "before"), (density.after, IDENTIFIED, "after")):

@@ -5,13 +5,12 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED
+from trunkline.figures.style import DOUBTFUL, IDENTIFIED, INITIAL, MEASURED
 from trunkline.identification.evaluation import Replay
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Identification
 from trunkline.identification.parameters import PARAMETERS
 
-DOUBTFUL = "#999999"
 NARROWEST = 60.0  # mm, of an axis: noise shall not look like motion
 COLORS = {"CAD": INITIAL, "initial": INITIAL, "identified": IDENTIFIED}
 
@@ -23,7 +22,7 @@ def convergence_figure(identification: Identification) -> Figure:
     for axis, (phase, history) in zip(axes[0], phases.items(), strict=True):
         axis.semilogy(history.best, color=IDENTIFIED, marker="o", markersize=3, label="best")
         if history.mean != history.best:
-            axis.semilogy(history.mean, color="#999999", label="mean of a generation's trials")
+            axis.semilogy(history.mean, color=DOUBTFUL, label="mean of a generation's trials")
             axis.legend()
         axis.set(title=phase.replace("_", " "), xlabel="generation" if history.mean != history.best else "iteration")
     axes[0, 0].set_ylabel("loss")

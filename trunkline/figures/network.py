@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt
+from trunkline.figures.style import BASE, IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt
 
 SLICE = 0.016  # m, half thickness of the slices shown
 
@@ -58,7 +58,7 @@ def error_map_figure(targets: pd.DataFrame) -> Figure:
         rows = rows.sort_values("error_mm")
         dots = ax.scatter(rows["x"] * 1e3, rows["z"] * 1e3, c=np.log10(rows["error_mm"] + 1e-3), s=6, linewidths=0,
                           vmin=-1.5, vmax=1)
-        ax.plot(0, 0, "k^", markersize=5)
+        ax.plot(0, 0, "^", color=BASE, markersize=5)
         ax.set(aspect="equal", xlim=extent["x"], ylim=extent["z"], xlabel="x (mm)")
         ax.set_title(f"θ_G = {np.degrees(angle):.0f}°")
     axes[0, 0].set_ylabel("z (mm), base at the triangle")

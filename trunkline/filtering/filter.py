@@ -1,15 +1,18 @@
 """A take becomes a trial: outliers out, gaps bridged, one uniform clock, filtered, in the base frame."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
+from pydantic import Field, NonNegativeFloat, PositiveFloat
 from scipy.ndimage import binary_dilation
 
 from trunkline.errors import InputError
+from trunkline.filtering.effect import Effect
 from trunkline.frames import make_continuous, tilt_of_gravity
 from trunkline.signals.base_frame import average_base, gravity_from_up, to_base_frame
 from trunkline.signals.smoothing import bridged, fill_gaps, low_pass, outliers, resample
-from trunkline.trials.start import cycle_time, free_time, release_time
+from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
 
@@ -19,41 +22,23 @@ class Filter:
     """rate: Hz of the uniform clock. cutoff: Hz, order: of the Butterworth low-pass.
 
     longest_bridge: s, longer gaps are filled and marked as not measured.
-    deviations: see `smoothing.outliers`.
+    outlier_deviations: see `smoothing.outliers`.
     release: where a release starts: at its "onset", or once the arm is "free" and moves already, see `start`.
     """
 
-    rate: float
-    cutoff: float
-    order: int
-    longest_bridge: float
-    deviations: float
-    release: str = "onset"
+    rate: PositiveFloat
+    cutoff: PositiveFloat
+    order: Annotated[int, Field(ge=1, le=10)]
+    longest_bridge: NonNegativeFloat
+    outlier_deviations: PositiveFloat
+    release: Literal["onset", "free"]
+
+    def __post_init__(self):
+        if self.cutoff >= self.rate / 2:
+            raise ValueError(f"cutoff: found {self.cutoff} Hz, expected less than half the rate of {self.rate} Hz")
 
 
-@dataclass
-class Findings:
-    """samples: of all segments on the uniform clock. gap_share, filled_share: not trusted, filled in.
-    outliers: samples dropped.
-
-    position_noise (m), angle_noise (rad): root mean square of what the filter took away, per axis.
-    tilt: rad, measured. motion: m, how far the segments still move in a static tilt (standard deviation).
-    base_shift (m), base_turn (rad): of the mount within the trial.
-    """
-
-    samples: int
-    gap_share: float
-    filled_share: float
-    outliers: int
-    position_noise: float
-    angle_noise: float | None
-    tilt: float
-    motion: float | None
-    base_shift: float
-    base_turn: float
-
-
-def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
+def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
     """Filter one take.
 
     Quaternions are filtered by component and normalised again: they are continuous in sign, and within the
@@ -68,36 +53,15 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
     frames, count = len(grid), len(take.segments)
     width = 3 if quaternions is None else 7
     columns, measured = np.empty((frames, count, width)), np.empty((frames, count), bool)
-    filled, dropped = 0, 0
-    removed = []
+    filled, dropped, removed = 0, 0, []
     for index, name in enumerate(take.segments):
-        samples = (
-            positions[:, index]
-            if quaternions is None
-            else np.hstack([positions[:, index], quaternions[:, index]])
-        )
-        good = np.isfinite(samples).all(axis=1)
-        time, samples = take.time[good], samples[good]
-        if width == 7:
-            samples[:, 3:] = make_continuous(samples[:, 3:])
-        inliers = ~outliers(time, samples[:, :3], settings.deviations)
-        if width == 7:
-            inliers &= ~outliers(time, samples[:, 3:], settings.deviations)
-        dropped += int(np.sum(~inliers))
-        time, samples = time[inliers], samples[inliers]
-        if len(time) < 2 * settings.order:
-            raise InputError(
-                f"trial {take.name}: {name!r}: found {len(time)} good samples, expected more"
-            )
-        smooth = low_pass(resample(time, samples, grid), settings.rate, settings.cutoff, settings.order)
-        columns[:, index] = smooth
-        # the low-pass carries what fills a gap some frames beyond its edges
-        filled_in = ~bridged(time, grid, settings.longest_bridge)
-        measured[:, index] = ~binary_dilation(
-            filled_in, iterations=round(settings.rate / settings.cutoff / 2)
-        )
-        filled += int(np.sum(~bridged(time, grid, 1.5 / settings.rate)))
-        removed.append(np.mean(np.square(samples - resample(grid, smooth, time)), axis=0))
+        samples = positions[:, index]
+        if quaternions is not None:
+            samples = np.hstack([samples, quaternions[:, index]])
+        found = _segment(take.time, samples, grid, settings, f"trial {take.name}: {name!r}")
+        columns[:, index], measured[:, index] = found.columns, found.measured
+        filled, dropped = filled + found.filled, dropped + found.dropped
+        removed.append(found.removed)
     noise = np.sqrt(np.mean(removed, axis=0))
     if width == 7:
         columns[..., 3:] /= np.linalg.norm(columns[..., 3:], axis=-1, keepdims=True)
@@ -105,73 +69,78 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Findings]:
     commands, wound = _on_pose_clock(take, grid)
     gravity = gravity_from_up(base, take.up)
     trial = Trial(
-        take.name,
-        take.experiment,
-        take.split,
-        take.level,
-        gravity,
-        grid,
-        take.segments,
-        columns[..., :3],
-        None if quaternions is None else columns[..., 3:],
-        measured,
-        take.tendons,
-        commands,
-        wound,
-        0.0,
+        name=take.name,
+        experiment=take.experiment,
+        split=take.split,
+        level=take.level,
+        gravity=gravity,
+        time=grid,
+        segments=take.segments,
+        positions=columns[..., :3],
+        quaternions=None if quaternions is None else columns[..., 3:],
+        measured=measured,
+        tendons=take.tendons,
+        commands=commands,
+        tendon_positions=wound,
     )
-    motion = None
-    if take.experiment == "static_tilt":
+    kind, motion = EXPERIMENTS[take.experiment], None
+    if kind.static:
         motion = float(np.sqrt(np.mean(np.var(trial.positions, axis=0))))
         trial = average_static(trial)
-    elif take.experiment == "release":
-        trial.start = release_time(grid, trial.positions)
-        if settings.release == "free":
-            trial.start, trial.in_motion = free_time(grid, trial.positions, trial.start), True
-    else:
-        trial.start = cycle_time(grid, commands)
-    findings = Findings(
-        frames * count,
-        1 - float(measured.mean()),
-        filled / (frames * count),
-        dropped,
-        float(np.sqrt(np.mean(noise[:3] ** 2))),
+    if kind.start is not None:
+        trial.start = kind.start(trial)
+        if kind.free is not None and settings.release == "free":
+            trial.start, trial.in_motion = kind.free(trial, trial.start), True
+    effect = Effect(
+        samples=frames * count,
+        gap_share=1 - float(measured.mean()),
+        filled_share=filled / (frames * count),
+        outliers=dropped,
+        position_noise=float(np.sqrt(np.mean(noise[:3] ** 2))),
         # half an angle is in the vector part; of its square mean, four components see what three axes bring
-        None if width == 3 else float(2 * np.sqrt(np.sum(noise[3:] ** 2) / 3)),
-        tilt_of_gravity(gravity),
-        motion,
-        base.shift,
-        base.turn,
+        angle_noise=None if width == 3 else float(2 * np.sqrt(np.sum(noise[3:] ** 2) / 3)),
+        tilt=tilt_of_gravity(gravity),
+        motion=motion,
+        base_shift=base.shift,
+        base_turn=base.turn,
     )
-    return trial, findings
+    return trial, effect
 
 
-def summary(trials: list[Trial], findings: list[Findings]) -> dict:
-    """The filtered session in a few numbers, for metrics.json. Shares are of all samples."""
-    static, moving = {}, {}
-    for trial, found in zip(trials, findings, strict=True):
-        if trial.experiment == "static_tilt":
-            static[trial.name] = {
-                "level_deg": trial.level,
-                "tilt_deg": float(np.degrees(found.tilt)),
-                "motion_mm": 1e3 * found.motion,
-            }
-        else:
-            moving[trial.name] = {"start_s": trial.start, "duration_s": float(trial.time[-1])}
-    angles = [found.angle_noise for found in findings if found.angle_noise is not None]
-    weights = [found.samples for found in findings]
-    return {
-        "trials": len(trials),
-        "outliers": sum(found.outliers for found in findings),
-        "gap_share": float(np.average([found.gap_share for found in findings], weights=weights)),
-        "filled_share": float(np.average([found.filled_share for found in findings], weights=weights)),
-        "removed_position_mm": 1e3 * float(np.median([found.position_noise for found in findings])),
-        "removed_orientation_deg": float(np.degrees(np.median(angles))) if angles else None,
-        "base_shift_mm": 1e3 * max(found.base_shift for found in findings),
-        "base_turn_deg": float(np.degrees(max(found.base_turn for found in findings))),
-        "static": static,
-        "moving": moving,
-    }
+class _Segment(NamedTuple):
+    """columns (G, C), filtered, and measured (G,), where they may be trusted. filled, dropped: samples on the uniform
+    clock between others that are further apart, and outliers. removed: mean square of what the filter took. (C,)."""
+
+    columns: np.ndarray
+    measured: np.ndarray
+    filled: int
+    dropped: int
+    removed: np.ndarray
+
+
+def _segment(time: np.ndarray, samples: np.ndarray, grid: np.ndarray, settings: Filter, where: str) -> _Segment:
+    """Filter one segment's samples (T, 3) or (T, 7), position and quaternion, NaN where unseen, onto `grid` (G,)."""
+    oriented = samples.shape[1] == 7
+    good = np.isfinite(samples).all(axis=1)
+    time, samples = time[good], samples[good]
+    if oriented:
+        samples[:, 3:] = make_continuous(samples[:, 3:])
+    inliers = ~outliers(time, samples[:, :3], settings.outlier_deviations)
+    if oriented:
+        inliers &= ~outliers(time, samples[:, 3:], settings.outlier_deviations)
+    time, samples = time[inliers], samples[inliers]
+    if len(time) < 2 * settings.order:
+        raise InputError(f"{where}: found {len(time)} good samples, expected more")
+    smooth = low_pass(resample(time, samples, grid), settings.rate, settings.cutoff, settings.order)
+    # the low-pass carries what fills a gap some frames beyond its edges
+    reach = round(settings.rate / settings.cutoff / 2)
+    return _Segment(
+        columns=smooth,
+        measured=~binary_dilation(~bridged(time, grid, settings.longest_bridge), iterations=reach),
+        filled=int(np.sum(~bridged(time, grid, 1.5 / settings.rate))),
+        dropped=int(np.sum(~inliers)),
+        removed=np.mean(np.square(samples - resample(grid, smooth, time)), axis=0),
+    )
 
 
 def average_static(trial: Trial) -> Trial:
@@ -182,21 +151,14 @@ def average_static(trial: Trial) -> Trial:
     if quaternions is not None:
         quaternions = np.einsum("ts,tsi->si", weight, quaternions)[None]
         quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
-    return Trial(
-        trial.name,
-        trial.experiment,
-        trial.split,
-        trial.level,
-        trial.gravity,
-        trial.time[:1],
-        trial.segments,
-        positions,
-        quaternions,
-        trial.measured.any(axis=0)[None],
-        trial.tendons,
-        trial.commands.mean(axis=0, keepdims=True),
-        trial.tendon_positions.mean(axis=0, keepdims=True),
-        0.0,
+    return replace(
+        trial,
+        time=trial.time[:1],
+        positions=positions,
+        quaternions=quaternions,
+        measured=trial.measured.any(axis=0)[None],
+        commands=trial.commands.mean(axis=0, keepdims=True),
+        tendon_positions=trial.tendon_positions.mean(axis=0, keepdims=True),
     )
 
 

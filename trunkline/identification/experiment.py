@@ -7,6 +7,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.identification.pose_fit import PoseFit, fit_pose
+from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial
 
 SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend takes up
@@ -68,7 +69,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         InputError: if a tracked segment or a commanded tendon is not in the model, or too little was measured.
     """
     check_names(trial, model)
-    static = trial.experiment == "static_tilt"
+    static = is_static(trial.experiment)
     step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 else 0.0
     held, seen = start_frames(trial)
     window = slice(0, 1) if static else slice(held + 1, held + 1 + frames)
@@ -99,7 +100,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
 
 def start_frames(trial: Trial) -> tuple[int, int]:
     """The last frame that is not compared, the arm being still held then, and the one of the pose to start from."""
-    static = trial.experiment == "static_tilt"
+    static = is_static(trial.experiment)
     held = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
     seen = _seen_frame(trial, held if trial.in_motion else max(held - QUIET_FRAMES, 0))
     return (seen if trial.in_motion else held), seen  # of an arm in motion, pose and velocity hold in that frame

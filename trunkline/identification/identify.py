@@ -1,9 +1,11 @@
 """One function for the three stages: they differ in their experiments and in their parameters."""
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import mujoco
 import numpy as np
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from trunkline.identification.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.experiment import Experiment
@@ -26,26 +28,38 @@ BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least 
 
 
 @dataclass
+class Rough:
+    """A coarser look: a time step `step_factor` times the model's own, over the first `frames` of `trials` trials."""
+
+    step_factor: Annotated[float, Field(ge=1, le=4)]
+    frames: PositiveInt
+    trials: PositiveInt
+
+
+@dataclass
+class Polish:
+    """Least squares on whole trials at the model's own step."""
+
+    iterations: PositiveInt
+    tolerance: PositiveFloat
+
+
+@dataclass
 class Method:
     """How a stage searches.
 
-    optimizer: of the scalars, roughly: with a time step `rough_step_factor` times the model's own, over the first
-        `rough_frames` of `rough_trials` trials.
-    polish_iterations, polish_tolerance: of the least squares that follows, on whole trials at the model's own step.
+    optimizer: of the scalars, roughly. polish: of them, after it.
     fine: optimizer of the factors of every joint, within `per_joint_range` of 1. per_joint_deviation: by how much
         joints are expected to scatter around 1, standard deviation; infinite for no such prior.
     """
 
     optimizer: Optimizer
-    rough_step_factor: float
-    rough_frames: int
-    rough_trials: int
-    polish_iterations: int
-    polish_tolerance: float
+    rough: Rough
+    polish: Polish
     fine: Optimizer
-    per_joint_range: float
-    seed: int
-    per_joint_deviation: float = np.inf
+    per_joint_range: Annotated[float, Field(gt=0, lt=1)]
+    per_joint_deviation: PositiveFloat
+    seed: NonNegativeInt
 
 
 @dataclass
@@ -109,10 +123,10 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     """
     method, parameters, per_joint, rest = fit.method, fit.parameters, fit.per_joint, fit.rest
     seen = [e for e in experiments if e.split == "identify"]
-    short = [e.shortened(method.rough_frames) for e in _few(seen, method.rough_trials)]
-    rough, exact = fit.problem(model, short, method.rough_step_factor), fit.problem(model, seen)
+    short = [e.shortened(method.rough.frames) for e in _few(seen, method.rough.trials)]
+    rough, exact = fit.problem(model, short, method.rough.step_factor), fit.problem(model, seen)
     searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}
-    searches["polish"] = found = _polish(exact, searches["coarse"].vector, method, f"{label} polish")
+    searches["polish"] = found = _polish(exact, searches["coarse"].vector, method.polish, f"{label} polish")
     values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
@@ -167,10 +181,10 @@ def _search(problem: Problem, optimizer: Optimizer, seed: int, label: str) -> Fo
         return search(problem, optimizer, seed, lambda best: bar.update(1, best_loss=best, **problem.effort()))
 
 
-def _polish(problem: Problem, start: np.ndarray, method: Method, label: str) -> Found:
-    with progress(method.polish_iterations, label, "iterations") as bar:
+def _polish(problem: Problem, start: np.ndarray, polish: Polish, label: str) -> Found:
+    with progress(polish.iterations, label, "iterations") as bar:
         return descend(
-            problem, start, method.polish_iterations, method.polish_tolerance,
+            problem, start, polish.iterations, polish.tolerance,
             lambda best: bar.update(1, best_loss=best, **problem.effort()),
         )  # fmt: skip
 

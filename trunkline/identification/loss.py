@@ -5,8 +5,10 @@ positions in the base frame, all in metres. `measured` (T, S) is False where the
 """
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
+from pydantic import NonNegativeFloat, PositiveFloat
 
 
 @dataclass
@@ -18,12 +20,12 @@ class LossWeights:
     weight_position, weight_velocity: w_pos and w_vel.
     """
 
-    delta_position: float
-    delta_velocity: float
-    epsilon: float
-    epsilon_velocity: float
-    weight_position: float
-    weight_velocity: float
+    delta_position: PositiveFloat
+    delta_velocity: PositiveFloat
+    epsilon: PositiveFloat
+    epsilon_velocity: PositiveFloat
+    weight_position: NonNegativeFloat
+    weight_velocity: NonNegativeFloat
 
 
 def huber(residual: np.ndarray, delta: float) -> np.ndarray:
@@ -73,6 +75,13 @@ def position_residuals(
 
 
 RESIDUALS = {"distances": distance_residuals, "positions": position_residuals}
+
+
+@dataclass(kw_only=True)
+class Loss(LossWeights):
+    """Which loss, and its numbers."""
+
+    kind: Literal[tuple(RESIDUALS)]
 
 
 def loss_of(residuals: np.ndarray) -> np.ndarray:

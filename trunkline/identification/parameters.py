@@ -185,28 +185,3 @@ def set_fields(model: mujoco.MjModel, fields: Fields, candidate: int = 0) -> Non
     """Write one candidate's fields into `model`."""
     for name, values in fields.items():
         getattr(model, name)[:] = values[candidate].reshape(getattr(model, name).shape)
-
-
-def save_model(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
-    """MJCF of `spec` with the identifiable fields of `model`, which was compiled from it."""
-    for joint in spec.joints:
-        index = model.joint(joint.name).id
-        dof = model.jnt_dofadr[index]
-        joint.stiffness = [model.jnt_stiffness[index], *model.jnt_stiffnesspoly[index]]
-        joint.damping = [model.dof_damping[dof], *model.dof_dampingpoly[dof]]
-        joint.frictionloss = model.dof_frictionloss[dof]
-        joint.springref = model.qpos_spring[model.jnt_qposadr[index]]
-    spec.body("base").quat = model.body("base").quat
-    for site in spec.sites:
-        site.pos = model.site(site.name).pos
-    for tendon in spec.tendons:
-        index = model.tendon(tendon.name).id
-        tendon.frictionloss = model.tendon_frictionloss[index]
-        tendon.solref_friction = model.tendon_solref_fri[index]
-    for actuator in spec.actuators:
-        index = model.actuator(actuator.name).id
-        actuator.gainprm[:] = model.actuator_gainprm[index]
-        actuator.biasprm[:] = model.actuator_biasprm[index]
-        actuator.dynprm[:] = model.actuator_dynprm[index]
-        actuator.forcerange = model.actuator_forcerange[index]
-    return spec.to_xml()

@@ -11,6 +11,7 @@ from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
 from trunkline.simulation.rest import longest_step
 from trunkline.threads import thread_count
+from trunkline.trials.experiments import is_static
 
 RELAXATION = 0.4  # s, damping over stiffness while a static shape settles: quick, without swinging
 SETTLE_CHUNK = 0.2  # s between looks at whether a shape rests
@@ -45,10 +46,10 @@ class Population:
     ):
         self._model = model
         self._segments = segments
-        self._static = [i for i, e in enumerate(experiments) if e.kind == "static_tilt"]
+        self._static = [i for i, e in enumerate(experiments) if is_static(e.kind)]
         # longest first, so that those still running are a prefix of each candidate's trials
         self._dynamic = sorted(
-            (i for i, e in enumerate(experiments) if e.kind != "static_tilt"), key=lambda i: -experiments[i].frames
+            (i for i, e in enumerate(experiments) if not is_static(e.kind)), key=lambda i: -experiments[i].frames
         )
         self._experiments = experiments
         self._step_factor = step_factor

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from mujoco import minimize
 
 from trunkline.frames import rotation_from_wxyz
 
@@ -11,8 +12,9 @@ POSITION_SIGMA = 0.5e-3  # m, what a tracked position is trusted to
 ROTATION_SIGMA = np.radians(1.0)  # what a tracked orientation is trusted to, axis misalignment included
 BEND_CHANGE_SIGMA = np.radians(6.0)  # how much neighbouring joints differ in a smooth bend
 LIMIT_GIVE = 1.5  # a limit is soft: units give when they are pressed on each other
-COST_TOLERANCE = 1e-4  # relative decrease of the cost at convergence
-STEP_TOLERANCE = 1e-5  # rad, largest change of an angle at convergence
+UNLIMITED = 2 * np.pi  # rad, of hinges without limits
+STEP_TOLERANCE = 1e-5  # relative step at convergence
+GRADIENT_TOLERANCE = 1e-3  # of the cost in units of sigma², with columns of unit length
 
 
 @dataclass
@@ -20,7 +22,7 @@ class PoseFit:
     """Joint angles of one frame.
 
     qpos: rad, shape (nq,). residuals: distance of each segment from its measurement, m, shape (S,).
-    iterations: Gauss-Newton steps. converged: whether the last one was below the tolerance.
+    iterations: of the last descent, on all segments. converged: whether it ended before they ran out.
     """
 
     qpos: np.ndarray
@@ -94,9 +96,9 @@ def fit_pose(
     segments: tuple[str, ...],
     positions: np.ndarray,
     quaternions: np.ndarray | None = None,
-    max_iterations: int = 100,
+    max_iterations: int = 300,
 ) -> PoseFit:
-    """Least squares over the residuals of a `PoseProblem`, whose arguments these are."""
+    """Least squares over the residuals of a `PoseProblem`, whose arguments these are, by `mujoco.minimize`."""
     problem = PoseProblem(model, segments, positions, quaternions)
     seen, hinges = problem.seen, problem.hinges
     qpos = np.zeros(model.nq)
@@ -105,44 +107,49 @@ def fit_pose(
     for known in range(1, len(seen) + 1):
         free = model.jnt_bodyid <= model.site_bodyid[problem.sites[seen[known - 1]]]
         first = int(free.sum())
-        fit = _gauss_newton(problem, qpos, seen[:known], free, max_iterations)
+        fit = _descend(problem, qpos, seen[:known], free, max_iterations)
         qpos = fit.qpos
         if 0 < first < model.nq:
             qpos[first:] = np.resize(qpos[first - hinges : first], model.nq - first)
     return fit
 
 
-def _gauss_newton(problem: PoseProblem, qpos, seen, free, max_iterations: int) -> PoseFit:
-    """Levenberg-Marquardt over the hinges `free` (nv,), against the segments `seen`, from `qpos`."""
-    model, data = problem.model, problem.data
-    lower, upper = model.jnt_range.T * LIMIT_GIVE
-    damping = 1e-3
-    jacobian, residual = problem.linearise(qpos, seen)
-    cost = float(residual @ residual)
-    iteration, settled = 0, False
-    while not settled and iteration < max_iterations:
-        iteration += 1
-        jacobian = jacobian[:, free]
-        normal = jacobian.T @ jacobian
-        normal += damping * np.diag(np.diag(normal))
-        trial = qpos.copy()
-        trial[free] += np.linalg.solve(normal, -jacobian.T @ residual)
-        trial = np.where(model.jnt_limited, np.clip(trial, lower, upper), trial)
-        change = np.abs(trial - qpos).max()
-        trial_jacobian, trial_residual = problem.linearise(trial, seen)
-        trial_cost = float(trial_residual @ trial_residual)
-        settled = change < STEP_TOLERANCE or abs(cost - trial_cost) < COST_TOLERANCE * cost
-        if trial_cost <= cost:
-            qpos, cost, residual = trial, trial_cost, trial_residual
-            damping = max(damping / 5, 1e-9)
-            jacobian = trial_jacobian
-        else:
-            damping *= 8
-            jacobian, _ = problem.linearise(qpos, seen)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
-    offsets = np.linalg.norm(data.site_xpos[problem.sites] - problem.positions, axis=1)
-    return PoseFit(qpos, offsets, iteration, bool(settled))
+def _descend(
+    problem: PoseProblem, qpos: np.ndarray, seen: np.ndarray, free: np.ndarray, max_iterations: int
+) -> PoseFit:
+    """Least squares over the hinges `free` (nv,), against the segments `seen`, from `qpos`, within the limits' give."""
+    model = problem.model
+    known: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+
+    def linear(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Jacobian and residuals at some angles; MuJoCo asks for both at each iterate."""
+        key = angles.tobytes()
+        if key not in known:
+            while len(known) > 1:  # the iterate and the step tried from it
+                known.pop(next(iter(known)))
+            pose = qpos.copy()
+            pose[free] = angles
+            known[key] = problem.linearise(pose, seen)
+        return known[key]
+
+    lower, upper = np.where(model.jnt_limited, model.jnt_range.T * LIMIT_GIVE, [[-UNLIMITED], [UNLIMITED]])
+    angles, steps = minimize.least_squares(
+        qpos[free],
+        lambda columns: np.stack([linear(column)[1] for column in columns.T], axis=1),
+        [lower[free], upper[free]],
+        lambda column, _: linear(column[:, 0])[0][:, free],
+        xtol=STEP_TOLERANCE,
+        gtol=GRADIENT_TOLERANCE,
+        max_iter=max_iterations,
+        x_scale="jac",
+        verbose=minimize.Verbosity.SILENT,
+    )
+    qpos = qpos.copy()
+    qpos[free] = angles
+    problem.data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, problem.data)
+    offsets = np.linalg.norm(problem.data.site_xpos[problem.sites] - problem.positions, axis=1)
+    return PoseFit(qpos, offsets, len(steps), len(steps) < max_iterations)
 
 
 def _rotation_vector(matrix: np.ndarray) -> np.ndarray:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from pydantic import FiniteFloat
 
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
@@ -19,8 +20,12 @@ DIVERGED_LOSS = 1e3  # finite, and with sensible weights far above the loss of a
 class Bounds:
     """Range of a parameter in its own unit, low < high."""
 
-    low: float
-    high: float
+    low: FiniteFloat
+    high: FiniteFloat
+
+    def __post_init__(self):
+        if self.low >= self.high:
+            raise ValueError(f"low: found {self.low}, expected less than high, {self.high}")
 
 
 @dataclass

@@ -4,15 +4,17 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from scipy.optimize import newton
 
 from trunkline.errors import InputError
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
 from trunkline.identification.pose_fit import fit_pose
+from trunkline.trials.experiments import EXPERIMENTS
 
 LAST = 0.5  # s at the end of a release in which it has to be at rest
 SAME_GRAVITY = 0.5  # m/s², 3° of tilt
-NEWTON_STEPS = 30  # far more than a stiffening spring needs
+BEND_TOLERANCE = 1e-12  # rad, of a joint's bend under its load
 STILL = 2e-3  # m, of every coordinate's range in that time
 
 
@@ -41,15 +43,20 @@ def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) ->
     """Joint angles q_0 at which each candidate's springs are slack, so that it rests in `rest`. Shape (C, nq).
 
     The torque of a spring is -(a x + b x² + c x³), x = q - q_0. At rest it balances the load, which bends it by x:
-    the stiffer the arm, the less of its shape comes from gravity. Fields that `fields` lacks are the model's.
+    the stiffer the arm, the less of its shape comes from gravity. Fields that `fields` lacks are the model's. NaN where
+    no bend balances the load.
     """
     a = fields.get("jnt_stiffness", model.jnt_stiffness[None])
     poly = fields.get("jnt_stiffnesspoly", model.jnt_stiffnesspoly[None])
-    b, c = poly[..., 0], poly[..., 1]
-    bend = rest.load / a
-    for _ in range(NEWTON_STEPS):
-        bend = bend - (bend * (a + bend * (b + bend * c)) - rest.load) / (a + bend * (2 * b + 3 * bend * c))
-    return rest.pose - bend
+    a, b, c, load = np.broadcast_arrays(a, poly[..., 0], poly[..., 1], rest.load)
+    bend, settled, _ = newton(
+        lambda x: x * (a + x * (b + x * c)) - load,
+        load / a,
+        lambda x: a + x * (2 * b + 3 * x * c),
+        tol=BEND_TOLERANCE,
+        full_output=True,
+    )
+    return rest.pose - np.where(settled, bend, np.nan)
 
 
 def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...]) -> RestShape:
@@ -60,7 +67,7 @@ def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], segments
     """
     shapes, gravities = [], []
     for experiment in experiments:
-        if experiment.kind != "release" or experiment.split != "identify":
+        if not EXPERIMENTS[experiment.kind].hangs or experiment.split != "identify":
             continue
         last = slice(-max(round(LAST / experiment.frame_step), 1), None)
         positions = np.where(experiment.measured[last, :, None], experiment.positions[last], np.nan)

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Annotated, Literal
 
 import numpy as np
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 from scipy.optimize import differential_evolution, least_squares
 from scipy.stats import qmc
 
@@ -26,10 +28,11 @@ class LeastSquares:
     most. tolerance: relative decrease of the loss at the end.
     """
 
-    starts: int
-    descents: int
-    iterations: int
-    tolerance: float
+    starts: NonNegativeInt
+    descents: PositiveInt
+    iterations: PositiveInt
+    tolerance: PositiveFloat
+    method: Literal["least_squares"] = "least_squares"
 
     def steps(self) -> int:
         return self.descents * self.iterations
@@ -43,16 +46,17 @@ class DifferentialEvolution:
     generations: at most. tolerance: standard deviation of the losses over their mean at the end.
     """
 
-    population: int
-    population_per_parameter: int
-    generations: int
-    tolerance: float
+    population: Annotated[int, Field(ge=5)]
+    population_per_parameter: NonNegativeInt
+    generations: PositiveInt
+    tolerance: PositiveFloat
+    method: Literal["differential_evolution"] = "differential_evolution"
 
     def steps(self) -> int:
         return self.generations
 
 
-Optimizer = LeastSquares | DifferentialEvolution
+Optimizer = Annotated[LeastSquares | DifferentialEvolution, Field(discriminator="method")]
 
 
 @dataclass

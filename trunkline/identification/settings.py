@@ -1,91 +1,36 @@
-"""Settings that the three identification stages share, and what they make of them."""
+"""What the three identification stages are set by: the method, and what is fitted to which trials."""
 
 from typing import Annotated, Literal
 
-from pydantic import Field, FiniteFloat, NonNegativeFloat, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import Field, NonNegativeInt, PositiveInt
 
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.identify import Method
+from trunkline.identification.loss import Loss
+from trunkline.identification.parameters import PARAMETERS, PER_JOINT_FIELDS
+from trunkline.identification.problem import Bounds
 from trunkline.settings import settings
+from trunkline.trials.experiments import ExperimentName
 
-ParameterName = Literal[
-    "stiffness", "hardening", "joint_friction", "damping", "tendon_friction", "friction_time",
-    "kp", "kv", "force_range", "time_constant", "mount_tilt_x", "mount_tilt_y", "mount_twist",
-]  # fmt: skip
+Experiments = Annotated[list[ExperimentName], Field(min_length=1)]
 
 
 @settings
-class Range:
-    low: FiniteFloat
-    high: FiniteFloat
+class IdentificationSettings(Method):
+    """See conf/identify_*/config.yaml. A stage's Config: a method of search and what it is for.
 
-    def __post_init__(self):
-        if self.low >= self.high:
-            raise ValueError(f"low: found {self.low}, expected less than high, {self.high}")
+    frames: compared of each trial, at most. command_delay: s from a logged command to the motor.
+    experiments: to fit. reported: to score, those and others.
+    """
 
-
-@settings
-class Loss:
-    kind: Literal["distances", "positions"]
-    delta_position: PositiveFloat
-    delta_velocity: PositiveFloat
-    epsilon: PositiveFloat
-    epsilon_velocity: PositiveFloat
-    weight_position: NonNegativeFloat
-    weight_velocity: NonNegativeFloat
-
-
-@settings
-class LeastSquaresSettings:
-    method: Literal["least_squares"]
-    starts: NonNegativeInt
-    descents: PositiveInt
-    iterations: PositiveInt
-    tolerance: PositiveFloat
-
-
-@settings
-class DifferentialEvolutionSettings:
-    method: Literal["differential_evolution"]
-    population: int = Field(ge=5)
-    population_per_parameter: NonNegativeInt
-    generations: PositiveInt
-    tolerance: PositiveFloat
-
-
-Optimizer = Annotated[LeastSquaresSettings | DifferentialEvolutionSettings, Field(discriminator="method")]
-
-
-@settings
-class RoughSettings:
-    step_factor: float = Field(ge=1, le=4)
     frames: PositiveInt
-    trials: PositiveInt
-
-
-@settings
-class PolishSettings:
-    iterations: PositiveInt
-    tolerance: PositiveFloat
-
-
-@settings
-class IdentificationSettings:
-    seed: NonNegativeInt
-    frames: PositiveInt
-    command_delay: float = Field(ge=0, le=1)
-    experiments: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
-    reported: list[Literal["static_tilt", "release", "curl"]] = Field(min_length=1)
+    command_delay: Annotated[float, Field(ge=0, le=1)]
+    experiments: Experiments
+    reported: Experiments
     rest_shape: Literal["unchanged", "measured"]
     markers: Literal["unchanged", "measured"]
     loss: Loss
-    parameters: dict[ParameterName, Range] = Field(min_length=1)
-    optimizer: Optimizer
-    rough: RoughSettings
-    polish: PolishSettings
-    per_joint: list[Literal["stiffness", "damping"]]
-    per_joint_range: float = Field(gt=0, lt=1)
-    per_joint_deviation: PositiveFloat
-    fine: Optimizer
+    parameters: Annotated[dict[Literal[tuple(PARAMETERS)], Bounds], Field(min_length=1)]
+    per_joint: list[Literal[tuple(PER_JOINT_FIELDS)]]
     cross_validation_folds: NonNegativeInt
 
     def __post_init__(self):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
+from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
 
 from trunkline.errors import InputError
 from trunkline.ik.network import InverseKinematics
@@ -23,11 +24,11 @@ class Training:
     """Attributes: width: of the hidden layers; epochs; batch: samples; learning_rate: the largest, after a warm-up,
     from which a cosine takes it to a thousandth; seed: of weights and shuffling."""
 
-    width: int
-    epochs: int
-    batch: int
-    learning_rate: float
-    seed: int
+    width: PositiveInt
+    epochs: PositiveInt
+    batch: PositiveInt
+    learning_rate: PositiveFloat
+    seed: NonNegativeInt
 
 
 def train(

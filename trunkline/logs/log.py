@@ -5,28 +5,13 @@ data section's. An intact log gives what `mcap.reader.make_reader` gives. From a
 chunks and the readable beginning of a last chunk that was cut off; what is lost is counted and said.
 """
 
-import hashlib
-import struct
-import zlib
-from collections.abc import Iterator
 from dataclasses import dataclass, field
-from io import BytesIO
 from pathlib import Path
 
-import lz4.frame
 import numpy as np
-import zstandard
-from mcap.data_stream import ReadDataStream
-from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, DataEnd, Schema, Statistics
 
 from trunkline.errors import InputError
-
-MAGIC = b"\x89MCAP0\r\n"
-RECORD_HEADER = struct.Struct("<BQ")
-MESSAGE_HEADER = struct.Struct("<HIQQ")
-CHUNK_HEADER = struct.Struct("<QQQI")
-LARGEST_EXPANSION = 1000  # of a chunk's bytes by decompression; poses shrink by less than 20
+from trunkline.logs.records import MAGIC, Contents, read_all, read_cut_chunk
 
 
 @dataclass
@@ -51,17 +36,6 @@ class Log:
     damage: list[str] = field(default_factory=list)
 
 
-@dataclass
-class _Contents:
-    """What was read so far: messages are (channel id, log time in ns, data)."""
-
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-    messages: list[tuple[int, int, bytes]] = field(default_factory=list)
-    expected: int | None = None  # messages, by the log's own statistics
-    chunks: set[bytes] = field(default_factory=set)  # digests of those read
-
-
 def read_log(path: Path) -> Log:
     """Read a log, salvaging what can be trusted.
 
@@ -74,10 +48,10 @@ def read_log(path: Path) -> Log:
         raise InputError(f"{path}: {error.strerror.lower()}, expected an MCAP log") from error
     if not data.startswith(MAGIC):
         raise InputError(f"{path}: found no MCAP file ({len(data)} bytes), expected an MCAP log")
-    contents, damage = _Contents(), []
-    end = _read_all(data, contents, damage, path)
+    contents, damage = Contents(), []
+    end = read_all(data, contents, damage, path)
     if end is not None:
-        damage.append(f"cut off at byte {len(data)}" + _read_cut_chunk(data[end:], contents))
+        damage.append(f"cut off at byte {len(data)}" + read_cut_chunk(data[end:], contents))
     if contents.expected is not None and contents.expected > len(contents.messages):
         lost = contents.expected - len(contents.messages)
         damage.append(f"{lost} of {contents.expected} messages lost")
@@ -90,112 +64,7 @@ def read_log(path: Path) -> Log:
     return Log(Path(path), topics, damage)
 
 
-def _read_all(data: bytes, contents: _Contents, damage: list[str], path: Path) -> int | None:
-    """Read record by record up to the footer; without one, the byte behind the last whole record."""
-    end, unchunked = len(MAGIC), False
-    for position, opcode, body in _records(data, len(MAGIC)):
-        end = position + RECORD_HEADER.size + len(body)
-        try:
-            if opcode == Opcode.FOOTER and data[end:] == MAGIC:
-                return None
-            if opcode == Opcode.CHUNK:
-                digest = hashlib.sha256(body).digest()
-                if digest in contents.chunks:
-                    raise ValueError("it is there twice")
-                _read_records(_chunk_data(body), contents)
-                contents.chunks.add(digest)
-            elif opcode == Opcode.DATA_END:
-                crc = DataEnd.read(_stream(body)).data_section_crc
-                if crc and crc != zlib.crc32(data[:position]):
-                    if unchunked:
-                        found = "wrong checksum over messages outside chunks"
-                        raise InputError(f"{path}: {found}, none can be trusted")
-                    if not damage:
-                        damage.append("the data section's checksum is wrong though every chunk's is right")
-            elif opcode == Opcode.STATISTICS:
-                contents.expected = Statistics.read(_stream(body)).message_count
-            else:
-                unchunked |= opcode == Opcode.MESSAGE
-                _read_record(opcode, body, contents)
-        except InputError:
-            raise
-        except Exception as error:  # a damaged record fails in any way; it is dropped, and that is said
-            name = f"{_record_name(opcode)} of {len(body)} bytes{_chunk_span(opcode, body)}"
-            damage.append(f"{name} dropped: {_reason(error)}")
-    return end
-
-
-def _records(data: bytes, position: int) -> Iterator[tuple[int, int, bytes]]:
-    """(offset, opcode, body) of each record that is wholly there."""
-    while position + RECORD_HEADER.size <= len(data):
-        opcode, length = RECORD_HEADER.unpack_from(data, position)
-        start = position + RECORD_HEADER.size
-        if start + length > len(data):
-            return
-        yield position, opcode, data[start : start + length]
-        position = start + length
-
-
-def _read_records(data: bytes, contents: _Contents) -> None:
-    for _, opcode, body in _records(data, 0):
-        _read_record(opcode, body, contents)
-
-
-def _read_record(opcode: int, body: bytes, contents: _Contents) -> None:
-    if opcode == Opcode.MESSAGE:
-        channel, _, log_time, _ = MESSAGE_HEADER.unpack_from(body)
-        contents.messages.append((channel, log_time, body[MESSAGE_HEADER.size :]))
-    elif opcode == Opcode.SCHEMA:
-        schema = Schema.read(_stream(body))
-        if contents.schemas.setdefault(schema.id, schema) != schema:
-            raise ValueError(f"schema {schema.id} is described before, and differently")
-    elif opcode == Opcode.CHANNEL:
-        channel = Channel.read(_stream(body))
-        if contents.channels.setdefault(channel.id, channel) != channel:
-            raise ValueError(f"channel {channel.id} is described before, and differently")
-
-
-def _chunk_data(body: bytes) -> bytes:
-    """The records in a chunk, checked. Raises ValueError where they are not what was written."""
-    chunk = Chunk.read(_stream(body))
-    data = _decompress(chunk.compression, chunk.data, chunk.uncompressed_size)
-    if len(data) != chunk.uncompressed_size:
-        raise ValueError(f"{len(data)} bytes, expected {chunk.uncompressed_size}")
-    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
-        raise ValueError("wrong checksum")
-    return data
-
-
-def _decompress(compression: str, data: bytes, size: int) -> bytes:
-    """At most `size` + 1 bytes, so that a damaged chunk takes no more memory than an intact one."""
-    if compression == "":
-        return data
-    if size > LARGEST_EXPANSION * len(data):
-        raise ValueError(f"{len(data)} bytes said to expand to {size}")
-    if compression == "zstd":
-        return zstandard.ZstdDecompressor().stream_reader(data).read(size + 1)
-    if compression == "lz4":
-        return lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=size + 1)
-    raise ValueError(f"unknown compression {compression!r}")
-
-
-def _read_cut_chunk(rest: bytes, contents: _Contents) -> str:
-    """Read the beginning of a last chunk that was cut off; a remark on what came of it."""
-    if rest[:1] != bytes([Opcode.CHUNK]):
-        return ""
-    before, body = len(contents.messages), rest[RECORD_HEADER.size :]
-    try:
-        (name_length,) = struct.unpack_from("<I", body, CHUNK_HEADER.size)
-        start = CHUNK_HEADER.size + 4 + name_length
-        compression, data = body[start - name_length : start].decode(), body[start + 8 :]
-        size = min(CHUNK_HEADER.unpack_from(body)[2], LARGEST_EXPANSION * len(data))
-        _read_records(_decompress(compression, data, size), contents)
-    except Exception:  # what a cut does to a compressed stream is not specified
-        pass
-    return f", {len(contents.messages) - before} messages of the chunk that was cut are readable"
-
-
-def _by_topic(contents: _Contents, damage: list[str]) -> dict[str, Topic]:
+def _by_topic(contents: Contents, damage: list[str]) -> dict[str, Topic]:
     """Messages by topic, of all its channels: a recorder opens one for each publisher.
 
     A topic has one schema and encoding, those of most of its messages; others are left out, and that is said.
@@ -221,25 +90,3 @@ def _by_topic(contents: _Contents, damage: list[str]) -> dict[str, Topic]:
         messages = [rows[i][1] for i in order]
         topics[name] = Topic(name, schema, schema_encoding, definition, encoding, messages, times[order])
     return topics
-
-
-def _stream(body: bytes) -> ReadDataStream:
-    return ReadDataStream(BytesIO(body))
-
-
-def _record_name(opcode: int) -> str:
-    try:
-        return Opcode(opcode).name.lower().replace("_", " ")
-    except ValueError:
-        return f"record of kind {opcode}"
-
-
-def _chunk_span(opcode: int, body: bytes) -> str:
-    if opcode != Opcode.CHUNK or len(body) < CHUNK_HEADER.size:
-        return ""
-    start, end, _, _ = CHUNK_HEADER.unpack_from(body)
-    return f" ({abs(end - start) / 1e9:.2f} s)"
-
-
-def _reason(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__

@@ -39,6 +39,8 @@ class Joints(NamedTuple):
 POSES: dict[str, Callable[..., Poses]] = {}
 JOINTS: dict[str, Callable[..., Joints]] = {}
 TOPIC_PER_BODY: set[str] = set()  # schemas of one pose, which the topic names
+# what a reader raises where a message is not as expected
+READING = (AttributeError, TypeError, ValueError, IndexError, OverflowError)
 
 
 def poses(*schemas: str, topic_per_body: bool = False):

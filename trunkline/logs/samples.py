@@ -62,3 +62,12 @@ class Samples(NamedTuple):
             frame[sample] = place
             taken[place].add(who)
         return frame, np.array(first, int)
+
+
+def union(batches: list[tuple[np.ndarray, list[str]]]) -> tuple[str, ...]:
+    """All names, in the order of their first appearance: by row, then by place."""
+    first = {}
+    for rows, names in batches:
+        for place, name in enumerate(names):
+            first[name] = min(first.get(name, (rows[0], place)), (rows[0], place))
+    return tuple(sorted(first, key=first.get))

@@ -1,15 +1,14 @@
 """Self-collision of the Panda, with the capsules that its maker publishes.
 
-Source: ``franka_description/robots/panda_arm.xacro`` in franka_ros (self-collision capsules) and the pairs
+Source: `franka_description/robots/panda_arm.xacro` in franka_ros (self-collision capsules) and the pairs
 that the maker's MoveIt configuration does not rule out. Two simplifications keep the map round about joint 1:
 the base's capsule, which points backwards, is swept to a sphere that covers it, and the plug beside the
 flange is left out, since joint 7 turns it out of the way without moving the mount.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from trunkline.panda.kinematics import FLANGE, Frame, joint_frames
+from trunkline.panda.kinematics import FLANGE, JointFrame, joint_frames
 
 # link: capsules as (end, end, radius) in m, in the frame of the joint that moves the link (0: base).
 CAPSULES = {
@@ -25,7 +24,7 @@ MOUNT_RADIUS = 0.04  # m, half the soft arm's base width; the adapter between fl
 CHUNK = 1 << 14  # poses at a time, so that the arrays stay in the processor's cache
 
 
-def clearance(q: NDArray, mount_offset: float = 0.0) -> NDArray:
+def clearance(q: np.ndarray, mount_offset: float = 0.0) -> np.ndarray:
     """Smallest gap between links that could touch, in m; negative when they overlap.
 
     Args:
@@ -41,12 +40,12 @@ def clearance(q: NDArray, mount_offset: float = 0.0) -> NDArray:
 
 
 def link_capsules(mount_offset: float) -> dict[int, list]:
-    """``CAPSULES`` with link 7 made longer by the adapter to the mount."""
+    """`CAPSULES` with link 7 made longer by the adapter to the mount."""
     adapter = ((0.0, 0.0, -0.06), (0.0, 0.0, max(0.08, FLANGE + mount_offset - MOUNT_RADIUS)), MOUNT_RADIUS)
     return CAPSULES | {7: [adapter]}
 
 
-def _clearance(frames: list[Frame], mount_offset: float) -> NDArray:
+def _clearance(frames: list[JointFrame], mount_offset: float) -> np.ndarray:
     capsules = {
         link: [(_point(frames, link, start), _point(frames, link, end), radius) for start, end, radius in parts]
         for link, parts in link_capsules(mount_offset).items()
@@ -60,14 +59,14 @@ def _clearance(frames: list[Frame], mount_offset: float) -> NDArray:
     return gap
 
 
-def _point(frames: list[Frame], link: int, local: tuple[float, float, float]) -> NDArray:
+def _point(frames: list[JointFrame], link: int, local: tuple[float, float, float]) -> np.ndarray:
     if link == 0:
         return np.array(local)[:, None]
     x, y, z, p = frames[link - 1]
     return p + local[0] * x + local[1] * y + local[2] * z
 
 
-def segment_distance(a_start: NDArray, a_end: NDArray, b_start: NDArray, b_end: NDArray) -> NDArray:
+def segment_distance(a_start: np.ndarray, a_end: np.ndarray, b_start: np.ndarray, b_end: np.ndarray) -> np.ndarray:
     """Distance between segments a and b, ends (3, N) in m. Shape (N,).
 
     Source: Ericson, Real-Time Collision Detection, section 5.1.9.
@@ -84,5 +83,5 @@ def segment_distance(a_start: NDArray, a_end: NDArray, b_start: NDArray, b_end: 
     return np.sqrt(_dot(gap, gap))
 
 
-def _dot(a: NDArray, b: NDArray) -> NDArray:
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

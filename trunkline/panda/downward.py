@@ -11,7 +11,6 @@ and q7 is free. Every sample points there exactly; only the limits of q5 and q6 
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import qmc
 
 from trunkline.panda.collision import CHUNK, clearance
@@ -24,8 +23,8 @@ BORDER_SHARE = 0.25
 BORDER_VALUES = ((1, Q_MIN[1]), (1, Q_MAX[1]), (2, 0.0), (3, Q_MIN[3]), (3, Q_MAX[3]))  # joint index, rad
 
 
-def sample_downward(count: int, seed: int, mount_offset: float = 0.0, avoid_collisions: bool = True) -> NDArray:
-    """At least ``count`` joint vectors (M, 7), in rad, within limits, with the end effector straight down.
+def sample_downward(count: int, seed: int, mount_offset: float = 0.0, avoid_collisions: bool = True) -> np.ndarray:
+    """At least `count` joint vectors (M, 7), in rad, within limits, with the end effector straight down.
 
     Args:
         count: how many to find.
@@ -36,13 +35,13 @@ def sample_downward(count: int, seed: int, mount_offset: float = 0.0, avoid_coll
     return _sample(qmc.Sobol(6, seed=seed), count, 0.0, mount_offset, avoid_collisions)
 
 
-def sample_tilted(count: int, seed: int, tilt: float, mount_offset: float, avoid_collisions: bool) -> NDArray:
-    """As ``sample_downward``, with the end effector ``tilt`` rad off straight down, its headings uniform."""
+def sample_tilted(count: int, seed: int, tilt: float, mount_offset: float, avoid_collisions: bool) -> np.ndarray:
+    """As `sample_downward`, with the end effector `tilt` rad off straight down, its headings uniform."""
     return _sample(qmc.Sobol(7, seed=seed), count, tilt, mount_offset, avoid_collisions)
 
 
-def _sample(sequence: qmc.Sobol, count: int, tilt: float, mount_offset: float, avoid_collisions: bool) -> NDArray:
-    def solve(draws: NDArray) -> NDArray:
+def _sample(sequence: qmc.Sobol, count: int, tilt: float, mount_offset: float, avoid_collisions: bool) -> np.ndarray:
+    def solve(draws: np.ndarray) -> np.ndarray:
         poses = _solve(draws, tilt)
         return poses[clearance(poses, mount_offset) > 0.0] if avoid_collisions else poses
 
@@ -57,8 +56,8 @@ def _sample(sequence: qmc.Sobol, count: int, tilt: float, mount_offset: float, a
     return np.concatenate(found)
 
 
-def _solve(draws: NDArray, tilt: float) -> NDArray:
-    """Poses from uniform ``draws`` (N, 6 or 7): four joints, q7, which border to sit on, if any, and the heading."""
+def _solve(draws: np.ndarray, tilt: float) -> np.ndarray:
+    """Poses from uniform `draws` (N, 6 or 7): four joints, q7, which border to sit on, if any, and the heading."""
     free = [0, 1, 2, 3, 6]
     q = np.empty((len(draws), 7))
     q[:, free] = Q_MIN[free] + draws[:, :5] * (Q_MAX - Q_MIN)[free]
@@ -77,8 +76,8 @@ def _solve(draws: NDArray, tilt: float) -> NDArray:
     return poses[within_limits(poses)]
 
 
-def wrist_towards(q: NDArray, direction: NDArray) -> tuple[NDArray, NDArray]:
-    """Both solutions (q5, q6), each (2, N) in rad, that point the end effector along ``direction`` (3, N) of the base
+def wrist_towards(q: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both solutions (q5, q6), each (2, N) in rad, that point the end effector along `direction` (3, N) of the base
     frame, of unit length, given q1..q4 (N, 4)."""
     frame = joint_frames(q)[-1]
     ux, uy, uz = ((axis * direction).sum(axis=0) for axis in frame[:3])

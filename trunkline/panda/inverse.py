@@ -4,41 +4,44 @@ Each step solves (J J^T + lambda^2 I) y = e with lambda^2 proportional to |e|^2 
 moves by J^T y and clips to the joint limits. The task error e is the position error and either the rotation
 vector of the orientation error or, for a target that leaves the yaw free, the cross product of the pointing
 directions.
+
+Many targets at once take 0.6 ms of processor each, against mink's 21 ms; a single one takes 62 ms, three times
+mink's (`python -m benchmarks.rigid_map`). The maps ask for hundreds at once.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunkline.panda.collision import clearance
-from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, Frame, cross, jacobian, joint_frames
+from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, JointFrame, cross, jacobian, joint_frames
 
 POSITION_TOLERANCE = 1e-5  # m
 ROTATION_TOLERANCE = 1e-4  # rad
 ITERATIONS = 60  # per start; a start that needs more is rarely worth it against a fresh one
 DAMPING = 0.3  # lambda^2 per squared task error
 DAMPING_FLOOR = 1e-10
+TOGETHER = 1000  # descents at once: with fewer, calls cost more than the arithmetic in them
 LARGEST_STEP = 0.5  # rad, per joint and iteration
 
 
 class InverseResult(NamedTuple):
     """Outcome for N targets.
 
-    ``q`` (N, 7) in rad; ``position_error`` (N,) in m and ``rotation_error`` (N,) in rad of the best start;
-    ``starts`` (N,) used; ``success`` (N,): within tolerance, limits and, if asked, free of collisions.
+    `q` (N, 7) in rad; `position_error` (N,) in m and `rotation_error` (N,) in rad of the best start;
+    `starts` (N,) used; `success` (N,): within tolerance, limits and, if asked, free of collisions.
     """
 
-    q: NDArray
-    position_error: NDArray
-    rotation_error: NDArray
-    starts: NDArray
-    success: NDArray
+    q: np.ndarray
+    position_error: np.ndarray
+    rotation_error: np.ndarray
+    starts: np.ndarray
+    success: np.ndarray
 
 
 def solve(
-    positions: NDArray,
-    rotations: NDArray | None = None,
+    positions: np.ndarray,
+    rotations: np.ndarray | None = None,
     *,
     seed: int,
     starts: int,
@@ -49,7 +52,7 @@ def solve(
 
     Args:
         positions: of the mount, (N, 3) in m.
-        rotations: of the mount, (N, 3, 3); ``None``: straight down, with any yaw.
+        rotations: of the mount, (N, 3, 3); `None`: straight down, with any yaw.
         seed: of the random starts; target i meets the same starts whatever the other targets are.
         starts: most starts per target.
         mount_offset: from the flange to the mount, in m.
@@ -59,26 +62,31 @@ def solve(
     n = len(positions)
     best = InverseResult(np.tile((Q_MIN + Q_MAX) / 2, (n, 1)), np.full(n, np.inf), np.full(n, np.inf),
                          np.zeros(n, int), np.zeros(n, bool))
-    left = np.arange(n)
-    for start in range(starts):
-        if not left.size:
-            break
-        first = np.random.default_rng([seed, start]).uniform(Q_MIN, Q_MAX, size=(n, 7))[left]
-        target = None if rotations is None else rotations[left]
-        q, position_error, rotation_error = _descend(first, positions[left], target, mount_offset)
+    left, done = np.arange(n), 0
+    while left.size and done < starts:
+        # As many starts at once as there were before: at most twice as many descents as one start after the other.
+        count = min(max(1, done), max(1, TOGETHER // left.size), starts - done)
+        first = [np.random.default_rng([seed, done + k]).uniform(Q_MIN, Q_MAX, size=(n, 7))[left] for k in range(count)]
+        rows = np.tile(left, count)
+        target = None if rotations is None else rotations[rows]
+        q, position_error, rotation_error = _descend(np.concatenate(first), positions[rows], target, mount_offset)
         success = (position_error <= POSITION_TOLERANCE) & (rotation_error <= ROTATION_TOLERANCE)
         if avoid_collisions:
             success[success] = clearance(q[success], mount_offset) > 0.0
-        better = success | (position_error + rotation_error < best.position_error[left] + best.rotation_error[left])
-        at = left[better]
-        best.q[at], best.position_error[at] = q[better], position_error[better]
-        best.rotation_error[at], best.success[at] = rotation_error[better], success[better]
-        best.starts[left] += 1
-        left = left[~success]
+        for part in np.split(np.arange(len(rows)), count):  # one start each, in order: the first success counts
+            part = part[~best.success[rows[part]]]
+            best.starts[rows[part]] += 1
+            total = position_error[part] + rotation_error[part]
+            at = rows[part]
+            part = part[success[part] | (total < best.position_error[at] + best.rotation_error[at])]
+            at = rows[part]
+            best.q[at], best.position_error[at] = q[part], position_error[part]
+            best.rotation_error[at], best.success[at] = rotation_error[part], success[part]
+        left, done = left[~best.success[left]], done + count
     return best
 
 
-def _descend(q: NDArray, positions: NDArray, rotations: NDArray | None, mount_offset: float):
+def _descend(q: np.ndarray, positions: np.ndarray, rotations: np.ndarray | None, mount_offset: float):
     """One start per target: joint angles (N, 7), position errors and rotation errors (N,) at its end."""
     q = q.copy()
     joints = 7 if rotations is not None else 6  # joint 7 changes neither position nor pointing direction
@@ -103,8 +111,8 @@ def _descend(q: NDArray, positions: NDArray, rotations: NDArray | None, mount_of
     return q, position_error, rotation_error
 
 
-def _step(q: NDArray, J: NDArray, error: NDArray) -> NDArray:
-    """One damped step from ``q`` (N, n) with Jacobians (N, 6, n) and errors (N, 6), inside the limits."""
+def _step(q: np.ndarray, J: np.ndarray, error: np.ndarray) -> np.ndarray:
+    """One damped step from `q` (N, n) with Jacobians (N, 6, n) and errors (N, 6), inside the limits."""
     n = q.shape[1]
     # A joint at its limit that the error pushes outwards is left out of the step.
     gradient = np.einsum("nij,ni->nj", J, error)
@@ -117,7 +125,7 @@ def _step(q: NDArray, J: NDArray, error: NDArray) -> NDArray:
     return np.clip(q + scale[:, None] * step, Q_MIN[:n], Q_MAX[:n])
 
 
-def _rotation_error(last: Frame, rotations: NDArray | None) -> NDArray:
+def _rotation_error(last: JointFrame, rotations: np.ndarray | None) -> np.ndarray:
     """Rotation that remains, (3, N) in rad (small angles: exactly; large ones: in the right direction)."""
     if rotations is None:
         down = np.array([[0.0], [0.0], [-1.0]])
@@ -128,8 +136,8 @@ def _rotation_error(last: Frame, rotations: NDArray | None) -> NDArray:
     return _unsaturated(axis, cosine)
 
 
-def _unsaturated(axis: NDArray, cosine: NDArray) -> NDArray:
-    """``axis`` (3, N), of length sin(angle), rescaled to length angle, so that half a turn is not an end."""
+def _unsaturated(axis: np.ndarray, cosine: np.ndarray) -> np.ndarray:
+    """`axis` (3, N), of length sin(angle), rescaled to length angle, so that half a turn is not an end."""
     sine = np.sqrt((axis**2).sum(axis=0))
     angle = np.arctan2(sine, cosine)
     return axis * np.where(sine > 1e-9, angle / np.maximum(sine, 1e-9), 1.0)

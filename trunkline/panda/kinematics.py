@@ -4,15 +4,15 @@ Each joint i follows Craig's modified Denavit-Hartenberg convention,
 
     T_{i-1,i} = Rot_x(alpha_i) Trans_x(a_i) Rot_z(q_i) Trans_z(d_i),
 
-and the mount of the soft arm lies ``FLANGE + mount_offset`` along z of frame 7. Frames are kept as their
+and the mount of the soft arm lies `FLANGE + mount_offset` along z of frame 7. Frames are kept as their
 three axes and origin, each of shape (3, N) in the base frame, so that a million poses are a few array
-operations a joint.
+operations a joint: pose and clearance in 1.0 µs of processor, against 3.4 µs by `mujoco.batch` and 14 µs by
+`mj_geomDistance`, to 1e-15 m the same (`python -m benchmarks.rigid_map`).
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 # Franka Control Interface documentation, "Denavit-Hartenberg parameters" and "Joint limits" of the Panda.
 DH_A = np.array([0.0, 0.0, 0.0, 0.0825, -0.0825, 0.0, 0.088])  # m
@@ -25,29 +25,29 @@ Q_MAX = np.array([2.8973, 1.7628, 2.8973, -0.0698, 2.8973, 3.7525, 2.8973])  # r
 _COS, _SIN = np.round(np.cos(DH_ALPHA), 15), np.round(np.sin(DH_ALPHA), 15)
 
 
-class Frame(NamedTuple):
-    """N frames in the base frame: axes ``x``, ``y``, ``z`` (unitless) and origin ``p`` (m), each (3, N)."""
+class JointFrame(NamedTuple):
+    """N frames in the base frame: axes `x`, `y`, `z` (unitless) and origin `p` (m), each (3, N)."""
 
-    x: NDArray
-    y: NDArray
-    z: NDArray
-    p: NDArray
+    x: np.ndarray
+    y: np.ndarray
+    z: np.ndarray
+    p: np.ndarray
 
 
-def next_frame(previous: Frame, joint: int, q: NDArray) -> Frame:
-    """Frame after ``joint`` (0 to 6) at angles ``q`` (N,), in rad, from the frame before it."""
+def next_frame(previous: JointFrame, joint: int, q: np.ndarray) -> JointFrame:
+    """JointFrame after `joint` (0 to 6) at angles `q` (N,), in rad, from the frame before it."""
     x, y, z, p = previous
     y, z = _COS[joint] * y + _SIN[joint] * z, _COS[joint] * z - _SIN[joint] * y
     cos, sin = np.cos(q), np.sin(q)
     origin = p + DH_A[joint] * x + DH_D[joint] * z
-    return Frame(cos * x + sin * y, cos * y - sin * x, z, origin)
+    return JointFrame(cos * x + sin * y, cos * y - sin * x, z, origin)
 
 
-def joint_frames(q: NDArray) -> list[Frame]:
-    """Frames 1, 2, ... of the joints whose angles ``q`` (N, up to 7), in rad, are given."""
+def joint_frames(q: np.ndarray) -> list[JointFrame]:
+    """Frames 1, 2, ... of the joints whose angles `q` (N, up to 7), in rad, are given."""
     columns = np.ascontiguousarray(np.asarray(q, dtype=float).T)
     axes = np.eye(3)[:, :, None]
-    frame = Frame(axes[0], axes[1], axes[2], np.zeros((3, 1)))
+    frame = JointFrame(axes[0], axes[1], axes[2], np.zeros((3, 1)))
     frames = []
     for joint, angles in enumerate(columns):
         frame = next_frame(frame, joint, angles)
@@ -55,7 +55,7 @@ def joint_frames(q: NDArray) -> list[Frame]:
     return frames
 
 
-def forward(q: NDArray, mount_offset: float = 0.0) -> tuple[NDArray, NDArray]:
+def mount_pose(q: np.ndarray, mount_offset: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Pose of the mount of the soft arm.
 
     Args:
@@ -70,11 +70,11 @@ def forward(q: NDArray, mount_offset: float = 0.0) -> tuple[NDArray, NDArray]:
     return (last.p + (FLANGE + mount_offset) * last.z).T, np.stack(last[:3], axis=1).transpose(2, 0, 1)
 
 
-def jacobian(frames: list[Frame], position: NDArray) -> NDArray:
-    """Geometric Jacobian (6, n, N) of a point fixed to the last of n ``frames``: linear (m/rad), then angular.
+def jacobian(frames: list[JointFrame], position: np.ndarray) -> np.ndarray:
+    """Geometric Jacobian (6, n, N) of a point fixed to the last of n `frames`: linear (m/rad), then angular.
 
     Args:
-        frames: from ``joint_frames``.
+        frames: from `joint_frames`.
         position: the point in the base frame, (3, N), in m.
     """
     columns = []
@@ -84,11 +84,11 @@ def jacobian(frames: list[Frame], position: NDArray) -> NDArray:
     return np.stack(columns, axis=1)
 
 
-def cross(a: NDArray, b: NDArray) -> NDArray:
+def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Cross product of (3, N) columns."""
     return np.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
-def within_limits(q: NDArray, tolerance: float = 0.0) -> NDArray:
-    """Whether each of ``q`` (N, 7), in rad, keeps all joint limits to ``tolerance`` rad. Shape (N,)."""
+def within_limits(q: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
+    """Whether each of `q` (N, 7), in rad, keeps all joint limits to `tolerance` rad. Shape (N,)."""
     return ((q >= Q_MIN - tolerance) & (q <= Q_MAX + tolerance)).all(axis=1)

@@ -8,7 +8,6 @@ the same further ones, but for points that the links' lengths rule out.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunkline.errors import InputError
 from trunkline.panda.inverse import solve
@@ -25,15 +24,15 @@ class Agreement(NamedTuple):
     unreachable: int
 
 
-def draw_points(lower: NDArray, upper: NDArray, count: int, seed: int) -> NDArray:
-    """``count`` points (count, 3), uniform in a box, in m."""
+def draw_points(lower: np.ndarray, upper: np.ndarray, count: int, seed: int) -> np.ndarray:
+    """`count` points (count, 3), uniform in a box, in m."""
     return np.random.default_rng(seed).uniform(lower, upper, size=(count, 3))
 
 
-def beyond_links(points: NDArray, mount_offset: float) -> NDArray:
+def beyond_links(points: np.ndarray, mount_offset: float) -> np.ndarray:
     """Points (N,) that no joint angles can reach, by the triangle inequality alone.
 
-    Pointing down, the wrist is ``FLANGE + mount_offset`` above the mount and a_7 beside it, and no further from the
+    Pointing down, the wrist is `FLANGE + mount_offset` above the mount and a_7 beside it, and no further from the
     shoulder than both link lengths.
     """
     upper_arm, forearm = np.hypot(DH_D[2], DH_A[3]), np.hypot(DH_D[4], DH_A[4])
@@ -43,15 +42,15 @@ def beyond_links(points: NDArray, mount_offset: float) -> NDArray:
 
 
 def label(
-    points: NDArray,
+    points: np.ndarray,
     *,
     seed: int,
     starts: int,
     starts_in_doubt: int,
     mount_offset: float,
     avoid_collisions: bool,
-) -> NDArray:
-    """Whether the solver reaches each of ``points`` (N, 3) with the end effector straight down. Shape (N,).
+) -> np.ndarray:
+    """Whether the solver reaches each of `points` (N, 3) with the end effector straight down. Shape (N,).
 
     Args:
         points: in m.
@@ -71,8 +70,8 @@ def label(
     return reached
 
 
-def agreement(claimed: NDArray, reachable: NDArray) -> Agreement:
-    """Accuracy, true and false positive rates of ``claimed`` (N,) against labels ``reachable`` (N,).
+def agreement(claimed: np.ndarray, reachable: np.ndarray) -> Agreement:
+    """Accuracy, true and false positive rates of `claimed` (N,) against labels `reachable` (N,).
 
     Raises:
         InputError: if all labels are the same, so that a rate would have nothing to stand on.

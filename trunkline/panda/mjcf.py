@@ -1,6 +1,6 @@
 """The Panda as a compact MuJoCo model, for tools that want one (mink, viewers): kinematics and self-collision.
 
-Frames, limits and capsules are those of ``panda`` and ``collision``. Masses are placeholders: nothing here is
+Frames, limits and capsules are those of `kinematics` and `collision`. Masses are placeholders: nothing here is
 about dynamics.
 """
 
@@ -15,7 +15,7 @@ PLACEHOLDER_INERTIA = [1e-2, 1e-2, 1e-2]  # kg m^2
 
 
 def panda_spec(mount_offset: float) -> mujoco.MjSpec:
-    """Bodies ``link_0`` to ``link_7``, hinges ``joint_1`` to ``joint_7``, site ``mount``; contacts between links only.
+    """Bodies `link_0` to `link_7`, hinges `joint_1` to `joint_7`, site `mount`; contacts between links only.
 
     Args:
         mount_offset: from the flange to the mount along the flange's z, in m.
@@ -44,7 +44,7 @@ def panda_spec(mount_offset: float) -> mujoco.MjSpec:
 
 
 def _add_capsules(body, link: int, capsules: list) -> list[str]:
-    """Add the capsules of ``link`` to ``body``, spheres where both ends coincide; the names of the geoms."""
+    """Add the capsules of `link` to `body`, spheres where both ends coincide; the names of the geoms."""
     names = [f"link_{link}_{index + 1}" for index in range(len(capsules))]
     for name, (start, end, radius) in zip(names, capsules, strict=True):
         geom = body.add_geom(name=name, contype=0, conaffinity=0, size=[radius, 0, 0])

@@ -8,6 +8,7 @@ use it, named in config.yaml's defaults list) is chosen in params.yaml by its na
 
 import difflib
 import json
+import re
 import runpy
 from pathlib import Path
 from typing import Any, TypeVar
@@ -107,8 +108,15 @@ def group_options(folder: Path) -> dict[str, dict[str, Path]]:
 
 
 def own_or_project(root: Path, name: str) -> Path:
-    """``root / name``; the project's where ``root`` is another pipeline of the same stages."""
-    return root / name if (root / name).is_dir() else PROJECT / name
+    """``root / name``; the project's where ``root`` is another pipeline of the same stages.
+
+    Raises:
+        InputError: neither is there, as where the library is installed without its repository.
+    """
+    for folder in (root / name, PROJECT / name):
+        if folder.is_dir():
+            return folder
+    raise InputError(f"{root / name}: no such folder, expected a checkout of Trunkline")
 
 
 def _read_section(path: Path, stage: str) -> dict[str, Any]:
@@ -197,7 +205,16 @@ def _describe(problem: Any, adapter: TypeAdapter) -> str:
     expected = problem["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     if problem["type"] == "value_error":  # a rule between fields, in the schema's own words
         return expected
-    return f"found {problem['input']!r}, expected {expected}"
+    found = problem["input"]
+    if problem["type"] == "union_tag_not_found":  # which of several classes: a key of theirs says it
+        return f"{problem['ctx']['discriminator']}: missing, expected a value".replace("'", "", 2)
+    if problem["type"] == "union_tag_invalid":
+        key, found = problem["ctx"]["discriminator"].strip("'"), problem["ctx"]["tag"]
+        expected = f"one of {problem['ctx']['expected_tags']}"
+        valid = re.findall(r"'([^']*)'", expected)
+        return f"{key}: found {found!r}, expected {expected}" + _nearest(found, valid)
+    valid = re.findall(r"'([^']*)'", expected) if problem["type"] == "literal_error" else []
+    return f"found {found!r}, expected {expected}" + _nearest(str(found), valid)
 
 
 def _nearest(found: str, valid: list[str]) -> str:

@@ -7,24 +7,25 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from trunkline.errors import InputError
+from trunkline.errors import InputError, existing
 from trunkline.figures import identification as plots
 from trunkline.figures.style import save_figure
 from trunkline.identification import curves
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import Replay, replay, scores
 from trunkline.identification.experiment import Experiment, prepare
-from trunkline.identification.identify import Fit, Identification, Method, identify, with_parameters
-from trunkline.identification.loss import LossWeights, internal_error
+from trunkline.identification.identify import Fit, Identification, identify, with_parameters
+from trunkline.identification.loss import internal_error
 from trunkline.identification.markers import with_measured_markers
 from trunkline.identification.parameter_table import parameter_table, undetermined
-from trunkline.identification.parameters import PARAMETERS, save_model
+from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Bounds
 from trunkline.identification.resting import resting_shape
-from trunkline.identification.search import DifferentialEvolution, LeastSquares, Optimizer
+from trunkline.identification.saving import save_model
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.pipeline.inputs import existing, read_spec
+from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial, read_trials
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
@@ -45,7 +46,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     model, experiments, fit = set_up(config, read_reported(config), model)
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)
-    if "stiffness" in fit.parameters and "static_tilt" not in config.experiments:
+    if "stiffness" in fit.parameters and not any(map(is_static, config.experiments)):
         print(f"{stage}: without static tilts, stiffness comes from the shape at rest and the ring-down of releases")
     result = identify(stage, model, fitted, fit)
     identified = save_model(spec, result.models["identified"])
@@ -205,33 +206,8 @@ def read_reported(config: IdentificationSettings) -> list[Trial]:
 def fit_of(config: IdentificationSettings, segments: tuple[str, ...]) -> Fit:
     """What a stage's settings ask for, with the shape at rest that the model has."""
     return Fit(
-        segments=segments,
-        parameters={name: Bounds(r.low, r.high) for name, r in config.parameters.items()},
-        per_joint=tuple(config.per_joint),
-        loss=config.loss.kind,
-        weights=LossWeights(**{key: value for key, value in vars(config.loss).items() if key != "kind"}),
-        method=_method(config),
+        segments, config.parameters, tuple(config.per_joint), config.loss.kind, weights=config.loss, method=config
     )
-
-
-def _method(config: IdentificationSettings) -> Method:
-    return Method(
-        optimizer=_optimizer(config.optimizer),
-        rough_step_factor=config.rough.step_factor,
-        rough_frames=config.rough.frames,
-        rough_trials=config.rough.trials,
-        polish_iterations=config.polish.iterations,
-        polish_tolerance=config.polish.tolerance,
-        fine=_optimizer(config.fine),
-        per_joint_range=config.per_joint_range,
-        per_joint_deviation=config.per_joint_deviation,
-        seed=config.seed,
-    )
-
-
-def _optimizer(config) -> Optimizer:
-    kind = {"least_squares": LeastSquares, "differential_evolution": DifferentialEvolution}[config.method]
-    return kind(**{key: value for key, value in vars(config).items() if key != "method"})
 
 
 def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:

@@ -4,18 +4,7 @@ from pathlib import Path
 
 import mujoco
 
-from trunkline.errors import InputError
-
-
-def existing(path: str | Path) -> Path:
-    """`path`, which an earlier stage wrote.
-
-    Raises:
-        InputError: there is no such file.
-    """
-    if not Path(path).is_file():
-        raise InputError(f"{path}: no such file, expected what an earlier stage writes (run `dvc repro`)")
-    return Path(path)
+from trunkline.errors import InputError, existing
 
 
 def read_spec(path: str | Path) -> mujoco.MjSpec:

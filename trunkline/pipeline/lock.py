@@ -1,4 +1,4 @@
-"""``python -m trunkline.pipeline.lock``: does dvc.lock belong to this code, params.yaml and metrics?
+"""``python -m trunkline.pipeline.lock``: does dvc.lock belong to this code, params.yaml, libraries and metrics?
 
 Works in a fresh clone, without data or cache. DVC compares commands, parameters and every file that is there;
 files that only the cache holds are compared through the lock: what a stage read must be what another wrote.
@@ -10,13 +10,17 @@ from pathlib import Path
 
 from dvc.repo import Repo
 
+from trunkline.errors import in_one_line
+from trunkline.pipeline.checkout import require_checkout
+from trunkline.pipeline.versions import installed_otherwise
+
 ABSENT = ("deleted", "not in cache")  # DVC's words for a file that a clone without the cache lacks
 
 
 def mismatches(root: Path) -> list[str]:
     """One line per way in which the lock files disagree with the working tree or with themselves."""
     with Repo(str(root)) as repo:
-        return [*_unlocked(repo), *_changed(repo), *_inconsistent(repo)]
+        return [*_unlocked(repo), *_changed(repo), *_inconsistent(repo), *installed_otherwise(root)]
 
 
 def _unlocked(repo: Repo) -> list[str]:
@@ -68,7 +72,9 @@ def _path(entry) -> Path:
     return Path(entry.fs_path).relative_to(entry.repo.root_dir)
 
 
+@in_one_line
 def main(root: Path = Path(".")) -> int:
+    require_checkout(root)
     problems = mismatches(root)
     for problem in problems:
         print(f"lock: FAIL {problem}")

@@ -1,6 +1,6 @@
-"""``python -m trunkline.pipeline.readme``: regenerate the READMEs' graph, tables of results and pictures.
+"""`python -m trunkline.pipeline.readme`: write the graph, the tables of results and the pictures anew.
 
-Generated blocks stand between ``<!-- name -->`` and ``<!-- /name -->``.
+Generated blocks stand between `<!-- name -->` and `<!-- /name -->`.
 """
 
 import json
@@ -12,7 +12,10 @@ from pathlib import Path
 import networkx
 from dvc.repo import Repo
 
+from trunkline.errors import in_one_line
+from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.gate import Limit, Limits, lookup, read_limits
+from trunkline.pipeline.lab_table import lab_table
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
 PICTURES = {
@@ -22,22 +25,23 @@ PICTURES = {
 }
 EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README and of its own README
 
-# E_internal of the paper's arm before and after, over 437 frames
+# E_internal of the paper's arm before and after identification, over 437 frames: its section "Parameter Identification"
 PAPER = {"cad": "89.8 mm (17 %)", "identified": "15.8 mm (3 %)"}
+MODELS = {"cad": "CAD", "coarse": "coarse: one scalar each", "identified": "identified: with factors"}
 
-# stage: [(what it is, dotted key in metrics.json, unit)]
+# stage: [(what it is, dotted key in metrics.json, unit)]; trials are of the split `validate`
 RESULTS = {
     "identify_stiffness": [
-        ("Static shapes, held-out tilts: E_internal", "identified.validate.e_internal_mm", "mm"),
+        ("Static tilts: E_internal", "identified.validate.e_internal_mm", "mm"),
         ("… mean position error", "identified.validate.e_position_mm", "mm"),
     ],
     "identify_damping": [
-        ("Held-out releases: E_internal", "identified.validate.e_internal_mm", "mm"),
+        ("Releases: E_internal", "identified.validate.e_internal_mm", "mm"),
         ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
         ("… mean position error", "identified.validate.e_position_mm", "mm"),
     ],
     "identify_control": [
-        ("Held-out releases and curls: E_internal", "identified.validate.e_internal_mm", "mm"),
+        ("Releases and curls: E_internal", "identified.validate.e_internal_mm", "mm"),
         ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
         ("… mean position error", "identified.validate.e_position_mm", "mm"),
         ("… E_internal of the CAD model", "cad.validate.e_internal_mm", "mm"),
@@ -48,33 +52,33 @@ RESULTS = {
         ("… largest", "mujoco_deviation_mm.max", "mm"),
     ],
     "train_ik": [
-        ("Tip error of the IK network after FK: median", "position_error_mm.median", "mm"),
+        ("Tip error of the network after FK, held-out samples: median", "position_error_mm.median", "mm"),
         ("… 95th percentile", "position_error_mm.p95", "mm"),
     ],
     "reachability": [
-        ("Rigid map: accuracy against independent IK", "rigid.accuracy", ""),
-        ("Soft maps: smallest overlap at angles left out", "soft.heldout_iou_min", ""),
+        ("Rigid map: share of points on which independent IK agrees", "rigid.accuracy", ""),
+        ("Soft maps: smallest overlap half-way between their angles", "soft.heldout_iou_min", ""),
     ],
     "package_unity": [
         ("Rules of the Unity importer broken", "rule_violations", ""),
-        ("Bundled model against the calibrated one: largest deviation", "roundtrip_max_deviation_mm", "mm"),
+        ("Packed model against the calibrated one: largest deviation", "roundtrip_max_deviation_mm", "mm"),
     ],
 }
 
 
 EXAMPLE_RESULTS = {
     "identify_damping": [
-        ("Held-out releases: mean position error", "identified.validate.e_position_mm", "mm"),
+        ("Releases of `validate`: mean position error", "identified.validate.e_position_mm", "mm"),
         ("… of the arm's length", "identified.validate.e_position_pct", "%"),
         ("… E_internal", "identified.validate.e_internal_mm", "mm"),
         ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
-        ("Releases to identify from: mean position error", "identified.identify.e_position_mm", "mm"),
+        ("Releases of `identify`: mean position error", "identified.identify.e_position_mm", "mm"),
     ],
 }
 
 
 def pipeline_graph(root: Path) -> str:
-    """The stages of dvc.yaml as a mermaid flowchart; edges that follow from others are left out."""
+    """The stages of dvc.yaml as a mermaid flowchart and a table; edges that follow from others are left out."""
     with Repo(str(root)) as repo:
         stages = {s.addressing: s for s in repo.index.stages if not s.addressing.startswith("examples/")}
         edges = [(above.addressing, stage.addressing) for stage, above in repo.index.graph.edges]
@@ -84,10 +88,12 @@ def pipeline_graph(root: Path) -> str:
     reduced = networkx.transitive_reduction(graph)
     order = list(networkx.lexicographical_topological_sort(reduced, key=list(stages).index))
     names = {address: address.removesuffix(".yaml").rpartition(":")[2] for address in order}
-    lines = ["```mermaid", "flowchart TD"]
-    lines += [f'    {names[a]}["<b>{names[a]}</b><br/>{stages[a].desc}"]' for a in order]
+    lines = ["```mermaid", "flowchart LR"]
+    lines += [f"    {names[a]}" for a in order if not reduced.degree(a)]
     lines += [f"    {names[a]} --> {names[b]}" for a in order for b in order if reduced.has_edge(a, b)]
-    return "\n".join([*lines, "```"])
+    lines += ["```", "", "| stage | what it does |", "|---|---|"]
+    lines += [f"| `{names[a]}` | {stages[a].desc} |" for a in order]
+    return "\n".join(lines)
 
 
 def results_table(root: Path, results: dict[str, list[tuple[str, str, str]]], limits: Limits) -> str:
@@ -103,14 +109,15 @@ def results_table(root: Path, results: dict[str, list[tuple[str, str, str]]], li
 
 
 def identification_table(root: Path) -> str:
-    """E_internal and mean position error of releases and curls, from the CAD model to the identified one."""
+    """E_internal and mean position error over releases and curls, of the models CAD, coarse and identified."""
     path = root / "artifacts" / "identify_control" / "metrics.json"
     metrics = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
     lines = [
-        "| model | E_internal, identify | validate | position error, identify | validate | E_internal, paper |",
+        "| model | E_internal, identify | E_internal, validate | position error, identify "
+        "| position error, validate | E_internal, paper's arm |",
         "|---|---:|---:|---:|---:|---:|",
     ]
-    for model, words in (("cad", "CAD"), ("coarse", "one scalar each"), ("identified", "and per-joint factors")):
+    for model, words in MODELS.items():
         cells = []
         for error in ("e_internal", "e_position"):
             for split in ("identify", "validate"):
@@ -138,10 +145,10 @@ def _number(value: float | None) -> str:
 
 
 def with_blocks(text: str, blocks: dict[str, str]) -> str:
-    """``text`` with the content of each named block replaced.
+    """`text` with the content of each named block replaced.
 
     Raises:
-        ValueError: if ``text`` has no such block.
+        ValueError: if `text` has no such block.
     """
     for name, content in blocks.items():
         block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
@@ -152,7 +159,7 @@ def with_blocks(text: str, blocks: dict[str, str]) -> str:
 
 
 def generate(root: Path) -> dict[Path, str]:
-    """README.md and the examples' own, with their generated blocks as they should be."""
+    """README.md, the examples' own and the page on intervals, with their generated blocks as they should be."""
     examples = {}
     for name in EXAMPLES:
         folder = root / "examples" / name
@@ -161,10 +168,14 @@ def generate(root: Path) -> dict[Path, str]:
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
     blocks = {root / "README.md": own | examples}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
+    blocks[root / "docs" / "results" / "intervals.md"] = {"lab": lab_table(root)}
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}
 
 
+@in_one_line
 def main(root: Path = Path(".")) -> int:
+    """Write what `generate` says, and the pictures."""
+    require_checkout(root)
     for path, text in generate(root).items():
         path.write_text(text, encoding="utf-8")
     copy_pictures(root)

@@ -5,7 +5,8 @@ import sys
 from pathlib import Path
 
 from trunkline.errors import in_one_line
-from trunkline.pipeline.config import check_settings, own_or_project
+from trunkline.pipeline.checkout import require_checkout
+from trunkline.pipeline.config import PROJECT, check_settings, own_or_project
 
 
 def check_once(root: Path = Path(".")) -> None:
@@ -22,6 +23,7 @@ def check_once(root: Path = Path(".")) -> None:
         return
     conf, stages = own_or_project(root, "conf"), own_or_project(root, "stages")
     files = [root / "params.yaml", root / "dvc.yaml", *conf.glob("**/*.yaml"), *stages.glob("*.py")]
+    files += (PROJECT / "trunkline").glob("**/*.py")  # what stages nest in their settings, and its ranges
     digest = hashlib.sha256()
     for file in sorted(file for file in files if file.is_file()):
         digest.update(str(file).encode() + b"\0" + file.read_bytes() + b"\0")
@@ -35,6 +37,7 @@ def check_once(root: Path = Path(".")) -> None:
 
 @in_one_line
 def main() -> int:
+    require_checkout(Path("."))
     stages = check_settings()
     print(f"settings: {len(stages)} stages checked")
     return 0

@@ -10,6 +10,7 @@ from trunkline.logs.messages import TOPIC_PER_BODY
 from trunkline.preparation.survey import Survey
 from trunkline.signals.clock import MIN_TRAVEL
 from trunkline.signals.units import likely_unit
+from trunkline.trials.experiments import EXPERIMENTS, PULL, TILT
 
 BASE_NAMES = ("base", "mount", "root", "origin")
 RESTING = 5e-3  # m; a trial whose every body stays within this, but for its worst hundredth, is at rest
@@ -93,20 +94,22 @@ def _topics(survey: Survey) -> list[str]:
 
 def _experiment(survey: Survey, base: str | None, up: np.ndarray, scale: float) -> tuple[str, float | None]:
     """(experiment, level) by the file's name, or else by what moves."""
-    words = re.match(r"(?:.*_)?(static|tilt|release|curl)", survey.log.path.stem.lower())
+    names = {word: name for name, kind in EXPERIMENTS.items() for word in kind.words}
+    word = re.match(rf"(?:.*_)?({'|'.join(names)})", survey.log.path.stem.lower())
     wound = survey.tendon_positions or survey.commands
     pull = 0.0 if wound is None or not wound.positions.size else float(np.nanmax(np.ptp(wound.positions, axis=0)))
     positions = survey.poses.positions
     travel = np.nanpercentile(np.abs(positions - np.nanmedian(positions, axis=0)), 99) * scale
-    if words:
-        experiment = {"release": "release", "curl": "curl"}.get(words[1], "static_tilt")
-    elif pull > MIN_TRAVEL:
-        experiment = "curl"
+    if word:
+        experiment = names[word[1]]
     else:
-        experiment = "static_tilt" if travel < RESTING else "release"
-    if experiment == "curl":
+        pulled = pull > MIN_TRAVEL
+        seen = (pulled, not pulled and travel < RESTING)
+        experiment = next(name for name, kind in EXPERIMENTS.items() if (kind.needs_motors, kind.static) == seen)
+    level = EXPERIMENTS[experiment].level
+    if level is PULL:
         return experiment, round(1e3 * pull)
-    return experiment, _tilt(survey, base, up) if experiment == "static_tilt" else None
+    return experiment, _tilt(survey, base, up) if level is TILT else None
 
 
 def _tilt(survey: Survey, base: str | None, up: np.ndarray) -> float:

@@ -7,9 +7,10 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.logs.cdr import short_name
+from trunkline.logs.joint_stream import JointStream, joint_stream
 from trunkline.logs.log import Log, Topic, read_log
 from trunkline.logs.messages import JOINTS, POSES
-from trunkline.logs.streams import JointStream, PoseStream, joint_stream, pose_stream
+from trunkline.logs.pose_stream import PoseStream, pose_stream
 from trunkline.sessions.source import COMMAND_WORDS, POSITION_WORDS, choose, pose_topics, static_topics
 
 GAP = 1.5  # median intervals between frames that make a gap

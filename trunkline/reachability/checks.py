@@ -3,15 +3,16 @@
 import functools
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
+from pydantic import Field, PositiveInt
 
 from trunkline.fields.grid import Lattice
 from trunkline.fields.mesh import Surface, contains, unsimplified
 from trunkline.fields.mesh_distance import mesh_distance
 from trunkline.panda.labels import Agreement, agreement, draw_points, label
-from trunkline.reachability.hybrid_check import Reach, draw_inside_and_outside, find_poses, verified
+from trunkline.reachability.hybrid_check import Poses, draw_inside_and_outside, find_poses, verified
 from trunkline.reachability.maps import Map, Maps, angle_name
 from trunkline.reachability.reach_signal import HeldOut, held_out, packed
 from trunkline.reachability.tilted import find_tilted
@@ -23,34 +24,34 @@ from trunkline.statics.chain import Chain
 class LabelSettings:
     """See conf/reachability/config.yaml; margin in m."""
 
-    count: int
-    starts: int
-    starts_in_doubt: int
-    margin: float
+    count: Annotated[int, Field(ge=100, le=1_000_000)]
+    starts: PositiveInt
+    starts_in_doubt: PositiveInt
+    margin: Annotated[float, Field(gt=0, le=1)]
 
 
 @dataclass(frozen=True)
 class SpotCheckSettings:
     """See conf/reachability/config.yaml; outside in m."""
 
-    count: int
-    outside: float
+    count: Annotated[int, Field(ge=1, le=10_000)]
+    outside: Annotated[float, Field(gt=0, le=0.2)]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Check:
     """How good the maps are.
 
-    ``rigid``: agreement of the rigid mesh (``claimed``, (N,)) with labels (``reachable``, (N,)) at ``points``
-    (N, 3). ``heldout``: the soft maps half-way between their angles. ``found``: by name of each hybrid map, the shares
-    of points inside it and a little outside it for which a pose of both arms was found and verified. ``moved``: by name
+    `rigid`: agreement of the rigid mesh (`claimed`, (N,)) with labels (`reachable`, (N,)) at `points`
+    (N, 3). `heldout`: the soft maps half-way between their angles. `found`: by name of each hybrid map, the shares
+    of points inside it and a little outside it for which a pose of both arms was found and verified. `moved`: by name
     of each map (the soft ones together), how far simplification moved the surface at most, in voxels.
     """
 
     rigid: Agreement
-    points: NDArray
-    claimed: NDArray
-    reachable: NDArray
+    points: np.ndarray
+    claimed: np.ndarray
+    reachable: np.ndarray
     heldout: list[HeldOut]
     found: dict[str, tuple[float, float]]
     moved: dict[str, float]
@@ -66,7 +67,7 @@ def check_maps(
     seed: int,
     done: Callable[[str], None],
 ) -> Check:
-    """Check all maps. ``done`` hears of each check, of the soft one once per angle.
+    """Check all maps. `done` hears of each check, of the soft one once per angle.
 
     Args:
         chain: of the soft arm, by which lengths lead to tips. tips_at: its tips at any gravity angle.
@@ -113,7 +114,7 @@ def check_hybrid(
     """By hybrid map, shares of points inside and outside to which both arms together bring the soft tip."""
     how = {"seed": seed, "mount_offset": maps.mount_offset, "avoid_collisions": maps.self_collision}
 
-    def shares(one: Map, tips: Tips, find: Callable[[NDArray], Reach]) -> tuple[float, float]:
+    def shares(one: Map, tips: Tips, find: Callable[[np.ndarray], Poses]) -> tuple[float, float]:
         sets = draw_inside_and_outside(one.field, one.lattice, spot_check.outside, spot_check.count, seed)
         return tuple(float(verified(p, find(p), tips.lengths, chain, maps.mount_offset).mean()) for p in sets)
 
@@ -128,7 +129,7 @@ def check_hybrid(
     return found
 
 
-def moved_voxels(mesh: Surface, field: NDArray, lattice: Lattice) -> float:
-    """How far simplification moved the surface of ``field`` at most, in lattice steps."""
+def moved_voxels(mesh: Surface, field: np.ndarray, lattice: Lattice) -> float:
+    """How far simplification moved the surface of `field` at most, in lattice steps."""
     whole = unsimplified(field, lattice)
     return mesh_distance((mesh.vertices, mesh.faces), whole, 0.5 * lattice.spacing) / lattice.spacing

@@ -11,7 +11,6 @@ few offsets t give the distance field of H near its surface, finer than the latt
 """
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import fft, ndimage
 
 from trunkline.fields.grid import Lattice, redistance, without_specks
@@ -22,8 +21,8 @@ NEAR = 0.2  # lattice steps
 OFFSETS = np.array([1.0, 0.5, 0.0, -0.5, -1.0])  # t in lattice steps, from the widest set to the narrowest
 
 
-def swept_cells(tips: NDArray, spacing: float) -> tuple[NDArray, Lattice]:
-    """Cells of a lattice of ``spacing`` (m) through the origin that ``tips`` (N, 3) pass when turned about z."""
+def swept_cells(tips: np.ndarray, spacing: float) -> tuple[np.ndarray, Lattice]:
+    """Cells of a lattice of `spacing` (m) through the origin that `tips` (N, 3) pass when turned about z."""
     radius, height = np.hypot(tips[:, 0], tips[:, 1]), tips[:, 2]
     reach = radius.max()
     # Once per cell of the half-plane, a quarter of the spacing wide: tips that share one pass the same cells.
@@ -39,13 +38,13 @@ def swept_cells(tips: NDArray, spacing: float) -> tuple[NDArray, Lattice]:
 
 
 def minkowski_field(
-    field: NDArray, lattice: Lattice, cells: NDArray, cells_lattice: Lattice, smoothing: float, smallest: int
-) -> tuple[NDArray, Lattice]:
-    """Signed distance field of (inside of ``field``) + ``cells``, exact near its surface to the lattice of ``cells``.
+    field: np.ndarray, lattice: Lattice, cells: np.ndarray, cells_lattice: Lattice, smoothing: float, smallest: int
+) -> tuple[np.ndarray, Lattice]:
+    """Signed distance field of (inside of `field`) + `cells`, exact near its surface to the lattice of `cells`.
 
     Args:
-        field: signed distance in m on ``lattice``, at least 1.5 ``cells_lattice.spacing`` wide outside.
-        cells: the set to add, on ``cells_lattice``, whose spacing and phase the result has.
+        field: signed distance in m on `lattice`, at least 1.5 `cells_lattice.spacing` wide outside.
+        cells: the set to add, on `cells_lattice`, whose spacing and phase the result has.
         smoothing: standard deviation of a Gaussian over the field, in lattice steps.
         smallest: islands and cavities of fewer cells vanish.
     """

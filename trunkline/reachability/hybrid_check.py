@@ -8,15 +8,14 @@ mount must be at p = x - Rot_z(yaw) c. Pairs (c, yaw) whose p lies deepest insid
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunkline.fields.grid import Lattice
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.panda.inverse import solve
-from trunkline.panda.kinematics import forward
+from trunkline.panda.kinematics import mount_pose
 from trunkline.panda.labels import beyond_links
 from trunkline.statics.chain import FORCE_ROUNDING, Chain
-from trunkline.statics.equilibria import forward as soft_forward
+from trunkline.statics.equilibria import forward
 
 COARSE_YAWS, FINE_YAWS = 24, 72
 COARSE_TIPS = 600
@@ -26,41 +25,41 @@ CLOSE = 1e-3  # m, how near its point a tip must come out when a pose is verifie
 DEEP = -0.01  # m; a pair whose mount lies this deep needs no finer search
 
 
-class Reach(NamedTuple):
+class Poses(NamedTuple):
     """How each of N points is reached.
 
-    ``found`` (N,); ``q`` (N, 7) in rad; ``tip`` (N,), index of the soft sample; ``yaw`` (N,) of the soft arm's
+    `found` (N,); `q` (N, 7) in rad; `tip` (N,), index of the soft sample; `yaw` (N,) of the soft arm's
     base in rad. Rows that are not found hold nothing of use.
     """
 
-    found: NDArray
-    q: NDArray
-    tip: NDArray
-    yaw: NDArray
+    found: np.ndarray
+    q: np.ndarray
+    tip: np.ndarray
+    yaw: np.ndarray
 
 
 def find_poses(
-    points: NDArray,
-    tips: NDArray,
-    rigid: NDArray,
+    points: np.ndarray,
+    tips: np.ndarray,
+    rigid: np.ndarray,
     lattice: Lattice,
     *,
     seed: int,
     mount_offset: float,
     avoid_collisions: bool,
-) -> Reach:
-    """Rigid pose and soft sample for each of ``points``.
+) -> Poses:
+    """Rigid pose and soft sample for each of `points`.
 
     Args:
         points: where the soft tip shall be, (N, 3) in m in the Panda's base frame.
         tips: of the soft arm at gravity angle 0, (M, 3) in m in its base frame.
-        rigid: signed distance field of the rigid map on ``lattice``, in m.
+        rigid: signed distance field of the rigid map on `lattice`, in m.
         seed: of the solver's starts and of the choice of tips for the first look.
         mount_offset: from the flange to the mount, in m.
         avoid_collisions: whether poses in which the Panda touches itself count.
     """
     few = np.random.default_rng(seed).permutation(len(tips))[:COARSE_TIPS]
-    reach = Reach(np.zeros(len(points), bool), np.zeros((len(points), 7)), np.zeros(len(points), int),
+    poses = Poses(np.zeros(len(points), bool), np.zeros((len(points), 7)), np.zeros(len(points), int),
                   np.zeros(len(points)))
     tip, yaw = np.zeros((len(points), TRIES), int), np.zeros((len(points), TRIES))
     for i, point in enumerate(points):
@@ -70,20 +69,20 @@ def find_poses(
             index, turn, depth = _deepest(point, tips, FINE_YAWS, rigid, lattice)
         tip[i], yaw[i] = index, turn
     for attempt in range(TRIES):
-        left = np.flatnonzero(~reach.found)
-        mounts, rotations = mount_pose(points[left], tips[tip[left, attempt]], yaw[left, attempt])
+        left = np.flatnonzero(~poses.found)
+        mounts, rotations = mount_for_tips(points[left], tips[tip[left, attempt]], yaw[left, attempt])
         near = ~beyond_links(mounts, mount_offset)
         left, mounts, rotations = left[near], mounts[near], rotations[near]
         result = solve(mounts, rotations, seed=seed + attempt, starts=STARTS, mount_offset=mount_offset,
                        avoid_collisions=avoid_collisions)
         at = left[result.success]
-        reach.found[at], reach.q[at] = True, result.q[result.success]
-        reach.tip[at], reach.yaw[at] = tip[at, attempt], yaw[at, attempt]
-    return reach
+        poses.found[at], poses.q[at] = True, result.q[result.success]
+        poses.tip[at], poses.yaw[at] = tip[at, attempt], yaw[at, attempt]
+    return poses
 
 
-def verified(points: NDArray, reach: Reach, lengths: NDArray, chain: Chain, mount_offset: float) -> NDArray:
-    """Whether joint angles and tendon lengths alone bring the tip to each of ``points`` (N, 3). Shape (N,).
+def verified(points: np.ndarray, poses: Poses, lengths: np.ndarray, chain: Chain, mount_offset: float) -> np.ndarray:
+    """Whether joint angles and tendon lengths alone bring the tip to each of `points` (N, 3). Shape (N,).
 
     The Panda's joint angles say where the mount is and how gravity pulls on the soft arm; the statics say where the
     tip then rests under the lengths.
@@ -92,13 +91,13 @@ def verified(points: NDArray, reach: Reach, lengths: NDArray, chain: Chain, moun
         lengths: of the soft samples, (M, K) in m.
     """
     good = np.zeros(len(points), bool)
-    rows = np.flatnonzero(reach.found)
+    rows = np.flatnonzero(poses.found)
     if not len(rows):
         return good
-    mount, rotation = forward(reach.q[rows], mount_offset)
+    mount, rotation = mount_pose(poses.q[rows], mount_offset)
     base = rotation * np.array([1.0, -1.0, -1.0])  # axes of the soft arm's base frame, in columns
     gravity = -STANDARD_GRAVITY * base[:, 2]
-    rest = soft_forward(chain, lengths[reach.tip[rows]], gravity)
+    rest = forward(chain, lengths[poses.tip[rows]], gravity)
     tip = mount + np.einsum("nij,nj->ni", base, rest.position)
     pulled = (rest.tensions <= (1 + FORCE_ROUNDING) * chain.max_tension).all(axis=1)
     good[rows] = rest.converged & pulled & (np.linalg.norm(tip - points[rows], axis=1) <= CLOSE)
@@ -106,9 +105,9 @@ def verified(points: NDArray, reach: Reach, lengths: NDArray, chain: Chain, moun
 
 
 def draw_inside_and_outside(
-    field: NDArray, lattice: Lattice, distance: float, count: int, seed: int
-) -> tuple[NDArray, NDArray]:
-    """Points uniform inside a map, and points ``distance`` m outside it (to a third more), (<= count, 3) each."""
+    field: np.ndarray, lattice: Lattice, distance: float, count: int, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points uniform inside a map, and points `distance` m outside it (to a third more), (<= count, 3) each."""
     upper = lattice.origin + lattice.spacing * (np.array(lattice.shape) - 1)
     points = np.random.default_rng(seed).uniform(lattice.origin, upper, size=(500 * count, 3))
     depth = lattice.sample(field, points)
@@ -116,8 +115,8 @@ def draw_inside_and_outside(
     return points[depth < 0][:count], points[outside][:count]
 
 
-def mount_pose(points: NDArray, tips: NDArray, yaw: NDArray) -> tuple[NDArray, NDArray]:
-    """Positions (N, 3) and rotations (N, 3, 3) of the mount that bring ``tips`` (N, 3) to ``points`` (N, 3)."""
+def mount_for_tips(points: np.ndarray, tips: np.ndarray, yaw: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (N, 3) and rotations (N, 3, 3) of the mount that bring `tips` (N, 3) to `points` (N, 3)."""
     turn = np.zeros((len(yaw), 3, 3))
     turn[:, 0, 0] = turn[:, 1, 1] = np.cos(yaw)
     turn[:, 1, 0] = np.sin(yaw)
@@ -126,7 +125,7 @@ def mount_pose(points: NDArray, tips: NDArray, yaw: NDArray) -> tuple[NDArray, N
     return points - np.einsum("nij,nj->ni", turn, tips), turn * np.array([1.0, -1.0, -1.0])
 
 
-def _deepest(point: NDArray, tips: NDArray, yaws: int, rigid: NDArray, lattice: Lattice):
+def _deepest(point: np.ndarray, tips: np.ndarray, yaws: int, rigid: np.ndarray, lattice: Lattice):
     """Tips (TRIES,), yaws and depths whose mount lies deepest in the rigid map, no tip twice, deepest first."""
     angles = 2 * np.pi * np.arange(yaws) / yaws
     cos, sin = np.cos(angles), np.sin(angles)

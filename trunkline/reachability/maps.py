@@ -2,9 +2,10 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
+from pydantic import Field, PositiveInt
 
 from trunkline.fields.grid import Lattice
 from trunkline.fields.mesh import Surface, surface
@@ -21,65 +22,74 @@ from trunkline.reachability.tips import TipSource
 class RigidSettings:
     """See conf/reachability/config.yaml; lengths in m, smoothing in lattice steps."""
 
-    mount_offset: float
+    mount_offset: Annotated[float, Field(ge=0, le=0.5)]
     self_collision: bool
-    poses: int
-    profile_voxel: float
-    voxel: float
-    closing: float
-    smoothing: float
-    smallest: int
+    poses: Annotated[int, Field(ge=1000, le=2**24)]
+    profile_voxel: Annotated[float, Field(ge=0.001, le=0.1)]
+    voxel: Annotated[float, Field(ge=0.005, le=0.1)]
+    closing: Annotated[float, Field(gt=0, le=0.2)]
+    smoothing: Annotated[float, Field(ge=0, le=5)]
+    smallest: PositiveInt
 
 
 @dataclass(frozen=True)
 class HybridSettings:
-    """See conf/reachability/config.yaml; voxel in m, smoothing in lattice steps, tilts in rad."""
+    """See conf/reachability/config.yaml; voxel in m, smoothing in lattice steps."""
 
-    voxel: float
-    smoothing: float
-    smallest: int
-    tilts: list[float]
-    tilted_poses: int
+    voxel: Annotated[float, Field(ge=0.007, le=0.1)]
+    smoothing: Annotated[float, Field(ge=0, le=5)]
+    smallest: PositiveInt
+    tilts_deg: list[float]
+    tilted_poses: Annotated[int, Field(ge=1000, le=2**22)]
+
+    def __post_init__(self) -> None:
+        if any(not 0 < tilt <= 120 for tilt in self.tilts_deg) or len(set(self.tilts_deg)) < len(self.tilts_deg):
+            raise ValueError(f"tilts_deg: found {self.tilts_deg}, expected different angles above 0, up to 120")
+
+    @property
+    def tilts(self) -> list[float]:
+        """Of the end effector off straight down, rad."""
+        return np.radians(self.tilts_deg).tolist()
 
 
-@dataclass(frozen=True)
+@dataclass
 class Map:
-    """A signed distance ``field`` (m, negative inside) on ``lattice``, and its surface."""
+    """A signed distance `field` (m, negative inside) on `lattice`, and its surface."""
 
-    field: NDArray
+    field: np.ndarray
     lattice: Lattice
     mesh: Surface
 
 
-@dataclass(frozen=True)
+@dataclass
 class TiltedMap(Map):
-    """A hybrid map with the end effector ``tilt`` rad off straight down, and the ``pairs`` that sample it."""
+    """A hybrid map with the end effector `tilt` rad off straight down, and the `pairs` that sample it."""
 
     tilt: float
     pairs: Pairs
 
 
-@dataclass(frozen=True)
+@dataclass
 class SoftMaps:
     """Soft maps on one lattice.
 
-    ``fields`` (B, X, Y, Z) at ``angles`` (B,) in rad, close enough together for linear blending, made to ``shape``;
-    ``meshes`` at ``mesh_angles`` (A,), those that were sampled.
+    `fields` (B, X, Y, Z) at `angles` (B,) in rad, close enough together for linear blending, made to `shape`;
+    `meshes` at `mesh_angles` (A,), those that were sampled.
     """
 
-    angles: NDArray
-    fields: NDArray
+    angles: np.ndarray
+    fields: np.ndarray
     lattice: Lattice
     shape: SoftShape
-    mesh_angles: NDArray
+    mesh_angles: np.ndarray
     meshes: list[Surface]
 
-    def at(self, angle: float) -> NDArray:
-        """The field at the nearest of ``angles``."""
+    def at(self, angle: float) -> np.ndarray:
+        """The field at the nearest of `angles`."""
         return self.fields[np.abs(self.angles - angle).argmin()]
 
 
-@dataclass(frozen=True)
+@dataclass
 class Maps:
     """Rigid and hybrid maps in the Panda's base frame, soft maps in the soft arm's, and how they were made."""
 
@@ -90,8 +100,8 @@ class Maps:
     mount_offset: float
     self_collision: bool
 
-    def arrays(self) -> dict[str, NDArray]:
-        """Grids by name (float16, m), each with ``<name>_origin`` and ``<name>_spacing``; soft ones share theirs."""
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Grids by name (float16, m), each with `<name>_origin` and `<name>_spacing`; soft ones share theirs."""
         arrays = {}
         for name, one in self.in_space().items():
             arrays |= {name: one.field.astype(np.float16)} | _placement(name, one.lattice)
@@ -113,14 +123,14 @@ class Maps:
 
 
 def angle_name(angle: float, kind: str = "soft") -> str:
-    """``kind`` and the angle in degrees, three digits before the point: ``soft_060``, ``soft_007p5``."""
+    """`kind` and the angle in degrees, three digits before the point: `soft_060`, `soft_007p5`."""
     text = f"{np.degrees(angle):06.2f}".rstrip("0").rstrip(".")
     return f"{kind}_" + text.replace(".", "p")
 
 
 def build_maps(
     tips_at: TipSource,
-    sampled: NDArray,
+    sampled: np.ndarray,
     rigid: RigidSettings,
     shape: SoftShape,
     hybrid: HybridSettings,
@@ -157,7 +167,7 @@ def build_maps(
 def build_tilted(
     tips_at: TipSource, rigid: RigidSettings, hybrid: HybridSettings, tilt: float, most_triangles: int, seed: int
 ) -> TiltedMap:
-    """The hybrid map with the end effector ``tilt`` rad off straight down."""
+    """The hybrid map with the end effector `tilt` rad off straight down."""
     pairs = draw_pairs(tips_at(tilt).positions, tilt, hybrid.tilted_poses, seed,
                        mount_offset=rigid.mount_offset, avoid_collisions=rigid.self_collision)
     field, lattice = tilted_field(pairs, hybrid.voxel, hybrid.smoothing, hybrid.smallest)
@@ -172,8 +182,8 @@ def build_rigid(rigid: RigidSettings, most_triangles: int, seed: int) -> Map:
     return Map(field, lattice, surface(field, lattice, most_triangles, "reachability.rigid"))
 
 
-def blend_angles(sampled: NDArray, step: float) -> NDArray:
-    """``sampled`` angles (A,) and evenly between them as many as it takes to be no more than ``step`` apart; rad."""
+def blend_angles(sampled: np.ndarray, step: float) -> np.ndarray:
+    """`sampled` angles (A,) and evenly between them as many as it takes to be no more than `step` apart; rad."""
     angles = [sampled[:1]]
     for low, high in zip(sampled[:-1], sampled[1:], strict=True):
         angles.append(np.linspace(low, high, int(np.ceil((high - low) / step - 1e-6)) + 1)[1:])
@@ -182,14 +192,14 @@ def blend_angles(sampled: NDArray, step: float) -> NDArray:
 
 def build_soft(
     tips_at: TipSource,
-    sampled: NDArray,
+    sampled: np.ndarray,
     shape: SoftShape,
     voxel: float,
     step: float,
     most_triangles: int,
     done: Callable[[str], None],
 ) -> SoftMaps:
-    """Fields at the ``blend_angles``; meshes at the ``sampled`` ones. ``done`` hears of each field by its name."""
+    """Fields at the `blend_angles`; meshes at the `sampled` ones. `done` hears of each field by its name."""
     angles = blend_angles(sampled, step)
     fields, lattice = soft_fields(tips_at, angles, shape, voxel, lambda angle: done(angle_name(angle)))
     chosen = [fields[np.abs(angles - a).argmin()] for a in sampled]
@@ -197,5 +207,5 @@ def build_soft(
     return SoftMaps(angles, fields, lattice, shape, sampled, meshes)
 
 
-def _placement(name: str, lattice: Lattice) -> dict[str, NDArray]:
+def _placement(name: str, lattice: Lattice) -> dict[str, np.ndarray]:
     return {f"{name}_origin": np.asarray(lattice.origin), f"{name}_spacing": np.asarray(lattice.spacing)}

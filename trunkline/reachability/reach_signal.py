@@ -11,19 +11,19 @@ beside θ. The tip reaches x, to the maps' tolerance, where s ≤ 0; elsewhere s
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from trunkline.fields.grid import Lattice, blend, overlap
 from trunkline.reachability.soft import SoftShape, soft_field
+from trunkline.threads import thread_count
 
 THRESHOLD = 0.0  # m; a signal above it means out of reach
 THICKNESS = 0.1  # of the distance of points outside: they are drawn from as much more
 
 
 class HeldOut(NamedTuple):
-    """At a gravity ``angle`` (rad) that has no grid: overlap ``iou`` of the blended map with the angle's own, share of
-    its tips that the signal calls ``reachable``, and share of points ``beyond`` reach that it calls so too."""
+    """At a gravity `angle` (rad) that has no grid: overlap `iou` of the blended map with the angle's own, share of
+    its tips that the signal calls `reachable`, and share of points `beyond` reach that it calls so too."""
 
     angle: float
     iou: float
@@ -31,37 +31,39 @@ class HeldOut(NamedTuple):
     beyond: float
 
 
-def packed(fields: NDArray) -> NDArray:
+def packed(fields: np.ndarray) -> np.ndarray:
     """Fields as the headset gets them."""
     return fields.astype(np.float16)
 
 
-def reach_signal(fields: NDArray, angles: NDArray, lattice: Lattice, points: NDArray, angle: float) -> NDArray:
-    """s for ``points`` (N, 3), m; negative within reach. Shape (N,).
+def reach_signal(
+    fields: np.ndarray, angles: np.ndarray, lattice: Lattice, points: np.ndarray, angle: float
+) -> np.ndarray:
+    """s for `points` (N, 3), m; negative within reach. Shape (N,).
 
     Args:
-        fields: ``packed``, (B, ...), at ``angles`` (B,), rad, ascending.
+        fields: `packed`, (B, ...), at `angles` (B,), rad, ascending.
         angle: gravity angle, rad.
     """
     return lattice.sample(blend(fields.astype(np.float32), angles, angle), points)
 
 
 def held_out(
-    fields: NDArray,
-    angles: NDArray,
+    fields: np.ndarray,
+    angles: np.ndarray,
     lattice: Lattice,
     shape: SoftShape,
-    tips: NDArray,
+    tips: np.ndarray,
     angle: float,
     *,
     beyond: float,
     count: int,
     seed: int,
 ) -> HeldOut:
-    """Check at ``angle``, rad, against its own ``tips`` (N, 3).
+    """Check at `angle`, rad, against its own `tips` (N, 3).
 
     Args:
-        fields, angles, lattice: as for ``reach_signal``.
+        fields, angles, lattice: as for `reach_signal`.
         beyond: m, how far from every tip are the points that shall be out of reach.
         count: how many of them to draw. seed: of the draw.
     """
@@ -74,11 +76,11 @@ def held_out(
     return HeldOut(angle, iou, float(reachable), float(called))
 
 
-def points_beyond(tips: NDArray, distance: float, count: int, rng: np.random.Generator) -> NDArray:
-    """Points (at most ``count``, 3) whose nearest tip is ``distance`` m away, or a little more."""
+def points_beyond(tips: np.ndarray, distance: float, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Points (at most `count`, 3) whose nearest tip is `distance` m away, or a little more."""
     around = tips[rng.integers(0, len(tips), 40 * count)]
     directions = rng.normal(size=around.shape)
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     points = around + (1 + THICKNESS) * distance * directions
-    nearest, _ = cKDTree(tips).query(points)
+    nearest, _ = cKDTree(tips).query(points, workers=thread_count())
     return points[(nearest >= distance) & (nearest <= (1 + THICKNESS) * distance)][:count]

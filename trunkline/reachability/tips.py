@@ -5,32 +5,33 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from trunkline.dataset.sampling import sample_angle
 from trunkline.statics.chain import Chain
 
+LOOK_EVERY = 4  # rays: along those between, a sample is at most a twentieth of the way from where it would else be
+
 
 class Tips(NamedTuple):
-    """``positions`` (N, 3) in the arm's base frame and the tendons' path ``lengths`` (N, K), in m."""
+    """`positions` (N, 3) in the arm's base frame and the tendons' path `lengths` (N, K), in m."""
 
-    positions: NDArray
-    lengths: NDArray
+    positions: np.ndarray
+    lengths: np.ndarray
 
 
 TipSource = Callable[[float], Tips]  # from a gravity angle in rad
 
 
-@dataclass(frozen=True)
+@dataclass
 class ArmTips:
-    """A ``TipSource``: the samples at the sampled angles, fresh equilibria at the others.
+    """A `TipSource`: the samples at the sampled angles, fresh equilibria at the others.
 
-    ``angles`` (A,) in rad, ascending, and ``samples`` at each; ``directions`` and ``steps`` as in
-    ``kinematics.sampling.sample_angle``; ``seed`` of the fresh ones, the same for an angle whatever others are asked.
+    `angles` (A,) in rad, ascending, and `samples` at each; `directions` and `steps` as in
+    `dataset.sampling.sample_angle`; `seed` of the fresh ones, the same for an angle whatever others are asked.
     """
 
     chain: Chain
-    angles: NDArray
+    angles: np.ndarray
     samples: list[Tips]
     directions: int
     steps: int
@@ -41,5 +42,5 @@ class ArmTips:
         if sampled.size:
             return self.samples[sampled[0]]
         rng = np.random.default_rng([self.seed, round(1e6 * angle)])
-        found = sample_angle(self.chain, angle, self.directions, self.steps, rng).equilibrium
+        found = sample_angle(self.chain, angle, self.directions, self.steps, rng, LOOK_EVERY).equilibrium
         return Tips(found.position, found.lengths)

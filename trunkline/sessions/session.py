@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError,
 from yaml import YAMLError
 
 from trunkline.errors import InputError
+from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
@@ -21,7 +22,7 @@ class Entry(BaseModel):
     model_config = ConfigDict(extra="forbid")
 
 
-class Frame(Entry):
+class MocapFrame(Entry):
     """The motion-capture frame: which way is up in it, and the unit of its positions.
 
     name: for logs of transforms between several frames, the one that the poses are wanted in; by default the nearest
@@ -65,12 +66,12 @@ class Topics(Entry):
 
 
 class TrialEntry(Entry):
-    """window: s from the log's first pose. level: degrees of tilt, or mm of pull."""
+    """window: s from the log's first pose. level: in the unit of the experiment."""
 
     name: str = ""
     file: str
     window: tuple[FiniteFloat, FiniteFloat] | None = None
-    experiment: Literal["static_tilt", "release", "curl"]
+    experiment: ExperimentName
     level: FiniteFloat | None = None
     split: Literal["identify", "validate"]
 
@@ -78,8 +79,12 @@ class TrialEntry(Entry):
     def _complete(self):
         if self.window is not None and not self.window[0] < self.window[1]:
             raise ValueError(f"window: found {list(self.window)}, expected [start, end] with start < end")
-        if self.level is None and self.experiment != "release":
+        level = EXPERIMENTS[self.experiment].level
+        if level is not None and self.level is None:
             raise ValueError(f"level: missing, expected the nominal level of a {self.experiment}")
+        if level is not None and not level.low <= self.level <= level.high:
+            expected = f"{level.low:g} to {level.high:g}, the {level.says} of a {self.experiment}"
+            raise ValueError(f"level: found {self.level:g}, expected {expected}")
         self.name = self.name or Path(self.file).stem
         return self
 
@@ -92,7 +97,7 @@ class Session(Entry):
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
     """
 
-    frame: Frame
+    frame: MocapFrame
     base: str | FixedBase
     segments: dict[str, str] | None = Field(default=None, min_length=1)
     tendons: dict[str, str] | None = Field(default=None, min_length=1)

@@ -6,9 +6,10 @@ from pathlib import Path
 
 from trunkline.errors import InputError
 from trunkline.logs.cdr import short_name
+from trunkline.logs.joint_stream import JointStream, joint_stream
 from trunkline.logs.log import Log, Topic, read_log
 from trunkline.logs.messages import JOINTS, POSES, TOPIC_PER_BODY
-from trunkline.logs.streams import JointStream, PoseStream, joint_stream, pose_stream
+from trunkline.logs.pose_stream import PoseStream, pose_stream
 from trunkline.sessions.session import Session
 
 STATIC = "tf_static"  # how the topic's name ends

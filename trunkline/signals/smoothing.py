@@ -1,6 +1,7 @@
 """Signals on a clock: outliers, gaps, a uniform rate, a low-pass without delay. Columns are independent."""
 
 import numpy as np
+import pandas as pd
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import median_filter
 from scipy.signal import butter, sosfiltfilt
@@ -86,9 +87,5 @@ def noise_level(columns: np.ndarray) -> np.ndarray:
 
 def fill_gaps(time: np.ndarray, columns: np.ndarray) -> np.ndarray:
     """Columns (T, C) with NaN replaced by linear interpolation, held at the ends; all-NaN columns are 0."""
-    filled = np.zeros_like(columns)
-    for index, column in enumerate(columns.T):
-        good = np.isfinite(column)
-        if good.any():
-            filled[:, index] = np.interp(time, time[good], column[good])
-    return filled
+    table = pd.DataFrame(columns, index=time).interpolate("index", limit_direction="both")
+    return np.ascontiguousarray(table.fillna(0.0))

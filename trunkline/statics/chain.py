@@ -11,10 +11,11 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+from trunkline.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances
 from trunkline.statics.supported import require_supported, unit_bodies
+from trunkline.statics.tendon_paths import tendon_crossings, tendon_holes
 
 FORCE_ROUNDING = 1e-3  # share by which a tension may exceed the motors' force and count as within it
-MIN_IMPEDANCE, MAX_IMPEDANCE = mujoco.mjMINIMP, mujoco.mjMAXIMP
 
 
 class Chain(NamedTuple):
@@ -28,10 +29,10 @@ class Chain(NamedTuple):
         center: centre of mass from the unit's joint, m. Shape (n, 3).
         stiffness: a, b, c of the elastic torque -(a x + b x² + c x³), x the angle from `rest`. Shape (n, 2, 3).
         rest: spring references, rad. Shape (n, 2).
-        torque: constant torques, N m; zero as read, dry friction where its band is sought. Shape (n, 2).
         limit: lower and upper angle at which a limit starts to push, rad (infinite if none). Shape (n, 2, 2).
-        limit_gain: k / dof_invweight0, N m/rad: see `energy.limit_spring`. Shape (n, 2).
+        limit_gain: k / dof_invweight0, N m/rad: see `limits.limit_torque`. Shape (n, 2).
         limit_impedance: solimp. Shape (n, 2, 5).
+        limit_energy: of a limit at the depth from which its impedance is constant, J. Shape (n, 2).
         hole_in: site on the unit before, from the unit's joint, m. Shape (n, K, 3).
         hole_out: site on the unit, from its joint, m. Shape (n, K, 3).
         crosses: 1 where the tendon crosses the unit's joint, else 0. Shape (n, K).
@@ -49,10 +50,10 @@ class Chain(NamedTuple):
     center: np.ndarray
     stiffness: np.ndarray
     rest: np.ndarray
-    torque: np.ndarray
     limit: np.ndarray
     limit_gain: np.ndarray
     limit_impedance: np.ndarray
+    limit_energy: np.ndarray
     hole_in: np.ndarray
     hole_out: np.ndarray
     crosses: np.ndarray
@@ -104,8 +105,9 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
     joints = model.body_jntadr[units][:, None] + np.arange(2)  # (n, 2)
     anchors = (data.xanchor[joints[:, 0]] - data.xpos[base]) @ to_base.T
     mass, center = _unit_inertials(model, data, units)
-    holes = _tendon_holes(model, data, units)
-    hole_in, hole_out, crosses, fixed_length = _tendon_crossings(holes, data, base, to_base, anchors)
+    holes = tendon_holes(model, data, units)
+    hole_in, hole_out, crosses, fixed_length = tendon_crossings(holes, data, base, to_base, anchors)
+    gains, impedances = limit_gains(model, joints), limit_impedances(model, joints)
     order = [int(np.flatnonzero(model.actuator_trnid[:, 0] == t)[0]) for t in range(model.ntendon)]
     tip, tip_quaternion = _tip(model, data, tip_site, units, base, to_base)
     return Chain(
@@ -116,10 +118,10 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         center=(center - data.xpos[base]) @ to_base.T - anchors,
         stiffness=np.concatenate([model.jnt_stiffness[joints][..., None], model.jnt_stiffnesspoly[joints]], axis=2),
         rest=model.qpos_spring[joints],
-        torque=np.zeros((len(units), 2)),
-        limit=_limits(model, joints),
-        limit_gain=_limit_gains(model, joints),
-        limit_impedance=_limit_impedances(model, joints),
+        limit=limit_angles(model, joints),
+        limit_gain=gains,
+        limit_impedance=impedances,
+        limit_energy=limit_energies(gains, impedances),
         hole_in=hole_in,
         hole_out=hole_out,
         crosses=crosses,
@@ -140,74 +142,6 @@ def _unit_inertials(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarra
         moment = (model.body_mass[welded, None] * data.xipos[welded]).sum(axis=0)
         center[index] = moment / mass[index] if mass[index] > 0 else data.xpos[unit]
     return mass, center
-
-
-def _tendon_holes(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarray):
-    """Per tendon its name and its sites as (unit index, -1 for the base; world position)."""
-    index_of = {0: -1} | {int(body): index for index, body in enumerate(units)}
-    holes = []
-    for tendon in range(model.ntendon):
-        start = model.tendon_adr[tendon]
-        sites = model.wrap_objid[start : start + model.tendon_num[tendon]]
-        bodies = model.body_weldid[model.site_bodyid[sites]]
-        path = [(index_of[int(b)], data.site_xpos[s]) for b, s in zip(bodies, sites, strict=True)]
-        holes.append((model.tendon(tendon).name, path))
-    return holes
-
-
-def _tendon_crossings(holes, data, base, to_base, anchors):
-    """Split each path into chords that cross one joint and chords within one unit, which never change."""
-    units, tendons = len(anchors), len(holes)
-    hole_in, hole_out = np.zeros((units, tendons, 3)), np.zeros((units, tendons, 3))
-    crosses, fixed_length = np.zeros((units, tendons)), np.zeros(tendons)
-    for tendon, (name, path) in enumerate(holes):
-        for (unit_a, world_a), (unit_b, world_b) in zip(path[:-1], path[1:], strict=True):
-            if unit_a == unit_b:
-                fixed_length[tendon] += np.linalg.norm(world_b - world_a)
-                continue
-            if abs(unit_a - unit_b) != 1:
-                raise InputError(f"model: tendon {name!r}: found sites that skip a unit, expected one in each")
-            (_, world_in), (outer, world_out) = sorted([(unit_a, world_a), (unit_b, world_b)], key=_unit_of)
-            if crosses[outer, tendon]:
-                raise InputError(f"model: tendon {name!r}: found a joint that it crosses twice, expected once")
-            hole_in[outer, tendon] = to_base @ (world_in - data.xpos[base]) - anchors[outer]
-            hole_out[outer, tendon] = to_base @ (world_out - data.xpos[base]) - anchors[outer]
-            crosses[outer, tendon] = 1
-    return hole_in, hole_out, crosses, fixed_length
-
-
-def _unit_of(hole: tuple) -> int:
-    return hole[0]
-
-
-def _limits(model: mujoco.MjModel, joints: np.ndarray) -> np.ndarray:
-    """Angles at which the limit's distance falls below its margin."""
-    margin = model.jnt_margin[joints][..., None] * [1, -1]
-    limited = model.jnt_limited[joints][..., None].astype(bool)
-    return np.where(limited, model.jnt_range[joints] + margin, [-np.inf, np.inf])
-
-
-def _limit_gains(model: mujoco.MjModel, joints: np.ndarray) -> np.ndarray:
-    """k / dof_invweight0 with k from solref (MuJoCo docs, "Solver parameters: Reference")."""
-    solref, d_width = model.jnt_solref[joints], _limit_impedances(model, joints)[..., 1]
-    time_constant, damping_ratio = solref[..., 0], solref[..., 1]
-    if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_REFSAFE:
-        time_constant = np.where(time_constant > 0, np.maximum(time_constant, 2 * model.opt.timestep), time_constant)
-    with np.errstate(divide="ignore"):
-        standard = 1 / np.maximum(mujoco.mjMINVAL, (d_width * time_constant * damping_ratio) ** 2)
-    direct = -solref[..., 0] / d_width**2
-    k = np.where(solref[..., 0] > 0, standard, direct)
-    dofs = model.jnt_dofadr[joints]
-    return k / model.dof_invweight0[dofs]
-
-
-def _limit_impedances(model: mujoco.MjModel, joints: np.ndarray) -> np.ndarray:
-    """solimp as MuJoCo clamps it."""
-    solimp = model.jnt_solimp[joints].copy()
-    solimp[..., [0, 1, 3]] = np.clip(solimp[..., [0, 1, 3]], MIN_IMPEDANCE, MAX_IMPEDANCE)
-    solimp[..., 2] = np.maximum(0, solimp[..., 2])
-    solimp[..., 4] = np.maximum(1, solimp[..., 4])
-    return solimp
 
 
 def _max_tensions(model: mujoco.MjModel, order: list[int]) -> np.ndarray:

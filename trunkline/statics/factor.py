@@ -1,44 +1,108 @@
-"""Cholesky factor of a small dense matrix, in place, in the order that lets the compiler vectorise it."""
+"""Cholesky factor of the Hessian in time proportional to the number of joints.
 
-from numba import njit
+Only neighbouring joints share a unit; all others meet through gravity and elastic tendons, in r = 3 + taut tendons
+products. So above its 2 x 2 blocks the Hessian is the upper part of a matrix of rank r, and so is its factor U:
+
+    H_jk = left_j · right_k,   U_jk = row_j · right_k   for k in a unit after that of j,
+
+with row from left by the same steps as in a dense factor (Vandebril, Van Barel, Mastronardi 2008, "Matrix
+Computations and Semiseparable Matrices", chapter 4). At 48 unknowns 8.8 times as fast as np.linalg.cholesky and
+np.linalg.solve in the same compiler (`python -m benchmarks.small_linear_algebra`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from trunkline.statics.kernel import kernel
 
 
-@njit(cache=True)
-def factorize(matrix, factor):
-    """Upper U with matrix = Uᵀ U from the upper triangle of `matrix`; False if that is not positive definite.
+class Hessian(NamedTuple):
+    """Shapes: left, right (r, nq), block (n, 3): the entries (1, 1), (1, 2) and (2, 2) of each unit's block."""
 
-    Args:
-        matrix, factor: shape (n, n); `factor` is overwritten above and on its diagonal.
-    """
-    n = matrix.shape[0]
-    for i in range(n):
-        for j in range(i, n):
-            factor[i, j] = matrix[i, j]
-    for k in range(n):
-        pivot = factor[k, k]
-        if not pivot > 0:
+    left: np.ndarray
+    right: np.ndarray
+    block: np.ndarray
+
+
+class Factor(NamedTuple):
+    """Upper U with H = Uᵀ U. Shapes: row (r, nq), block (n, 3), total (r, r): Σ row rowᵀ so far."""
+
+    row: np.ndarray
+    block: np.ndarray
+    total: np.ndarray
+
+
+@kernel
+def new_factor(units, rank):
+    """Room for the factor of a Hessian of `units` units whose rank is at most `rank`."""
+    return Factor(np.zeros((rank, 2 * units)), np.zeros((units, 3)), np.zeros((rank, rank)))
+
+
+@kernel
+def factorize(hessian, factor):
+    """Fill `factor`; False if the Hessian is not positive definite."""
+    right, row, total = hessian.right, factor.row, factor.total
+    rank = right.shape[0]
+    for m in range(rank):
+        for k in range(rank):
+            total[m, k] = 0.0
+    for i in range(hessian.block.shape[0]):
+        a, b = 2 * i, 2 * i + 1
+        aa, ab, bb = hessian.block[i, 0], hessian.block[i, 1], hessian.block[i, 2]
+        for m in range(rank):
+            from_a, from_b = 0.0, 0.0
+            for k in range(rank):
+                from_a += total[m, k] * right[k, a]
+                from_b += total[m, k] * right[k, b]
+            aa -= right[m, a] * from_a
+            ab -= right[m, a] * from_b
+            bb -= right[m, b] * from_b
+            row[m, a] = hessian.left[m, a] - from_a
+            row[m, b] = hessian.left[m, b] - from_b
+        if not aa > 0:
             return False
-        scale = 1 / pivot**0.5
-        for j in range(k, n):
-            factor[k, j] *= scale
-        for i in range(k + 1, n):
-            f = factor[k, i]
-            for j in range(i, n):
-                factor[i, j] -= f * factor[k, j]
+        aa = aa**0.5
+        ab /= aa
+        bb -= ab * ab
+        if not bb > 0:
+            return False
+        bb = bb**0.5
+        factor.block[i, 0], factor.block[i, 1], factor.block[i, 2] = aa, ab, bb
+        for m in range(rank):
+            row[m, a] /= aa
+            row[m, b] = (row[m, b] - ab * row[m, a]) / bb
+        for m in range(rank):
+            for k in range(rank):
+                total[m, k] += row[m, a] * row[k, a] + row[m, b] * row[k, b]
     return True
 
 
-@njit(cache=True)
-def solve(factor, x):
-    """Solve Uᵀ U y = x in place, `x` of shape (n,)."""
-    n = factor.shape[0]
-    for i in range(n):
-        x[i] /= factor[i, i]
-        f = x[i]
-        for j in range(i + 1, n):
-            x[j] -= f * factor[i, j]
-    for i in range(n - 1, -1, -1):
-        s = x[i]
-        for j in range(i + 1, n):
-            s -= factor[i, j] * x[j]
-        x[i] = s / factor[i, i]
+@kernel
+def solve(hessian, factor, x):
+    """Solve H y = x in place, `x` of shape (nq,)."""
+    right, row, block = hessian.right, factor.row, factor.block
+    rank, units = right.shape[0], block.shape[0]
+    sums = np.zeros(rank)
+    for i in range(units):
+        a, b = 2 * i, 2 * i + 1
+        at_a, at_b = x[a], x[b]
+        for m in range(rank):
+            at_a -= right[m, a] * sums[m]
+            at_b -= right[m, b] * sums[m]
+        x[a] = at_a / block[i, 0]
+        x[b] = (at_b - block[i, 1] * x[a]) / block[i, 2]
+        for m in range(rank):
+            sums[m] += row[m, a] * x[a] + row[m, b] * x[b]
+    for m in range(rank):
+        sums[m] = 0.0
+    for i in range(units - 1, -1, -1):
+        a, b = 2 * i, 2 * i + 1
+        at_a, at_b = x[a], x[b]
+        for m in range(rank):
+            at_a -= row[m, a] * sums[m]
+            at_b -= row[m, b] * sums[m]
+        x[b] = at_b / block[i, 2]
+        x[a] = (at_a - block[i, 1] * x[b]) / block[i, 0]
+        for m in range(rank):
+            sums[m] += right[m, a] * x[a] + right[m, b] * x[b]

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from trunkline.statics.chain import Chain
-from trunkline.statics.equilibria import Equilibrium, equilibrium_paths, solve_paths
+from trunkline.statics.equilibria import Equilibrium, equilibrium_paths, follow
 from trunkline.statics.supported import unit_bodies
 
 BACK = 0.98  # share of the tensions from which the direction of the way in is taken
@@ -57,15 +57,13 @@ def friction_band(
     before, here = way[0::2], way[1::2]
     commands = here.lengths - tensions / chain.gain
     slides = np.sign(here.lengths - before.lengths), np.sign(here.qpos - before.qpos).reshape(-1, chain.units, 2)
+    doubled = with_friction(chain)
     ends = []
     for side in (1, -1):
-        found = np.full((len(tensions), 3), np.nan)
-        for row, (command, dl, dq) in enumerate(zip(commands, *slides, strict=True)):
-            rubbing = with_friction(chain._replace(torque=-side * joint_friction * dq))
-            end = _held(rubbing, command, side * tendon_friction * dl, gravity[row])
-            if way.converged[2 * row + 1] and end.converged[0]:
-                found[row] = end.position[0]
-        ends.append(found)
+        torques = -side * joint_friction * slides[1]
+        end = _held(doubled, commands, side * tendon_friction * slides[0], torques, gravity)
+        found = (here.converged & end.converged)[:, None]
+        ends.append(np.where(found, end.position, np.nan))
     return Band(*ends)
 
 
@@ -76,11 +74,12 @@ def with_friction(chain: Chain) -> Chain:
     return chain._replace(**twice)
 
 
-def _held(chain: Chain, command: np.ndarray, friction: np.ndarray, gravity: np.ndarray) -> Equilibrium:
-    """Equilibrium under actuators that hold `command` (K,), m, and constant tensions `friction` (K,), N."""
-    tendons = len(command)
-    tensions = np.concatenate([np.zeros(tendons), friction])[None, None]
-    lengths = np.concatenate([command, np.zeros(tendons)])[None, None]
+def _held(chain: Chain, commands, friction, torques, gravity) -> Equilibrium:
+    """Equilibria under actuators that hold `commands` (N, K), m, constant tensions `friction` (N, K), N, and torques
+    at the joints (N, n, 2), N m."""
+    tendons = commands.shape[1]
+    tensions = np.concatenate([np.zeros_like(commands), friction], axis=1)[:, None]
+    lengths = np.concatenate([commands, np.zeros_like(commands)], axis=1)[:, None]
     slope = np.concatenate([chain.gain[:tendons], np.zeros(tendons)])
     ceiling = np.concatenate([chain.max_tension[:tendons], np.full(tendons, np.inf)])
-    return solve_paths(chain, tensions, lengths, gravity, slope, ceiling, cables=False)
+    return follow(chain, tensions, lengths, gravity, slope, ceiling, torques=torques)

@@ -1,24 +1,23 @@
 """Equilibria from any first guess: Newton's method at once, without following the loads from nothing.
 
-From a neighbouring equilibrium this is a hundred times faster than `statics.forward` and stays on its branch. From
+From a neighbouring equilibrium this is many times faster than `equilibria.forward` and stays on its branch. From
 far away it may end in another equilibrium, if there is one: that is how others are looked for.
 """
 
-import numba
 import numpy as np
-from numba import njit, prange
 
 from trunkline.statics.chain import Chain
+from trunkline.statics.continuation import record
 from trunkline.statics.energy import Pull
-from trunkline.statics.equilibria import PENALTY, Equilibrium, empty_equilibria, tip_pose
+from trunkline.statics.equilibria import PENALTY, Equilibrium, equilibria, plain, room
+from trunkline.statics.kernel import kernel, over_rows
 from trunkline.statics.newton import find_equilibrium, new_work
-from trunkline.threads import thread_count
 
 
 def restart(
     chain: Chain, qpos: np.ndarray, tensions: np.ndarray, lengths: np.ndarray, gravity: np.ndarray
 ) -> Equilibrium:
-    """Equilibria with cables of given lengths, as `statics.forward`, from the joint angles `qpos`.
+    """Equilibria with cables of given lengths, as `equilibria.forward`, from the joint angles `qpos`.
 
     Args:
         qpos: first guess, rad. Shape (B, nq).
@@ -27,30 +26,18 @@ def restart(
         gravity: m/s². Shape (3,) or (B, 3).
     """
     count = len(qpos)
-    gravity = np.ascontiguousarray(np.broadcast_to(np.asarray(gravity, float), (count, 3)))
-    out = empty_equilibria(count, chain)
-    out.qpos[:], out.tensions[:] = qpos, tensions
-    numba.set_num_threads(min(thread_count(), numba.config.NUMBA_NUM_THREADS))
-    _restart(
-        chain, np.ascontiguousarray(lengths, float), gravity, out.qpos, out.position, out.quaternion, out.lengths,
-        out.tensions, out.residual, out.iterations, out.converged,
-    )  # fmt: skip
-    return out
+    found = room(chain, count)
+    found.qpos[:], found.tensions[:] = qpos, tensions
+    over_rows(_restart, count, chain, plain(lengths), plain(gravity, (count, 3)), PENALTY, found)
+    return equilibria(chain, found)
 
 
-@njit(cache=True, parallel=True)
-def _restart(
-    chain, all_lengths, gravities, qpos, position, quaternion, lengths, tensions, residual, iterations, converged
-):
-    tendons = all_lengths.shape[1]
-    slope, ceiling = np.full(tendons, PENALTY), np.full(tendons, np.inf)
-    for row in prange(len(qpos)):
-        work = new_work(chain.mass.shape[0], tendons)
-        pull = Pull(tensions[row].copy(), slope, all_lengths[row], ceiling)
-        loss, _, total, good = find_equilibrium(chain, qpos[row], gravities[row], pull, True, work)
-        lengths[row] = work.state.lengths
-        tensions[row] = work.state.tensions
-        residual[row] = loss
-        iterations[row] = total
-        converged[row] = good
-        tip_pose(chain, work.state, position[row], quaternion[row])
+@kernel
+def _restart(first, last, chain, all_lengths, gravities, penalty, found):
+    units, tendons = chain.mass.shape[0], all_lengths.shape[1]
+    slope, ceiling, torque = np.full(tendons, penalty), np.full(tendons, np.inf), np.zeros((units, 2))
+    for row in range(first, last):
+        work = new_work(units, tendons)
+        pull = Pull(found.tensions[row].copy(), slope, all_lengths[row], ceiling, torque)
+        residual, _, total, good = find_equilibrium(chain, found.qpos[row], gravities[row], pull, True, work)
+        record(found, row, work.state, residual, total, good)

@@ -5,15 +5,15 @@ At rest ∇E(q) + Jᵀ T = 0, so dq/dT = -H⁻¹ Jᵀ; the tip moves by J_tip dq
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
-from numba import njit, prange
 
 from trunkline.statics.chain import Chain
-from trunkline.statics.energy import Pull, evaluate, fill_hessian
+from trunkline.statics.energy import Pull, evaluate, find_hessian
+from trunkline.statics.equilibria import plain
 from trunkline.statics.factor import factorize, solve
+from trunkline.statics.kernel import kernel, over_rows
 from trunkline.statics.newton import new_work
-from trunkline.threads import thread_count
+from trunkline.statics.vectors import cross, plus, turned, vector
 
 
 @dataclass
@@ -38,47 +38,41 @@ def sensitivity(chain: Chain, qpos: np.ndarray, tensions: np.ndarray, gravity: n
         gravity: m/s². Shape (3,) or (B, 3).
     """
     count, tendons = tensions.shape
-    gravity = np.ascontiguousarray(np.broadcast_to(np.asarray(gravity, float), (count, 3)))
     tip, turn = np.zeros((count, 3, tendons)), np.zeros((count, 3, tendons))
     length = np.zeros((count, tendons, tendons))
-    numba.set_num_threads(min(thread_count(), numba.config.NUMBA_NUM_THREADS))
-    _sensitivities(chain, np.ascontiguousarray(qpos), np.ascontiguousarray(tensions), gravity, tip, turn, length)
+    over_rows(_sensitivities, count, chain, plain(qpos), plain(tensions), plain(gravity, (count, 3)), tip, turn, length)
     return Sensitivity(tip, turn, length)
 
 
-@njit(cache=True, parallel=True)
-def _sensitivities(chain, qpos, tensions, gravity, tip, turn, length):
-    for row in prange(len(qpos)):
+@kernel
+def _sensitivities(first, last, chain, qpos, tensions, gravity, tip, turn, length):
+    for row in range(first, last):
         _sensitivity(chain, qpos[row], tensions[row], gravity[row], tip[row], turn[row], length[row])
 
 
-@njit(cache=True)
+@kernel
 def _sensitivity(chain, q, tensions, gravity, tip, turn, length):
     """Fill tip (3, K), turn (3, K) and length (K, K) for one equilibrium."""
     units, tendons = chain.mass.shape[0], tensions.shape[0]
     work = new_work(units, tendons)
-    state = work.state
+    state, step = work.state, work.step
     free = np.zeros(tendons)
-    pull = Pull(tensions, free, free, free)
+    pull = Pull(tensions, free, free, free, np.zeros((units, 2)))
     evaluate(chain, q, gravity, pull, state)
-    fill_hessian(chain, q, gravity, pull, state)
-    factorize(state.hessian, work.factor)
-    rotation, end = state.rotation[-1], np.empty(3)
-    for k in range(3):
-        moved = rotation[k, 0] * chain.tip[0] + rotation[k, 1] * chain.tip[1] + rotation[k, 2] * chain.tip[2]
-        end[k] = state.position[-1, k] + moved
+    hessian = find_hessian(gravity, pull, state)
+    factorize(hessian, work.factor)
+    last = state.rotation[-1]
+    arm = turned((vector(last, 0), vector(last, 1), vector(last, 2)), (chain.tip[0], chain.tip[1], chain.tip[2]))
+    end = plus(vector(state.position, units - 1), 1.0, arm)
     for t in range(tendons):
-        step = work.columns[t]
         for j in range(2 * units):
             step[j] = -state.jacobian[t, j]
-        solve(work.factor, step)
+        solve(hessian, work.factor, step)
         for j in range(2 * units):
-            axis, joint = state.hinge[j // 2, j % 2], state.position[j // 2]
-            x, y, z = end[0] - joint[0], end[1] - joint[1], end[2] - joint[2]
-            tip[0, t] += step[j] * (axis[1] * z - axis[2] * y)
-            tip[1, t] += step[j] * (axis[2] * x - axis[0] * z)
-            tip[2, t] += step[j] * (axis[0] * y - axis[1] * x)
+            axis = vector(state.hinge[j // 2], j % 2)
+            moved = cross(axis, plus(end, -1.0, vector(state.position, j // 2)))
             for k in range(3):
+                tip[k, t] += step[j] * moved[k]
                 turn[k, t] += step[j] * axis[k]
             for s in range(tendons):
                 length[s, t] += step[j] * state.jacobian[s, j]

@@ -1,8 +1,10 @@
 """What a trial must have, and what is said about one that had to be repaired."""
 
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import numpy as np
+from pydantic import Field, PositiveFloat
 
 from trunkline.errors import InputError
 from trunkline.signals.clock import FrameFit, OffsetFit
@@ -16,10 +18,10 @@ class Limits:
     clock_offset: s, the largest looked for between motors and cameras.
     """
 
-    duration: float
-    coverage: float
-    disorder: float
-    clock_offset: float
+    duration: PositiveFloat
+    coverage: Annotated[float, Field(gt=0, le=1)]
+    disorder: PositiveFloat
+    clock_offset: PositiveFloat
 
 
 @dataclass

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from trunkline.signals.runs import lasting
+
 SHORTEST = 5  # frames that agree to the last bit; noise does not, and a rounded log is known by its single axes
 ROUNDED = 0.05  # share of other steps in which an axis does not change, above which the log is rounded
 
@@ -17,17 +19,8 @@ def frozen(positions: np.ndarray) -> np.ndarray:
         seen = np.flatnonzero(np.isfinite(positions[:, body, 0]))
         same = np.diff(positions[seen, body], axis=0) == 0
         whole = same.all(axis=1)
-        long = _long_runs(whole)
+        long = lasting(whole, SHORTEST - 1)
         rest = same[~long]
         if 0 < long.sum() < len(seen) / 2 and rest.any(axis=1).mean() <= ROUNDED:
             repeats[seen[1:][long], body] = True
     return repeats
-
-
-def _long_runs(flags: np.ndarray) -> np.ndarray:
-    """Which of (T,) lie in runs of True of at least `SHORTEST` - 1."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    long = np.zeros(len(flags), bool)
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        long[begin:end] = end - begin >= SHORTEST - 1
-    return long

@@ -1,30 +1,35 @@
 """The tendons of a trial: commands and measured positions around its frames."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.logs.joint_stream import JointStream
 from trunkline.logs.messages import JOINTS
-from trunkline.logs.streams import JointStream
 from trunkline.sessions.session import Session
 from trunkline.sessions.source import Source
 from trunkline.takes.checks import Findings, Limits, in_order
+from trunkline.takes.reading import Stretch
 
 ROLES = ("command", "tendon position")
 
 
-def read_motors(
-    source: Source,
-    session: Session,
-    epoch: int,
-    logged: int,
-    time: np.ndarray,
-    limits: Limits,
-    where: str,
-    findings: Findings,
-) -> tuple[tuple[str, ...], list[np.ndarray]]:
-    """K tendon names, and [command time, commands (Tc, K), tendon time, tendon positions (Tm, K)], s and m.
+@dataclass
+class Motors:
+    """What moves the tendons around a trial, each stream on its own times: as in a take."""
 
-    Args: epoch, logged: ns, the stamp of the trial's first frame and when the recorder had it; time (T,) s from there.
+    tendons: tuple[str, ...]
+    command_time: np.ndarray
+    commands: np.ndarray
+    tendon_time: np.ndarray
+    tendon_positions: np.ndarray
+
+
+def read_motors(
+    source: Source, session: Session, stretch: Stretch, limits: Limits, where: str, findings: Findings
+) -> Motors:
+    """The messages near enough to the stretch, dated from its first frame.
 
     Raises:
         InputError: the tendons of a topic are not those of session.yaml, or of the other topic.
@@ -40,34 +45,32 @@ def read_motors(
             arrays += [np.empty(0), np.empty((0, len(tendons)))]
             continue
         columns = _columns(stream, session.tendons, tendons, f"{where}: {role} topic")
-        stamps = _stamps(stream, recorder, epoch - logged)
+        stamps = _stamps(stream, recorder, stretch)
         if recorder and session.clock != "log":
             findings.repairs.append(f"{role} messages dated by the recorder's clock, as not all have stamps")
         rows = in_order(stamps, limits.disorder, f"{where}: {role} topic", findings)
-        seconds = (stamps[rows] - epoch) * 1e-9
+        seconds = (stamps[rows] - stretch.epoch) * 1e-9
         pulls = stream.positions[rows][:, columns]
-        near = (seconds > -limits.clock_offset) & (seconds < time[-1] + limits.clock_offset)
+        near = (seconds > -limits.clock_offset) & (seconds < stretch.time[-1] + limits.clock_offset)
         finite = np.isfinite(pulls).all(axis=1)
         if not finite.all():
             findings.repairs.append(f"{int(np.sum(~finite))} {role} messages that are not finite dropped")
         arrays += [seconds[near & finite], pulls[near & finite]]
-    return tuple(tendons), arrays
+    return Motors(tuple(tendons), *arrays)
 
 
-def check_curl(
+def check_motors(
     source: Source,
     session: Session,
     joint_topics: tuple[str, ...],
-    motors: list[np.ndarray],
-    epoch: int,
-    logged: int,
-    time: np.ndarray,
+    motors: Motors,
+    stretch: Stretch,
     limits: Limits,
     where: str,
 ) -> None:
-    """A curl needs commands or tendon positions: raises InputError with what there is instead.
+    """Where nothing pulls within reach of the poses: raises InputError with what there is instead.
 
-    Args: joint_topics: of all logs of the session. motors: from `read_motors`.
+    Args: joint_topics: of all logs of the session.
     """
     kind = ", ".join(JOINTS)
     others = f"{', '.join(joint_topics) or 'none'} ({kind})"
@@ -75,13 +78,13 @@ def check_curl(
         name = getattr(session.topics, key)
         if name is not None and name not in joint_topics:
             raise InputError(f"{where}: topics.{key}: found {name!r}, which no log has, expected one of: {others}")
-    if any(pulls.size for pulls in motors[1::2]):
+    if motors.commands.size or motors.tendon_positions.size:
         return
     recorder = _by_recorder(source, session)
     found = [
         f"no {role} topic"
         if stream is None
-        else f"{len(stream.stamps)} messages on {stream.topic}{_distance(stream, recorder, epoch, logged, time)}"
+        else f"{len(stream.stamps)} messages on {stream.topic}{_distance(stream, recorder, stretch)}"
         for stream, role in zip((source.commands, source.tendon_positions), ROLES, strict=True)
     ]
     expected = f"expected commands or tendon positions within {limits.clock_offset:g} s of the poses"
@@ -99,9 +102,9 @@ def _by_recorder(source: Source, session: Session) -> bool:
     return session.clock == "log" or any(not s.timed or not s.stamps.any() for s in streams if len(s.stamps))
 
 
-def _stamps(stream: JointStream, recorder: bool, shift: int) -> np.ndarray:
-    """When each message was sent, ns: by its header, or by the recorder, whose clock is `shift` ns behind."""
-    return stream.log_times + shift if recorder else stream.stamps
+def _stamps(stream: JointStream, recorder: bool, stretch: Stretch) -> np.ndarray:
+    """When each message was sent, ns: by its header, or by the recorder, moved to the clock of the poses."""
+    return stream.log_times + (stretch.epoch - stretch.logged) if recorder else stream.stamps
 
 
 def _columns(stream: JointStream, mapped: dict[str, str] | None, tendons: tuple[str, ...], where: str) -> list[int]:
@@ -120,12 +123,12 @@ def _columns(stream: JointStream, mapped: dict[str, str] | None, tendons: tuple[
     return columns
 
 
-def _distance(stream: JointStream, recorder: bool, epoch: int, logged: int, time: np.ndarray) -> str:
+def _distance(stream: JointStream, recorder: bool, stretch: Stretch) -> str:
     """How far the stream's nearest message is from the trial, in words; nothing where it has none."""
     if not len(stream.stamps):
         return ""
-    seconds = (_stamps(stream, recorder, epoch - logged) - epoch) * 1e-9
-    apart = np.maximum(np.maximum(-seconds, seconds - time[-1]), 0)
+    seconds = (_stamps(stream, recorder, stretch) - stretch.epoch) * 1e-9
+    apart = np.maximum(np.maximum(-seconds, seconds - stretch.time[-1]), 0)
     nearest = int(apart.argmin())
     if apart[nearest] == 0:
         return ", none finite"

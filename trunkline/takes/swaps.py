@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from itertools import permutations
 
 import numpy as np
-from scipy.ndimage import binary_opening
+
+from trunkline.signals.runs import lasting
 
 LONGEST = 4  # labels in a round
 NEIGHBOURS = 2  # nearest segments with which one may be exchanged
@@ -111,9 +112,4 @@ def _exchanged(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]
         both += seen.any(axis=1)
     told = (terms >= 3) & (contrast > LEAST_CONTRAST * terms)
     flagged = told & (kept > 0.5 * contrast) & (exchanged < CLEAR * kept)
-    return flagged & ((both == len(bodies)) | _lasting(flagged))
-
-
-def _lasting(flags: np.ndarray) -> np.ndarray:
-    """Which of (T,) lie in runs of True of at least `LONE` frames."""
-    return binary_opening(flags, np.ones(LONE, bool))
+    return flagged & ((both == len(bodies)) | lasting(flagged, LONE))

@@ -3,6 +3,7 @@
 import numpy as np
 
 from trunkline.signals.base_frame import average_base
+from trunkline.trials.experiments import EXPERIMENTS, TILT
 from trunkline.trials.take import Take
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -20,7 +21,7 @@ def check_vertical(takes: list[Take], measured_base: bool) -> tuple[np.ndarray |
     Args:
         measured_base: whether a body marks the mount; otherwise its orientation follows from the vertical itself.
     """
-    static = [take for take in takes if take.experiment == "static_tilt" and take.level is not None]
+    static = [take for take in takes if EXPERIMENTS[take.experiment].level is TILT and take.level is not None]
     if not static or not measured_base:
         return None, _check_hanging(takes)
     up = takes[0].up
@@ -44,7 +45,7 @@ def _misfit(z: np.ndarray, up: np.ndarray, levels: np.ndarray) -> float:
 
 def _check_hanging(takes: list[Take]) -> str | None:
     """After a release an arm hangs more or less; told where all releases come to rest along another axis."""
-    hanging = [_hang(take) for take in takes if take.experiment == "release"]
+    hanging = [_hang(take) for take in takes if EXPERIMENTS[take.experiment].hangs]
     if not hanging:
         return None
     down, up = np.array(hanging), takes[0].up

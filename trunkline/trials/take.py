@@ -7,13 +7,14 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from trunkline.trials.recording import Recording
 from trunkline.trials.tables import long_table, pose_table, read_tables, stack
 
 BASE = "base"  # the base body's name in poses.parquet
 
 
-@dataclass
-class Take:
+@dataclass(kw_only=True)
+class Take(Recording):
     """T frames, S segments, K tendons; the motors have Tc commands and Tm measured positions.
 
     up: (3,) unit vector against gravity. time: (T,) s from the first frame.
@@ -23,22 +24,11 @@ class Take:
     commands (Tc, K), tendon_positions (Tm, K): m of pull.
     """
 
-    name: str
-    experiment: str
-    split: str
-    level: float | None
     up: np.ndarray
-    time: np.ndarray
-    segments: tuple[str, ...]
-    positions: np.ndarray
-    quaternions: np.ndarray | None
     base_positions: np.ndarray
     base_quaternions: np.ndarray
-    tendons: tuple[str, ...]
     command_time: np.ndarray
-    commands: np.ndarray
     tendon_time: np.ndarray
-    tendon_positions: np.ndarray
     clock_offset: float = 0.0
 
 
@@ -107,31 +97,34 @@ def read_takes(folder: Path) -> list[Take]:
         shape = (row["frames"], 1 + len(row["segments"]))
         pose = {key: column[pose_row : pose_row + shape[0] * shape[1]] for key, column in poses.items()}
         pose_row += shape[0] * shape[1]
-        motors = []
-        for count in (row["commands"], row["tendon_positions"]):
+        motors = {}
+        for stream, count in (("command", row["commands"]), ("tendon", row["tendon_positions"])):
             size = (count, len(row["tendons"]))
             span = slice(pull_row, pull_row + size[0] * size[1])
             time = pulls["time"][span].reshape(size)[:, 0] if size[1] else np.empty(0)
-            motors += [time, pulls["pull"][span].reshape(size)]
+            motors[stream] = time, pulls["pull"][span].reshape(size)
             pull_row = span.stop
         positions = stack(pose, ("x", "y", "z"), shape)
         quaternions = stack(pose, ("qw", "qx", "qy", "qz"), shape)
         takes.append(
             Take(
-                row["trial"],
-                row["experiment"],
-                row["split"],
-                row["level"],
-                np.array(row["up"]),
-                pose["time"].reshape(shape)[:, 0].copy(),
-                tuple(row["segments"]),
-                positions[:, 1:],
-                quaternions[:, 1:] if row["orientations"] else None,
-                positions[:, 0],
-                quaternions[:, 0],
-                tuple(row["tendons"]),
-                *motors,
-                row["clock_offset"],
+                name=row["trial"],
+                experiment=row["experiment"],
+                split=row["split"],
+                level=row["level"],
+                up=np.array(row["up"]),
+                time=pose["time"].reshape(shape)[:, 0].copy(),
+                segments=tuple(row["segments"]),
+                positions=positions[:, 1:],
+                quaternions=quaternions[:, 1:] if row["orientations"] else None,
+                base_positions=positions[:, 0],
+                base_quaternions=quaternions[:, 0],
+                tendons=tuple(row["tendons"]),
+                command_time=motors["command"][0],
+                commands=motors["command"][1],
+                tendon_time=motors["tendon"][0],
+                tendon_positions=motors["tendon"][1],
+                clock_offset=row["clock_offset"],
             )
         )
     return takes

@@ -11,42 +11,26 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from trunkline.trials.recording import Recording
 from trunkline.trials.tables import long_table, pose_table, read_tables, stack
 
-EXPERIMENTS = ("static_tilt", "release", "curl")
-SPLITS = ("identify", "validate")
 
-
-@dataclass
-class Trial:
+@dataclass(kw_only=True)
+class Trial(Recording):
     """One experiment of T frames, S segments and K tendons.
 
-    name: unique within the session.
-    experiment: one of `EXPERIMENTS`. split: one of `SPLITS`.
-    level: nominal level, degrees of tilt for static_tilt, mm of pull for curl, None where there is none.
     gravity: (3,) m/s² in the base frame, measured from the base body.
-    time: (T,) s, uniform. A static tilt is averaged over time and has T = 1.
+    time: (T,) s, uniform. A static trial is averaged over time and has T = 1.
     positions: (T, S, 3) m. quaternions: (T, S, 4) wxyz, hemisphere-continuous; None where the log has none.
     measured: (T, S) False where a sample was bridged over a gap too long to trust.
     commands, tendon_positions: (T, K) m of pull from the straight arm's path length, on the same clock.
-    start: s, the detected release, or the beginning of the curl cycle; 0 for a static tilt.
+    start: s, when it begins: the detected release, or the beginning of the curl cycle; 0 for a static trial.
     in_motion: whether the arm moves at `start` already.
     """
 
-    name: str
-    experiment: str
-    split: str
-    level: float | None
     gravity: np.ndarray
-    time: np.ndarray
-    segments: tuple[str, ...]
-    positions: np.ndarray
-    quaternions: np.ndarray | None
     measured: np.ndarray
-    tendons: tuple[str, ...]
-    commands: np.ndarray
-    tendon_positions: np.ndarray
-    start: float
+    start: float = 0.0
     in_motion: bool = False
 
 

@@ -1,4 +1,4 @@
-"""Rules that an MJCF must keep so that MuJoCo's Unity importer makes the same model of it (SPEC section 10).
+"""Rules that an MJCF must keep so that MuJoCo's Unity importer makes the same model of it.
 
 The importer reads what libmujoco saves, so that is what is checked here.
 """

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import mujoco
 import numpy as np
+from pydantic import Field, PositiveFloat
 
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize_joints
@@ -25,12 +27,11 @@ SCRIPTS = [Path(__file__).parent / "csharp" / name for name in ("CalibratedSprin
 class Label:
     """How the package calls itself; `unity` is the oldest editor that it is for."""
 
-    name: str
-    version: str
+    name: Annotated[str, Field(pattern=r"^[a-z0-9-]+(\.[a-z0-9-]+){2,}$")]
+    version: Annotated[str, Field(pattern=r"^\d+\.\d+\.\d+$")]
     display_name: str
     description: str
-    unity: str
-    trunkline: str
+    unity: Annotated[str, Field(pattern=r"^\d+\.\d+$")]
 
 
 @dataclass
@@ -38,17 +39,25 @@ class Trajectory:
     """The movement on which models are compared.
 
     Attributes:
-        duration: s. pull: largest pull of tendon 1, m. tilts: gravity angles, rad.
+        duration: s. pull: largest pull of tendon 1, m. tilts_deg: gravity angles.
     """
 
-    duration: float
-    pull: float
-    tilts: list[float]
+    duration: PositiveFloat
+    pull: PositiveFloat
+    tilts_deg: Annotated[list[float], Field(min_length=1)]
+
+    @property
+    def tilts(self) -> list[float]:
+        """Gravity angles, rad."""
+        return np.radians(self.tilts_deg).tolist()
 
 
 @dataclass
 class Sources:
-    """What the earlier stages made: the calibrated MJCF, files to read, metrics by stage, texts by name."""
+    """What the earlier stages made: the calibrated MJCF, files to read, metrics by stage, texts by name.
+
+    trunkline: version of the code that made it.
+    """
 
     mjcf: str
     network: Path
@@ -56,6 +65,7 @@ class Sources:
     grids: Path
     metrics: dict[str, dict]
     texts: dict[str, bytes]
+    trunkline: str
 
 
 def assemble(
@@ -96,7 +106,7 @@ def assemble(
     manifest = Manifest(
         name=label.name,
         versions=Versions(
-            package=label.version, trunkline=label.trunkline, mujoco=mujoco.__version__, unity=label.unity
+            package=label.version, trunkline=sources.trunkline, mujoco=mujoco.__version__, unity=label.unity
         ),
         model=describe_model(
             bundled,

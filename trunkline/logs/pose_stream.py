@@ -1,4 +1,4 @@
-"""A topic's messages as arrays: all poses, or all joint positions, of a log."""
+"""A topic's messages as arrays: all poses of a log."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -8,9 +8,13 @@ import numpy as np
 from trunkline.logs.cdr import short_name
 from trunkline.logs.encodings import decode
 from trunkline.logs.log import Topic
-from trunkline.logs.messages import JOINTS, POSES, Poses
-from trunkline.logs.samples import Samples
+from trunkline.logs.messages import POSES, READING, Poses
+from trunkline.logs.samples import Samples, union
 from trunkline.logs.transforms import in_one_frame
+
+# Messages of the same bodies: their rows (n,) in the topic, and their poses with the messages as first axis and a
+# list of names. Their time is (n,), or (n, S) where each body has its own.
+Batch = tuple[np.ndarray, Poses]
 
 
 @dataclass
@@ -31,46 +35,9 @@ class PoseStream:
     present: np.ndarray
     positions: np.ndarray
     quaternions: np.ndarray | None
-    undecodable: int
+    undecodable: int = 0
     unnamed: int | None = None
     parents: tuple[str, ...] = ()
-
-
-@dataclass
-class JointStream:
-    """T messages, K joints. stamps, log_times: (T,) ns. positions: (T, K) m, NaN where absent.
-
-    timed: whether the messages have stamps; without, stamps are the log times. unnamed: as for poses.
-    """
-
-    topic: str
-    stamps: np.ndarray
-    log_times: np.ndarray
-    names: tuple[str, ...]
-    positions: np.ndarray
-    undecodable: int
-    timed: bool = True
-    unnamed: int | None = None
-
-
-@dataclass
-class Batch:
-    """n messages of the same bodies. rows: (n,) in their topic. time: (n,) ns, or (n, S) where each body has its own.
-
-    positions (n, S, 3), orientations (n, S, 4) or None, frame (n,) or None.
-    """
-
-    rows: np.ndarray
-    names: list[str]
-    time: np.ndarray
-    positions: np.ndarray
-    orientations: np.ndarray | None
-    frame: np.ndarray | None
-    parents: list[str] | None
-
-
-# what readers raise where a message is not as expected
-READING = (AttributeError, TypeError, ValueError, IndexError, OverflowError)
 
 
 def pose_stream(
@@ -99,9 +66,9 @@ def pose_stream(
             unnamed = max(poses.positions.shape[-2] for _, poses in batches)
             given = [str(number + 1) for number in range(unnamed)]
         read.append((topic, [part for batch in batches for part in _batches(*batch, topic, given)]))
-    parents = {frame: None for _, batches in read for batch in batches for frame in batch.parents or ()}
-    kept = sum(len(batch.rows) for _, batches in read for batch in batches)
-    own_times = any(batch.time.ndim == 2 for _, batches in read for batch in batches)
+    parents = {frame: None for _, batches in read for _, poses in batches for frame in poses.parents or ()}
+    kept = sum(len(rows) for _, batches in read for rows, _ in batches)
+    own_times = any(poses.time.ndim == 2 for _, batches in read for _, poses in batches)
     if not own_times and len(read) == 1:
         stream = _by_message(*read[0])
     else:
@@ -113,46 +80,6 @@ def pose_stream(
     stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - kept
     stream.unnamed, stream.parents = unnamed, tuple(parents)
     return stream
-
-
-def joint_stream(topic: Topic) -> JointStream:
-    """All messages of a topic whose schema is in `JOINTS`; numbers without names go by their place, from 1.
-
-    Raises:
-        ValueError: the messages cannot be read at all.
-    """
-    reader, batches, unnamed, timed = JOINTS[short_name(topic.schema)], [], None, True
-    for rows, message in decode(topic):
-        try:
-            joints = reader(message)
-            positions = joints.positions.reshape(rows.size, joints.positions.shape[-1])
-        except READING:
-            continue
-        names = joints.names
-        if names is None:
-            unnamed = max(unnamed or 0, positions.shape[1])
-            names = [str(number + 1) for number in range(positions.shape[1])]
-        timed &= joints.time is not None
-        if len(names) == positions.shape[1]:
-            batches.append((np.atleast_1d(rows), list(names), positions, joints.time))
-    names = _union([(rows, names) for rows, names, *_ in batches])
-    positions = np.full((len(topic.messages), len(names)), np.nan)
-    stamps, kept = topic.log_times.copy(), np.zeros(len(topic.messages), bool)
-    for rows, some, values, time in batches:
-        kept[rows] = True
-        positions[np.ix_(rows, [names.index(name) for name in some])] = values
-        if timed:
-            stamps[rows] = time
-    return JointStream(
-        topic.name,
-        stamps[kept],
-        topic.log_times[kept],
-        names,
-        positions[kept],
-        len(topic.messages) - int(kept.sum()),
-        timed,
-        unnamed,
-    )
 
 
 def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, Poses]]:
@@ -168,7 +95,7 @@ def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, Poses]]:
 
 
 def _batches(rows: np.ndarray, poses: Poses, topic: Topic, given: Sequence[str] | None) -> Iterator[Batch]:
-    """What a reader returned, with the messages as first axis: a batch a set of names, none if they do not fit."""
+    """What a reader returned as batches, one a set of names; none if they do not fit."""
     count, size = rows.size, poses.positions.shape[-2]
     time = topic.log_times[rows] if poses.time is None else poses.time
     own_times = poses.parents is not None or np.ndim(time) > rows.ndim
@@ -184,42 +111,39 @@ def _batches(rows: np.ndarray, poses: Poses, topic: Topic, given: Sequence[str] 
         parts = [(list(names or ()), slice(None))]
     for some, part in parts:
         if len(some) == size == len(set(some)):
-            yield Batch(
-                rows[part],
-                some,
-                time[part],
-                positions[part],
-                None if orientations is None else orientations[part],
-                None if frame is None else frame[part],
-                poses.parents,
+            yield rows[part], poses._replace(
+                time=time[part],
+                names=some,
+                positions=positions[part],
+                orientations=None if orientations is None else orientations[part],
+                frame=None if frame is None else frame[part],
             )
 
 
 def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
     """A frame a message."""
-    names, count = _union([(batch.rows, batch.names) for batch in batches]), len(topic.messages)
+    names, count = union([(rows, poses.names) for rows, poses in batches]), len(topic.messages)
     positions = np.full((count, len(names), 3), np.nan)
     quaternions = np.full((count, len(names), 4), np.nan)
     present, kept = np.zeros((count, len(names)), bool), np.zeros(count, bool)
     stamps, frames = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    for batch in batches:
-        columns = np.ix_(batch.rows, [names.index(name) for name in batch.names])
-        stamps[batch.rows], kept[batch.rows] = batch.time, True
-        present[columns], positions[columns] = True, batch.positions
-        if batch.orientations is not None:
-            quaternions[columns] = batch.orientations
-        if batch.frame is not None:
-            frames[batch.rows] = batch.frame
-    oriented = any(batch.orientations is not None for batch in batches)
+    for rows, poses in batches:
+        columns = np.ix_(rows, [names.index(name) for name in poses.names])
+        stamps[rows], kept[rows] = poses.time, True
+        present[columns], positions[columns] = True, poses.positions
+        if poses.orientations is not None:
+            quaternions[columns] = poses.orientations
+        if poses.frame is not None:
+            frames[rows] = poses.frame
+    oriented = any(poses.orientations is not None for _, poses in batches)
     return PoseStream(
-        stamps[kept],
-        topic.log_times[kept],
-        frames[kept] if all(batch.frame is not None for batch in batches) else None,
-        names,
-        present[kept],
-        positions[kept],
-        quaternions[kept] if oriented else None,
-        0,
+        stamps=stamps[kept],
+        log_times=topic.log_times[kept],
+        frames=frames[kept] if all(poses.frame is not None for _, poses in batches) else None,
+        names=names,
+        present=present[kept],
+        positions=positions[kept],
+        quaternions=quaternions[kept] if oriented else None,
     )
 
 
@@ -235,7 +159,13 @@ def _gather(samples: Samples) -> PoseStream:
     if quaternions is not None:
         quaternions[frame, body] = samples.quaternions
     return PoseStream(
-        samples.stamps[first], samples.logged[first], None, names, present, positions, quaternions, 0
+        stamps=samples.stamps[first],
+        log_times=samples.logged[first],
+        frames=None,
+        names=names,
+        present=present,
+        positions=positions,
+        quaternions=quaternions,
     )
 
 
@@ -243,26 +173,17 @@ def _samples(read: list[tuple[Topic, list[Batch]]]) -> Samples:
     """What batches hold, body by body."""
     parts = [Samples.none()]
     for topic, batches in read:
-        for batch in batches:
-            shape = (len(batch.rows), len(batch.names))
-            time = batch.time if batch.time.ndim == 2 else batch.time[:, None]
-            turned = np.full((*shape, 4), np.nan) if batch.orientations is None else batch.orientations
+        for rows, poses in batches:
+            shape = (len(rows), len(poses.names))
+            time = poses.time if poses.time.ndim == 2 else poses.time[:, None]
+            turned = np.full((*shape, 4), np.nan) if poses.orientations is None else poses.orientations
             parts.append(Samples(
                 np.broadcast_to(time, shape).ravel(),
-                np.repeat(topic.log_times[batch.rows], shape[1]),
-                np.tile(np.array(batch.names, dtype=str), shape[0]),
-                np.tile(np.array(batch.parents or [""] * shape[1], dtype=str), shape[0]),
-                batch.positions.reshape(-1, 3),
+                np.repeat(topic.log_times[rows], shape[1]),
+                np.tile(np.array(poses.names, dtype=str), shape[0]),
+                np.tile(np.array(poses.parents or [""] * shape[1], dtype=str), shape[0]),
+                poses.positions.reshape(-1, 3),
                 turned.reshape(-1, 4),
             ))  # fmt: skip
     samples = Samples(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     return samples.take(np.argsort(samples.logged, kind="stable"))
-
-
-def _union(batches: list[tuple[np.ndarray, list[str]]]) -> tuple[str, ...]:
-    """All names, in the order of their first appearance: by row, then by place."""
-    first = {}
-    for rows, names in batches:
-        for place, name in enumerate(names):
-            first[name] = min(first.get(name, (rows[0], place)), (rows[0], place))
-    return tuple(sorted(first, key=first.get))

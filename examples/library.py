@@ -1,0 +1,28 @@
+"""The library alone: where does the twin's tip rest, and which tendon lengths bring it there? (no DVC, no checkout)
+
+    python library.py artifacts/identify_control/arm.xml artifacts/train_ik/ik.onnx
+"""
+
+import sys
+
+import mujoco
+import numpy as np
+import onnxruntime
+
+from trunkline.frames import gravity_in_base
+from trunkline.statics.chain import read_chain
+from trunkline.statics.equilibria import equilibrium, forward
+
+model, network = sys.argv[1:]
+chain = read_chain(mujoco.MjModel.from_xml_path(model))
+tilt = np.array([0.3])  # rad, between the straight arm and gravity
+gravity = gravity_in_base(tilt)
+tensions = np.zeros((1, chain.tendons))
+tensions[0, 0] = 5.0  # N, on the first tendon alone
+rest = equilibrium(chain, tensions, gravity)
+pose = np.concatenate([tilt[:, None], rest.position, rest.quaternion], axis=1)  # (1, 8), base frame, w first
+lengths = onnxruntime.InferenceSession(network).run(None, {"pose": pose.astype(np.float32)})[0]
+reached = forward(chain, lengths.astype(float), gravity)
+print("tip (m):", rest.position[0].round(4))
+print("lengths (m):", lengths[0].round(4))
+print("tip missed by (mm):", (1e3 * np.linalg.norm(reached.position - rest.position, axis=1)[0]).round(2))

@@ -1,0 +1,145 @@
+"""The docs: what they point to is there, what they list is complete, and their lines are short."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+from omegaconf import OmegaConf
+
+from trunkline.logs.cdr import short_name
+from trunkline.logs.messages import JOINTS, POSES
+from trunkline.sessions.session import FixedBase, MocapFrame, Session, Topics, TrialEntry
+
+ROOT = Path(__file__).parents[2]
+DOCS = sorted(
+    path
+    for pattern in ("*.md", "docs/*.md", "docs/results/*.md", "data/*/README.md", "examples/*/README.md")
+    for path in ROOT.glob(pattern)
+)
+FOLDERS = "trunkline|stages|conf|docs|demo|studies|benchmarks|tests|examples"
+PACKED = ROOT / "docs/unity.md"  # part of the Unity package: wrapping its lines would change the package
+OTHERS = ("pytest", "pip", "venv")  # modules that are not the project's
+
+def pages(chosen: list[Path]) -> pytest.MarkDecorator:
+    return pytest.mark.parametrize("page", chosen, ids=lambda page: str(page.relative_to(ROOT)))
+
+
+every_page = pages(DOCS)
+
+
+def test_there_are_pages_to_check():
+    assert {"README.md", "CONTRIBUTING.md", "CHANGELOG.md"} <= {page.name for page in DOCS}
+    assert sum(len(paths(page)) for page in DOCS) > 80
+    assert sum(len(links(page)) for page in DOCS) > 40
+
+
+@every_page
+def test_files_that_it_names_exist(page):
+    assert [name for name in paths(page) if not (ROOT / name).exists()] == []
+
+
+@every_page
+def test_artifacts_that_it_names_are_written_by_a_stage(page):
+    pipeline = (ROOT / "dvc.yaml").read_text(encoding="utf-8")
+    named = re.findall(r"`artifacts/(\w[\w./]*)`", page.read_text(encoding="utf-8"))
+    assert [name for name in named if f"artifacts/{name.rstrip('/')}" not in pipeline] == []
+
+
+@every_page
+def test_links_lead_somewhere(page):
+    broken = []
+    for target, anchor in links(page):
+        file = page.parent / target if target else page
+        if not file.exists() or (anchor and anchor not in anchors(file)):
+            broken.append(f"{target}#{anchor}")
+    assert broken == []
+
+
+@every_page
+def test_commands_that_it_names_exist(page):
+    text = page.read_text(encoding="utf-8")
+    modules = [name.rstrip(".") for name in re.findall(r"python -m ([\w.]+)", text)]
+    places = {name: ROOT / name.replace(".", "/") for name in modules if name not in OTHERS}
+    missing = [n for n, p in places.items() if not p.with_suffix(".py").is_file() and not (p / "__main__.py").is_file()]
+    assert missing == []
+    targets = set(re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
+    assert set(re.findall(r"(?:`|^)make (\w+)", text, re.MULTILINE)) <= targets
+
+
+@pages([page for page in DOCS if page != PACKED])
+def test_its_lines_are_short(page):
+    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    assert [line for line in text.splitlines() if len(line) > 120 and not line.startswith("|")] == []
+
+
+def test_nothing_cites_a_specification_that_readers_lack():
+    files = [file for folder in FOLDERS.split("|") for file in (ROOT / folder).rglob("*.*")]
+    files = [file for file in files if file.suffix in (".py", ".yaml", ".md")]
+    assert len(files) > 200
+    assert [f for f in files if re.search(r"\bSPE[C]\b", f.read_text(encoding="utf-8"))] == []
+
+
+def test_the_readme_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+
+
+def test_the_paper_is_cited_as_the_readme_names_it():
+    citation = OmegaConf.to_container(OmegaConf.load(ROOT / "CITATION.cff"))
+    assert {"cff-version", "message", "title", "authors"} <= set(citation)
+    titles = [reference["title"] for reference in citation["references"] if reference["type"] and reference["authors"]]
+    assert f"*{titles[0]}*" in " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+
+
+def test_the_rooms_are_all_of_them_and_none_imports_a_later_one():
+    block = re.search(r"<!-- rooms -->(.*?)<!-- /rooms -->", (ROOT / "CONTRIBUTING.md").read_text(), re.DOTALL)
+    rooms = re.findall(r"^\| `(\w+)` \|", block[1], re.MULTILINE)
+    assert sorted(rooms) == sorted(path.parent.name for path in ROOT.glob("trunkline/*/__init__.py"))
+    back = [
+        f"{file.relative_to(ROOT)} imports {other}"
+        for place, room in enumerate(rooms)
+        for file in sorted((ROOT / "trunkline" / room).rglob("*.py"))
+        for other in imported_rooms(file)
+        if other in rooms[place + 1 :]
+    ]
+    assert back == []
+
+
+def test_the_reference_of_sessions_has_every_key_and_schema():
+    text = (ROOT / "data/raw/README.md").read_text(encoding="utf-8")
+    keys = [f"`{key}`" for key in Session.model_fields if key not in ("frame", "trials")]
+    keys += [f"`frame.{key}`" for key in MocapFrame.model_fields]
+    keys += [f"`trials[].{key}`" for key in TrialEntry.model_fields]
+    words = [*Topics.model_fields, *FixedBase.model_fields]
+    words += [re.split(r"[./]", short_name(schema))[-1] for schema in (*POSES, *JOINTS)]
+    assert [key for key in keys if key not in text] == []
+    assert [word for word in words if not re.search(rf"\b{word}\b", text)] == []
+
+
+def paths(page: Path) -> list[str]:
+    """What looks like a file or folder of the project, seen from its top."""
+    found = re.findall(rf"(?<![\w/.<-])((?:{FOLDERS})/[\w./-]+)", page.read_text(encoding="utf-8"))
+    return [name.rstrip(".") for name in found if "/artifacts/" not in name]
+
+
+def links(page: Path) -> list[tuple[str, str]]:
+    """(file, anchor) of each link that stays within the project."""
+    found = re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", page.read_text(encoding="utf-8"))
+    return [(target, anchor) for target, anchor in found if "://" not in target]
+
+
+def anchors(page: Path) -> set[str]:
+    """The names that GitHub gives to the headings of a page."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def imported_rooms(file: Path) -> set[str]:
+    """Rooms of trunkline that a module imports."""
+    found = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        found |= {name.split(".")[1] for name in names if name.startswith("trunkline.")}
+    return found

@@ -1,0 +1,89 @@
+"""pyproject.toml declares what the library imports, each thing once and where it belongs, and nothing besides."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+OWN = {"trunkline", "stages", "demo", "benchmarks", "studies", "examples", "tests"}
+# For an extra's sake or by name alone: no import shows them.
+UNSEEN = {"absl-py", "daqp", "plotly", "pyright", "pytest-xdist", "ruff", "setuptools"}
+NEEDS_PIPELINE = ("trunkline/pipeline", "trunkline/figures", "trunkline/ik/network.py", "trunkline/ik/tip_loss.py")
+
+
+def declared(requirements: list[str]) -> set[str]:
+    """Normalised names of the distributions, those of extras of this project resolved."""
+    found = set()
+    for requirement in requirements:
+        own = re.match(r"trunkline\[(.*)\]", requirement)
+        for extra in own[1].split(",") if own else []:
+            found |= declared(PROJECT["optional-dependencies"][extra])
+        if not own:
+            found.add(normal(re.match(r"[\w.-]+", requirement)[0]))
+    return found
+
+
+def normal(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def imported(files: list[Path]) -> dict[str, set[str]]:
+    """Distribution, the declared one where several bring a module, to the files that import it."""
+    distributions, found = packages_distributions(), {}
+    everything = declared([*PROJECT["dependencies"], "trunkline[dev]"])
+    for file in files:
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            modules = []
+            if isinstance(node, ast.Import):
+                modules = [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom) and not node.level:
+                modules = [node.module]
+            for module in modules:
+                top = module.partition(".")[0]
+                if top not in sys.stdlib_module_names | OWN:
+                    names = [normal(name) for name in distributions[top]]
+                    name = next((name for name in names if name in everything), names[0])
+                    found.setdefault(name, set()).add(file.relative_to(ROOT).as_posix())
+    return found
+
+
+def files(*folders: str) -> list[Path]:
+    return [file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))]
+
+
+def test_the_library_needs_its_dependencies_alone():
+    light = [f for f in files("trunkline") if not f.relative_to(ROOT).as_posix().startswith(NEEDS_PIPELINE)]
+    undeclared = {n: w for n, w in imported(light).items() if n not in declared(PROJECT["dependencies"])}
+    assert undeclared == {}
+
+
+@pytest.mark.parametrize(
+    ("extra", "folders"),
+    [
+        ("pipeline", ["trunkline", "stages", "demo", "studies", "examples/asl_trunk"]),
+        ("bench", ["benchmarks"]),
+        ("test", ["tests"]),
+    ],
+)
+def test_an_extra_declares_what_its_folders_import(extra, folders):
+    known = declared([*PROJECT["dependencies"], "trunkline[pipeline]", f"trunkline[{extra}]"])
+    assert {name: where for name, where in imported(files(*folders)).items() if name not in known} == {}
+
+
+def test_every_dependency_is_imported():
+    everything = declared([*PROJECT["dependencies"], "trunkline[dev]"])
+    assert everything - UNSEEN - set(imported(files(*OWN))) == set()
+
+
+def test_the_lock_pins_every_dependency_with_a_hash_and_names_no_host():
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    pinned = {normal(name) for name in re.findall(r"^([\w.-]+)==.*\\\n    --hash=sha256:", lock, re.MULTILINE)}
+    assert declared([*PROJECT["dependencies"], "trunkline[dev]"]) - pinned == {"torch"}
+    assert "://" not in lock
+    assert not re.search(r"^-", lock, re.MULTILINE)

@@ -1,0 +1,14 @@
+"""Names of the columns of the table of samples."""
+
+AXES = "xyz"
+POSE = [*AXES, "qw", "qx", "qy", "qz"]  # of the tip: m, and a quaternion
+
+
+def length_columns(tendons: int) -> list[str]:
+    """l1, l2, …"""
+    return [f"l{t + 1}" for t in range(tendons)]
+
+
+def tension_columns(tendons: int) -> list[str]:
+    """f1, f2, …"""
+    return [f"f{t + 1}" for t in range(tendons)]

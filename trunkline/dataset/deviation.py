@@ -1,0 +1,50 @@
+"""How far the samples are from MuJoCo at rest, and how far friction, which is off in both, may hold the tip."""
+
+import mujoco
+import numpy as np
+import pandas as pd
+
+from trunkline.dataset.columns import length_columns, tension_columns
+from trunkline.errors import InputError
+from trunkline.frames import gravity_in_base
+from trunkline.simulation.rest import settle
+from trunkline.statics.chain import Chain
+from trunkline.statics.hysteresis import friction_band, model_friction
+
+GROUP = 64  # simulations that wait for the slowest among them to settle
+
+
+def mujoco_deviation(
+    model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, count: int, rng: np.random.Generator
+) -> pd.DataFrame:
+    """Distance of `count` random samples' tips from those of MuJoCo settled to rest under the same actuators.
+
+    Returns:
+        Columns theta_g (rad), largest_tension (N), deviation_mm, rested, and friction_band_mm: how far apart friction,
+        which is off in the comparison, may hold the tip (NaN where the ends of its band were not found).
+
+    Raises:
+        InputError: if there are fewer samples.
+    """
+    if count > len(table):
+        raise InputError(f"fk_dataset.check: found {len(table)} samples, expected at least the {count} to be checked")
+    rows = table.iloc[np.sort(rng.permutation(len(table))[:count])]
+    tensions = rows[tension_columns(chain.tendons)].to_numpy()
+    lengths = rows[length_columns(chain.tendons)].to_numpy()
+    by_actuator = model.actuator_trnid[:, 0]
+    commands = lengths - tensions / chain.gain  # f = kp (l - command), and no pull where they are equal
+    gravity = gravity_in_base(rows["theta_g"].to_numpy())
+    groups = np.array_split(np.arange(count), int(np.ceil(count / GROUP)))
+    settled = [settle(model, commands[group][:, by_actuator], gravity[group]) for group in groups]
+    position, rested = (np.concatenate([getattr(one, name) for one in settled]) for name in ("position", "rested"))
+    band = friction_band(chain, tensions, gravity, *model_friction(model))
+    deviation = np.linalg.norm(position - rows[["x", "y", "z"]].to_numpy(), axis=1)
+    return pd.DataFrame(
+        {
+            "theta_g": rows["theta_g"].to_numpy(),
+            "largest_tension": tensions.max(axis=1),
+            "deviation_mm": deviation * 1e3,
+            "rested": rested,
+            "friction_band_mm": band.width * 1e3,
+        }
+    )

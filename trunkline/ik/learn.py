@@ -1,0 +1,150 @@
+"""From samples to a network that is trained, exported and scored by forward kinematics."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+import onnx
+import onnxruntime
+import pandas as pd
+import torch
+from pydantic import Field, NonNegativeFloat, PositiveInt
+
+from trunkline.dataset.columns import length_columns, tension_columns
+from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension, turn_by_tension
+from trunkline.ik.network import INPUTS, InverseKinematics
+from trunkline.ik.onnx import to_onnx
+from trunkline.ik.polish import polish
+from trunkline.ik.score import TipErrors, beyond_range, largest_difference, outside_targets, tip_errors
+from trunkline.ik.tip_loss import tip_loss
+from trunkline.ik.training import Training, train
+from trunkline.progress import progress
+from trunkline.statics.chain import Chain
+
+
+@dataclass
+class Unseen:
+    """Targets between the gravity angles of the data set: pulls around the arm, tips along each, how many in all."""
+
+    directions: Annotated[int, Field(ge=8)]
+    steps: Annotated[int, Field(ge=8)]
+    samples: Annotated[int, Field(ge=100)]
+
+
+@dataclass
+class Polish:
+    """Gauss-Newton from the network's answers: for how many held-out targets, and of how many steps at most."""
+
+    targets: PositiveInt
+    steps: PositiveInt
+
+
+@dataclass(kw_only=True)
+class Learning(Training):
+    """The training and what it is scored on, see conf/train_ik/config.yaml.
+
+    lever: m; the loss counts a turn of the tip by 1 rad as this much distance. outside: targets far off.
+    """
+
+    lever: NonNegativeFloat
+    unseen: Unseen
+    polish: Polish
+    outside: PositiveInt
+
+
+@dataclass
+class Learned:
+    """A network, also as ONNX, and its learning curve: epoch, train_mm, validate_mm.
+
+    held_out: the samples that no training saw. errors: of the exported network, for them ("held out") and for targets
+    at "unseen angles". polished: of some held-out targets after Gauss-Newton steps from its answers.
+    outside: how many targets far off there are, beyond_range: how far (m) any answer to them leaves the tendons' range.
+    difference: between the network and what was exported, m, at most.
+    """
+
+    network: InverseKinematics
+    exported: onnx.ModelProto
+    curve: pd.DataFrame
+    held_out: pd.DataFrame
+    errors: dict[str, TipErrors]
+    polished: TipErrors
+    outside: int
+    beyond_range: float
+    difference: float
+
+
+def learn(chain: Chain, tendons: list[str], table: pd.DataFrame, learning: Learning) -> Learned:
+    """Train on the samples of `table` that are not held out, and score on those that are and on others.
+
+    Args:
+        tendons: their names, in the order of the chain.
+    """
+    network, curve = fit(table, chain.tendons, learning)
+    held_out = table[table["split"] == "validate"]
+    unseen = unseen_targets(chain, np.unique(table["theta_g"]), learning.unseen, learning.seed)
+    exported = to_onnx(network, tendons)
+    runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
+    errors, difference = {}, 0.0
+    for name, targets in (("held out", held_out), ("unseen angles", unseen)):
+        inputs = targets[INPUTS].to_numpy()
+        lengths = answers(runtime, inputs)
+        with torch.no_grad():
+            torch_lengths = network(torch.tensor(inputs, dtype=torch.float32)).numpy()
+        difference = max(difference, largest_difference(lengths, torch_lengths))
+        print(f"train_ik: forward kinematics of {len(inputs)} answers, {name}", flush=True)
+        errors[name] = tip_errors(chain, inputs, lengths.astype(float))
+    polished = polished_errors(chain, held_out, runtime, learning.polish, learning.seed)
+    far = answers(runtime, outside_targets(learning.outside, chain.length, np.random.default_rng(learning.seed)))
+    known = table.loc[table["split"] == "train", length_columns(chain.tendons)].to_numpy()
+    return Learned(
+        network, exported, curve, held_out, errors, polished, len(far), beyond_range(far, known), difference
+    )
+
+
+def fit(table: pd.DataFrame, tendons: int, learning: Learning) -> tuple[InverseKinematics, pd.DataFrame]:
+    """The trained network and its learning curve: epoch, train_mm, validate_mm."""
+    turn = learning.lever * turn_by_tension(table, tendons)
+    loss = tip_loss(
+        table[tension_columns(tendons)].to_numpy(),
+        np.concatenate([tip_by_tension(table, tendons), turn], axis=1),
+        length_by_tension(table, tendons),
+    )
+    curve = []
+    with progress(learning.epochs, "train_ik", "epochs") as bar:
+
+        def report(epoch: int, train_error: float, validate_error: float) -> None:
+            curve.append({"epoch": epoch, "train_mm": train_error * 1e3, "validate_mm": validate_error * 1e3})
+            bar.update(1, **{k: v for k, v in curve[-1].items() if k != "epoch"})
+
+        network = train(
+            table[INPUTS].to_numpy(),
+            table[length_columns(tendons)].to_numpy(),
+            loss,
+            (table["split"] == "train").to_numpy(),
+            learning,
+            report,
+        )
+    return network, pd.DataFrame(curve)
+
+
+def answers(runtime: onnxruntime.InferenceSession, inputs: np.ndarray) -> np.ndarray:
+    """Lengths (N, K), m, that the exported network gives for `inputs` (N, 8)."""
+    return runtime.run(None, {"pose": inputs.astype(np.float32)})[0]
+
+
+def polished_errors(chain: Chain, held_out: pd.DataFrame, runtime, polishing: Polish, seed: int) -> TipErrors:
+    """Errors of some held-out targets after Gauss-Newton steps from the network's answers."""
+    count = min(polishing.targets, len(held_out))
+    inputs = held_out[INPUTS].sample(count, random_state=seed).to_numpy()
+    print(f"train_ik: up to {polishing.steps} Gauss-Newton steps for {count} answers", flush=True)
+    found = polish(chain, inputs, answers(runtime, inputs).astype(float), polishing.steps)
+    return TipErrors(found.position_error, found.orientation_error)
+
+
+def unseen_targets(chain: Chain, angles: np.ndarray, unseen: Unseen, seed: int) -> pd.DataFrame:
+    """Targets at gravity angles half way between those of the data set, `angles` (A,) in rad."""
+    between = (angles[1:] + angles[:-1]) / 2
+    rng = np.random.default_rng(seed)
+    count = unseen.samples // max(1, len(between))
+    tables = [sample_table(chain, tilt, count, unseen.directions, unseen.steps, rng)[0] for tilt in between]
+    return pd.concat(tables, ignore_index=True)

@@ -1,0 +1,40 @@
+"""What is said about the maps: how well they agree with what the arms can do, and how they are made."""
+
+import numpy as np
+import pandas as pd
+
+from trunkline.fields.mesh import Surface
+from trunkline.reachability.checks import Check
+from trunkline.reachability.maps import Maps
+
+
+def heldout_table(check: Check) -> pd.DataFrame:
+    """A row for each gravity angle half-way between the soft maps, in degrees."""
+    table = pd.DataFrame(check.heldout).rename(columns={"angle": "angle_deg"})
+    table["angle_deg"] = np.degrees(table["angle_deg"]).round(6)
+    return table
+
+
+def summary(maps: Maps, check: Check) -> dict:
+    """The maps in a few numbers, for metrics.json."""
+    soft = maps.soft.meshes
+    space = {name: mesh_summary(one.mesh, check.moved[name]) for name, one in maps.in_space().items()}
+    found = {
+        name: space[name] | {"found_inside": inside, "found_outside": outside}
+        for name, (inside, outside) in check.found.items()
+    }
+    return found | {
+        "rigid": check.rigid._asdict() | space["rigid"],
+        "soft": {
+            "heldout_iou_min": min(one.iou for one in check.heldout),
+            "heldout_reachable_min": min(one.reachable for one in check.heldout),
+            "heldout_beyond_max": max(one.beyond for one in check.heldout),
+            "watertight": all(mesh.is_closed() for mesh in soft),
+            "triangles": max(len(mesh.faces) for mesh in soft),
+            "moved_voxels": check.moved["soft"],
+        },
+    }
+
+
+def mesh_summary(mesh: Surface, moved: float) -> dict:
+    return {"watertight": mesh.is_closed(), "triangles": len(mesh.faces), "moved_voxels": moved}

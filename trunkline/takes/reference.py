@@ -1,0 +1,64 @@
+"""What all logs of a session together say of their bodies: which there are, in which unit, how far apart."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from trunkline.sessions.session import FixedBase, Session
+from trunkline.sessions.source import Source
+from trunkline.signals.units import extent, likely_unit
+from trunkline.takes.swaps import usual_distances
+
+UNIT = {"m": 1.0, "mm": 1e-3}
+
+
+@dataclass
+class Reference:
+    """What each trial is read and repaired by.
+
+    segments: name in the log to name in the model, in the order of every take. base: the body that marks the mount,
+    None where none does. scale: m per unit of the logs' positions; note: on it, where it is not the declared one.
+    distances: between the base and the segments, see `usual_distances`; None where there is too little to compare.
+    joint_topics: of all logs.
+    """
+
+    segments: dict[str, str]
+    base: str | None
+    scale: float
+    note: str | None
+    distances: np.ndarray | None
+    joint_topics: tuple[str, ...]
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names in the log of the bodies that a trial needs: the base, where one marks it, then the segments."""
+        return list(self.segments) if self.base is None else [self.base, *self.segments]
+
+
+def reference_of(session: Session, sources: list[Source]) -> Reference:
+    """Compare the logs of a session."""
+    base = None if isinstance(session.base, FixedBase) else session.base
+    segments = session.segments
+    if segments is None:
+        names = {name for source in sources for name in source.poses.names if name != session.base}
+        segments = {name: name for name in sorted(names)}
+    joint_topics = tuple(sorted({name for source in sources for name in source.joint_topics}))
+    reference = Reference(segments, base, UNIT[session.frame.unit], None, None, joint_topics)
+    bodies = reference.bodies
+    logs = [
+        source.poses.positions[:, [source.poses.names.index(name) for name in bodies]]
+        for source in sources
+        if set(bodies) <= set(source.poses.names)
+    ]
+    found = likely_unit(logs)
+    if found is not None and found != session.frame.unit:
+        apart = np.median([extent(positions) for positions in logs])
+        said = f"bodies {apart:.4g} apart are no arm in {session.frame.unit}, as declared"
+        reference.scale, reference.note = UNIT[found], f"unit: {said}; taken as {found}"
+    if logs and len(bodies) >= 3:
+        logs = [reference.scale * positions for positions in logs]
+        if isinstance(session.base, FixedBase):
+            mount = np.array(session.base.position)
+            logs = [np.insert(positions, 0, mount, axis=1) for positions in logs]
+        reference.distances = usual_distances(logs)
+    return reference

@@ -1,0 +1,97 @@
+"""Repairs of one trial's poses: samples that are none, labels that changed places, frames that nobody counted."""
+
+import numpy as np
+
+from trunkline.logs.pose_stream import PoseStream
+from trunkline.logs.transforms import is_rotation
+from trunkline.signals.smoothing import noise_level
+from trunkline.takes.checks import Findings
+from trunkline.takes.frozen import frozen
+from trunkline.takes.lost import find_lost, put_back
+from trunkline.takes.reference import Reference
+from trunkline.takes.swaps import find_swaps
+
+
+def good_samples(
+    poses: PoseStream,
+    rows: np.ndarray,
+    columns: list[int],
+    scale: float,
+    names: list[str],
+    findings: Findings,
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """Positions in metres and unit quaternions of the bodies in `columns`, NaN where either is no good."""
+    positions = scale * poses.positions[np.ix_(rows, columns)]
+    present = poses.present[np.ix_(rows, columns)]
+    good = np.isfinite(positions).all(axis=-1)
+    quaternions = None
+    if poses.quaternions is not None:
+        quaternions = poses.quaternions[np.ix_(rows, columns)]
+        rotation = is_rotation(quaternions)
+        _tell_dropped(present & good & ~rotation, "with a NaN, zero or unnormalised quaternion", names, findings)
+        quaternions[rotation] /= np.linalg.norm(quaternions[rotation], axis=-1, keepdims=True)
+        good, bad = good & rotation, present & ~good
+        quaternions[~good] = np.nan
+    else:
+        bad = present & ~good
+    _tell_dropped(bad, "with a position that is not finite", names, findings)
+    positions[~good] = np.nan
+    return positions, quaternions
+
+
+def drop_frozen(
+    positions: np.ndarray, quaternions: np.ndarray | None, names: list[str], findings: Findings
+) -> None:
+    """Make NaN of the poses that only repeat the one before."""
+    still = frozen(positions)
+    _tell_dropped(still, "that only repeat the one before, to the last bit,", names, findings)
+    positions[still] = np.nan
+    if quaternions is not None:
+        quaternions[still] = np.nan
+
+
+def untangle(
+    base: tuple[np.ndarray, np.ndarray],
+    positions: np.ndarray,
+    quaternions: np.ndarray | None,
+    reference: Reference,
+    findings: Findings,
+) -> None:
+    """Give labels that changed places back, in the poses of the base (where a body marks it) and of the segments."""
+    if reference.distances is None:
+        return
+    names = [reference.base or "base", *reference.segments]
+    bodies = np.insert(positions, 0, base[0], axis=1)
+    turns = None if quaternions is None else np.insert(quaternions, 0, base[1], axis=1)
+    for swap in find_swaps(bodies, reference.distances, reference.base is not None):
+        wrong, right = list(swap.bodies), [*swap.bodies[1:], swap.bodies[0]]
+        for values in (bodies, turns):
+            if values is not None:
+                values[np.ix_(swap.frames, right)] = values[np.ix_(swap.frames, wrong)]
+        count, who = int(swap.frames.sum()), " and ".join(repr(names[body]) for body in swap.bodies)
+        findings.repairs.append(f"{who} were taken for each other in {count} frames, put right")
+    base[0][:], positions[:] = bodies[:, 0], bodies[:, 1:]
+    if turns is not None:
+        base[1][:], quaternions[:] = turns[:, 0], turns[:, 1:]
+
+
+def with_lost_time(time: np.ndarray, positions: np.ndarray, motors: bool, findings: Findings) -> np.ndarray:
+    """Time (T,) with what even stamps hide put back, unless motors are dated by a clock that would not move along."""
+    noise = float(np.median(noise_level(positions.reshape(len(time), -1))))
+    lost = find_lost(time, positions, noise)
+    if not lost:
+        return time
+    count, at = sum(place.frames for place in lost), ", ".join(f"{time[place.after]:.2f}" for place in lost)
+    frames = "frame" if count == 1 else "frames"
+    told = f"{count} {frames} lost at {at} s, though the stamps go on evenly: all bodies jump ahead on their ways"
+    if motors:
+        findings.warnings.append(f"{told}; left so, as the motors have a clock of their own")
+        return time
+    findings.repairs.append(f"{told}; their time put back")
+    return put_back(time, lost)
+
+
+def _tell_dropped(bad: np.ndarray, what: str, names: list[str], findings: Findings) -> None:
+    if bad.any():
+        where = ", ".join(name for name, hit in zip(names, bad.any(axis=0), strict=True) if hit)
+        findings.repairs.append(f"{int(bad.sum())} samples {what} dropped ({where})")

@@ -1,0 +1,83 @@
+"""The kinds of experiment: what each is, in one table that every room reads.
+
+A new kind is one entry here, and a detector in `start` if none there tells when it begins. Then sessions may name
+it, `ingest` and `filter` know what to do with it, and an identification stage can list it in its configuration.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from trunkline.trials.recording import Recording
+from trunkline.trials.start import cycle_time, free_time, release_time
+
+
+@dataclass(frozen=True)
+class Level:
+    """What the nominal level of a trial says. unit: "deg" or "mm". low, high: what session.yaml may name."""
+
+    says: str
+    unit: str
+    low: float
+    high: float
+
+
+TILT = Level("degrees of tilt", "deg", 0.0, 180.0)
+PULL = Level("mm of pull", "mm", 1.0, 10_000.0)  # below, metres were meant
+
+
+@dataclass(frozen=True)
+class Kind:
+    """level: of a trial, None where it has none.
+
+    static: the arm rests throughout; a trial is averaged over time to one frame, and its model settles to rest.
+    needs_motors: refused without commands or tendon positions.
+    words: in the name of a log that is proposed to be one.
+    start: when a moving trial begins, s, by its filtered positions and commands; see the module `start`.
+    free: when the last hand is off, s, where that may be later than `start` says.
+    hangs: at its end, the arm hangs at rest with nothing that pulls it.
+    """
+
+    level: Level | None
+    static: bool
+    needs_motors: bool
+    words: tuple[str, ...]
+    start: Callable[[Recording], float] | None = None
+    free: Callable[[Recording, float], float] | None = None
+    hangs: bool = False
+
+
+EXPERIMENTS: dict[str, Kind] = {
+    "static_tilt": Kind(
+        level=TILT,
+        static=True,
+        needs_motors=False,
+        words=("static", "tilt"),
+    ),
+    "release": Kind(
+        level=None,
+        static=False,
+        needs_motors=False,
+        words=("release",),
+        start=lambda trial: release_time(trial.time, trial.positions),
+        free=lambda trial, begin: free_time(trial.time, trial.positions, begin),
+        hangs=True,
+    ),
+    "curl": Kind(
+        level=PULL,
+        static=False,
+        needs_motors=True,
+        words=("curl",),
+        start=lambda trial: cycle_time(trial.time, trial.commands),
+    ),
+}
+
+if TYPE_CHECKING:
+    ExperimentName = str
+else:
+    ExperimentName = Literal[tuple(EXPERIMENTS)]  # so that whoever names another is told which there are
+
+
+def is_static(experiment: str) -> bool:
+    """Whether the arm rests throughout a trial of this kind."""
+    return EXPERIMENTS[experiment].static

@@ -1,0 +1,37 @@
+"""What every form of a trial says: planned, simulated by the stand-in lab, as recorded, and as filtered."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(kw_only=True)
+class Planned:
+    """What the experimenter says of a trial.
+
+    name: unique within the session. experiment: one of `experiments.EXPERIMENTS`. split: what the trial is for,
+    "identify" or "validate". level: nominal, in the unit of its experiment; None where there is none.
+    """
+
+    name: str
+    experiment: str
+    split: str
+    level: float | None
+
+
+@dataclass(kw_only=True)
+class Recording(Planned):
+    """A trial of T frames, S segments and K tendons.
+
+    time: (T,) s from the first frame. positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None: of the segments.
+    commands, tendon_positions: m of pull, one column a tendon. What else a frame, a clock or a gap means is told by
+    the class that derives from this one.
+    """
+
+    time: np.ndarray
+    segments: tuple[str, ...]
+    positions: np.ndarray
+    quaternions: np.ndarray | None
+    tendons: tuple[str, ...]
+    commands: np.ndarray
+    tendon_positions: np.ndarray

@@ -1,0 +1,59 @@
+"""The models of a finished package beside the calibrated one, on the same curl."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+import pandas as pd
+
+from trunkline.unity.importer import as_imported
+from trunkline.unity.linearize import compile_with
+from trunkline.unity.manifest import Manifest
+from trunkline.unity.roundtrip import curl, deviation, simulate
+from trunkline.unity.twin import MANIFEST, MODEL, Trajectory
+
+
+@dataclass
+class Curled:
+    """Models on a curl of T steps: time (T,) s; by model the tip (T, 3) m, by all but the first how far any body is
+    from where the first has it, (T,) m."""
+
+    time: np.ndarray
+    tips: dict[str, np.ndarray]
+    gaps: dict[str, np.ndarray]
+
+    def table(self) -> pd.DataFrame:
+        """Every tenth step: time (s), gaps (mm) and tips (m)."""
+        columns = {"time": self.time} | {f"{name}_gap_mm": gap for name, gap in self.gaps_mm().items()}
+        columns |= {f"{name}_{axis}": tip[:, "xyz".index(axis)] for name, tip in self.tips.items() for axis in "xyz"}
+        return pd.DataFrame(columns)[::10]
+
+    def gaps_mm(self) -> dict[str, np.ndarray]:
+        return {name: 1e3 * gap for name, gap in self.gaps.items()}
+
+
+def read_models(calibrated: str, packed: dict[str, bytes]) -> dict[str, mujoco.MjModel]:
+    """Calibrated, packed and as Unity imports it; the latter two with the manifest's springs and dampers restored.
+
+    Args:
+        calibrated: MJCF. packed: the package's files by path.
+    """
+    mjcf = packed[MODEL].decode()
+    described = Manifest.model_validate_json(packed[MANIFEST]).model
+    return {
+        "calibrated": mujoco.MjModel.from_xml_string(calibrated),
+        "packed": compile_with(mjcf, described.springs, described.dampers),
+        "imported": compile_with(as_imported(mjcf), described.springs, described.dampers),
+    }
+
+
+def curled(models: dict[str, mujoco.MjModel], trajectory: Trajectory) -> Curled:
+    """The curl at the last gravity angle; the calibrated model is the first."""
+    calibrated = models["calibrated"]
+    controls = curl(calibrated, trajectory.duration, trajectory.pull)
+    motions = {name: simulate(model, controls, trajectory.tilts[-1]) for name, model in models.items()}
+    return Curled(
+        time=calibrated.opt.timestep * np.arange(1, len(controls) + 1),
+        tips={name: motion.positions[:, -1] for name, motion in motions.items()},
+        gaps={name: deviation(motions["calibrated"], motions[name]) for name in ("packed", "imported")},
+    )

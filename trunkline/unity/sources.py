@@ -1,0 +1,37 @@
+"""What the earlier stages wrote, gathered for the package."""
+
+import json
+from pathlib import Path
+
+from trunkline.errors import InputError, existing
+from trunkline.unity.twin import Sources
+from trunkline.version import __version__
+
+STAGES = ["ingest", "filter", "build_mjcf", "identify_stiffness", "identify_damping", "identify_control"]
+STAGES += ["fk_dataset", "train_ik", "reachability"]
+
+
+def read_sources(root: Path, version: str) -> Sources:
+    """The finished artifacts of the pipeline in `root`, for a package of this `version`.
+
+    Raises:
+        InputError: a file is missing.
+    """
+    artifacts = root / "artifacts"
+    meshes = sorted((artifacts / "reachability/meshes").glob("*.obj"))
+    if not meshes:
+        found = f"{artifacts}/reachability/meshes: found no mesh"
+        raise InputError(f"{found}, expected .obj files (run the reachability stage)")
+    return Sources(
+        mjcf=existing(artifacts / "identify_control/arm.xml").read_text(),
+        network=existing(artifacts / "train_ik/ik.onnx"),
+        meshes=meshes,
+        grids=existing(artifacts / "reachability/grids.npz"),
+        metrics={s: json.loads(existing(artifacts / s / "metrics.json").read_text()) for s in STAGES},
+        texts={
+            "README.md": existing(root / "docs/unity.md").read_bytes(),
+            "LICENSE.md": existing(root / "LICENSE").read_bytes(),
+            "CHANGELOG.md": f"# Changelog\n\n## [{version}]\n\nSee `Runtime/manifest.json`.\n".encode(),
+        },
+        trunkline=__version__,
+    )
