@@ -17,14 +17,8 @@ import numpy as np
 import pandas as pd
 import torch
 
-from trunkline.dataset.table import (
-    length_by_tension,
-    length_columns,
-    sample_table,
-    tension_columns,
-    tip_by_tension,
-    turn_by_tension,
-)
+from trunkline.dataset.columns import length_columns, tension_columns
+from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension, turn_by_tension
 from trunkline.errors import in_one_line
 from trunkline.ik.network import INPUTS
 from trunkline.ik.score import tip_errors
@@ -45,7 +39,7 @@ TITLES += ["turn, median (°)"]
 def setting(text: str) -> Training:
     """From four numbers, WIDTH,EPOCHS,BATCH,LEARNING_RATE."""
     width, epochs, batch, rate = text.split(",")
-    return Training(int(width), int(epochs), int(batch), float(rate), seed=1)
+    return Training(int(width), int(epochs), int(batch), float(rate), 1)
 
 
 @in_one_line
