@@ -1,6 +1,5 @@
 """(1) Simulator steps per second inside identification against the bare batch on the same model."""
 
-import copy
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -13,7 +12,7 @@ from benchmarks.identification.case import Case, ReadCase, Size
 from benchmarks.identification.timing import Spent, alternate
 from trunkline.identification.parameters import Fields
 from trunkline.identification.population import Population
-from trunkline.threads import thread_count
+from trunkline.simulation.motion import batch_of
 
 CANDIDATES = 12
 
@@ -63,9 +62,7 @@ def bare_batch(case: Case, fields: Fields, count: int, step_factor: float) -> tu
     experiments = case.experiments
     repeat = partial(np.repeat, repeats=count, axis=0)
     substeps = round(experiments[0].frame_step / (case.model.opt.timestep * step_factor))
-    model = copy.copy(case.model)
-    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
-    batch = Batch(model, count * len(experiments), nthread=thread_count())
+    batch = batch_of(case.model, count * len(experiments))
     for name, values in fields.items():
         batch.expand(name)[:] = np.tile(values, (len(experiments),) + (1,) * (values.ndim - 1))
     batch.expand("opt.gravity")[:] = repeat([e.gravity for e in experiments])
