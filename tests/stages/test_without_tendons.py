@@ -31,9 +31,9 @@ def arm(tmp_path, monkeypatch):
     ("name", "found"),
     [
         ("identify_control", "params.yaml: identify_control.parameters.kp: found it for an arm without tendons"),
-        ("fk_dataset", "model: found no tendons, expected at least one"),
-        ("train_ik", "model: found no tendons, expected at least one"),
-        ("reachability", "model: found no tendons, expected at least one"),
+        ("fk_dataset", "artifacts/identify_control/arm.xml: found no tendons, expected at least one"),
+        ("train_ik", "artifacts/identify_control/arm.xml: found no tendons, expected at least one"),
+        ("reachability", "artifacts/identify_control/arm.xml: found no tendons, expected at least one"),
     ],
 )
 def test_asking_for_more_is_an_error_of_one_line(arm, capsys, name, found):

@@ -22,5 +22,12 @@ def read_spec(path: str | Path) -> mujoco.MjSpec:
 
 
 def read_model(path: str | Path) -> mujoco.MjModel:
-    """The MJCF at `path`, compiled. Raises InputError as `read_spec` does."""
-    return read_spec(path).compile()
+    """The MJCF at `path`, of an arm with tendons, compiled.
+
+    Raises:
+        InputError: as `read_spec`, or the arm has no tendons.
+    """
+    model = read_spec(path).compile()
+    if not model.ntendon:
+        raise InputError(f"{path}: found no tendons, expected at least one: an arm without ends with identify_damping")
+    return model

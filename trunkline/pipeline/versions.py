@@ -19,8 +19,9 @@ LOCKS = ("requirements.lock", "requirements-torch.txt")
 # Every direct dependency of the stages but what only reads settings (hydra, omegaconf, pydantic), shows (matplotlib,
 # rich) or runs them (dvc, threadpoolctl).
 LIBRARIES = (
-    "fast-simplification", "lz4", "mcap", "mcap-protobuf-support", "mcap-ros2-support", "mujoco", "numba", "numpy",
-    "onnx", "onnxruntime", "pandas", "protobuf", "pyarrow", "scikit-image", "scipy", "torch", "trimesh", "zstandard",
+    "fast-simplification", "lz4", "mcap", "mcap-protobuf-support", "mcap-ros2-support", "mujoco", "numba",
+    "numpy", "onnx", "onnxruntime", "pandas", "point-cloud-utils", "protobuf", "pyarrow", "scikit-image",
+    "scipy", "torch", "trimesh", "zstandard",
 )  # fmt: skip
 HEADER = "# Versions that results depend on, from requirements.lock by `make requirements`; dvc.yaml names them.\n"
 

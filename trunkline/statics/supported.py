@@ -122,8 +122,6 @@ def _require_pulling_actuators(model: mujoco.MjModel) -> None:
         low, high = model.actuator_forcerange[actuator]
         if not model.actuator_forcelimited[actuator] or high > 0 or low >= 0:
             raise InputError(f"model: actuator {name!r}: found force range {low:g} {high:g}, expected -F 0: it pulls")
-    if not model.ntendon:
-        raise InputError("model: found no tendons, expected at least one: an arm without ends with identify_damping")
     pulled = model.actuator_trnid[:, 0] if model.nu else np.zeros(0, int)
     for tendon in range(model.ntendon):
         count = int(np.sum(pulled == tendon))
