@@ -5,6 +5,7 @@ import json
 import os
 import re
 import subprocess
+from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from omegaconf import OmegaConf
 from tests.support.stub_pipeline import StubPipeline
 from trunkline.pipeline import lock
 from trunkline.pipeline.config import SHARED, check_settings, group_options
+from trunkline.pipeline.versions import LIBRARIES
 
 ROOT = Path(__file__).parents[2]
 STAGES = [
@@ -69,7 +71,22 @@ def test_a_stage_lists_its_settings(stages, address):
     groups = group_options(ROOT / "conf" / name)
     expected = {f"{folder}params.yaml": [name], f"conf/{name}/config.yaml": []}
     expected |= {options[section[group]].relative_to(ROOT).as_posix(): [] for group, options in groups.items()}
+    params.pop("versions.yaml")  # the next test's
     assert params == expected
+
+
+@pytest.mark.parametrize("address", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record"])
+def test_a_stage_lists_the_libraries_that_its_numbers_go_through(stages, address):
+    """Those that it imports, directly or through its rooms, so that another version of one runs it again."""
+    (listed,) = (dep.params for dep in stages[address].deps if _relative(dep) == "versions.yaml")
+    distributions, imported = packages_distributions(), set()
+    for file in _imported(stages[address].cmd.split()[-1].replace(".", "/") + ".py"):
+        for node in ast.walk(ast.parse((ROOT / file).read_text())):
+            modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            modules += [node.module] if isinstance(node, ast.ImportFrom) and not node.level else []
+            names = {name for module in modules for name in distributions.get(module.partition(".")[0], [])}
+            imported |= {re.sub(r"[-_.]+", "-", name).lower() for name in names}
+    assert list(listed) == [name for name in LIBRARIES if name in imported]
 
 
 @pytest.mark.parametrize("address", EXAMPLES)
@@ -191,6 +208,13 @@ def test_an_edit_of_code_reruns_the_stages_that_use_it(pipeline, stages, file, f
 def test_a_conf_file_reruns_its_stage_and_no_other(pipeline):
     pipeline.edit("conf/package_unity/config.yaml", lambda text: f"{text}\nadded: 1\n")
     assert pipeline.ran("dvc", "repro", "-q") == ["stages.package_unity"]
+    pipeline.restore()
+
+
+def test_another_torch_reruns_what_it_trains_and_no_other(pipeline, stages):
+    pipeline.edit("versions.yaml", lambda text: text.replace('torch: "', 'torch: "1'))
+    expected = [f"stages.{stage}" for stage in _and_below(stages, "train_ik")]
+    assert sorted(pipeline.ran("dvc", "repro", "-q")) == sorted(expected)
     pipeline.restore()
 
 
