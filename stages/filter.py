@@ -19,7 +19,7 @@ INGEST, PROCESSED, ARTIFACTS = Path("data/processed/ingest"), Path("data/process
 Config = settings(Filter)
 
 
-def main(config: Config) -> None:
+def main(config: Filter) -> None:
     takes = read_takes(INGEST)
     trials, effects = [], []
     with progress(len(takes), "filter", "trials") as bar:

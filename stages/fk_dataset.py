@@ -18,7 +18,7 @@ DATA, ARTIFACTS = Path("data/processed/fk_dataset"), Path("artifacts/fk_dataset"
 Config = settings(Sampling)
 
 
-def main(config: Config) -> None:
+def main(config: Sampling) -> None:
     model = read_model(MODEL)
     chain = read_chain(model)
     with progress(len(config.angles_deg), "fk_dataset", "angles") as bar:

@@ -25,14 +25,14 @@ ARTIFACTS = Path("artifacts/reachability")
 Config = settings(Survey)
 
 
-def main(config: Config) -> None:
+def main(config: Survey) -> None:
     chain = read_chain(read_model(MODEL))
     tips_at = read_tips(SAMPLES, chain, config.soft, config.seed)
     with progress(config.parts(tips_at), "reachability", "parts") as bar:
         maps, check = survey(tips_at, config, lambda part: bar.update(1, done=part))
 
     with output_folder(ARTIFACTS) as folder:
-        np.savez_compressed(folder / "grids.npz", **maps.arrays())
+        np.savez_compressed(folder / "grids.npz", allow_pickle=False, **maps.arrays())
         (folder / "meshes").mkdir()
         for name, mesh in maps.meshes().items():
             write_obj(folder / "meshes" / f"{name}.obj", mesh, f"Reachable set: {name}")

@@ -23,7 +23,7 @@ ARTIFACTS = Path("artifacts/train_ik")
 Config = settings(Learning)
 
 
-def main(config: Config) -> None:
+def main(config: Learning) -> None:
     model = read_model(MODEL)
     chain = read_chain(model)
     table = read_samples(SAMPLES, chain.tendons, "split")

@@ -20,4 +20,6 @@ def settings(cls: type[Schema]) -> type[Schema]:
     The class becomes a keyword-only pydantic dataclass; numbers must be finite. The nested ones stay as they are and
     need no decorator. Where a library's dataclass is all that a stage is set by: ``Config = settings(Filter)``.
     """
-    return dataclass(cls, config=ConfigDict(extra="forbid", strict=True, allow_inf_nan=False), kw_only=True)
+    made = dataclass(cls, config=ConfigDict(extra="forbid", strict=True, allow_inf_nan=False), kw_only=True)
+    assert issubclass(made, cls)  # itself, or a class made of it where it was a dataclass before
+    return made

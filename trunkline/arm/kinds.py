@@ -8,7 +8,7 @@ import pkgutil
 from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Protocol, Union, get_args
+from typing import TYPE_CHECKING, Annotated, Protocol, Union, get_args
 
 from pydantic import Field
 
@@ -34,4 +34,7 @@ def _kinds() -> dict[str, type[Kind]]:
 
 
 ARMS = _kinds()
-Arm = Annotated[Union[tuple(ARMS.values())], Field(discriminator="kind")]  # noqa: UP007 (a union of found classes)
+if TYPE_CHECKING:
+    Arm = Kind  # which classes there are is found out when the program runs
+else:
+    Arm = Annotated[Union[tuple(ARMS.values())], Field(discriminator="kind")]  # noqa: UP007 (of found classes)

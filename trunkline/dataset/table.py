@@ -29,8 +29,8 @@ class Density:
 
     def unevenness(self) -> tuple[float, float]:
         """Standard deviation over mean of the number of tips in occupied cells of 2 cm, before and after."""
-        counts = (crowding(self.before, 0.02), crowding(self.after, 0.02))
-        return tuple(float(n.std() / n.mean()) for n in counts)
+        before, after = crowding(self.before, 0.02), crowding(self.after, 0.02)
+        return float(before.std() / before.mean()), float(after.std() / after.mean())
 
 
 def sample_table(

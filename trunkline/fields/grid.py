@@ -6,6 +6,7 @@ Sign convention everywhere: negative inside the reachable set, positive outside,
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import ndimage
 from skimage.morphology import isotropic_closing, remove_small_holes, remove_small_objects
 
@@ -21,7 +22,7 @@ class Lattice:
     shape: tuple[int, ...]
 
     @classmethod
-    def around(cls, lower: np.ndarray, upper: np.ndarray, spacing: float, margin: float) -> "Lattice":
+    def around(cls, lower: ArrayLike, upper: ArrayLike, spacing: float, margin: float) -> "Lattice":
         """The lattice through multiples of `spacing` that covers a box and `margin` m more on each side."""
         first = np.floor((np.asarray(lower) - margin) / spacing).astype(int)
         last = np.ceil((np.asarray(upper) + margin) / spacing).astype(int)

@@ -27,7 +27,7 @@ def quality_figure(
 ) -> Figure:
     """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals."""
     figure = plt.figure(figsize=(14, 13))
-    left, right = figure.subfigures(1, 2, width_ratios=(3, 2))
+    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 2))[0]
     _coverage(left.subplots(), qualities)
     gaps, noise, jitter, clock, words = right.subplots(5, 1, height_ratios=(1, 1, 1, 1, 1.4))
 

@@ -1,9 +1,9 @@
 """Pictures in space: axes with one scale, shaded surfaces, thick lines."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
@@ -23,7 +23,7 @@ def space(figure: Figure, position: int, title: str) -> Axes3D:
     axes.set_zlabel("z (m)", labelpad=10)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.pane.set_facecolor(BACKGROUND)
-        axis.set_major_locator(plt.MaxNLocator(5))
+        axis.set_major_locator(MaxNLocator(5))
     return axes
 
 

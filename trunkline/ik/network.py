@@ -17,6 +17,11 @@ class InverseKinematics(nn.Module):
     SI units; the quaternion is of unit length, of either sign. Outputs stay within the lengths of the training set.
     """
 
+    mean: torch.Tensor  # of the features over the training set, as is 1 / scale their standard deviation
+    scale: torch.Tensor
+    middle: torch.Tensor  # of the lengths' range, m
+    half_range: torch.Tensor
+
     def __init__(self, width: int, inputs: np.ndarray, lengths: np.ndarray):
         """Args: width: of each hidden layer; inputs (N, 8), lengths (N, K): the training set, for normalisation."""
         super().__init__()

@@ -5,6 +5,7 @@ import json
 import numpy as np
 import onnx
 from onnx import TensorProto, helper, numpy_helper
+from torch import nn
 
 from trunkline.ik.network import FIRST, INPUTS, SECOND, InverseKinematics
 
@@ -29,7 +30,7 @@ def to_onnx(network: InverseKinematics, tendons: list[str]) -> onnx.ModelProto:
         return output
 
     def gather(columns: list[int], output: str) -> str:
-        return node("Gather", ["pose", constant(f"{output}_columns", np.int64(columns))], output, axis=1)
+        return node("Gather", ["pose", constant(f"{output}_columns", np.array(columns, np.int64))], output, axis=1)
 
     angle, position = gather([0], "theta_g"), gather([1, 2, 3], "position")
     products = node("Mul", [gather(FIRST, "first"), gather(SECOND, "second")], "quaternion_products")
@@ -37,7 +38,7 @@ def to_onnx(network: InverseKinematics, tendons: list[str]) -> onnx.ModelProto:
     x = node("Concat", parts, "features", axis=1)
     x = node("Sub", [x, constant("mean", network.mean.numpy())], "centred")
     x = node("Mul", [x, constant("scale", network.scale.numpy())], "normalised")
-    linear = [layer for layer in network.layers if hasattr(layer, "weight")]
+    linear = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
     for index, layer in enumerate(linear, start=1):
         weight = constant(f"weight_{index}", layer.weight.detach().numpy().T.copy())
         bias = constant(f"bias_{index}", layer.bias.detach().numpy())

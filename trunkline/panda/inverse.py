@@ -131,8 +131,9 @@ def _rotation_error(last: JointFrame, rotations: np.ndarray | None) -> np.ndarra
         down = np.array([[0.0], [0.0], [-1.0]])
         axis = cross(last.z, np.broadcast_to(down, last.z.shape))
         return _unsaturated(axis, -last.z[2])
-    axis = 0.5 * sum(cross(now, rotations[:, :, i].T) for i, now in enumerate(last[:3]))
-    cosine = 0.5 * (sum((now * rotations[:, :, i].T).sum(axis=0) for i, now in enumerate(last[:3])) - 1.0)
+    axes, zero = list(zip(last[:3], rotations.transpose(2, 1, 0), strict=True)), np.zeros(())  # now and wanted
+    axis = 0.5 * sum((cross(now, wanted) for now, wanted in axes), start=zero)
+    cosine = 0.5 * (sum(((now * wanted).sum(axis=0) for now, wanted in axes), start=zero) - 1.0)
     return _unsaturated(axis, cosine)
 
 

@@ -91,4 +91,4 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def within_limits(q: np.ndarray, tolerance: float = 0.0) -> np.ndarray:
     """Whether each of `q` (N, 7), in rad, keeps all joint limits to `tolerance` rad. Shape (N,)."""
-    return ((q >= Q_MIN - tolerance) & (q <= Q_MAX + tolerance)).all(axis=1)
+    return np.all((q >= Q_MIN - tolerance) & (q <= Q_MAX + tolerance), axis=1)

@@ -69,7 +69,7 @@ def check_settings(root: str | Path = ".") -> list[str]:
     params, stages = root / "params.yaml", list(_load(root / "dvc.yaml").stages)
     for section in _load(params):
         if section not in stages:
-            raise InputError(f"{params}: {section}: no such stage{_nearest(section, stages)}")
+            raise InputError(f"{params}: {section}: no such stage{_nearest(str(section), stages)}")
     files = [file for file in sorted(own_or_project(root, "stages").glob("*.py")) if file.stem in stages]
     for file in files:
         load_config(runpy.run_path(str(file), run_name=file.stem)["Config"], file.stem, root)
@@ -92,7 +92,9 @@ def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[
             config = compose("config", overrides=overrides)
         OmegaConf.set_struct(config, False)
         values = {key: value for key, value in section.items() if key not in chosen}
-        return _plain(OmegaConf.merge(config, values))
+        merged = OmegaConf.merge(config, values)
+        assert isinstance(merged, DictConfig)  # as `config` is
+        return _plain(merged)
     except (HydraException, OmegaConfBaseException, YAMLError) as error:
         raise InputError(f"{folder}: {error}") from error
 
@@ -123,7 +125,7 @@ def _read_section(path: Path, stage: str) -> dict[str, Any]:
     params = _load(path)
     if stage not in params:
         raise InputError(f"{path}: no section {stage!r}{_nearest(stage, [str(key) for key in params])}")
-    section = {} if params[stage] is None else OmegaConf.to_container(params, resolve=False)[stage]
+    section = {} if params[stage] is None else _container(params)[stage]
     if not isinstance(section, dict):
         raise InputError(f"{path}: {stage}: found {section!r}, expected a section of `key: value` lines")
     return section
@@ -144,7 +146,7 @@ def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str
 
 def _defaults(folder: Path) -> dict[str, str]:
     """Each group of the defaults list with the option that it names, often ???."""
-    entries = OmegaConf.to_container(_load(folder / "config.yaml")).get("defaults", [])
+    entries = _container(_load(folder / "config.yaml")).get("defaults", [])
     return {group: option for entry in entries if isinstance(entry, dict) for group, option in entry.items()}
 
 
@@ -160,12 +162,19 @@ def _load(path: Path) -> DictConfig:
     return config
 
 
+def _container(config: DictConfig, resolve: bool = False) -> dict[Any, Any]:
+    """``config`` as plain values; its keys are what YAML makes of them."""
+    container = OmegaConf.to_container(config, resolve=resolve)
+    assert isinstance(container, dict)
+    return container
+
+
 def _plain(config: DictConfig) -> dict[str, Any]:
     """``config`` as plain values, without its ``???`` entries, so that validation reports them as missing."""
     try:
-        return _without_missing(OmegaConf.to_container(config, resolve=True))
+        return _without_missing(_container(config, resolve=True))
     except InterpolationToMissingValueError:  # then the missing value is the mistake, and validation names it
-        return _without_missing(OmegaConf.to_container(config, resolve=False))
+        return _without_missing(_container(config))
 
 
 def _without_missing(value: Any) -> Any:
@@ -179,13 +188,14 @@ def _path(problem: Any, composed: dict[str, Any]) -> list[str]:
     path, value = [], composed
     for place, part in enumerate(problem["loc"]):
         last = place == len(problem["loc"]) - 1
-        if isinstance(value, dict):
-            known = part in value or (last and problem["type"] == "missing")
+        if isinstance(value, dict) and (part in value or (last and problem["type"] == "missing")):
+            within = value.get(part)
+        elif isinstance(value, list) and isinstance(part, int):
+            within = None if last else value[part]  # the last of a list may be what it lacks
         else:
-            known = isinstance(value, list) and isinstance(part, int)
-        if known:
-            path.append(str(part))
-            value = None if last else value[part]
+            continue
+        path.append(str(part))
+        value = within
     return path
 
 

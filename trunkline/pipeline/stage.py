@@ -75,8 +75,9 @@ def write_json(path: str | Path, data: object) -> None:
 
 
 def _plain(value: object, key: str) -> object:
-    if hasattr(value, "tolist"):  # NumPy scalars and arrays
-        value = value.tolist()
+    tolist = getattr(value, "tolist", None)  # of NumPy scalars and arrays
+    if tolist is not None:
+        value = tolist()
     if isinstance(value, dict):
         return {str(k): _plain(v, f"{key}.{k}" if key else str(k)) for k, v in value.items()}
     if isinstance(value, list | tuple):

@@ -116,7 +116,10 @@ def check_hybrid(
 
     def shares(one: Map, tips: Tips, find: Callable[[np.ndarray], Poses]) -> tuple[float, float]:
         sets = draw_inside_and_outside(one.field, one.lattice, spot_check.outside, spot_check.count, seed)
-        return tuple(float(verified(p, find(p), tips.lengths, chain, maps.mount_offset).mean()) for p in sets)
+        inside, outside = (
+            float(verified(p, find(p), tips.lengths, chain, maps.mount_offset).mean()) for p in sets
+        )
+        return inside, outside
 
     down, rigid = tips_at(0.0), maps.rigid
     found = {"hybrid": shares(

@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numba
+from numba.core import config
 
 from trunkline.threads import thread_count
 
@@ -24,13 +25,14 @@ def kernel(function: Callable) -> Callable:
     Divisions by zero give infinities, as in numpy. numba reads its cache folder at this moment, so the setting is
     put back at once; one given by NUMBA_CACHE_DIR is left as it is.
     """
-    before = numba.config.CACHE_DIR
+    settings = config.__dict__  # made from the environment, so that no name in it is declared
+    before = settings["CACHE_DIR"]
     if not before and os.access(_HERE, os.W_OK):
-        numba.config.CACHE_DIR = str(_HERE / "__pycache__" / f"kernels-{_STAMP}")
+        settings["CACHE_DIR"] = str(_HERE / "__pycache__" / f"kernels-{_STAMP}")
     try:
         return numba.njit(cache=True, nogil=True, error_model="numpy")(function)
     finally:
-        numba.config.CACHE_DIR = before
+        settings["CACHE_DIR"] = before
 
 
 def over_rows(rows: Callable, count: int, *arguments) -> None:

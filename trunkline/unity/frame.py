@@ -4,9 +4,10 @@ The map is a reflection, so rotations keep their axis, mapped, and turn the othe
 """
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
-def unity_position(position: np.ndarray) -> np.ndarray:
+def unity_position(position: ArrayLike) -> np.ndarray:
     """Positions or directions (..., 3) as Unity's (x, y, z)."""
     return np.asarray(position)[..., [0, 2, 1]]
 

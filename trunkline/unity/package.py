@@ -69,9 +69,9 @@ def read_tarball(path: Path) -> dict[str, bytes]:
     try:
         with tarfile.open(path, "r:gz") as archive:
             return {
-                entry.name.removeprefix(ROOT): archive.extractfile(entry).read()
+                entry.name.removeprefix(ROOT): file.read()
                 for entry in archive.getmembers()
-                if entry.isfile()
+                if entry.isfile() and (file := archive.extractfile(entry)) is not None
             }
     except (tarfile.TarError, EOFError, OSError) as error:
         raise InputError(f"{path}: found {error}, expected a package's .tgz") from error

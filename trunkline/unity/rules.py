@@ -66,7 +66,8 @@ def lint_mjcf(xml: str, assets: dict[str, bytes] | None = None) -> list[Violatio
     ]  # LoadModelFromFile throws on them
     found += _unknown_elements(root)
     found += _names(root)
-    found += _inertials(root.find("worldbody"), moving=False)
+    for world in root.iterfind("worldbody"):
+        found += _inertials(world, moving=False)
     for element in root.iter():
         found += _attributes(element)
         found += _values(element)
@@ -136,7 +137,9 @@ def _inertials(body: ET.Element, moving: bool) -> Iterator[Violation]:
 
 def _attributes(element: ET.Element) -> Iterator[Violation]:
     known = kept_attributes(element)
-    for name, value in element.attrib.items() if known is not None else ():
+    if known is None:
+        return
+    for name, value in element.attrib.items():
         if name not in known:
             yield Violation(_label(element), "attribute", f'{name}="{value}" is not imported')
 
@@ -164,7 +167,7 @@ def _values(element: ET.Element) -> Iterator[Violation]:
 
 def _axes(root: ET.Element) -> Iterator[Violation]:
     """libmujoco leaves out the default axis, z; before pull request 3546 the importer put x in its place."""
-    for joint in root.find("worldbody").iter("joint"):
+    for joint in root.iterfind("worldbody//joint"):
         if joint.get("axis") is None and joint.get("type", "hinge") in ("hinge", "slide"):
             yield Violation(
                 _label(joint), "axis", "0 0 1, left out when saved; turn the body so that it differs"
