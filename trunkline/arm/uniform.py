@@ -64,13 +64,13 @@ def uniform_properties(
         stiffness: K of every joint, N m/rad: EI/ℓ where the bending stiffness EI of the arm is known.
         damping_ratio: ζ.
     """
-    masses = np.broadcast_to(np.asarray(masses, dtype=float), (chain.units,)).copy()
+    each = np.broadcast_to(np.asarray(masses, dtype=float), (chain.units,)).copy()
     radius = chain.widths / 2
-    stiffness = np.full(chain.units, stiffness)
+    joints = np.full(chain.units, stiffness)
     return UnitProperties(
-        masses=masses,
-        transverse_inertia=masses * (radius**2 / 4 + chain.lengths**2 / 12),
-        axial_inertia=masses * radius**2 / 2,
-        stiffness=stiffness,
-        damping=joint_damping(stiffness, masses.mean(), chain.lengths[0], damping_ratio),
+        masses=each,
+        transverse_inertia=each * (radius**2 / 4 + chain.lengths**2 / 12),
+        axial_inertia=each * radius**2 / 2,
+        stiffness=joints,
+        damping=joint_damping(joints, each.mean(), chain.lengths[0], damping_ratio),
     )

@@ -36,6 +36,7 @@ def summary(trials: list[Trial], effects: list[Effect]) -> dict:
     for trial, effect in zip(trials, effects, strict=True):
         kind = EXPERIMENTS[trial.experiment]
         if kind.static:
+            assert effect.motion is not None, "the filter measures it in every static trial"
             level = {} if kind.level is None else {f"level_{kind.level.unit}": trial.level}
             static[trial.name] = level | {
                 "tilt_deg": float(np.degrees(effect.tilt)),

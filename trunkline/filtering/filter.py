@@ -156,7 +156,7 @@ def average_static(trial: Trial) -> Trial:
         time=trial.time[:1],
         positions=positions,
         quaternions=quaternions,
-        measured=trial.measured.any(axis=0)[None],
+        measured=np.any(trial.measured, axis=0)[None],
         commands=trial.commands.mean(axis=0, keepdims=True),
         tendon_positions=trial.tendon_positions.mean(axis=0, keepdims=True),
     )

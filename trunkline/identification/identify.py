@@ -130,7 +130,9 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
-    linear, moves = found.linear, surrogate(exact, found.vector, found.linear.residuals).moves
+    linear = found.linear
+    assert linear is not None, "least squares ends on its own linearisation"
+    moves = surrogate(exact, found.vector, linear.residuals).moves
     problems = [rough, exact]
 
     factors: dict[str, np.ndarray] = {}

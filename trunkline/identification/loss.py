@@ -5,7 +5,7 @@ positions in the base frame, all in metres. `measured` (T, S) is False where the
 """
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import NonNegativeFloat, PositiveFloat
@@ -76,12 +76,17 @@ def position_residuals(
 
 RESIDUALS = {"distances": distance_residuals, "positions": position_residuals}
 
+if TYPE_CHECKING:
+    LossName = str
+else:
+    LossName = Literal[tuple(RESIDUALS)]  # so that whoever names another is told which there are
+
 
 @dataclass(kw_only=True)
 class Loss(LossWeights):
     """Which loss, and its numbers."""
 
-    kind: Literal[tuple(RESIDUALS)]
+    kind: LossName
 
 
 def loss_of(residuals: np.ndarray) -> np.ndarray:

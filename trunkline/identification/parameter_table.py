@@ -59,8 +59,9 @@ def _factor_table(result: Identification) -> dict:
     """Factors on top of the scaling law by unit, with the half width of their 95 % intervals, null if infinite."""
     if not result.factors:
         return {}
-    widths = result.factor_certainty.half_width.reshape(len(result.factors), -1)
+    assert result.factor_certainty is not None, "factors are searched and judged together"
+    widths = result.factor_certainty.half_width.reshape(len(result.factors), -1).tolist()
     return {
-        name: {"factor": factors, "half_width_95": np.where(np.isfinite(width), width, None)}
+        name: {"factor": factors, "half_width_95": [half if np.isfinite(half) else None for half in width]}
         for (name, factors), width in zip(result.factors.items(), widths, strict=True)
     }

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING, Literal
 
 import mujoco
 import numpy as np
@@ -145,6 +146,13 @@ PARAMETERS: dict[str, Parameter] = {
 }  # fmt: skip
 
 PER_JOINT_FIELDS = {"stiffness": STIFFNESS_FIELDS, "damping": DAMPING_FIELDS}
+
+if TYPE_CHECKING:
+    ParameterName = str
+    PerJointName = str
+else:  # so that whoever names another is told which there are
+    ParameterName = Literal[tuple(PARAMETERS)]
+    PerJointName = Literal[tuple(PER_JOINT_FIELDS)]
 
 
 def candidate_fields(

@@ -8,7 +8,7 @@ from scipy.optimize import newton
 
 from trunkline.errors import InputError
 from trunkline.identification.experiment import Experiment
-from trunkline.identification.parameters import Fields
+from trunkline.identification.parameters import STIFFNESS_FIELDS, Fields
 from trunkline.identification.pose_fit import fit_pose
 from trunkline.trials.experiments import EXPERIMENTS
 
@@ -46,9 +46,9 @@ def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) ->
     the stiffer the arm, the less of its shape comes from gravity. Fields that `fields` lacks are the model's. NaN where
     no bend balances the load.
     """
-    a = fields.get("jnt_stiffness", model.jnt_stiffness[None])
-    poly = fields.get("jnt_stiffnesspoly", model.jnt_stiffnesspoly[None])
-    a, b, c, load = np.broadcast_arrays(a, poly[..., 0], poly[..., 1], rest.load)
+    springs = {name: getattr(model, name)[None] for name in STIFFNESS_FIELDS} | fields
+    poly = springs["jnt_stiffnesspoly"]
+    a, b, c, load = np.broadcast_arrays(springs["jnt_stiffness"], poly[..., 0], poly[..., 1], rest.load)
     bend, settled, _ = newton(
         lambda x: x * (a + x * (b + x * c)) - load,
         load / a,

@@ -6,7 +6,7 @@ from pydantic import Field, NonNegativeInt, PositiveInt
 
 from trunkline.identification.identify import Method
 from trunkline.identification.loss import Loss
-from trunkline.identification.parameters import PARAMETERS, PER_JOINT_FIELDS
+from trunkline.identification.parameters import PARAMETERS, ParameterName, PerJointName
 from trunkline.identification.problem import Bounds
 from trunkline.settings import settings
 from trunkline.trials.experiments import ExperimentName
@@ -29,8 +29,8 @@ class IdentificationSettings(Method):
     rest_shape: Literal["unchanged", "measured"]
     markers: Literal["unchanged", "measured"]
     loss: Loss
-    parameters: Annotated[dict[Literal[tuple(PARAMETERS)], Bounds], Field(min_length=1)]
-    per_joint: list[Literal[tuple(PER_JOINT_FIELDS)]]
+    parameters: Annotated[dict[ParameterName, Bounds], Field(min_length=1)]
+    per_joint: list[PerJointName]
     cross_validation_folds: NonNegativeInt
 
     def __post_init__(self):

@@ -107,7 +107,7 @@ def decode(
                 pending, data = pending[1:], data[1:]
                 continue
             same = np.all(data[:, layout.structure] == data[0, layout.structure], axis=1)
-            yield pending[same], _extract(layout.fields, data[same])
+            yield pending[same], _message(layout.fields, data[same])
             pending, data = pending[~same], data[~same]
 
 
@@ -172,12 +172,16 @@ def _lay_out(data: bytes, schema: str, definitions: Definitions) -> Layout:
     return layout
 
 
-def _extract(node, data: np.ndarray):
+def _message(fields: dict, data: np.ndarray) -> SimpleNamespace:
     """The tree of a layout with the numbers of all rows of `data` (n, bytes)."""
+    return SimpleNamespace(**{name: _extract(node, data) for name, node in fields.items()})
+
+
+def _extract(node, data: np.ndarray):
     if isinstance(node, Numbers):
         width = node.dtype.itemsize * (1 if node.count is None else node.count)
         columns = np.ascontiguousarray(data[:, node.offset : node.offset + width]).view(node.dtype)
         return columns[:, 0] if node.count is None else columns.reshape(len(data), node.count)
     if isinstance(node, dict):
-        return SimpleNamespace(**{name: _extract(child, data) for name, child in node.items()})
+        return _message(node, data)
     return [_extract(child, data) for child in node] if isinstance(node, list) else node

@@ -1,7 +1,7 @@
 """A topic's messages, decoded by the encoding and the schema that the log itself names."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from types import SimpleNamespace
 
 import numpy as np
@@ -40,14 +40,14 @@ def decode(topic: Topic) -> Iterator[tuple[np.ndarray, object]]:
         yield np.array(row), message
 
 
-def _json(data: bytes):
+def _json(data: bytes) -> object:
     return json.loads(data, object_hook=lambda fields: SimpleNamespace(**fields))
 
 
-def _protobuf(topic: Topic):
+def _protobuf(topic: Topic) -> Callable[[bytes], object]:
     try:
-        return DecoderFactory().decoder_for(
-            "protobuf", Schema(1, topic.definition, "protobuf", topic.schema)
-        )
+        read = DecoderFactory().decoder_for("protobuf", Schema(1, topic.definition, "protobuf", topic.schema))
     except Exception as error:  # a damaged descriptor fails in any way
         raise ValueError(f"its protobuf schema cannot be read: {error}") from error
+    assert read is not None, "the factory declines only other encodings"
+    return read

@@ -45,7 +45,7 @@ def read_log(path: Path) -> Log:
     try:
         data = Path(path).read_bytes()
     except OSError as error:
-        raise InputError(f"{path}: {error.strerror.lower()}, expected an MCAP log") from error
+        raise InputError(f"{path}: {(error.strerror or str(error)).lower()}, expected an MCAP log") from error
     if not data.startswith(MAGIC):
         raise InputError(f"{path}: found no MCAP file ({len(data)} bytes), expected an MCAP log")
     contents, damage = Contents(), []

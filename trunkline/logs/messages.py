@@ -43,15 +43,15 @@ TOPIC_PER_BODY: set[str] = set()  # schemas of one pose, which the topic names
 READING = (AttributeError, TypeError, ValueError, IndexError, OverflowError)
 
 
-def poses(*schemas: str, topic_per_body: bool = False):
+def poses(*schemas: str, topic_per_body: bool = False) -> Callable[[Callable[..., Poses]], Callable[..., Poses]]:
     """Register the decorated function as the reader of pose schemas."""
     TOPIC_PER_BODY.update(schemas if topic_per_body else ())
-    return lambda function: POSES.update(dict.fromkeys(schemas, function)) or function
+    return lambda function: POSES.update({schema: function for schema in schemas}) or function
 
 
-def joints(*schemas: str):
+def joints(*schemas: str) -> Callable[[Callable[..., Joints]], Callable[..., Joints]]:
     """Register the decorated function as the reader of joint schemas."""
-    return lambda function: JOINTS.update(dict.fromkeys(schemas, function)) or function
+    return lambda function: JOINTS.update({schema: function for schema in schemas}) or function
 
 
 @poses("mocap4r2_msgs/RigidBodies")

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,9 +13,20 @@ from trunkline.logs.messages import POSES, READING, Poses
 from trunkline.logs.samples import Samples, union
 from trunkline.logs.transforms import in_one_frame
 
-# Messages of the same bodies: their rows (n,) in the topic, and their poses with the messages as first axis and a
-# list of names. Their time is (n,), or (n, S) where each body has its own.
-Batch = tuple[np.ndarray, Poses]
+
+class Batch(NamedTuple):
+    """Messages of the same S bodies. rows: (n,) in the topic. time: ns, (n,), or (n, S) where each body has its own.
+
+    positions: (n, S, 3). orientations: (n, S, 4). frame: (n,). The rest as in `Poses`.
+    """
+
+    rows: np.ndarray
+    time: np.ndarray
+    names: list[str]
+    positions: np.ndarray
+    orientations: np.ndarray | None
+    frame: np.ndarray | None
+    parents: list[str] | None
 
 
 @dataclass
@@ -66,9 +78,9 @@ def pose_stream(
             unnamed = max(poses.positions.shape[-2] for _, poses in batches)
             given = [str(number + 1) for number in range(unnamed)]
         read.append((topic, [part for batch in batches for part in _batches(*batch, topic, given)]))
-    parents = {frame: None for _, batches in read for _, poses in batches for frame in poses.parents or ()}
-    kept = sum(len(rows) for _, batches in read for rows, _ in batches)
-    own_times = any(poses.time.ndim == 2 for _, batches in read for _, poses in batches)
+    parents = {frame: None for _, batches in read for batch in batches for frame in batch.parents or ()}
+    kept = sum(len(batch.rows) for _, batches in read for batch in batches)
+    own_times = any(batch.time.ndim == 2 for _, batches in read for batch in batches)
     if not own_times and len(read) == 1:
         stream = _by_message(*read[0])
     else:
@@ -111,35 +123,37 @@ def _batches(rows: np.ndarray, poses: Poses, topic: Topic, given: Sequence[str] 
         parts = [(list(names or ()), slice(None))]
     for some, part in parts:
         if len(some) == size == len(set(some)):
-            yield rows[part], poses._replace(
+            yield Batch(
+                rows=rows[part],
                 time=time[part],
                 names=some,
                 positions=positions[part],
                 orientations=None if orientations is None else orientations[part],
                 frame=None if frame is None else frame[part],
+                parents=poses.parents,
             )
 
 
 def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
     """A frame a message."""
-    names, count = union([(rows, poses.names) for rows, poses in batches]), len(topic.messages)
+    names, count = union([(batch.rows, batch.names) for batch in batches]), len(topic.messages)
     positions = np.full((count, len(names), 3), np.nan)
     quaternions = np.full((count, len(names), 4), np.nan)
     present, kept = np.zeros((count, len(names)), bool), np.zeros(count, bool)
     stamps, frames = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    for rows, poses in batches:
-        columns = np.ix_(rows, [names.index(name) for name in poses.names])
-        stamps[rows], kept[rows] = poses.time, True
-        present[columns], positions[columns] = True, poses.positions
-        if poses.orientations is not None:
-            quaternions[columns] = poses.orientations
-        if poses.frame is not None:
-            frames[rows] = poses.frame
-    oriented = any(poses.orientations is not None for _, poses in batches)
+    for batch in batches:
+        columns = np.ix_(batch.rows, np.array([names.index(name) for name in batch.names], int))
+        stamps[batch.rows], kept[batch.rows] = batch.time, True
+        present[columns], positions[columns] = True, batch.positions
+        if batch.orientations is not None:
+            quaternions[columns] = batch.orientations
+        if batch.frame is not None:
+            frames[batch.rows] = batch.frame
+    oriented = any(batch.orientations is not None for batch in batches)
     return PoseStream(
         stamps=stamps[kept],
         log_times=topic.log_times[kept],
-        frames=frames[kept] if all(poses.frame is not None for _, poses in batches) else None,
+        frames=frames[kept] if all(batch.frame is not None for batch in batches) else None,
         names=names,
         present=present[kept],
         positions=positions[kept],
@@ -173,16 +187,16 @@ def _samples(read: list[tuple[Topic, list[Batch]]]) -> Samples:
     """What batches hold, body by body."""
     parts = [Samples.none()]
     for topic, batches in read:
-        for rows, poses in batches:
-            shape = (len(rows), len(poses.names))
-            time = poses.time if poses.time.ndim == 2 else poses.time[:, None]
-            turned = np.full((*shape, 4), np.nan) if poses.orientations is None else poses.orientations
+        for batch in batches:
+            shape = (len(batch.rows), len(batch.names))
+            time = batch.time if batch.time.ndim == 2 else batch.time[:, None]
+            turned = np.full((*shape, 4), np.nan) if batch.orientations is None else batch.orientations
             parts.append(Samples(
                 np.broadcast_to(time, shape).ravel(),
-                np.repeat(topic.log_times[rows], shape[1]),
-                np.tile(np.array(poses.names, dtype=str), shape[0]),
-                np.tile(np.array(poses.parents or [""] * shape[1], dtype=str), shape[0]),
-                poses.positions.reshape(-1, 3),
+                np.repeat(topic.log_times[batch.rows], shape[1]),
+                np.tile(np.array(batch.names, dtype=str), shape[0]),
+                np.tile(np.array(batch.parents or [""] * shape[1], dtype=str), shape[0]),
+                batch.positions.reshape(-1, 3),
                 turned.reshape(-1, 4),
             ))  # fmt: skip
     samples = Samples(*(np.concatenate(values) for values in zip(*parts, strict=True)))

@@ -66,8 +66,8 @@ class Samples(NamedTuple):
 
 def union(batches: list[tuple[np.ndarray, list[str]]]) -> tuple[str, ...]:
     """All names, in the order of their first appearance: by row, then by place."""
-    first = {}
+    first: dict[str, tuple[int, int]] = {}
     for rows, names in batches:
         for place, name in enumerate(names):
             first[name] = min(first.get(name, (rows[0], place)), (rows[0], place))
-    return tuple(sorted(first, key=first.get))
+    return tuple(sorted(first, key=first.__getitem__))

@@ -53,9 +53,9 @@ def read_export(path: Path) -> PoseStream:
         raise InputError(f"{path}: a {kind.lower()} lacks one of its columns Position X, Y and Z")
     if quaternions is None and any(key[0] == kind and key[2] == "Rotation" for key in columns):
         raise InputError(f"{path}: rotation type: found {about.get('Rotation Type', 'angles')}, expected Quaternion")
-    hidden = ~np.isfinite(positions).all(axis=-1)
+    hidden = ~np.all(np.isfinite(positions), axis=-1)
     if quaternions is not None:
-        hidden |= ~np.isfinite(quaternions).all(axis=-1)
+        hidden |= ~np.all(np.isfinite(quaternions), axis=-1)
         quaternions[hidden] = np.nan
     positions[hidden] = np.nan
     stamps = _start(about) + np.round(numbers[:, 1] * 1e9).astype(np.int64)
@@ -97,9 +97,12 @@ def _columns(path: Path, above: list[list[str]], axes: list[str]) -> dict[tuple[
     names = next((i for i in between if "Name" in above[i][:2]), kinds + 1)
     if names >= components:
         raise InputError(f"{path}: header: found no row of names between those of types and of Position")
-    rows = [above[kinds], above[names], above[components], axes]
-    width = min(map(len, rows))
-    return {tuple(row[i].strip() for row in rows): i for i in range(2, width) if rows[2][i].strip()}
+    keys = zip(above[kinds], above[names], above[components], axes, strict=False)  # the shortest row ends them
+    return {
+        (kind.strip(), name.strip(), component.strip(), axis.strip()): column
+        for column, (kind, name, component, axis) in enumerate(keys)
+        if column >= 2 and component.strip()
+    }
 
 
 def _numbers(path: Path, rows: list[list[str]], first: int) -> np.ndarray:

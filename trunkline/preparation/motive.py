@@ -24,6 +24,7 @@ UP = (0, 1, 0)
 
 def write_log(path: Path, poses: PoseStream) -> None:
     """Write poses as an MCAP log, whole or not at all; an occluded body is missing from its frame's message."""
+    assert poses.frames is not None, "an export numbers its frames"
     oriented = poses.quaternions is not None
     part = path.with_name(f".{path.name}.part")
     with open(part, "wb") as file, Writer(file) as writer:
@@ -31,7 +32,7 @@ def write_log(path: Path, poses: PoseStream) -> None:
         schema = writer.register_msgdef(f"mocap4r2_msgs/msg/{name}", text)
         for index, stamp in enumerate(poses.stamps.tolist()):
             seconds, nanoseconds = divmod(stamp, 1_000_000_000)
-            bodies = [_body(poses, index, body) for body in np.flatnonzero(poses.present[index])]
+            bodies = [_body(poses, index, body) for body in np.flatnonzero(poses.present[index]).tolist()]
             message = {
                 "header": {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": "mocap"},
                 "frame_number": int(poses.frames[index]),

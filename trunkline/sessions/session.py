@@ -80,11 +80,12 @@ class TrialEntry(Entry):
         if self.window is not None and not self.window[0] < self.window[1]:
             raise ValueError(f"window: found {list(self.window)}, expected [start, end] with start < end")
         level = EXPERIMENTS[self.experiment].level
-        if level is not None and self.level is None:
-            raise ValueError(f"level: missing, expected the nominal level of a {self.experiment}")
-        if level is not None and not level.low <= self.level <= level.high:
-            expected = f"{level.low:g} to {level.high:g}, the {level.says} of a {self.experiment}"
-            raise ValueError(f"level: found {self.level:g}, expected {expected}")
+        if level is not None:
+            if self.level is None:
+                raise ValueError(f"level: missing, expected the nominal level of a {self.experiment}")
+            if not level.low <= self.level <= level.high:
+                expected = f"{level.low:g} to {level.high:g}, the {level.says} of a {self.experiment}"
+                raise ValueError(f"level: found {self.level:g}, expected {expected}")
         self.name = self.name or Path(self.file).stem
         return self
 

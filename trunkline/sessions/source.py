@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from trunkline.errors import InputError
 from trunkline.logs.cdr import short_name
@@ -12,6 +13,7 @@ from trunkline.logs.messages import JOINTS, POSES, TOPIC_PER_BODY
 from trunkline.logs.pose_stream import PoseStream, pose_stream
 from trunkline.sessions.session import Session
 
+Stream = TypeVar("Stream")
 STATIC = "tf_static"  # how the topic's name ends
 COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "position")
 
@@ -58,22 +60,23 @@ def open_log(path: Path, session: Session) -> Source:
     if len(poses.parents) > 1 and session.frame.name is None:
         found = f"found poses in the frames {', '.join(poses.parents)}, which nothing connects"
         raise InputError(f"{where}: {found}, expected one, or its name in session.yaml: frame.name")
-    joints = []
-    for wanted, role, words in (
-        (session.topics.commands, "command", COMMAND_WORDS),
-        (session.topics.tendon_positions, "tendon position", POSITION_WORDS),
-    ):
-        topic = choose(log, wanted, JOINTS, role, words)
-        stream = topic and _understood(f"{path}: {topic.name}", joint_stream, topic)
-        if stream is not None and stream.unnamed is not None and session.tendons is None:
-            found = f"found {stream.unnamed} numbers without names"
-            raise InputError(
-                f"{path}: {topic.name}: {found}, expected `tendons` in session.yaml to name them, in order"
-            )
-        joints.append(stream)
+    commands = _joints(log, session.topics.commands, "command", COMMAND_WORDS, session)
+    tendon_positions = _joints(log, session.topics.tendon_positions, "tendon position", POSITION_WORDS, session)
     joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
-    return Source(log, name, poses, *joints, joint_topics)
+    return Source(log, name, poses, commands, tendon_positions, joint_topics)
+
+
+def _joints(log: Log, wanted: str | None, role: str, words: tuple[str, ...], session: Session) -> JointStream | None:
+    topic = choose(log, wanted, JOINTS, role, words)
+    if topic is None:
+        return None
+    where = f"{log.path}: {topic.name}"
+    stream = _understood(where, joint_stream, topic)
+    if stream.unnamed is not None and session.tendons is None:
+        found = f"found {stream.unnamed} numbers without names"
+        raise InputError(f"{where}: {found}, expected `tendons` in session.yaml to name them, in order")
+    return stream
 
 
 def pose_topics(log: Log, wanted: str | dict[str, str] | None) -> dict[str | None, Topic]:
@@ -138,7 +141,7 @@ def _names_in(topics: list[Topic]) -> list[str]:
     return ["/".join(path[before : len(path) - behind]) or "/".join(path) for path in paths]
 
 
-def _understood(where: str, read: Callable, *arguments):
+def _understood(where: str, read: Callable[..., Stream], *arguments) -> Stream:
     """What `read` returns; that a topic cannot be read at all becomes the user's business."""
     try:
         return read(*arguments)

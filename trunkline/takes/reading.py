@@ -42,7 +42,7 @@ def read_stretch(
     findings.logged = _log_fit(poses)
     stamps, findings.frames = _stamps(poses, session.clock, where, source.pose_topic)
     rows = in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings)
-    epoch = stamps[rows[0]]
+    epoch = int(stamps[rows[0]])
     time = (stamps[rows] - epoch) * 1e-9
     if trial.window is not None:
         inside = (time >= trial.window[0]) & (time <= trial.window[1])
@@ -55,7 +55,7 @@ def read_stretch(
         lost = f" (damaged: {'; '.join(source.log.damage)})" if source.log.damage else ""
         expected = f"expected at least {limits.duration:g} s"
         raise InputError(f"{where}: found {time[-1]:.2f} s of poses in {len(time)} frames{lost}, {expected}")
-    return Stretch(rows, time, epoch, poses.log_times[rows[0]])
+    return Stretch(rows, time, epoch, int(poses.log_times[rows[0]]))
 
 
 def columns_of(source: Source, names: list[str], where: str) -> list[int]:

@@ -21,12 +21,13 @@ def good_samples(
     findings: Findings,
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """Positions in metres and unit quaternions of the bodies in `columns`, NaN where either is no good."""
-    positions = scale * poses.positions[np.ix_(rows, columns)]
-    present = poses.present[np.ix_(rows, columns)]
+    cells = np.ix_(rows, np.array(columns, int))
+    positions = scale * poses.positions[cells]
+    present = poses.present[cells]
     good = np.isfinite(positions).all(axis=-1)
     quaternions = None
     if poses.quaternions is not None:
-        quaternions = poses.quaternions[np.ix_(rows, columns)]
+        quaternions = poses.quaternions[cells]
         rotation = is_rotation(quaternions)
         _tell_dropped(present & good & ~rotation, "with a NaN, zero or unnormalised quaternion", names, findings)
         quaternions[rotation] /= np.linalg.norm(quaternions[rotation], axis=-1, keepdims=True)
@@ -64,14 +65,14 @@ def untangle(
     bodies = np.insert(positions, 0, base[0], axis=1)
     turns = None if quaternions is None else np.insert(quaternions, 0, base[1], axis=1)
     for swap in find_swaps(bodies, reference.distances, reference.base is not None):
-        wrong, right = list(swap.bodies), [*swap.bodies[1:], swap.bodies[0]]
+        wrong, right = np.array(swap.bodies), np.array([*swap.bodies[1:], swap.bodies[0]])
         for values in (bodies, turns):
             if values is not None:
                 values[np.ix_(swap.frames, right)] = values[np.ix_(swap.frames, wrong)]
         count, who = int(swap.frames.sum()), " and ".join(repr(names[body]) for body in swap.bodies)
         findings.repairs.append(f"{who} were taken for each other in {count} frames, put right")
     base[0][:], positions[:] = bodies[:, 0], bodies[:, 1:]
-    if turns is not None:
+    if turns is not None and quaternions is not None:
         base[1][:], quaternions[:] = turns[:, 0], turns[:, 1:]
 
 
@@ -93,5 +94,5 @@ def with_lost_time(time: np.ndarray, positions: np.ndarray, motors: bool, findin
 
 def _tell_dropped(bad: np.ndarray, what: str, names: list[str], findings: Findings) -> None:
     if bad.any():
-        where = ", ".join(name for name, hit in zip(names, bad.any(axis=0), strict=True) if hit)
+        where = ", ".join(name for name, hit in zip(names, np.any(bad, axis=0), strict=True) if hit)
         findings.repairs.append(f"{int(bad.sum())} samples {what} dropped ({where})")

@@ -21,12 +21,13 @@ def check_vertical(takes: list[Take], measured_base: bool) -> tuple[np.ndarray |
     Args:
         measured_base: whether a body marks the mount; otherwise its orientation follows from the vertical itself.
     """
-    static = [take for take in takes if EXPERIMENTS[take.experiment].level is TILT and take.level is not None]
+    tilted = (take for take in takes if EXPERIMENTS[take.experiment].level is TILT)
+    static = [(take, take.level) for take in tilted if take.level is not None]
     if not static or not measured_base:
         return None, _check_hanging(takes)
     up = takes[0].up
-    levels = np.radians([take.level for take in static])
-    z = np.array([average_base(t.base_positions, t.base_quaternions).rotation.apply([0, 0, 1]) for t in static])
+    levels = np.radians([level for _, level in static])
+    z = np.array([average_base(t.base_positions, t.base_quaternions).rotation.apply([0, 0, 1]) for t, _ in static])
     off = _misfit(z, up, levels)
     if off <= OFF:
         return None, None
