@@ -1,4 +1,4 @@
-"""``python -m benchmarks.pipeline``: how long each stage takes here and in another commit, stage by stage in one run.
+"""`python -m benchmarks.pipeline`: how long each stage takes here and in another commit, stage by stage in one run.
 
 The other commit is cloned into a temporary folder; both run on this checkout's session, one stage after the other, each
 on what its own earlier stages wrote. Results of this checkout are left alone: it is copied too.

@@ -1,4 +1,4 @@
-"""``python -m benchmarks.surrogate``: fits of a surrogate to weighed trials, all at once and one by one with scipy."""
+"""`python -m benchmarks.surrogate`: fits of a surrogate to weighed trials, all at once and one by one with scipy."""
 
 import time
 

@@ -1,4 +1,4 @@
-"""``python -m studies.intervals``: how often intervals of several makings hold the truth, where the truth is known.
+"""`python -m studies.intervals`: how often intervals of several makings hold the truth, where the truth is known.
 
 A parameter is the mean of a few trials, each of which has many residuals that hang together, as those of a simulation
 against a measurement do. Intervals: the library's jackknife and bootstrap over trials, scipy's bootstrap over trials

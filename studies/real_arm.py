@@ -77,7 +77,7 @@ def error(case: Case, takes: list[Take]) -> tuple[float, float, float]:
 
 
 def arm(case: Case) -> mujoco.MjModel:
-    """The example's initial arm, changed."""
+    """The example's CAD model, changed."""
     config = load_config(build_mjcf.Config, "build_mjcf", EXAMPLE)
     model = build_mjcf.cad_arm(replace(config, arm=replace(config.arm, **case.arm))).spec.compile()
     model.dof_dampingpoly[:, 0] = case.quadratic_damping * model.dof_damping

@@ -28,7 +28,7 @@ class _Bar:
         self._rate = _Rate()
 
     def update(self, n: int = 1, **info: object) -> None:
-        """Count ``n`` more units and show ``info`` (generation, best loss, ...)."""
+        """Count `n` more units and show `info` (generation, best loss, ...)."""
         rate = self._rate.add(n)
         self._bar.update(self._task, advance=n, info=_words(info | {f"{self._unit}/s": rate}))
 
@@ -43,7 +43,7 @@ class _Lines:
         self._printed = time.monotonic()
 
     def update(self, n: int = 1, **info: object) -> None:
-        """Count ``n`` more units and, every few seconds, print a line with ``info``."""
+        """Count `n` more units and, every few seconds, print a line with `info`."""
         self._done += n
         self._info = info | {f"{self._unit}/s": self._rate.add(n)}
         if self._done < self._total and time.monotonic() - self._printed >= PLAIN_INTERVAL:
@@ -74,12 +74,12 @@ def _words(info: dict[str, object]) -> str:
 
 @contextmanager
 def progress(total: int, label: str, unit: str = "steps") -> Iterator[_Bar | _Lines]:
-    """Show the progress of ``total`` units; call ``.update(n, **info)`` on what this yields.
+    """Show the progress of `total` units; call `.update(n, **info)` on what this yields.
 
     Args:
         total: how many units make up the whole.
-        label: what runs, e.g. ``"identify_damping coarse"``.
-        unit: plural noun for the count and the rate, e.g. ``"generations"``.
+        label: what runs, e.g. `"identify_damping coarse"`.
+        unit: plural noun for the count and the rate, e.g. `"generations"`.
     """
     if sys.stdout.isatty():
         columns = (TextColumn("{task.description}"), BarColumn(bar_width=24), MofNCompleteColumn(),

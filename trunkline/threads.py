@@ -6,10 +6,10 @@ from trunkline.errors import InputError
 
 
 def thread_count() -> int:
-    """Threads to use: ``TRUNKLINE_THREADS`` if set, else every core this process may run on.
+    """Threads to use: `TRUNKLINE_THREADS` if set, else every core this process may run on.
 
     Raises:
-        InputError: if ``TRUNKLINE_THREADS`` is not a whole number of at least 1.
+        InputError: if `TRUNKLINE_THREADS` is not a whole number of at least 1.
     """
     found = os.environ.get("TRUNKLINE_THREADS", "").strip()
     if not found:

@@ -1,6 +1,5 @@
 """The docs: what they point to is there, what they list is complete, and their lines are short."""
 
-import ast
 import re
 from pathlib import Path
 
@@ -91,20 +90,6 @@ def test_the_paper_is_cited_as_the_readme_names_it():
     assert f"*{titles[0]}*" in " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
 
 
-def test_the_rooms_are_all_of_them_and_none_imports_a_later_one():
-    block = re.search(r"<!-- rooms -->(.*?)<!-- /rooms -->", (ROOT / "CONTRIBUTING.md").read_text(), re.DOTALL)
-    rooms = re.findall(r"^\| `(\w+)` \|", block[1], re.MULTILINE)
-    assert sorted(rooms) == sorted(path.parent.name for path in ROOT.glob("trunkline/*/__init__.py"))
-    back = [
-        f"{file.relative_to(ROOT)} imports {other}"
-        for place, room in enumerate(rooms)
-        for file in sorted((ROOT / "trunkline" / room).rglob("*.py"))
-        for other in imported_rooms(file)
-        if other in rooms[place + 1 :]
-    ]
-    assert back == []
-
-
 def test_the_reference_of_sessions_has_every_key_and_schema():
     text = (ROOT / "data/raw/README.md").read_text(encoding="utf-8")
     keys = [f"`{key}`" for key in Session.model_fields if key not in ("frame", "trials")]
@@ -132,14 +117,3 @@ def anchors(page: Path) -> set[str]:
     """The names that GitHub gives to the headings of a page."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
-
-
-def imported_rooms(file: Path) -> set[str]:
-    """Rooms of trunkline that a module imports."""
-    found = set()
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
-        names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-        if isinstance(node, ast.ImportFrom) and node.module:
-            names = [f"{node.module}.{alias.name}" for alias in node.names]
-        found |= {name.split(".")[1] for name in names if name.startswith("trunkline.")}
-    return found

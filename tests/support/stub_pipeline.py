@@ -40,7 +40,7 @@ def run(stage):
 
 
 class StubPipeline:
-    """A Git and DVC repository in ``folder`` with the project's pipeline and stub stages."""
+    """A Git and DVC repository in `folder` with the project's pipeline and stub stages."""
 
     def __init__(self, folder: Path):
         self.folder, self.log = folder, folder.parent / f"{folder.name}.log"
@@ -77,13 +77,13 @@ class StubPipeline:
         self.run("dvc", "checkout", "-q")
 
     def ran(self, *command: str) -> list[str]:
-        """The stages that ``command`` ran, in their order."""
+        """The stages that `command` ran, in their order."""
         self.log.unlink(missing_ok=True)
         self.run(*command)
         return self.log.read_text().split() if self.log.exists() else []
 
     def edit(self, name: str, change) -> None:
-        """Replace the text of a file by ``change(text)``."""
+        """Replace the text of a file by `change(text)`."""
         path = self.folder / name
         path.write_text(change(path.read_text()))
 

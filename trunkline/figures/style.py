@@ -48,6 +48,6 @@ plt.rcParams.update(
 
 
 def save_figure(figure: Figure, path: str | Path, dpi: int = 150) -> None:
-    """Write ``figure`` as PNG without dates or versions in it, and close it."""
+    """Write `figure` as PNG without dates or versions in it, and close it."""
     figure.savefig(path, dpi=dpi, metadata={"Software": None})
     plt.close(figure)

@@ -6,6 +6,6 @@ from trunkline.errors import InputError
 
 
 def require_checkout(root: Path) -> None:
-    """Raise InputError unless ``root`` holds a pipeline, as the top of a checkout of Trunkline does."""
+    """Raise InputError unless `root` holds a pipeline, as the top of a checkout of Trunkline does."""
     if not (root / "dvc.yaml").is_file():
         raise InputError(f"{root.resolve()}: found no dvc.yaml, expected the top of a checkout of Trunkline")

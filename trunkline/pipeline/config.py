@@ -1,9 +1,9 @@
 """A stage's settings: its conf folder composed by Hydra, overridden by its section of params.yaml, checked.
 
-``conf/<stage>/config.yaml`` and its groups hold structure, variants and untuned values; ``params.yaml``
-holds, per stage, the values people tune. A key is set in one place only: it is absent from conf, or ``???``,
-if it is tuned in params.yaml. A group (a subfolder of ``conf/<stage>``, or of ``conf/shared`` if several stages
-use it, named in config.yaml's defaults list) is chosen in params.yaml by its name: ``arm: spiral``.
+`conf/<stage>/config.yaml` and its groups hold structure, variants and untuned values; `params.yaml`
+holds, per stage, the values people tune. A key is set in one place only: it is absent from conf, or `???`,
+if it is tuned in params.yaml. A group (a subfolder of `conf/<stage>`, or of `conf/shared` if several stages
+use it, named in config.yaml's defaults list) is chosen in params.yaml by its name: `arm: spiral`.
 """
 
 import difflib
@@ -30,12 +30,12 @@ PROJECT = Path(__file__).parents[2]
 
 
 def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Schema:
-    """Compose, override and validate the settings of ``stage``.
+    """Compose, override and validate the settings of `stage`.
 
     Args:
-        schema: a class decorated with ``@settings``.
-        stage: name of the stage, of its section in params.yaml and of its folder under ``conf/``.
-        root: the folder that holds ``params.yaml``, and ``conf/`` unless it is the project's.
+        schema: a class decorated with `@settings`.
+        stage: name of the stage, of its section in params.yaml and of its folder under `conf/`.
+        root: the folder that holds `params.yaml`, and `conf/` unless it is the project's.
 
     Raises:
         InputError: one line that names file and key, what was found and what was expected.
@@ -60,7 +60,7 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
 
 
 def check_settings(root: str | Path = ".") -> list[str]:
-    """Validate the settings of every stage in ``root / "dvc.yaml"``, and return their names.
+    """Validate the settings of every stage in `root / "dvc.yaml"`, and return their names.
 
     Raises:
         InputError: for the first bad value in any section, or a section of no stage in dvc.yaml.
@@ -77,9 +77,9 @@ def check_settings(root: str | Path = ".") -> list[str]:
 
 
 def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[str, Any]:
-    """Hydra's composition of ``folder`` with the groups that ``section`` names, then its values.
+    """Hydra's composition of `folder` with the groups that `section` names, then its values.
 
-    ``where`` begins the message of an InputError about ``section``.
+    `where` begins the message of an InputError about `section`.
     """
     if not (folder / "config.yaml").is_file():
         raise InputError(f"{folder / 'config.yaml'}: no such file, expected the stage's settings")
@@ -100,7 +100,7 @@ def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[
 
 
 def group_options(folder: Path) -> dict[str, dict[str, Path]]:
-    """The config groups that ``folder / "config.yaml"`` names, each with its options and their files."""
+    """The config groups that `folder / "config.yaml"` names, each with its options and their files."""
     found = {}
     for group in _defaults(folder):
         own = folder / group
@@ -110,7 +110,7 @@ def group_options(folder: Path) -> dict[str, dict[str, Path]]:
 
 
 def own_or_project(root: Path, name: str) -> Path:
-    """``root / name``; the project's where ``root`` is another pipeline of the same stages.
+    """`root / name`; the project's where `root` is another pipeline of the same stages.
 
     Raises:
         InputError: neither is there, as where the library is installed without its repository.
@@ -132,7 +132,7 @@ def _read_section(path: Path, stage: str) -> dict[str, Any]:
 
 
 def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str]:
-    """The option that ``section`` names for each group of the defaults list in ``folder / config.yaml``."""
+    """The option that `section` names for each group of the defaults list in `folder / config.yaml`."""
     chosen, defaults = {}, _defaults(folder)
     for group, options in group_options(folder).items():
         found = section.get(group, defaults[group])
@@ -170,7 +170,7 @@ def _container(config: DictConfig, resolve: bool = False) -> dict[Any, Any]:
 
 
 def _plain(config: DictConfig) -> dict[str, Any]:
-    """``config`` as plain values, without its ``???`` entries, so that validation reports them as missing."""
+    """`config` as plain values, without its `???` entries, so that validation reports them as missing."""
     try:
         return _without_missing(_container(config, resolve=True))
     except InterpolationToMissingValueError:  # then the missing value is the mistake, and validation names it

@@ -1,4 +1,4 @@
-"""``python -m trunkline.pipeline.gate``: do the metrics keep within tests/limits.yaml, and an example's within its own?
+"""`python -m trunkline.pipeline.gate`: do the metrics keep within tests/limits.yaml, and an example's within its own?
 
 Each metric has an absolute bound and, where it makes sense, an allowed regression against the value committed
 before. The earlier value is HEAD's, or, where the file is as in HEAD (a fresh clone, CI), the one before the
@@ -23,7 +23,7 @@ from trunkline.settings import settings
 
 @settings
 class Below:
-    """The value times ``factor`` must not exceed the metric ``key`` of the same stage."""
+    """The value times `factor` must not exceed the metric `key` of the same stage."""
 
     key: str
     factor: PositiveFloat
@@ -31,7 +31,7 @@ class Below:
 
 @settings
 class Limit:
-    """Bounds of one metric. At least one of ``max``, ``min`` and ``equals`` must be given.
+    """Bounds of one metric. At least one of `max`, `min` and `equals` must be given.
 
     regression: how much worse than the earlier value it may be, as a share of that value.
     slack: and in the metric's own unit, for values near zero; the larger of the two counts.
@@ -56,7 +56,7 @@ Limits = Annotated[dict[str, Annotated[dict[str, Limit], Field(min_length=1)]], 
 
 
 def read_limits(path: Path) -> Limits:
-    """The limits in the file at ``path``; InputError where it is malformed or empty."""
+    """The limits in the file at `path`; InputError where it is malformed or empty."""
     try:
         content = json.dumps(OmegaConf.to_container(OmegaConf.load(path)))
         return TypeAdapter(Limits).validate_json(content, strict=True)
@@ -123,7 +123,7 @@ def _problems(limit: Limit, key: str, metrics: Any, earlier: Any) -> list[str]:
 
 
 def lookup(metrics: Any, key: str) -> Any:
-    """The value at the dotted ``key`` of nested mappings; None where there is none."""
+    """The value at the dotted `key` of nested mappings; None where there is none."""
     for part in key.split("."):
         metrics = metrics.get(part) if isinstance(metrics, dict) else None
     return metrics
@@ -161,7 +161,7 @@ def earlier_metrics(name: str, root: Path) -> Any:
 
 
 def _git(root: Path, name: str, *arguments: str) -> str:
-    """Output of a git command in ``root``; InputError, naming the metrics ``name``, where it fails."""
+    """Output of a git command in `root`; InputError, naming the metrics `name`, where it fails."""
     try:
         done = subprocess.run(["git", *arguments], cwd=root, capture_output=True, encoding="utf-8",
                               errors="replace", check=False)  # fmt: skip

@@ -1,4 +1,4 @@
-"""``python -m trunkline.pipeline.lock``: does dvc.lock belong to this code, params.yaml, libraries and metrics?
+"""`python -m trunkline.pipeline.lock`: does dvc.lock belong to this code, params.yaml, libraries and metrics?
 
 Works in a fresh clone, without data or cache. DVC compares commands, parameters and every file that is there;
 files that only the cache holds are compared through the lock: what a stage read must be what another wrote.
@@ -36,7 +36,7 @@ def _unlocked(repo: Repo) -> list[str]:
 
 
 def _changed(repo: Repo) -> list[str]:
-    """What ``dvc status`` reports, but for files that a clone without the cache cannot have."""
+    """What `dvc status` reports, but for files that a clone without the cache cannot have."""
     command = ["git", "ls-files", "-z"]
     listed = subprocess.run(command, cwd=repo.root_dir, capture_output=True, text=True, check=True).stdout
     expected = {Path(file) for file in listed.split("\0") if file}

@@ -1,4 +1,4 @@
-"""``python -m trunkline.pipeline.settings``: check every stage's settings before anything runs."""
+"""`python -m trunkline.pipeline.settings`: check every stage's settings before anything runs."""
 
 import hashlib
 import sys

@@ -24,10 +24,10 @@ Config = TypeVar("Config")
 def run_stage(
     name: str, schema: type[Config], main: Callable[[Config], None], root: str | Path = "."
 ) -> None:
-    """Call ``main`` with the stage's settings; a user's mistake ends in one line and exit code 1.
+    """Call `main` with the stage's settings; a user's mistake ends in one line and exit code 1.
 
-    ``root`` holds the stage's ``params.yaml`` and ``conf/``. Meanwhile BLAS keeps to one thread, as its sums, and
-    so the results, otherwise depend on how many cores there are; ``TRUNKLINE_THREADS`` is for what does not.
+    `root` holds the stage's `params.yaml` and `conf/`. Meanwhile BLAS keeps to one thread, as its sums, and
+    so the results, otherwise depend on how many cores there are; `TRUNKLINE_THREADS` is for what does not.
     """
     started = time.monotonic()
     try:
@@ -45,7 +45,7 @@ def run_stage(
 
 @contextmanager
 def output_folder(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary folder beside ``path``; it replaces ``path`` on success and vanishes on failure."""
+    """Yield a temporary folder beside `path`; it replaces `path` on success and vanishes on failure."""
     path = Path(path)
     partial, old = path.with_name(f".{path.name}.partial"), path.with_name(f".{path.name}.old")
     for leftover in (partial, old):

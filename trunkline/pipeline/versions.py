@@ -1,4 +1,4 @@
-"""``python -m trunkline.pipeline.versions``: write versions.yaml, the versions of the libraries that results depend on.
+"""`python -m trunkline.pipeline.versions`: write versions.yaml, the versions of the libraries that results depend on.
 
 A stage lists in dvc.yaml, as parameters, those that its numbers go through. So another MuJoCo reruns what MuJoCo
 computes, and another pytest reruns nothing. The versions are the locked ones, the same on every machine.
@@ -41,7 +41,7 @@ def locked_versions(root: Path) -> dict[str, str]:
 
 
 def installed_otherwise(root: Path) -> list[str]:
-    """One line per library that is installed in another version than ``root / "versions.yaml"`` names.
+    """One line per library that is installed in another version than `root / "versions.yaml"` names.
 
     A local part does not count: torch 2.13.0+cpu is torch 2.13.0.
     """

@@ -31,7 +31,7 @@ class Survey:
 
 
 def survey(tips_at: ArmTips, settings: Survey, done: Callable[[str], None]) -> tuple[Maps, Check]:
-    """Rigid, soft and hybrid maps, and their check. ``done`` hears of each part."""
+    """Rigid, soft and hybrid maps, and their check. `done` hears of each part."""
     soft, seed = settings.soft, settings.seed
     maps = build_maps(
         tips_at,
