@@ -124,14 +124,10 @@ def _batches(rows: np.ndarray, poses: Poses, topic: Topic, given: Sequence[str] 
     for some, part in parts:
         if len(some) == size == len(set(some)):
             yield Batch(
-                rows=rows[part],
-                time=time[part],
-                names=some,
-                positions=positions[part],
-                orientations=None if orientations is None else orientations[part],
-                frame=None if frame is None else frame[part],
-                parents=poses.parents,
-            )
+                rows[part], time[part], some, positions[part],
+                None if orientations is None else orientations[part],
+                None if frame is None else frame[part], poses.parents,
+            )  # fmt: skip
 
 
 def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
