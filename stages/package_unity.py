@@ -20,7 +20,7 @@ class Config(Label):
 
 
 def main(config: Config) -> None:
-    sources = read_sources(Path("."), config.version)
+    sources = read_sources(Path("."))
     files, violations = assemble(config, sources, config.roundtrip)
     for violation in violations:
         print(f"package_unity: broken rule: {violation}")

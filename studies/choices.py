@@ -25,12 +25,14 @@ from benchmarks.identification.timing import Stopwatch
 from trunkline.errors import in_one_line
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
-from trunkline.identification.identify import Fit, identify
+from trunkline.identification.fit import Fit
+from trunkline.identification.identify import identify
+from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.problem import Bounds
-from trunkline.identification.search import DifferentialEvolution, LeastSquares
 from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported, set_up
+from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported
 from trunkline.pipeline.inputs import read_spec
 from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial

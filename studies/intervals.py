@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import bootstrap as scipy_bootstrap
 
 from trunkline.identification.certainty import bootstrap, certainty
-from trunkline.identification.search import Linearisation
+from trunkline.identification.linearisation import Linearisation
 
 TRIALS, FRAMES, REPETITIONS = 6, 50, 400
 SCATTER, NOISE = 1.0, 0.3  # of trials, and of frames within one

@@ -20,8 +20,8 @@ from trunkline.filtering.filter import filter_take
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.identify import identify
 from trunkline.identification.problem import Bounds
+from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import set_up
 from trunkline.trials.take import Take, read_takes
 
 EXAMPLE = Path("examples/asl_trunk")

@@ -1,4 +1,7 @@
-"""Progress of a long stage: a live bar on a terminal, plain lines where there is none."""
+"""Progress of a long stage: a live bar on a terminal, plain lines where there is none.
+
+tqdm would write one ever longer line into a log, as it goes back to its beginning for each update.
+"""
 
 import sys
 import time

@@ -15,13 +15,15 @@ from benchmarks.identification.timing import Spent
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
-from trunkline.identification.identify import Fit, identify, values_of, with_parameters
+from trunkline.identification.fit import Fit
+from trunkline.identification.identify import identify, values_of, with_parameters
 from trunkline.identification.loss import loss_of
 from trunkline.identification.parameter_table import undetermined
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Problem
+from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported, set_up
+from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported
 from trunkline.pipeline.inputs import read_spec
 
 # every stage, and the model that it begins with

@@ -11,12 +11,12 @@ from benchmarks.identification.recipe import as_first_written, by_recipe
 from benchmarks.identification.sysid import by_sysid, stalled
 from tests.support.matched_plant import release, segments_of, small_model
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Fit, Method, Polish, Rough
+from trunkline.identification.fit import Fit, Method, Polish, Rough
 from trunkline.identification.loss import LossWeights
+from trunkline.identification.optimizers import LeastSquares
 from trunkline.identification.parameters import candidate_fields, set_fields
 from trunkline.identification.population import Population
 from trunkline.identification.problem import Bounds
-from trunkline.identification.search import LeastSquares
 
 TRUTH = np.log([0.09, 0.5])
 SIZE = Size(budget=0.5, seeds=2, repeats=1, units=(3, 5))

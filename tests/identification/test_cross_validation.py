@@ -7,11 +7,12 @@ from tests.support.matched_plant import segments_of, small_model, tilt
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Fit, Method, Polish, Rough, identify
+from trunkline.identification.fit import Fit, Method, Polish, Rough
+from trunkline.identification.identify import identify
 from trunkline.identification.loss import LossWeights
+from trunkline.identification.optimizers import LeastSquares
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import Bounds
-from trunkline.identification.search import LeastSquares
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 METHOD = Method(

@@ -5,11 +5,12 @@ import pytest
 
 from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Fit, Method, Polish, Rough, identify
+from trunkline.identification.fit import Fit, Method, Polish, Rough
+from trunkline.identification.identify import identify
 from trunkline.identification.loss import LossWeights
+from trunkline.identification.optimizers import LeastSquares
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import DIVERGED_LOSS, Bounds, Problem
-from trunkline.identification.search import LeastSquares
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 

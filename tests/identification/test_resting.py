@@ -12,12 +12,13 @@ from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import Fit, Method, Polish, Rough, identify
+from trunkline.identification.fit import Fit, Method, Polish, Rough
+from trunkline.identification.identify import identify
 from trunkline.identification.loss import LossWeights
+from trunkline.identification.optimizers import LeastSquares
 from trunkline.identification.parameters import candidate_fields, set_fields
 from trunkline.identification.problem import Bounds
 from trunkline.identification.resting import resting_shape
-from trunkline.identification.search import LeastSquares
 from trunkline.trials.trial import Trial
 
 ROOT = Path(__file__).parents[2]

@@ -5,10 +5,12 @@ import pytest
 
 from tests.support.matched_plant import release, segments_of, small_model
 from trunkline.identification.experiment import prepare
+from trunkline.identification.linearisation import linearise
 from trunkline.identification.loss import LossWeights
+from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import Bounds, Problem
-from trunkline.identification.search import DifferentialEvolution, LeastSquares, descend, linearise, search
+from trunkline.identification.search import descend, search
 
 TRUE = {"damping": 0.07, "tendon_friction": 0.6}
 

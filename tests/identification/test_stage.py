@@ -9,12 +9,12 @@ import pytest
 from tests.support.matched_plant import curl, release, small_model, tilt
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
-from trunkline.identification.identify import Polish, Rough
+from trunkline.identification.fit import Polish, Rough
 from trunkline.identification.loss import Loss
+from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import Bounds
 from trunkline.identification.saving import save_model
-from trunkline.identification.search import DifferentialEvolution, LeastSquares
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.identify import run
 from trunkline.trials.trial import write_trials

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from trunkline.identification.search import Linearisation
+from trunkline.identification.linearisation import Linearisation
 from trunkline.identification.surrogate import LONGEST, surrogate
 
 TRIALS, ROWS = 6, 40

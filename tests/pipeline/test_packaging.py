@@ -8,6 +8,9 @@ from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
+from omegaconf import OmegaConf
+
+from trunkline.version import __version__
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -95,3 +98,8 @@ def test_the_lock_pins_every_dependency_with_a_hash_and_names_no_host():
 def test_files_whose_types_are_not_checked_yet_exist():
     pyright = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["pyright"]
     assert [name for name in pyright["ignore"] if not (ROOT / name).is_file()] == []
+
+
+def test_the_unity_package_has_the_library_s_version():
+    """params.yaml says it a second time, because dvc.yaml names the file after it."""
+    assert OmegaConf.load(ROOT / "params.yaml").package_unity.version == __version__

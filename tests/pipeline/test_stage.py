@@ -99,7 +99,7 @@ def test_json_is_sorted_rounded_and_free_of_numpy(tmp_path):
 
 @pytest.mark.parametrize("bad", [float("nan"), np.inf, np.array([1.0, np.nan])])
 def test_json_refuses_what_is_not_finite_by_name(tmp_path, bad):
-    with pytest.raises(ValueError, match=r"errors\.tip.*expected a finite number"):
+    with pytest.raises(InputError, match=r"errors\.tip.*expected a finite number"):
         write_json(tmp_path / "a.json", {"errors": {"tip": bad}})
     assert not (tmp_path / "a.json").exists()
 

@@ -13,9 +13,10 @@ from trunkline.panda.kinematics import Q_MAX, mount_pose
 from trunkline.panda.labels import agreement, beyond_links, draw_points, label
 from trunkline.reachability.hybrid import minkowski_field, swept_cells
 from trunkline.reachability.hybrid_check import Poses, draw_inside_and_outside, find_poses, verified
-from trunkline.reachability.maps import RigidSettings, angle_name, build_rigid, build_soft
+from trunkline.reachability.maps import angle_name, build_rigid, build_soft
 from trunkline.reachability.reach_signal import held_out, packed, points_beyond, reach_signal
 from trunkline.reachability.rigid import profile, rigid_field
+from trunkline.reachability.settings import RigidSettings
 from trunkline.reachability.soft import SoftShape, soft_field, soft_lattice
 from trunkline.reachability.tips import ArmTips, Tips
 from trunkline.statics.chain import read_chain

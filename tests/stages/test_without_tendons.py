@@ -48,6 +48,15 @@ def test_asking_for_more_is_an_error_of_one_line(arm, capsys, name, found):
     assert sorted(arm.rglob("*")) == before
 
 
+def test_a_package_names_the_stage_that_is_missing(arm, capsys):
+    stage = import_module("stages.package_unity")
+    with pytest.raises(SystemExit):
+        run_stage("package_unity", stage.Config, stage.main)
+    said = capsys.readouterr().err
+    assert said.startswith("error: artifacts/reachability/meshes: found no mesh, expected .obj files")
+    assert said.count("\n") == 1
+
+
 @pytest.mark.parametrize(("content", "found"), [(None, "no such file"), ("<mujoco>", "not a model that MuJoCo reads")])
 def test_without_a_model_that_is_said(arm, capsys, content, found):
     model = arm / "artifacts/identify_control/arm.xml"

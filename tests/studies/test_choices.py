@@ -7,9 +7,9 @@ import pytest
 
 from benchmarks.identification.case import STAGES
 from studies.choices import CHOICES, quick
-from trunkline.identification.search import LeastSquares
+from trunkline.identification.optimizers import LeastSquares
+from trunkline.identification.setup import fit_of
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import fit_of
 
 CHANGED = {  # name → stage → the settings that it changes
     "committed": {},

@@ -29,7 +29,7 @@ def summary(found: Gathered) -> dict:
         "residual_max": table["residual"].max(),
         "iterations_median": table["iterations"].median(),
         "density_unevenness": {"before": before, "after": after},
-        "mujoco_deviation_mm": spread(deviation["deviation_mm"]),
+        "mujoco_deviation_mm": spread(deviation["deviation_mm"], skipna=False),
         "mujoco_checked": len(deviation),
         "mujoco_rested": int(deviation["rested"].sum()),
         "friction_band_mm": spread(deviation["friction_band_mm"]),
@@ -37,5 +37,8 @@ def summary(found: Gathered) -> dict:
     }
 
 
-def spread(values: pd.Series) -> dict:
+def spread(values: pd.Series, skipna: bool = True) -> dict:
+    """Median, 95th percentile and largest; without `skipna`, all are NaN if one is."""
+    if not skipna and values.isna().any():
+        return {"median": np.nan, "p95": np.nan, "max": np.nan}
     return {"median": values.median(), "p95": values.quantile(0.95), "max": values.max()}

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, stdtrit
 
-from trunkline.identification.search import Linearisation
+from trunkline.identification.linearisation import Linearisation
 
 RESAMPLINGS = 20_000  # of which some twenty lie beyond each end of an interval of six trials
 Moves = Callable[[np.ndarray], np.ndarray]  # weights of T trials (B, T) → by how much the estimate moves (B, P)

@@ -6,8 +6,9 @@ import numpy as np
 
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
-from trunkline.identification.identify import Fit, Identification, identify
-from trunkline.identification.search import LeastSquares
+from trunkline.identification.fit import Fit
+from trunkline.identification.identify import Identification, identify
+from trunkline.identification.optimizers import LeastSquares
 
 
 def cross_validate(

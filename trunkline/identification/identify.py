@@ -1,91 +1,23 @@
 """One function for the three stages: they differ in their experiments and in their parameters."""
 
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 import mujoco
 import numpy as np
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 
 from trunkline.identification.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.experiment import Experiment
-from trunkline.identification.loss import LossWeights
+from trunkline.identification.fit import Fit, Polish
+from trunkline.identification.linearisation import linearise
+from trunkline.identification.optimizers import Optimizer
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.problem import Bounds, Problem
+from trunkline.identification.problem import Problem
 from trunkline.identification.resting import RestShape, spring_references
-from trunkline.identification.search import (
-    Convergence,
-    Found,
-    Optimizer,
-    descend,
-    linearise,
-    search,
-)
+from trunkline.identification.search import Convergence, Found, descend, search
 from trunkline.identification.surrogate import surrogate
 from trunkline.progress import progress
 
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
-
-
-@dataclass
-class Rough:
-    """A coarser look: a time step `step_factor` times the model's own, over the first `frames` of `trials` trials."""
-
-    step_factor: Annotated[float, Field(ge=1, le=4)]
-    frames: PositiveInt
-    trials: PositiveInt
-
-
-@dataclass
-class Polish:
-    """Least squares on whole trials at the model's own step."""
-
-    iterations: PositiveInt
-    tolerance: PositiveFloat
-
-
-@dataclass
-class Method:
-    """How a stage searches.
-
-    optimizer: of the scalars, roughly. polish: of them, after it.
-    fine: optimizer of the factors of every joint, within `per_joint_range` of 1. per_joint_deviation: by how much
-        joints are expected to scatter around 1, standard deviation; infinite for no such prior.
-    """
-
-    optimizer: Optimizer
-    rough: Rough
-    polish: Polish
-    fine: Optimizer
-    per_joint_range: Annotated[float, Field(gt=0, lt=1)]
-    per_joint_deviation: PositiveFloat
-    seed: NonNegativeInt
-
-
-@dataclass
-class Fit:
-    """What is fitted to trials, and how.
-
-    segments: names of those that the trials track.
-    parameters: scalars of the whole arm and their ranges.
-    per_joint: what then gets a factor for each joint, "stiffness" or "damping".
-    loss: "distances" (the paper's) or "positions".
-    rest: the shape in which the arm hangs, whatever its stiffness; None where it is as the model says.
-    """
-
-    segments: tuple[str, ...]
-    parameters: dict[str, Bounds]
-    per_joint: tuple[str, ...]
-    loss: str
-    weights: LossWeights
-    method: Method
-    rest: RestShape | None = None
-
-    def problem(self, model: mujoco.MjModel, experiments: list[Experiment], step_factor: float = 1.0) -> Problem:
-        """The search for the scalars, from those of `model`."""
-        return Problem(
-            model, experiments, self.segments, self.parameters, self.loss, self.weights, step_factor, rest=self.rest
-        )
 
 
 @dataclass

@@ -2,15 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
 from scipy.optimize import differential_evolution, least_squares
 
+from trunkline.identification.linearisation import Linearisation, linearise
+from trunkline.identification.optimizers import DifferentialEvolution, Optimizer
 from trunkline.identification.problem import Problem
 
-DIFFERENCE = 1e-3  # step of a one-sided difference: in ln(value), in a factor, or in a signed value
 PLATEAU_SCAN = 24  # values over the range of a parameter that does not matter, and
 PLATEAU_STARTS = 3  # from how many of the nearest that do matter to search again
 PLATEAU_ITERATIONS, PLATEAU_TOLERANCE = 6, 1e-3  # of each
@@ -19,43 +18,6 @@ STEP_TOLERANCE = 1e-5  # of a candidate z, relative: a smaller step of least squ
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
 
 
-@dataclass
-class LeastSquares:
-    """Descents from the best of a few starts, by scipy's trust region (Branch, Coleman, Li 1999).
-
-    starts: of a Latin hypercube, besides the given one. descents: from how many of the best. iterations: of each, at
-    most. tolerance: relative decrease of the loss at the end.
-    """
-
-    starts: NonNegativeInt
-    descents: PositiveInt
-    iterations: PositiveInt
-    tolerance: PositiveFloat
-    method: Literal["least_squares"] = "least_squares"
-
-    def steps(self) -> int:
-        return self.descents * self.iterations
-
-
-@dataclass
-class DifferentialEvolution:
-    """best1bin, a whole generation per batch (Storn, Price 1997; scipy, deferred updating).
-
-    population, population_per_parameter: candidates a generation, P parameters: the first plus P times the second.
-    generations: at most. tolerance: standard deviation of the losses over their mean at the end.
-    """
-
-    population: Annotated[int, Field(ge=5)]
-    population_per_parameter: NonNegativeInt
-    generations: PositiveInt
-    tolerance: PositiveFloat
-    method: Literal["differential_evolution"] = "differential_evolution"
-
-    def steps(self) -> int:
-        return self.generations
-
-
-Optimizer = Annotated[LeastSquares | DifferentialEvolution, Field(discriminator="method")]
 
 
 @dataclass
@@ -64,31 +26,6 @@ class Convergence:
 
     best: list[float] = field(default_factory=list)
     mean: list[float] = field(default_factory=list)
-
-
-@dataclass
-class Linearisation:
-    """Residuals (R,) and their derivatives (R, P) per trial, around a vector, and the weights (P,) of a prior."""
-
-    vector: np.ndarray
-    residuals: list[np.ndarray]
-    jacobians: list[np.ndarray]
-    prior: np.ndarray | None = None
-
-    def normals(self) -> np.ndarray:
-        """JᵀJ of every trial. Shape (T, P, P)."""
-        return np.stack([j.T @ j for j in self.jacobians])
-
-    def moves(self, weights: np.ndarray) -> np.ndarray:
-        """By how much the minimum moves when trials weigh `weights` (B, T) in place of 1, to first order. (B, P)."""
-        normals = self.normals()
-        scores = np.stack([j.T @ r for j, r in zip(self.jacobians, self.residuals, strict=True)])
-        scores = scores - scores.mean(axis=0)  # they sum to nothing, but for a search that stopped early
-        prior = np.zeros_like(normals[0]) if self.prior is None else np.diag(self.prior**2)
-        scale = 1 / np.sqrt(np.maximum(np.diag(normals.sum(axis=0) + prior), 1e-300))
-        scaling = np.outer(scale, scale)
-        weighted = (np.einsum("bt,tpq->bpq", weights, normals) + prior) * scaling
-        return -np.einsum("bpq,bq->bp", np.linalg.pinv(weighted, hermitian=True) * scaling, weights @ scores)
 
 
 @dataclass
@@ -185,25 +122,6 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
     if not np.array_equal(last.vector, result.x):
         last = linearise(problem, result.x, blocks_at(result.x))
     return Found(result.x, float(result.cost), convergence, result.status > 0, last)
-
-
-def linearise(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] | None = None) -> Linearisation:
-    """Derivatives of all residuals by differences towards the inside of the bounds, all columns in one batch.
-
-    Args:
-        residuals: those at `vector`, where they are known. Per trial (R,).
-    """
-    high = problem.bounds()[1]
-    steps = np.where(vector + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
-    candidates = vector + np.diag(steps)
-    if residuals is None:
-        blocks = problem.residuals(np.concatenate([vector[None], candidates]))
-        residuals, blocks = [block[0] for block in blocks], [block[1:] for block in blocks]
-    else:
-        blocks = problem.residuals(candidates)
-    columns = [((moved - base) / steps[:, None]).T for moved, base in zip(blocks, residuals, strict=True)]
-    weights = problem.prior(np.full((1, len(vector)), 2.0))[0]  # of f - 1 = 1
-    return Linearisation(vector, residuals, columns, weights if weights.any() else None)
 
 
 def _evolve(

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, NonNegativeInt, PositiveInt
 
-from trunkline.identification.identify import Method
+from trunkline.identification.fit import Method
 from trunkline.identification.loss import Loss
 from trunkline.identification.parameters import PARAMETERS, ParameterName, PerJointName
 from trunkline.identification.problem import Bounds

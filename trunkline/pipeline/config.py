@@ -6,9 +6,7 @@ if it is tuned in params.yaml. A group (a subfolder of `conf/<stage>`, or of `co
 use it, named in config.yaml's defaults list) is chosen in params.yaml by its name: `arm: spiral`.
 """
 
-import difflib
 import json
-import re
 import runpy
 from pathlib import Path
 from typing import Any, TypeVar
@@ -21,11 +19,11 @@ from pydantic import TypeAdapter, ValidationError
 from yaml import YAMLError
 
 from trunkline.errors import InputError
+from trunkline.pipeline.mistakes import describe, nearest, path_of, rank
 
 Schema = TypeVar("Schema")
 
 SHARED = "shared"  # folder beside those of the stages, of groups that several of them use
-UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
 PROJECT = Path(__file__).parents[2]
 
 
@@ -48,9 +46,9 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
     try:
         return adapter.validate_json(json.dumps(composed), strict=True)
     except ValidationError as error:
-        problems = sorted(error.errors(), key=_rank)
+        problems = sorted(error.errors(), key=rank)
         first, more = problems[0], len(problems) - 1
-        path, described = [stage, *map(str, _path(first, composed))], _describe(first, adapter)
+        path, described = [stage, *map(str, path_of(first, composed))], describe(first, adapter)
         ruled = described.split(":")[0]  # a rule between the stage's fields names the one that breaks it
         if not first["loc"] and ruled.split(".")[0] in composed:
             path, described = [*path, *ruled.split(".")], described.removeprefix(f"{ruled}: ")
@@ -69,7 +67,7 @@ def check_settings(root: str | Path = ".") -> list[str]:
     params, stages = root / "params.yaml", list(_load(root / "dvc.yaml").stages)
     for section in _load(params):
         if section not in stages:
-            raise InputError(f"{params}: {section}: no such stage{_nearest(str(section), stages)}")
+            raise InputError(f"{params}: {section}: no such stage{nearest(str(section), stages)}")
     files = [file for file in sorted(own_or_project(root, "stages").glob("*.py")) if file.stem in stages]
     for file in files:
         load_config(runpy.run_path(str(file), run_name=file.stem)["Config"], file.stem, root)
@@ -124,7 +122,7 @@ def own_or_project(root: Path, name: str) -> Path:
 def _read_section(path: Path, stage: str) -> dict[str, Any]:
     params = _load(path)
     if stage not in params:
-        raise InputError(f"{path}: no section {stage!r}{_nearest(stage, [str(key) for key in params])}")
+        raise InputError(f"{path}: no section {stage!r}{nearest(stage, [str(key) for key in params])}")
     section = {} if params[stage] is None else _container(params)[stage]
     if not isinstance(section, dict):
         raise InputError(f"{path}: {stage}: found {section!r}, expected a section of `key: value` lines")
@@ -138,7 +136,7 @@ def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str
         found = section.get(group, defaults[group])
         if found not in list(options):
             state = "missing" if found in ("???", None) else f"found {found!r}"
-            expected = ", ".join(options) + _nearest(str(found), list(options))
+            expected = ", ".join(options) + nearest(str(found), list(options))
             raise InputError(f"{where}.{group}: {state}, expected one of {expected}")
         chosen[group] = found
     return chosen
@@ -183,50 +181,3 @@ def _without_missing(value: Any) -> Any:
     return value
 
 
-def _path(problem: Any, composed: dict[str, Any]) -> list[str]:
-    """Where pydantic found a problem as a path of keys: without its mark for keys and its choices among classes."""
-    path, value = [], composed
-    for place, part in enumerate(problem["loc"]):
-        last = place == len(problem["loc"]) - 1
-        if isinstance(value, dict) and (part in value or (last and problem["type"] == "missing")):
-            within = value.get(part)
-        elif isinstance(value, list) and isinstance(part, int):
-            within = None if last else value[part]  # the last of a list may be what it lacks
-        else:
-            continue
-        path.append(str(part))
-        value = within
-    return path
-
-
-def _rank(problem: Any) -> int:
-    """Unknown keys first, for they explain missing ones, and those explain the rest."""
-    return {UNKNOWN_KEY: 0, "missing": 1}.get(problem["type"], 2)
-
-
-def _describe(problem: Any, adapter: TypeAdapter) -> str:
-    if problem["type"] == UNKNOWN_KEY:
-        schema = adapter.json_schema()
-        classes = [schema, *schema.get("$defs", {}).values()]
-        valid = [name for cls in classes for name in cls.get("properties", {})]
-        return "unknown key" + _nearest(str(problem["loc"][-1]), valid)
-    if problem["type"] == "missing":
-        return "missing, expected a value"
-    expected = problem["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
-    if problem["type"] == "value_error":  # a rule between fields, in the schema's own words
-        return expected
-    found = problem["input"]
-    if problem["type"] == "union_tag_not_found":  # which of several classes: a key of theirs says it
-        return f"{problem['ctx']['discriminator']}: missing, expected a value".replace("'", "", 2)
-    if problem["type"] == "union_tag_invalid":
-        key, found = problem["ctx"]["discriminator"].strip("'"), problem["ctx"]["tag"]
-        expected = f"one of {problem['ctx']['expected_tags']}"
-        valid = re.findall(r"'([^']*)'", expected)
-        return f"{key}: found {found!r}, expected {expected}" + _nearest(found, valid)
-    valid = re.findall(r"'([^']*)'", expected) if problem["type"] == "literal_error" else []
-    return f"found {found!r}, expected {expected}" + _nearest(str(found), valid)
-
-
-def _nearest(found: str, valid: list[str]) -> str:
-    matches = difflib.get_close_matches(found, valid, n=1)
-    return f", did you mean {matches[0]!r}?" if matches else ""

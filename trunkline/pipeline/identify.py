@@ -10,16 +10,15 @@ import numpy as np
 from trunkline.errors import InputError, existing
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import Replay, replay, scores
-from trunkline.identification.experiment import Experiment, prepare
-from trunkline.identification.identify import Fit, Identification, identify, with_parameters
+from trunkline.identification.experiment import Experiment
+from trunkline.identification.identify import Identification, identify, with_parameters
 from trunkline.identification.loss import internal_error
-from trunkline.identification.markers import with_measured_markers
 from trunkline.identification.parameter_table import parameter_table, undetermined
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Bounds
-from trunkline.identification.resting import resting_shape
 from trunkline.identification.saving import save_model
 from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.setup import check_folds, check_parameters, set_up
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json
 from trunkline.trials.experiments import is_static
@@ -174,21 +173,6 @@ def _select(replays: dict[str, Replay], indices: list[int]) -> dict[str, Replay]
     return {name: replace(r, positions=[r.positions[i] for i in indices]) for name, r in replays.items()}
 
 
-def set_up(
-    config: IdentificationSettings, trials: list[Trial], model: mujoco.MjModel
-) -> tuple[mujoco.MjModel, list[Experiment], Fit]:
-    """What `identify` works on: the model to begin with, its markers where they were measured if that is asked for,
-    an experiment for each trial, and what to fit to those of the kinds to identify from."""
-    if config.markers == "measured":
-        model = with_measured_markers(model, [t for t in trials if t.experiment in config.experiments])
-    experiments = [prepare(trial, model, config.frames, config.command_delay) for trial in trials]
-    fit = fit_of(config, trials[0].segments)
-    if config.rest_shape == "measured":
-        fitted = [e for e in experiments if e.kind in config.experiments]
-        fit.rest = resting_shape(model, fitted, fit.segments)
-    return model, experiments, fit
-
-
 def read_reported(config: IdentificationSettings) -> list[Trial]:
     """The session's trials of the reported kinds, which all track the same segments."""
     trials = [t for t in read_trials(TRIALS) if t.experiment in config.reported]
@@ -206,24 +190,3 @@ def read_reported(config: IdentificationSettings) -> list[Trial]:
     return trials
 
 
-def fit_of(config: IdentificationSettings, segments: tuple[str, ...]) -> Fit:
-    """What a stage's settings ask for, with the shape at rest that the model has."""
-    return Fit(
-        segments, config.parameters, tuple(config.per_joint), config.loss.kind, weights=config.loss, method=config
-    )
-
-
-def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
-    """Refuse parameters of tendons and motors that the arm has not got."""
-    for name in config.parameters:
-        if not model.ntendon and PARAMETERS[name].fields[0].startswith(("tendon_", "actuator_")):
-            found = "found it for an arm without tendons, expected parameters of joints alone"
-            end = "; such an arm's pipeline ends with `dvc repro identify_damping`"
-            raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}{end}")
-
-
-def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:
-    """Refuse to leave out more groups of trials than there are trials to identify from."""
-    trials = sum(e.split == "identify" for e in fitted)
-    if folds > trials:
-        raise InputError(f"{stage}.cross_validation_folds: found {folds}, expected at most {trials}, one a trial")

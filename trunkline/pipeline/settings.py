@@ -30,7 +30,8 @@ def check_once(root: Path = Path(".")) -> None:
     passed = stages.parent / ".dvc" / "tmp" / f"settings.{root.resolve().name}.sha256"
     if passed.is_file() and passed.read_text() == digest.hexdigest():
         return
-    check_settings(root)
+    print("settings: checking those of all stages", flush=True)
+    print(f"settings: {len(check_settings(root))} stages checked", flush=True)
     passed.parent.mkdir(parents=True, exist_ok=True)
     passed.write_text(digest.hexdigest())
 
@@ -38,8 +39,7 @@ def check_once(root: Path = Path(".")) -> None:
 @in_one_line
 def main() -> int:
     require_checkout(Path("."))
-    stages = check_settings()
-    print(f"settings: {len(stages)} stages checked")
+    check_once()
     return 0
 
 

@@ -68,9 +68,9 @@ def write_json(path: str | Path, data: object) -> None:
     NumPy scalars and arrays become numbers and lists.
 
     Raises:
-        ValueError: naming the key, if a number is not finite.
+        InputError: naming file and key, if a number is not finite.
     """
-    text = json.dumps(_plain(data, ""), indent=2, sort_keys=True, allow_nan=False)
+    text = json.dumps(_plain(data, f"{path}: "), indent=2, sort_keys=True, allow_nan=False)
     Path(path).write_text(text + "\n", encoding="utf-8")
 
 
@@ -79,11 +79,11 @@ def _plain(value: object, key: str) -> object:
     if tolist is not None:
         value = tolist()
     if isinstance(value, dict):
-        return {str(k): _plain(v, f"{key}.{k}" if key else str(k)) for k, v in value.items()}
+        return {str(k): _plain(v, f"{key}{k}" if key.endswith(": ") else f"{key}.{k}") for k, v in value.items()}
     if isinstance(value, list | tuple):
         return [_plain(v, f"{key}[{i}]") for i, v in enumerate(value)]
     if isinstance(value, float):
         if not math.isfinite(value):
-            raise ValueError(f"{key}: found {value}, expected a finite number")
+            raise InputError(f"{key}: found {value}, expected a finite number")
         return float(f"{value:.9g}")
     return value

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PositiveInt
 
 from trunkline.fields.grid import Lattice
 from trunkline.fields.mesh import Surface, surface
@@ -13,43 +11,10 @@ from trunkline.panda.downward import sample_downward
 from trunkline.reachability.hybrid import minkowski_field, swept_cells
 from trunkline.reachability.reach_signal import THRESHOLD, packed
 from trunkline.reachability.rigid import profile, rigid_field
+from trunkline.reachability.settings import HybridSettings, RigidSettings
 from trunkline.reachability.soft import SoftShape, soft_fields
 from trunkline.reachability.tilted import Pairs, draw_pairs, tilted_field
 from trunkline.reachability.tips import TipSource
-
-
-@dataclass(frozen=True)
-class RigidSettings:
-    """See conf/reachability/config.yaml; lengths in m, smoothing in lattice steps."""
-
-    mount_offset: Annotated[float, Field(ge=0, le=0.5)]
-    self_collision: bool
-    poses: Annotated[int, Field(ge=1000, le=2**24)]
-    profile_voxel: Annotated[float, Field(ge=0.001, le=0.1)]
-    voxel: Annotated[float, Field(ge=0.005, le=0.1)]
-    closing: Annotated[float, Field(gt=0, le=0.2)]
-    smoothing: Annotated[float, Field(ge=0, le=5)]
-    smallest: PositiveInt
-
-
-@dataclass(frozen=True)
-class HybridSettings:
-    """See conf/reachability/config.yaml; voxel in m, smoothing in lattice steps."""
-
-    voxel: Annotated[float, Field(ge=0.007, le=0.1)]
-    smoothing: Annotated[float, Field(ge=0, le=5)]
-    smallest: PositiveInt
-    tilts_deg: list[float]
-    tilted_poses: Annotated[int, Field(ge=1000, le=2**22)]
-
-    def __post_init__(self) -> None:
-        if any(not 0 < tilt <= 120 for tilt in self.tilts_deg) or len(set(self.tilts_deg)) < len(self.tilts_deg):
-            raise ValueError(f"tilts_deg: found {self.tilts_deg}, expected different angles above 0, up to 120")
-
-    @property
-    def tilts(self) -> list[float]:
-        """Of the end effector off straight down, rad."""
-        return np.radians(self.tilts_deg).tolist()
 
 
 @dataclass

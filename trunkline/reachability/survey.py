@@ -7,7 +7,8 @@ from typing import Annotated
 from pydantic import Field, NonNegativeInt
 
 from trunkline.reachability.checks import Check, LabelSettings, SpotCheckSettings, check_maps
-from trunkline.reachability.maps import HybridSettings, Maps, RigidSettings, blend_angles, build_maps
+from trunkline.reachability.maps import Maps, blend_angles, build_maps
+from trunkline.reachability.settings import HybridSettings, RigidSettings
 from trunkline.reachability.soft import SoftSettings
 from trunkline.reachability.tips import ArmTips
 

@@ -16,7 +16,7 @@ from trunkline.simulation.motion import batch_of
 LONGEST_STEP = 0.005  # s
 RELAXATION = 0.3  # s, damping over stiffness of each joint: about critical for the slowest swing of an arm
 CHUNK = 0.1  # s between looks at which simulations rest
-FINE_SPEED = 5e-7  # rad/s of the fastest joint, where MuJoCo is the reference: tips are some 1e-7 m from rest
+FINE_SPEED = 5e-9  # rad/s of the fastest joint, where MuJoCo is the reference: tips are some 1e-9 m from rest
 RAMP, RAMP_STEPS = 1.0, 50  # s in which tendons are drawn in, and in how many steps
 
 

@@ -11,8 +11,8 @@ STAGES = ["ingest", "filter", "build_mjcf", "identify_stiffness", "identify_damp
 STAGES += ["fk_dataset", "train_ik", "reachability"]
 
 
-def read_sources(root: Path, version: str) -> Sources:
-    """The finished artifacts of the pipeline in `root`, for a package of this `version`.
+def read_sources(root: Path) -> Sources:
+    """The finished artifacts of the pipeline in `root`.
 
     Raises:
         InputError: a file is missing.
@@ -31,7 +31,7 @@ def read_sources(root: Path, version: str) -> Sources:
         texts={
             "README.md": existing(root / "docs/unity.md").read_bytes(),
             "LICENSE.md": existing(root / "LICENSE").read_bytes(),
-            "CHANGELOG.md": f"# Changelog\n\n## [{version}]\n\nSee `Runtime/manifest.json`.\n".encode(),
+            "CHANGELOG.md": existing(root / "CHANGELOG.md").read_bytes(),
         },
         trunkline=__version__,
     )

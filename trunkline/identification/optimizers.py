@@ -1,0 +1,45 @@
+"""Two ways to the minimum, as they are set."""
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
+
+
+@dataclass
+class LeastSquares:
+    """Descents from the best of a few starts, by scipy's trust region (Branch, Coleman, Li 1999).
+
+    starts: of a Latin hypercube, besides the given one. descents: from how many of the best. iterations: of each, at
+    most. tolerance: relative decrease of the loss at the end.
+    """
+
+    starts: NonNegativeInt
+    descents: PositiveInt
+    iterations: PositiveInt
+    tolerance: PositiveFloat
+    method: Literal["least_squares"] = "least_squares"
+
+    def steps(self) -> int:
+        return self.descents * self.iterations
+
+
+@dataclass
+class DifferentialEvolution:
+    """best1bin, a whole generation per batch (Storn, Price 1997; scipy, deferred updating).
+
+    population, population_per_parameter: candidates a generation, P parameters: the first plus P times the second.
+    generations: at most. tolerance: standard deviation of the losses over their mean at the end.
+    """
+
+    population: Annotated[int, Field(ge=5)]
+    population_per_parameter: NonNegativeInt
+    generations: PositiveInt
+    tolerance: PositiveFloat
+    method: Literal["differential_evolution"] = "differential_evolution"
+
+    def steps(self) -> int:
+        return self.generations
+
+
+Optimizer = Annotated[LeastSquares | DifferentialEvolution, Field(discriminator="method")]

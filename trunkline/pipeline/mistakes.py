@@ -1,0 +1,58 @@
+"""What pydantic found wrong, as one line that names the key."""
+
+import difflib
+import re
+from typing import Any
+
+from pydantic import TypeAdapter
+
+UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
+
+
+def path_of(problem: Any, composed: dict[str, Any]) -> list[str]:
+    """Where pydantic found a problem as a path of keys: without its mark for keys and its choices among classes."""
+    path, value = [], composed
+    for place, part in enumerate(problem["loc"]):
+        last = place == len(problem["loc"]) - 1
+        if isinstance(value, dict) and (part in value or (last and problem["type"] == "missing")):
+            within = value.get(part)
+        elif isinstance(value, list) and isinstance(part, int):
+            within = None if last else value[part]  # the last of a list may be what it lacks
+        else:
+            continue
+        path.append(str(part))
+        value = within
+    return path
+
+
+def rank(problem: Any) -> int:
+    """Unknown keys first, for they explain missing ones, and those explain the rest."""
+    return {UNKNOWN_KEY: 0, "missing": 1}.get(problem["type"], 2)
+
+
+def describe(problem: Any, adapter: TypeAdapter) -> str:
+    if problem["type"] == UNKNOWN_KEY:
+        schema = adapter.json_schema()
+        classes = [schema, *schema.get("$defs", {}).values()]
+        valid = [name for cls in classes for name in cls.get("properties", {})]
+        return "unknown key" + nearest(str(problem["loc"][-1]), valid)
+    if problem["type"] == "missing":
+        return "missing, expected a value"
+    expected = problem["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
+    if problem["type"] == "value_error":  # a rule between fields, in the schema's own words
+        return expected
+    found = problem["input"]
+    if problem["type"] == "union_tag_not_found":  # which of several classes: a key of theirs says it
+        return f"{problem['ctx']['discriminator']}: missing, expected a value".replace("'", "", 2)
+    if problem["type"] == "union_tag_invalid":
+        key, found = problem["ctx"]["discriminator"].strip("'"), problem["ctx"]["tag"]
+        expected = f"one of {problem['ctx']['expected_tags']}"
+        valid = re.findall(r"'([^']*)'", expected)
+        return f"{key}: found {found!r}, expected {expected}" + nearest(found, valid)
+    valid = re.findall(r"'([^']*)'", expected) if problem["type"] == "literal_error" else []
+    return f"found {found!r}, expected {expected}" + nearest(str(found), valid)
+
+
+def nearest(found: str, valid: list[str]) -> str:
+    matches = difflib.get_close_matches(found, valid, n=1)
+    return f", did you mean {matches[0]!r}?" if matches else ""
