@@ -126,6 +126,16 @@ def test_a_mistake_is_one_line_that_names_the_key(project, section, message):
     assert "\n" not in str(caught.value)
 
 
+def test_a_mistake_in_a_group_names_the_group_s_own_file(project, tmp_path):
+    file = tmp_path / "conf" / "fit" / "arm" / "bent.yaml"
+    for text, message in (("length: 1\ntpi: 0\n", "fit.arm.tpi: unknown key, did you mean 'tip'"),
+                          ("length: 1\n", "fit.arm.tip: missing"), ("length: 0\ntip: 1\n", "fit.arm.length: found 0")):
+        file.write_text(text)
+        with pytest.raises(InputError) as caught:
+            project("{arm: bent, count: 3, spans: {}}")
+        assert str(caught.value).startswith(f"{file}: {message}")
+
+
 def test_missing_section_and_missing_file(project, tmp_path):
     project("{arm: spiral, count: 3}")
     with pytest.raises(InputError, match="no section 'fitt', did you mean 'fit'"):
@@ -161,7 +171,7 @@ def whole_project(tmp_path):
 def test_a_stage_checks_the_settings_of_all(whole_project):
     with pytest.raises(InputError, match="train.cuont: unknown key, did you mean 'count'"):
         whole_project("{fit: {count: 1}, train: {cuont: 2}}")
-    with pytest.raises(InputError, match="trian: no such stage, did you mean 'train'"):
+    with pytest.raises(InputError, match="trian: no such stage in dvc.yaml, did you mean 'train'"):
         whole_project("{fit: {count: 1}, trian: {count: 2}}")
     whole_project("{fit: {count: 1}, train: {count: 2}}")
     with pytest.raises(InputError, match="fit.count: found 'x', expected a valid integer"):

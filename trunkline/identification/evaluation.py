@@ -83,4 +83,6 @@ def _score(positions, experiment: Experiment, loss: str, weights: LossWeights, l
 
 
 def _mean(rows: list[dict[str, float]]) -> dict[str, float]:
-    return {key: float(np.mean([row[key] for row in rows])) for key in rows[0]}
+    """Of each error over the trials that have it: the arm has a velocity in moving ones alone."""
+    errors = dict.fromkeys(key for row in rows for key in row)
+    return {key: float(np.mean([row[key] for row in rows if key in row])) for key in errors}

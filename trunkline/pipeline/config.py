@@ -53,7 +53,10 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
         if not first["loc"] and ruled.split(".")[0] in composed:
             path, described = [*path, *ruled.split(".")], described.removeprefix(f"{ruled}: ")
         tuned = first["type"] == "missing" or (len(path) > 1 and path[1] in section)
-        where = f"{params if tuned else folder}: {'.'.join(path)}"
+        file, chosen = params if tuned else folder, _choices(folder, section, "")
+        if len(path) > 1 and path[1] in chosen:  # a group's values are in the file that params.yaml names
+            file = group_options(folder)[path[1]][chosen[path[1]]]
+        where = f"{file}: {'.'.join(path)}"
         raise InputError(f"{where}: {described}" + (f" (and {more} more)" if more else "")) from error
 
 
@@ -67,7 +70,7 @@ def check_settings(root: str | Path = ".") -> list[str]:
     params, stages = root / "params.yaml", list(_load(root / "dvc.yaml").stages)
     for section in _load(params):
         if section not in stages:
-            raise InputError(f"{params}: {section}: no such stage{nearest(str(section), stages)}")
+            raise InputError(f"{params}: {section}: no such stage in dvc.yaml{nearest(str(section), stages)}")
     files = [file for file in sorted(own_or_project(root, "stages").glob("*.py")) if file.stem in stages]
     for file in files:
         load_config(runpy.run_path(str(file), run_name=file.stem)["Config"], file.stem, root)

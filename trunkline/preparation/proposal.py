@@ -111,6 +111,8 @@ def _experiment(
         experiment = next(name for name, kind in EXPERIMENTS.items() if (kind.needs_motors, kind.static) == seen)
     level = EXPERIMENTS[experiment].level
     if level is PULL:
+        if EXPERIMENTS[experiment].static and wound is not None and np.isfinite(wound.positions).any():
+            pull = float(np.nanmax(wound.positions))  # what is held throughout; only a change shows elsewhere
         return experiment, round(1e3 * pull)
     return experiment, _tilt(poses, base, up) if level is TILT else None
 

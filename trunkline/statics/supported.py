@@ -83,8 +83,14 @@ def _require_no_contacts(model: mujoco.MjModel) -> None:
         )
         meets[model.body_weldid[model.geom_bodyid] == model.body_weldid[model.geom_bodyid[geom]]] = 0
         if np.any(meets):
-            other = model.geom(int(np.flatnonzero(meets)[0])).name
-            raise InputError(f"model: geom {model.geom(geom).name!r}: may touch {other!r}, expected no contacts")
+            one, other = (_geom_name(model, index) for index in (geom, int(np.flatnonzero(meets)[0])))
+            raise InputError(f"model: {one}: may touch {other}, expected no contacts (contype and conaffinity 0)")
+
+
+def _geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """Few geoms have names of their own."""
+    name = model.geom(geom).name
+    return f"geom {name!r}" if name else f"a geom of body {model.body(model.geom_bodyid[geom]).name!r}"
 
 
 def _require_site_tendons(model: mujoco.MjModel) -> None:
