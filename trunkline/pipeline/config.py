@@ -164,7 +164,7 @@ def _load(path: Path) -> DictConfig:
 
 
 def _container(config: DictConfig, resolve: bool = False) -> dict[Any, Any]:
-    """``config`` as plain values; its keys are what YAML makes of them."""
+    """`config` as plain values; its keys are what YAML makes of them."""
     container = OmegaConf.to_container(config, resolve=resolve)
     assert isinstance(container, dict)
     return container

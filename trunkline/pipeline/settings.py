@@ -23,7 +23,8 @@ def check_once(root: Path = Path(".")) -> None:
         return
     conf, stages = own_or_project(root, "conf"), own_or_project(root, "stages")
     files = [root / "params.yaml", root / "dvc.yaml", *conf.glob("**/*.yaml"), *stages.glob("*.py")]
-    files += (PROJECT / "trunkline").glob("**/*.py")  # what stages nest in their settings, and its ranges
+    # and what stages nest in their settings: a range is a type of pydantic's
+    files += [file for file in (PROJECT / "trunkline").glob("**/*.py") if b"pydantic" in file.read_bytes()]
     digest = hashlib.sha256()
     for file in sorted(file for file in files if file.is_file()):
         digest.update(str(file).encode() + b"\0" + file.read_bytes() + b"\0")
@@ -40,6 +41,7 @@ def check_once(root: Path = Path(".")) -> None:
 def main() -> int:
     require_checkout(Path("."))
     check_once()
+    print("settings: in order")
     return 0
 
 
