@@ -1,7 +1,8 @@
 """`python -m benchmarks.pipeline`: how long each stage takes here and in another commit, stage by stage in one run.
 
 The other commit is cloned into a temporary folder; both run on this checkout's session, one stage after the other, each
-on what its own earlier stages wrote. Results of this checkout are left alone: it is copied too.
+on what its own earlier stages wrote. Results of this checkout are left alone: it is copied too. With `--stages`, only
+those run, on what the stages before them wrote in this checkout.
 """
 
 import argparse
@@ -51,8 +52,11 @@ def run_stage(stage: str, folder: Path) -> Cost:
     return Cost(time.monotonic() - begun, first, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
 
 
-def copies(other: str, session: str, folder: Path) -> dict[str, Path]:
-    """This working tree and commit `other`, each in a folder of its own with the session's logs."""
+def copies(other: str, session: str, folder: Path, results: bool) -> dict[str, Path]:
+    """This working tree and commit `other`, each in a folder of its own with the session's logs.
+
+    With `results`, also with what this checkout's stages wrote.
+    """
     logs = ROOT / "data" / "raw" / session
     if not logs.is_dir():
         raise InputError(f"{logs}: no such folder, expected a session's logs (run `make demo`)")
@@ -66,6 +70,9 @@ def copies(other: str, session: str, folder: Path) -> dict[str, Path]:
         if name and (ROOT / name).is_file():
             (made["here"] / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, made["here"] / name)
+    for path in made.values() if results else ():
+        for name in ("data/processed", "artifacts"):
+            shutil.copytree(ROOT / name, path / name, dirs_exist_ok=True)
     return made
 
 
@@ -74,10 +81,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--against", default="HEAD~1", help="the other commit")
     parser.add_argument("--session", default="demo")
+    parser.add_argument("--stages", nargs="+", help="all by default")
     chosen = parser.parse_args()
-    stages = list(yaml.safe_load((ROOT / "dvc.yaml").read_text())["stages"])
+    stages = chosen.stages or list(yaml.safe_load((ROOT / "dvc.yaml").read_text())["stages"])
     with tempfile.TemporaryDirectory() as folder:
-        made = copies(chosen.against, chosen.session, Path(folder))
+        made = copies(chosen.against, chosen.session, Path(folder), bool(chosen.stages))
         totals = {name: 0.0 for name in made}
         print(f"wall s (to the first line; CPU s; MiB), here against {chosen.against}")
         for stage in stages:
