@@ -11,7 +11,7 @@ from trunkline.sessions.session import read_session
 from trunkline.takes.checks import Limits
 from trunkline.takes.intake import take_in
 
-SHARED = Path(__file__).parents[2] / "shared" / "data" / "asl_trunk"
+SHARED = Path(__file__).parents[3] / "shared" / "data" / "asl_trunk"
 LIMITS = Limits(0.5, 0.3, 0.1, 1.0)
 
 

@@ -19,7 +19,7 @@ from trunkline.takes.intake import take_in
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
-REAL = Path(__file__).parents[2] / "shared/data/asl_trunk"
+REAL = Path(__file__).parents[3] / "shared/data/asl_trunk"
 
 
 def taken(folder):

@@ -300,7 +300,7 @@ def project(tmp_path, sources) -> Path:
     """A folder with all that the stage reads."""
     root = tmp_path / "project"
     shutil.copytree(ROOT / "conf/package_unity", root / "conf/package_unity")
-    for name in ("params.yaml", "LICENSE", "docs/unity.md"):
+    for name in ("params.yaml", "LICENSE", "CHANGELOG.md", "docs/unity.md"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, root / name)
     stages = (
