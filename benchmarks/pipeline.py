@@ -70,6 +70,8 @@ def copies(other: str, session: str, folder: Path, results: bool) -> dict[str, P
         if name and (ROOT / name).is_file():
             (made["here"] / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(ROOT / name, made["here"] / name)
+    # without the file, Python would take the `stages` that is installed
+    (made[other] / "stages" / "__init__.py").touch()
     for path in made.values() if results else ():
         for name in ("data/processed", "artifacts"):
             shutil.copytree(ROOT / name, path / name, dirs_exist_ok=True)
