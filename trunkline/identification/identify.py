@@ -17,6 +17,7 @@ from trunkline.identification.search import Convergence, Found, descend, search
 from trunkline.identification.surrogate import surrogate
 from trunkline.progress import progress
 
+COARSER_TOLERANCE = 1e-2  # relative decrease of the loss at a coarser step, whose minimum lies elsewhere anyway
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
 
 
@@ -58,14 +59,19 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     short = [e.shortened(method.rough.frames) for e in _few(seen, method.rough.trials)]
     rough, exact = fit.problem(model, short, method.rough.step_factor), fit.problem(model, seen)
     searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}
-    searches["polish"] = found = _polish(exact, searches["coarse"].vector, method.polish, f"{label} polish")
+    problems, found = [rough, exact], searches["coarse"]
+    if method.rough.step_factor > 1 and any(e.frames > 1 for e in seen):  # at rest, the step changes nothing
+        whole = fit.problem(model, seen, method.rough.step_factor)
+        problems.append(whole)
+        loose = replace(method.polish, tolerance=max(method.polish.tolerance, COARSER_TOLERANCE))
+        searches["whole"] = found = _polish(whole, found, loose, f"{label} on whole trials")
+    searches["polish"] = found = _polish(exact, found, method.polish, f"{label} polish")
     values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
     linear = found.linear
     assert linear is not None, "least squares ends on its own linearisation"
     moves = surrogate(exact, found.vector, linear.residuals).moves
-    problems = [rough, exact]
 
     factors: dict[str, np.ndarray] = {}
     factor_certainty = None
@@ -115,7 +121,12 @@ def _search(problem: Problem, optimizer: Optimizer, seed: int, label: str) -> Fo
         return search(problem, optimizer, seed, lambda best: bar.update(1, best_loss=best, **problem.effort()))
 
 
-def _polish(problem: Problem, start: np.ndarray, polish: Polish, label: str) -> Found:
+def _polish(problem: Problem, rough: Found, polish: Polish, label: str) -> Found:
+    """Least squares from the best, by this problem, of the minima that the rough search found."""
+    start = rough.vector
+    if rough.others:
+        minima = np.stack([rough.vector, *rough.others])
+        start = minima[np.argmin(problem.losses(minima))]
     with progress(polish.iterations, label, "iterations") as bar:
         return descend(
             problem, start, polish.iterations, polish.tolerance,

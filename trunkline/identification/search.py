@@ -4,20 +4,18 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.optimize import differential_evolution, least_squares
+from scipy.optimize import OptimizeResult, differential_evolution, least_squares
 
 from trunkline.identification.linearisation import Linearisation, linearise
 from trunkline.identification.optimizers import DifferentialEvolution, Optimizer
 from trunkline.identification.problem import Problem
 
 PLATEAU_SCAN = 24  # values over the range of a parameter that does not matter, and
-PLATEAU_STARTS = 3  # from how many of the nearest that do matter to search again
-PLATEAU_ITERATIONS, PLATEAU_TOLERANCE = 6, 1e-3  # of each
+PLATEAU_STARTS = 2  # from how many of the nearest that do matter to search again
+PLATEAU_ITERATIONS, PLATEAU_TOLERANCE = 4, 1e-3  # of each
 PLATEAU_LEVEL = 1e-6  # relative change of the loss that matters
 STEP_TOLERANCE = 1e-5  # of a candidate z, relative: a smaller step of least squares is no step
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
-
-
 
 
 @dataclass
@@ -33,7 +31,8 @@ class Found:
     """Result of a search.
 
     vector: the best candidate z. loss: its. converged: stopped for that reason, not because its time was up.
-    linear: the residuals around it, if least squares ended there.
+    linear: the residuals around it, if least squares ended there. others: worse minima that were found on the way,
+    which whole trials may rank otherwise than the few that a search is made on.
     """
 
     vector: np.ndarray
@@ -41,6 +40,7 @@ class Found:
     convergence: Convergence
     converged: bool
     linear: Linearisation | None = None
+    others: tuple[np.ndarray, ...] = ()
 
 
 def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) -> Found:
@@ -73,7 +73,10 @@ def _leave_plateaus(problem: Problem, found: Found, report: Report) -> Found:
         if len(nearest):
             again = _best_descent(problem, scan[nearest], PLATEAU_ITERATIONS, PLATEAU_TOLERANCE, report)
             if again.loss < found.loss:
-                found = replace(found, vector=again.vector, loss=again.loss, linear=again.linear)
+                others = (*found.others, found.vector)
+                found = replace(found, vector=again.vector, loss=again.loss, linear=again.linear, others=others)
+            else:
+                found = replace(found, others=(*found.others, again.vector))
     return found
 
 
@@ -83,7 +86,11 @@ def _best_descent(problem: Problem, starts, iterations: int, tolerance: float, r
 
 
 def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report) -> Found:
-    """Least squares on the loss's residuals. Only a step that is taken costs a Jacobian."""
+    """Least squares on the loss's residuals. Only a step that is taken costs a Jacobian.
+
+    It ends with the first step that gains less than `tolerance` of the loss, also where less was gained than expected:
+    there scipy's own rule goes on, in ever smaller steps along a kink.
+    """
     convergence = Convergence()
     known: dict[bytes, list[np.ndarray]] = {}
     accepted: list[Linearisation] = []
@@ -111,17 +118,22 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
         prior = np.zeros(len(vector)) if found.prior is None else found.prior
         return np.concatenate([*found.jacobians, np.diag(prior)])
 
+    def enough(_: OptimizeResult) -> None:
+        if len(best := convergence.best) > 1 and best[-2] - best[-1] < tolerance * best[-2]:
+            raise StopIteration
+
     inside = np.clip(start, low + 1e-9, high - 1e-9)
     result = least_squares(
-        residuals, inside, derivatives, bounds=(low, high), max_nfev=iterations, ftol=tolerance, xtol=STEP_TOLERANCE
-    )
+        residuals, inside, derivatives, bounds=(low, high), max_nfev=iterations, ftol=tolerance, xtol=STEP_TOLERANCE,
+        callback=enough,
+    )  # fmt: skip
     if result.cost != convergence.best[-1]:
         convergence.best.append(float(result.cost))
         convergence.mean.append(float(result.cost))
     last = accepted[0]
     if not np.array_equal(last.vector, result.x):
         last = linearise(problem, result.x, blocks_at(result.x))
-    return Found(result.x, float(result.cost), convergence, result.status > 0, last)
+    return Found(result.x, float(result.cost), convergence, result.status != 0, last)
 
 
 def _evolve(
