@@ -1,4 +1,4 @@
-"""The library alone: where does the twin's tip rest, and which tendon lengths bring it there? (no DVC, no checkout)
+"""The library alone: where does the twin's tip rest, and which commands bring it there? (no DVC, no checkout)
 
     python library.py artifacts/identify_control/arm.xml artifacts/train_ik/ik.onnx
 """
@@ -12,7 +12,7 @@ import onnxruntime
 from trunkline.frames import gravity_in_base
 from trunkline.ik.ask import ask
 from trunkline.statics.chain import read_chain
-from trunkline.statics.equilibria import equilibrium, forward
+from trunkline.statics.equilibria import actuated, equilibrium
 
 model, network = sys.argv[1:]
 chain = read_chain(mujoco.MjModel.from_xml_path(model))
@@ -22,8 +22,8 @@ tensions = np.zeros((1, chain.tendons))
 tensions[0, 0] = 5.0  # N, on the first tendon alone
 rest = equilibrium(chain, tensions, gravity)
 pose = np.concatenate([tilt[:, None], rest.position, rest.quaternion], axis=1)  # (1, 8), base frame, w first
-lengths = ask(onnxruntime.InferenceSession(network), pose)["lengths"]  # a pose that is none is an InputError
-reached = forward(chain, lengths.astype(float), gravity)
+commands = ask(onnxruntime.InferenceSession(network), pose)["commands"]  # a pose that is none is an InputError
+reached = actuated(chain, commands.astype(float), gravity)
 print("tip (m):", rest.position[0].round(4))
-print("lengths (m):", lengths[0].round(4))
+print("commands (m):", commands[0].round(4))
 print("tip missed by (mm):", (1e3 * np.linalg.norm(reached.position - rest.position, axis=1)[0]).round(2))

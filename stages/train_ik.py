@@ -27,7 +27,7 @@ def main(config: Learning) -> None:
     model = read_model(MODEL)
     chain = read_chain(model)
     table = read_samples(SAMPLES, chain.tendons, "split")
-    learned = learn(chain, [model.tendon(t).name for t in range(chain.tendons)], table, config)
+    learned = learn(model, chain, table, config)
 
     with output_folder(ARTIFACTS) as folder:
         onnx.save(learned.exported, str(folder / "ik.onnx"))

@@ -68,18 +68,18 @@ def test_the_example_runs_outside_of_a_checkout(python, tmp_path):
     tensions[0, 0] = 5.0
     rest = equilibrium(chain, tensions, gravity_in_base(0.3))
     inputs = np.concatenate([np.full((2, 1), 0.3), rest.position, rest.quaternion], axis=1)
-    network = InverseKinematics(8, inputs, rest.lengths)
-    onnx.save(to_onnx(network, ["a", "b", "c"]), str(tmp_path / "ik.onnx"))
+    network = InverseKinematics(8, inputs, rest.commands, rest.lengths)
+    onnx.save(to_onnx(network, ["a", "b", "c"], 0.005), str(tmp_path / "ik.onnx"))
     spec = stump_spec()
     spec.compile()
     (tmp_path / "arm.xml").write_text(spec.to_xml())
     shutil.copy(ROOT / "examples" / "library.py", tmp_path)
     done = run(tmp_path, python, "library.py", "arm.xml", "ik.onnx")
     assert done.returncode == 0, done.stderr
-    tip, lengths, missed = (line.partition(":")[2].strip(" []").split() for line in done.stdout.splitlines())
+    tip, commands, missed = (line.partition(":")[2].strip(" []").split() for line in done.stdout.splitlines())
     np.testing.assert_allclose(np.array(tip, float), rest.position[0], atol=1e-4)
-    low, high = rest.lengths.min(axis=0) - 1e-4, rest.lengths.max(axis=0) + 1e-4  # within which the network keeps
-    assert ((low <= np.array(lengths, float)) & (np.array(lengths, float) <= high)).all()
+    low, high = rest.commands.min(axis=0) - 1e-4, rest.commands.max(axis=0) + 1e-4  # within which the network keeps
+    assert ((low <= np.array(commands, float)) & (np.array(commands, float) <= high)).all()
     assert 0 < float(missed[0]) < 1e3 * chain.length
 
 

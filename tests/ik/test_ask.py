@@ -20,7 +20,8 @@ def session(model) -> onnxruntime.InferenceSession:
 
 @pytest.fixture(scope="module")
 def model():
-    return to_onnx(InverseKinematics(8, POSE, np.array([[0.4, 0.5, 0.6], [0.5, 0.6, 0.7]])), ["a", "b", "c"])
+    commands = np.array([[0.4, 0.5, 0.6], [0.5, 0.6, 0.7]])
+    return to_onnx(InverseKinematics(8, POSE, commands, commands + 0.01), ["a", "b", "c"], 0.05)
 
 
 @pytest.fixture(scope="module")
@@ -36,10 +37,10 @@ def changed(row, columns, value):
 
 def test_it_answers_as_the_file_does_for_either_sign_and_rounded_quaternions(network):
     expected = network.run(None, {"pose": POSE.astype(np.float32)})[0]
-    np.testing.assert_array_equal(ask(network, POSE)["lengths"], expected)
-    np.testing.assert_array_equal(ask(network, POSE * np.repeat([1, -1], 4))["lengths"], expected)
-    assert ask(network, POSE.astype(np.float32).round(3).tolist())["lengths"].shape == (2, 3)
-    assert ask(network, POSE[:0])["lengths"].shape == (0, 3)
+    np.testing.assert_array_equal(ask(network, POSE)["commands"], expected)
+    np.testing.assert_array_equal(ask(network, POSE * np.repeat([1, -1], 4))["commands"], expected)
+    assert ask(network, POSE.astype(np.float32).round(3).tolist())["commands"].shape == (2, 3)
+    assert ask(network, POSE[:0])["commands"].shape == (0, 3)
 
 
 @pytest.mark.parametrize(
@@ -69,7 +70,7 @@ def test_an_answer_that_is_not_finite_is_an_error(model):
     broken = onnx.ModelProto.FromString(model.SerializeToString())
     (middle,) = (tensor for tensor in broken.graph.initializer if tensor.name == "middle")
     middle.CopyFrom(onnx.numpy_helper.from_array(np.array([np.nan, 0, 0], np.float32), "middle"))
-    with pytest.raises(InputError, match="pose 0: found lengths .*nan"):
+    with pytest.raises(InputError, match="pose 0: found commands .*nan"):
         ask(session(broken), POSE)
 
 
@@ -78,3 +79,13 @@ def test_a_network_of_somebody_else_is_an_error(model):
     del other.metadata_props[:]
     with pytest.raises(InputError, match="found no 'inputs' in the file's metadata"):
         ask(session(other), POSE)
+
+
+def test_a_tip_foreseen_far_from_its_target_is_doubted(network):
+    tip = ask(network, POSE)["tip"].astype(float)
+    for distance, doubtful in ((0.01, False), (0.06, True)):
+        near = POSE.copy()
+        for _ in range(200):  # where the network foresees the tip that it is asked for, but for `distance`
+            near[:, 1:4] = ask(network, near)["tip"] + [0, 0, distance]
+        np.testing.assert_array_equal(ask(network, near)["doubtful"], doubtful)
+    assert np.isfinite(tip).all()

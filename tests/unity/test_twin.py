@@ -33,16 +33,16 @@ TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts_deg=[0.0, 57.3])
 
 def network(inputs: int = 8, opset: int = 15, outputs: list[str] | None = None) -> bytes:
     weights = helper.make_tensor("w", TensorProto.FLOAT, [inputs, 3], np.ones(3 * inputs))
-    ends = [
-        helper.make_tensor_value_info(n, TensorProto.FLOAT, ["n", w]) for n, w in (("x", inputs), ("l", 3))
-    ]
-    graph = helper.make_graph(
-        [helper.make_node("MatMul", ["x", "w"], ["l"])], "ik", ends[:1], ends[1:], [weights]
-    )
+    names = ("commands", "lengths", "tip")
+    widths = {"x": inputs} | dict.fromkeys(names, 3)
+    ends = [helper.make_tensor_value_info(n, TensorProto.FLOAT, ["n", w]) for n, w in widths.items()]
+    nodes = [helper.make_node("MatMul", ["x", "w"], [name]) for name in names]
+    graph = helper.make_graph(nodes, "ik", ends[:1], ends[1:], [weights])
     opsets = [helper.make_opsetid("", opset)]
     model = helper.make_model(graph, opset_imports=opsets, ir_version=8)
     names = {"inputs": INPUTS, "outputs": outputs or ["tendon_1", "tendon_2", "tendon_3"]}
-    helper.set_model_props(model, {key: json.dumps(value) for key, value in names.items()})
+    meaning = {name: f"{name} in m" for name in ("commands", "lengths", "tip")} | {"doubt_beyond_m": "0.005"}
+    helper.set_model_props(model, {key: json.dumps(value) for key, value in names.items()} | meaning)
     return model.SerializeToString()
 
 
@@ -134,7 +134,9 @@ def test_the_manifest_is_valid_and_true(files, sources):
     assert manifest.model.names.actuators == ["tendon_1_position", "tendon_2_position", "tendon_3_position"]
     assert manifest.model.names.joints[:2] == ["unit_01_x", "unit_01_y"]
     assert manifest.network.output_order == ["tendon_1", "tendon_2", "tendon_3"]
-    assert (manifest.network.input, manifest.network.output, manifest.network.opset) == ("x", "l", 15)
+    assert (manifest.network.input, manifest.network.opset) == ("x", 15)
+    assert list(manifest.network.outputs) == ["commands", "lengths", "tip"]
+    assert manifest.network.doubt_beyond == 0.005
     assert set(manifest.meshes) == {"rigid", "soft_030"}
     with pytest.raises(ValueError, match="extra"):
         Manifest.model_validate(json.loads(files[MANIFEST]) | {"surprise": 1})

@@ -9,6 +9,11 @@ def length_columns(tendons: int) -> list[str]:
     return [f"l{t + 1}" for t in range(tendons)]
 
 
+def command_columns(tendons: int) -> list[str]:
+    """c1, c2, …"""
+    return [f"c{t + 1}" for t in range(tendons)]
+
+
 def tension_columns(tendons: int) -> list[str]:
     """f1, f2, …"""
     return [f"f{t + 1}" for t in range(tendons)]

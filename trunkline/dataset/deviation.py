@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pandas as pd
 
-from trunkline.dataset.columns import length_columns, tension_columns
+from trunkline.dataset.columns import command_columns, tension_columns
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.simulation.rest import settle
@@ -28,9 +28,8 @@ def mujoco_deviation(
         raise InputError(f"fk_dataset.check: found {len(table)} samples, expected at least the {count} to be checked")
     rows = table.iloc[np.sort(rng.permutation(len(table))[:count])]
     tensions = rows[tension_columns(chain.tendons)].to_numpy()
-    lengths = rows[length_columns(chain.tendons)].to_numpy()
+    commands = rows[command_columns(chain.tendons)].to_numpy()
     by_actuator = model.actuator_trnid[:, 0]
-    commands = lengths - tensions / chain.gain  # f = kp (l - command), and no pull where they are equal
     gravity = gravity_in_base(rows["theta_g"].to_numpy())
     settled = settle(model, commands[:, by_actuator], gravity)
     band = friction_band(chain, tensions, gravity, *model_friction(model))

@@ -96,6 +96,12 @@ def planar_directions(chain: Chain) -> tuple[np.ndarray, list[str]]:
     return np.array([[force[0], 0, 0], [0, min(force[1:]), min(force[1:])]]), ["dorsal", "ventral"]
 
 
+def around_the_arm(chain: Chain) -> np.ndarray:
+    """The tendons in the order in which they lie around the arm. Shape (K,)."""
+    holes = _first_holes(chain)
+    return np.argsort(np.arctan2(holes[:, 1], holes[:, 0]))
+
+
 def _first_holes(chain: Chain) -> np.ndarray:
     """Where each tendon leaves the base, in the plane across the straight arm, as unit vectors. Shape (K, 3)."""
     holes = chain.hole_in[0] + chain.offset[0]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pandas as pd
 
-from trunkline.dataset.columns import AXES, POSE, length_columns, tension_columns
+from trunkline.dataset.columns import AXES, POSE, command_columns, length_columns, tension_columns
 from trunkline.dataset.sampling import Candidates, crowding, sample_angle, thin
 from trunkline.statics.chain import Chain
 from trunkline.statics.sensitivity import sensitivity
@@ -38,9 +38,9 @@ def sample_table(
 ) -> tuple[pd.DataFrame, Density]:
     """About `count` samples at one gravity angle, thinned in the space of tips.
 
-    Columns: theta_g (rad), x, y, z (m), qw, qx, qy, qz, l1… (m, path lengths), f1… (N, tensions), residual (N m),
-    iterations, set, and the derivatives by tension dx_df1… (tip, m/N), rx_df1… (turn of the tip as a rotation
-    vector in the base frame, rad/N) and dl1_df1… (path lengths, m/N).
+    Columns: theta_g (rad), x, y, z (m), qw, qx, qy, qz, l1… (m, path lengths), f1… (N, tensions), c1… (m, commands),
+    residual (N m), iterations, set, and the derivatives by tension dx_df1… (tip, m/N), rx_df1… (turn of the tip as a
+    rotation vector in the base frame, rad/N) and dl1_df1… (path lengths, m/N).
     The planar sets are kept beside the thinned samples, thinned along their own curves.
 
     Args:
@@ -65,6 +65,7 @@ def _table(chain: Chain, tilt: float, candidates: Candidates, kept: np.ndarray) 
     columns |= dict(zip(POSE, np.concatenate([rest.position, rest.quaternion], axis=1).T, strict=True))
     columns |= dict(zip(length_columns(chain.tendons), rest.lengths.T, strict=True))
     columns |= dict(zip(tension_columns(chain.tendons), rest.tensions.T, strict=True))
+    columns |= dict(zip(command_columns(chain.tendons), rest.commands.T, strict=True))
     columns |= {"residual": rest.residual, "iterations": rest.iterations, "set": candidates.kind[kept]}
     for t in range(chain.tendons):
         columns |= {f"d{axis}_df{t + 1}": slopes.tip_by_tension[:, k, t] for k, axis in enumerate(AXES)}
@@ -89,6 +90,11 @@ def length_by_tension(table: pd.DataFrame, tendons: int) -> np.ndarray:
     """∂(path lengths)/∂(tensions), m/N. Shape (N, K, K)."""
     names = [[f"dl{s + 1}_df{t + 1}" for t in range(tendons)] for s in range(tendons)]
     return np.stack([table[row].to_numpy() for row in names], axis=1)
+
+
+def command_by_tension(table: pd.DataFrame, gain: np.ndarray) -> np.ndarray:
+    """∂(commands)/∂(tensions) with actuators of `gain` (K,), N/m: m/N. Shape (N, K, K)."""
+    return length_by_tension(table, len(gain)) - np.diag(1 / gain)
 
 
 def split(count: int, validate_share: float, rng: np.random.Generator) -> np.ndarray:

@@ -11,7 +11,10 @@ UNIT = 1e-3  # by which a quaternion's length may differ from 1: that of one wri
 
 
 def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, np.ndarray]:
-    """What the network of `train_ik` answers, by the name of the output, each (N, K).
+    """What the network of `train_ik` answers, by the name of the output.
+
+    "commands" and "lengths" (N, K) and "tip" (N, 3) as in `network.Answer`, m, and "doubtful" (N,): whether the tip is
+    foreseen so far from its target that the arm cannot take the pose.
 
     Args:
         poses: gravity angle (rad), tip position (m) and unit quaternion (w first, either sign) in the base frame, as
@@ -22,8 +25,9 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
             has no finite answer.
     """
     (taken,), meaning = runtime.get_inputs(), runtime.get_modelmeta().custom_metadata_map
-    if "inputs" not in meaning:
-        raise InputError("found no 'inputs' in the file's metadata, expected a network of train_ik")
+    for key in ("inputs", "doubt_beyond_m"):
+        if key not in meaning:
+            raise InputError(f"found no {key!r} in the file's metadata, expected a network of train_ik")
     names = [output.name for output in runtime.get_outputs()]
     given = {taken.name: checked(poses, json.loads(meaning["inputs"]))}
     answers = dict(zip(names, runtime.run(names, given), strict=True))
@@ -31,7 +35,8 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
         if len(bad):
             raise InputError(f"pose {bad[0]}: found {name} {values[bad[0]]}, expected finite numbers")
-    return answers
+    missed = np.linalg.norm(answers["tip"] - given[taken.name][:, 1:4], axis=1)
+    return answers | {"doubtful": missed > float(meaning["doubt_beyond_m"])}
 
 
 def checked(poses: np.ndarray, inputs: list[str]) -> np.ndarray:

@@ -1,8 +1,10 @@
 """From samples to a network that is trained, exported and scored by forward kinematics."""
 
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
+import mujoco
 import numpy as np
 import onnx
 import onnxruntime
@@ -10,13 +12,21 @@ import pandas as pd
 import torch
 from pydantic import Field, NonNegativeFloat, PositiveInt
 
-from trunkline.dataset.columns import length_columns, tension_columns
-from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension, turn_by_tension
+from trunkline.dataset.columns import command_columns, length_columns, tension_columns
+from trunkline.dataset.table import command_by_tension, sample_table, tip_by_tension, turn_by_tension
+from trunkline.ik.as_controls import SHARE, AsControls, score
 from trunkline.ik.ask import ask
-from trunkline.ik.network import INPUTS, InverseKinematics
+from trunkline.ik.network import INPUTS, OUTPUTS, InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.polish import polish
-from trunkline.ik.score import TipErrors, beyond_range, largest_difference, outside_targets, tip_errors
+from trunkline.ik.score import (
+    TipErrors,
+    beyond_range,
+    largest_difference,
+    length_errors,
+    outside_targets,
+    tip_errors,
+)
 from trunkline.ik.tip_loss import tip_loss
 from trunkline.ik.training import Training, train
 from trunkline.progress import progress
@@ -49,6 +59,7 @@ class Learning(Training):
 
     lever: NonNegativeFloat
     unseen: Unseen
+    as_controls: AsControls
     polish: Polish
     outside: PositiveInt
 
@@ -57,8 +68,9 @@ class Learning(Training):
 class Learned:
     """A network, also as ONNX, and its learning curve: epoch, train_mm, validate_mm.
 
-    held_out: the samples that no training saw. errors: of the exported network, for them ("held out") and for targets
-    at "unseen angles". polished: of some held-out targets after Gauss-Newton steps from its answers.
+    held_out: the samples that no training saw. errors: of the exported network's commands, for them ("held out") and
+    for targets at "unseen angles". as_lengths: of its lengths, for the latter, held by cables. as_controls: what comes
+    of its commands in MuJoCo. polished: of some held-out targets after Gauss-Newton steps from its answers.
     outside: how many targets far off there are, beyond_range: how far (m) any answer to them leaves the tendons' range.
     difference: between the network and what was exported, m, at most.
     """
@@ -68,47 +80,66 @@ class Learned:
     curve: pd.DataFrame
     held_out: pd.DataFrame
     errors: dict[str, TipErrors]
+    as_lengths: TipErrors
+    as_controls: dict
     polished: TipErrors
     outside: int
     beyond_range: float
     difference: float
 
 
-def learn(chain: Chain, tendons: list[str], table: pd.DataFrame, learning: Learning) -> Learned:
+def learn(model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Learning) -> Learned:
     """Train on the samples of `table` that are not held out, and score on those that are and on others.
 
     Args:
-        tendons: their names, in the order of the chain.
+        model: whose `chain` it is.
     """
-    network, curve = fit(table, chain.tendons, learning)
+    network, curve = fit(table, chain, learning)
     held_out = table[table["split"] == "validate"]
-    unseen = unseen_targets(chain, np.unique(table["theta_g"]), learning.unseen, learning.seed)
-    exported = to_onnx(network, tendons)
+    angles = np.unique(table["theta_g"])
+    unseen = unseen_targets(chain, angles, learning.unseen, learning.seed)
+    exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], SHARE * chain.length)
     runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
-    errors, difference = {}, 0.0
+    errors, difference, found = {}, 0.0, {}
     for name, targets in (("held out", held_out), ("unseen angles", unseen)):
         inputs = targets[INPUTS].to_numpy()
-        lengths = answers(runtime, inputs)
+        found = ask(runtime, inputs)
         with torch.no_grad():
-            torch_lengths = network(torch.tensor(inputs, dtype=torch.float32)).numpy()
-        difference = max(difference, largest_difference(lengths, torch_lengths))
+            told = network(torch.tensor(inputs, dtype=torch.float32))._asdict()
+        difference = max(difference, *(largest_difference(found[key], told[key].numpy()) for key in OUTPUTS))
         print(f"train_ik: forward kinematics of {len(inputs)} answers, {name}", flush=True)
-        errors[name] = tip_errors(chain, inputs, lengths.astype(float))
+        errors[name] = tip_errors(chain, inputs, found["commands"].astype(float))
+    as_lengths = length_errors(chain, unseen[INPUTS].to_numpy(), found["lengths"].astype(float))
     polished = polished_errors(chain, held_out, runtime, learning.polish, learning.seed)
-    far = answers(runtime, outside_targets(learning.outside, chain.length, np.random.default_rng(learning.seed)))
-    known = table.loc[table["split"] == "train", length_columns(chain.tendons)].to_numpy()
+    rng = np.random.default_rng(learning.seed)
+    far = ask(runtime, outside_targets(learning.outside, chain.length, rng))["commands"]
+    known = table.loc[table["split"] == "train", command_columns(chain.tendons)].to_numpy()
+    print("train_ik: sending commands to MuJoCo until the arm rests", flush=True)
+    deepest = chain.straight_lengths - known.min(axis=0)
+    sent = score(model, chain, partial(ask, runtime), angles, deepest, learning.as_controls, rng)
     return Learned(
-        network, exported, curve, held_out, errors, polished, len(far), beyond_range(far, known), difference
+        network=network,
+        exported=exported,
+        curve=curve,
+        held_out=held_out,
+        errors=errors,
+        as_lengths=as_lengths,
+        as_controls=sent,
+        polished=polished,
+        outside=len(far),
+        beyond_range=beyond_range(far, known),
+        difference=difference,
     )
 
 
-def fit(table: pd.DataFrame, tendons: int, learning: Learning) -> tuple[InverseKinematics, pd.DataFrame]:
+def fit(table: pd.DataFrame, chain: Chain, learning: Learning) -> tuple[InverseKinematics, pd.DataFrame]:
     """The trained network and its learning curve: epoch, train_mm, validate_mm."""
+    tendons = chain.tendons
     turn = learning.lever * turn_by_tension(table, tendons)
     loss = tip_loss(
         table[tension_columns(tendons)].to_numpy(),
         np.concatenate([tip_by_tension(table, tendons), turn], axis=1),
-        length_by_tension(table, tendons),
+        command_by_tension(table, chain.gain),
     )
     curve = []
     with progress(learning.epochs, "train_ik", "epochs") as bar:
@@ -119,6 +150,7 @@ def fit(table: pd.DataFrame, tendons: int, learning: Learning) -> tuple[InverseK
 
         network = train(
             table[INPUTS].to_numpy(),
+            table[command_columns(tendons)].to_numpy(),
             table[length_columns(tendons)].to_numpy(),
             loss,
             (table["split"] == "train").to_numpy(),
@@ -128,17 +160,12 @@ def fit(table: pd.DataFrame, tendons: int, learning: Learning) -> tuple[InverseK
     return network, pd.DataFrame(curve)
 
 
-def answers(runtime: onnxruntime.InferenceSession, inputs: np.ndarray) -> np.ndarray:
-    """Lengths (N, K), m, that the exported network gives for `inputs` (N, 8)."""
-    return ask(runtime, inputs)["lengths"]
-
-
 def polished_errors(chain: Chain, held_out: pd.DataFrame, runtime, polishing: Polish, seed: int) -> TipErrors:
     """Errors of some held-out targets after Gauss-Newton steps from the network's answers."""
     count = min(polishing.targets, len(held_out))
     inputs = held_out[INPUTS].sample(count, random_state=seed).to_numpy()
     print(f"train_ik: up to {polishing.steps} Gauss-Newton steps for {count} answers", flush=True)
-    found = polish(chain, inputs, answers(runtime, inputs).astype(float), polishing.steps)
+    found = polish(chain, inputs, ask(runtime, inputs)["lengths"].astype(float), polishing.steps)
     return TipErrors(found.position_error, found.orientation_error)
 
 

@@ -7,17 +7,18 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
-from trunkline.ik.network import FIRST, INPUTS, SECOND, InverseKinematics
+from trunkline.ik.network import FIRST, INPUTS, OUTPUTS, SECOND, InverseKinematics
 
 OPSET = 15
 IR_VERSION = 8  # of the ONNX release that brought opset 15
 
 
-def to_onnx(network: InverseKinematics, tendons: list[str]) -> onnx.ModelProto:
-    """A model with input `pose` (N, 8) and output `lengths` (N, K), float32, weights inside.
+def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> onnx.ModelProto:
+    """A model with input `pose` (N, 8) and outputs `commands` (N, K), `lengths` (N, K) and `tip` (N, 3), float32.
 
     Args:
-        tendons: names, in the order of the outputs.
+        tendons: names, in the order of the columns of commands and lengths.
+        doubt_beyond: m; a foreseen tip further than this from its target is a reason to doubt. Only written down.
     """
     nodes, constants = [], []
 
@@ -38,29 +39,48 @@ def to_onnx(network: InverseKinematics, tendons: list[str]) -> onnx.ModelProto:
     x = node("Concat", parts, "features", axis=1)
     x = node("Sub", [x, constant("mean", network.mean.numpy())], "centred")
     x = node("Mul", [x, constant("scale", network.scale.numpy())], "normalised")
-    linear = [layer for layer in network.layers if isinstance(layer, nn.Linear)]
-    for index, layer in enumerate(linear, start=1):
-        weight = constant(f"weight_{index}", layer.weight.detach().numpy().T.copy())
-        bias = constant(f"bias_{index}", layer.bias.detach().numpy())
-        x = node("Gemm", [x, weight, bias], f"layer_{index}")
-        if index < len(linear):
-            x = node("Relu", [x], f"relu_{index}")
-    bounds = [constant("lowest", np.float32(-1)), constant("highest", np.float32(1))]
-    x = node("Clip", [x, *bounds], "in_range")
-    x = node("Mul", [x, constant("half_range", network.half_range.numpy())], "offset")
-    node("Add", [x, constant("middle", network.middle.numpy())], "lengths")
+
+    def perceptron(x: str, layers: nn.Sequential, name: str) -> str:
+        linear = [layer for layer in layers if isinstance(layer, nn.Linear)]
+        for index, layer in enumerate(linear, start=1):
+            weight = constant(f"{name}_weight_{index}", layer.weight.detach().numpy().T.copy())
+            bias = constant(f"{name}_bias_{index}", layer.bias.detach().numpy())
+            x = node("Gemm", [x, weight, bias], f"{name}_layer_{index}")
+            if index < len(linear):
+                x = node("Relu", [x], f"{name}_relu_{index}")
+        return x
+
+    def columns_of(x: str, first: int, output: str) -> str:
+        columns = constant(f"{output}_columns", np.arange(first, first + len(tendons), dtype=np.int64))
+        return node("Gather", [x, columns], output, axis=1)
+
+    def clip(x: str, lowest: float, output: str) -> str:
+        bounds = [constant(f"{output}_lowest", np.float32(lowest)), constant(f"{output}_highest", np.float32(1))]
+        return node("Clip", [x, *bounds], output)
+
+    both = perceptron(x, network.layers, "inverse")
+    pulls = clip(columns_of(both, 0, "raw_pulls"), -1, "pulls")
+    x = node("Mul", [pulls, constant("half_range", network.half_range.numpy())], "offset")
+    commands = node("Add", [x, constant("middle", network.middle.numpy())], "commands")
+    stretches = clip(columns_of(both, len(tendons), "raw_stretches"), 0, "stretch_shares")
+    x = node("Mul", [stretches, constant("most_stretch", network.most_stretch.numpy())], "stretches")
+    node("Add", [commands, x], "lengths")
+    x = perceptron(node("Concat", ["sin_theta_g", "cos_theta_g", pulls], "seen", axis=1), network.tip_layers, "tip")
+    x = node("Mul", [x, constant("tip_half_range", network.tip_half_range.numpy())], "tip_offset")
+    node("Add", [x, constant("tip_middle", network.tip_middle.numpy())], "tip")
 
     pose = helper.make_tensor_value_info("pose", TensorProto.FLOAT, ["batch", len(INPUTS)])
-    lengths = helper.make_tensor_value_info("lengths", TensorProto.FLOAT, ["batch", len(tendons)])
-    graph = helper.make_graph(nodes, "inverse_kinematics", [pose], [lengths], constants)
+    widths = dict(zip(OUTPUTS, (len(tendons), len(tendons), 3), strict=True))
+    outputs = [helper.make_tensor_value_info(k, TensorProto.FLOAT, ["batch", n]) for k, n in widths.items()]
+    graph = helper.make_graph(nodes, "inverse_kinematics", [pose], outputs, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", OPSET)], ir_version=IR_VERSION)
     model.producer_name = "trunkline"
-    helper.set_model_props(model, _meaning(network, tendons))
+    helper.set_model_props(model, _meaning(network, tendons, doubt_beyond))
     onnx.checker.check_model(model, full_check=True)
     return model
 
 
-def _meaning(network: InverseKinematics, tendons: list[str]) -> dict[str, str]:
+def _meaning(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> dict[str, str]:
     """Metadata: names, shapes, units, frame, normalisation."""
     low, high = network.middle - network.half_range, network.middle + network.half_range
     return {
@@ -70,8 +90,11 @@ def _meaning(network: InverseKinematics, tendons: list[str]) -> dict[str, str]:
         "outputs": json.dumps(tendons),
         "output_units": json.dumps(["m"] * len(tendons)),
         "output_shape": json.dumps(["batch", len(tendons)]),
-        "output_range_m": json.dumps([[round(float(v), 9) for v in pair] for pair in zip(low, high, strict=True)]),
-        "output_meaning": "tendon path lengths to command; a slack tendon may be given more than its path",
+        "commands_range_m": json.dumps([[round(float(v), 9) for v in pair] for pair in zip(low, high, strict=True)]),
+        "commands": "what each tendon's position actuator is sent; a slack tendon may be given more than its path",
+        "lengths": "path length of each tendon at rest: longer than the command by tension / kp. Not to be sent",
+        "tip": "x, y, z in the base frame, m: where the tip will come to rest. Off the target: out of the arm's reach",
+        "doubt_beyond_m": f"{doubt_beyond:.6g}",
         "frame": "tip pose in the base frame: origin at the mount, straight arm along -z, tendon 1 over +x",
         "quaternion": "w, x, y, z, unit length, either sign",
         "normalisation": "inside the network",

@@ -5,7 +5,7 @@ equilibrium, a step is
 
     min |r - P δT|²   over  0 ≤ T + δT ≤ F, no more than two tendons taut,     l ← l + C δT.
 
-Tensions say which tendons are taut, lengths are what is commanded and what the tip follows most evenly; so the
+Tensions say which tendons are taut, lengths are what the tip follows most evenly; so the
 step is found in the first and taken in the second. Two taut tendons are as many as the data set has.
 """
 
@@ -31,6 +31,7 @@ class Polished:
 
     Attributes:
         lengths: path length of each tendon at the equilibrium found, m. Shape (N, K).
+        commands: of the position actuators, that hold it, m. Shape (N, K).
         position_error: of the tip at that equilibrium, m. Shape (N,).
         orientation_error: rad. Shape (N,).
         steps: Gauss-Newton steps taken. Shape (N,).
@@ -38,6 +39,7 @@ class Polished:
     """
 
     lengths: np.ndarray
+    commands: np.ndarray
     position_error: np.ndarray
     orientation_error: np.ndarray
     steps: np.ndarray
@@ -63,8 +65,8 @@ def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 
         rows = np.flatnonzero(going)
         if not len(rows):
             break
-        tensions, commands = _step(chain, best[rows], error[rows], gravity[rows], lever)
-        found = restart(chain, best.qpos[rows], tensions, commands, gravity[rows])
+        tensions, lengths_to_hold = _step(chain, best[rows], error[rows], gravity[rows], lever)
+        found = restart(chain, best.qpos[rows], tensions, lengths_to_hold, gravity[rows])
         missing = _missing_pose(found, targets[rows], lever)
         better = found.converged & (np.linalg.norm(missing, axis=1) < size[rows])
         at = rows[better]
@@ -75,6 +77,7 @@ def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 
         going[rows] = better & (size[rows] > NEGLIGIBLE)
     return Polished(
         lengths=np.where(best.converged[:, None], best.lengths, lengths),
+        commands=np.where(best.converged[:, None], best.commands, np.nan),
         position_error=np.where(best.converged, np.linalg.norm(error[:, :3], axis=1), np.inf),
         orientation_error=np.where(best.converged, np.linalg.norm(error[:, 3:], axis=1) / lever, np.inf),
         steps=taken,
@@ -90,7 +93,7 @@ def _missing_pose(found: Equilibrium, targets: np.ndarray, lever: float) -> np.n
 
 
 def _step(chain, here: Equilibrium, error, gravity, lever) -> tuple[np.ndarray, np.ndarray]:
-    """Tensions (N, K) that the step foresees, and the lengths (N, K) to command."""
+    """Tensions (N, K) that the step foresees, and the lengths (N, K) to hold."""
     slopes = sensitivity(chain, here.qpos, here.tensions, gravity)
     pose = np.concatenate([slopes.tip_by_tension, lever * slopes.turn_by_tension], axis=1)  # (N, 6, K)
     tensions, least = here.tensions.copy(), np.full(len(error), np.inf)

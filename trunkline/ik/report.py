@@ -12,6 +12,8 @@ def summary(learned: Learned, length: float) -> dict:
     """The network in a few numbers, for metrics.json. `length`: of the arm, m."""
     return learned.errors["held out"].metrics(length) | {
         "unseen_angles": learned.errors["unseen angles"].metrics(length),
+        "as_lengths": learned.as_lengths.metrics(length),
+        "as_controls": learned.as_controls,
         "polished": learned.polished.metrics(length),
         "outside": {"targets": learned.outside, "beyond_range_m": learned.beyond_range},
         "onnx_max_abs_diff_m": learned.difference,

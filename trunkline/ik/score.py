@@ -1,13 +1,13 @@
-"""What the network is worth: the tip error after forward kinematics of the lengths it predicts, and far-off targets."""
+"""What the network is worth: the tip error after forward kinematics of the commands it gives, and far-off targets."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.statics.chain import FORCE_ROUNDING, Chain
-from trunkline.statics.equilibria import forward
+from trunkline.statics.equilibria import Equilibrium, actuated, forward
 
 
 @dataclass
@@ -17,7 +17,7 @@ class TipErrors:
     Attributes:
         position: distance from the target, m. Shape (N,).
         orientation: angle from the target, rad. Shape (N,).
-        beyond_force: where the lengths ask for more pull than the motors have; None if not looked at. Shape (N,).
+        beyond_force: where lengths ask for more pull than the motors have; None if not looked at. Shape (N,).
     """
 
     position: np.ndarray
@@ -51,15 +51,24 @@ class TipErrors:
         }
 
 
-def tip_errors(chain: Chain, inputs: np.ndarray, lengths: np.ndarray) -> TipErrors:
-    """Errors of predicted lengths (N, K), m, for targets `inputs` (N, 8): θ_G, position, quaternion."""
+def tip_errors(chain: Chain, inputs: np.ndarray, commands: np.ndarray) -> TipErrors:
+    """Errors of predicted commands (N, K), m, for targets `inputs` (N, 8): θ_G, position, quaternion."""
+    return _errors(actuated(chain, commands, gravity_in_base(inputs[:, 0])), inputs)
+
+
+def length_errors(chain: Chain, inputs: np.ndarray, lengths: np.ndarray) -> TipErrors:
+    """Errors of predicted path lengths (N, K), m, held by cables whatever it takes, for targets as in `tip_errors`."""
     found = forward(chain, lengths, gravity_in_base(inputs[:, 0]))
+    beyond = found.converged & (found.tensions > (1 + FORCE_ROUNDING) * chain.max_tension).any(axis=1)
+    return replace(_errors(found, inputs), beyond_force=beyond)
+
+
+def _errors(found: Equilibrium, inputs: np.ndarray) -> TipErrors:
     position = np.linalg.norm(found.position - inputs[:, 1:4], axis=1)
     overlap = np.abs(np.einsum("ni,ni->n", found.quaternion, inputs[:, 4:]))
     orientation = 2 * np.arccos(np.clip(overlap, 0, 1))
     position[~found.converged], orientation[~found.converged] = np.nan, np.nan
-    beyond = found.converged & (found.tensions > (1 + FORCE_ROUNDING) * chain.max_tension).any(axis=1)
-    return TipErrors(position, orientation, beyond)
+    return TipErrors(position, orientation)
 
 
 def outside_targets(count: int, length: float, rng: np.random.Generator) -> np.ndarray:
@@ -73,15 +82,15 @@ def outside_targets(count: int, length: float, rng: np.random.Generator) -> np.n
     ])
 
 
-def beyond_range(lengths: np.ndarray, known: np.ndarray) -> float:
-    """How far any of `lengths` (N, K) lies beyond the shortest and longest of `known` (M, K), m; zero if none does.
+def beyond_range(commands: np.ndarray, known: np.ndarray) -> float:
+    """How far any of `commands` (N, K) lies beyond the shortest and longest of `known` (M, K), m; zero if none does.
 
     Raises:
         InputError: an answer is not finite.
     """
-    _check_finite(lengths)
+    _check_finite(commands)
     low, high = known.min(axis=0), known.max(axis=0)
-    return float(max(0.0, (low - lengths).max(), (lengths - high).max()))
+    return float(max(0.0, (low - commands).max(), (commands - high).max()))
 
 
 def largest_difference(lengths: np.ndarray, others: np.ndarray) -> float:

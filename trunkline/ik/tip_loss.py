@@ -1,10 +1,12 @@
-"""Errors in tendon length as errors of the tip pose, to first order: what the network is trained on.
+"""Errors in command as errors of the tip pose, to first order: what the network is trained on.
 
-Taut tendons A and slack ones S of an equilibrium, with P = ∂(tip pose)/∂T and C = ∂l/∂T; a pose has D = 6
-components, position in m and turn in rad times a lever in m. Lengths δ too long change the
+Taut tendons A and slack ones S of an equilibrium, with P = ∂(tip pose)/∂T and C = ∂c/∂T; a pose has D = 6
+components, position in m and turn in rad times a lever in m. Commands δ too long change the
 tensions of A by C_AA⁻¹ δ_A and the tip by M δ with M_A = P_A C_AA⁻¹. A slack tendon s follows with C_sA C_AA⁻¹ δ_A;
 only if its own δ_s is less than that does it pull, by r = a·δ > 0, and move the tip by v r more, with
 v = -(P_s - M_A C_As) / (C_ss - C_sA C_AA⁻¹ C_As). So a slack tendon costs nothing when it is given too much length.
+
+A command is c = l - T / kp, so C = ∂l/∂T - 1/kp on its diagonal. With C = ∂l/∂T it is the same for path lengths.
 """
 
 from dataclasses import dataclass
@@ -31,19 +33,19 @@ class TipLoss:
     push: torch.Tensor
 
     def __call__(self, rows: torch.Tensor, delta: torch.Tensor) -> torch.Tensor:
-        """Change of pose, m, of samples `rows` for lengths that are `delta` (B, K) m too long. Shape (B, D)."""
+        """Change of pose, m, of samples `rows` for commands that are `delta` (B, K) m too long. Shape (B, D)."""
         shortage = torch.relu(torch.einsum("nst,nt->ns", self.excess[rows], delta))
         moved = torch.einsum("nkt,nt->nk", self.direct[rows], delta)
         return moved + torch.einsum("nks,ns->nk", self.push[rows], shortage)
 
 
-def tip_loss(tensions: np.ndarray, pose_by_tension: np.ndarray, length_by_tension: np.ndarray) -> TipLoss:
+def tip_loss(tensions: np.ndarray, pose_by_tension: np.ndarray, command_by_tension: np.ndarray) -> TipLoss:
     """Set up the loss.
 
     Args:
         tensions: N. Shape (N, K).
         pose_by_tension: m/N. Shape (N, D, K).
-        length_by_tension: m/N. Shape (N, K, K).
+        command_by_tension: m/N. Shape (N, K, K).
     """
     (count, tendons), size = tensions.shape, pose_by_tension.shape[1]
     direct, push = np.zeros((count, size, tendons)), np.zeros((count, size, tendons))
@@ -52,7 +54,7 @@ def tip_loss(tensions: np.ndarray, pose_by_tension: np.ndarray, length_by_tensio
     for index, taut in enumerate(patterns):
         rows = np.flatnonzero(pattern_of.reshape(-1) == index)
         a, s = np.flatnonzero(taut), np.flatnonzero(~taut)
-        p, c = pose_by_tension[rows], length_by_tension[rows]
+        p, c = pose_by_tension[rows], command_by_tension[rows]
         inverse = np.linalg.inv(c[:, a[:, None], a])
         follow = c[:, s[:, None], a] @ inverse  # (n, S, A)
         direct[rows[:, None], :, a] = (p[:, :, a] @ inverse).transpose(0, 2, 1)

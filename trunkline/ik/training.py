@@ -14,7 +14,9 @@ from trunkline.ik.tip_loss import TipLoss
 from trunkline.threads import thread_count
 
 ROUNDING = 0.5e-3  # m, tip errors well under this count by their square, larger ones by their size
-TIE = 0.02  # weight of plain length errors, which alone tie down how long a slack tendon is
+TIE = 0.02  # weight of plain command errors, which alone tie down how long a slack tendon is
+STRETCH = 1.0  # weight of errors of the lengths over the commands
+SLACK = 1e-3  # m, most by which slack tendons are paid out where the tip is foreseen: that moves it nowhere
 WARM_UP = 0.1  # share of the steps in which the learning rate rises from zero, while Adam learns each weight's scale
 PARTS = 2  # of a batch, whose gradients are summed in this order whatever thread found them: more cores, same network
 
@@ -33,6 +35,7 @@ class Training:
 
 def train(
     inputs: np.ndarray,
+    commands: np.ndarray,
     lengths: np.ndarray,
     loss: TipLoss,
     is_train: np.ndarray,
@@ -45,7 +48,7 @@ def train(
 
     Args:
         inputs: Shape (N, 8).
-        lengths: m. Shape (N, K).
+        commands, lengths: m, equal where a tendon is slack. Shape (N, K).
         report: called with epoch, mean tip error in m of the training and of the other samples.
 
     Raises:
@@ -53,10 +56,14 @@ def train(
     """
     torch.set_num_threads(1)
     torch.manual_seed(training.seed)
-    network = InverseKinematics(training.width, inputs[is_train], lengths[is_train])
+    network = InverseKinematics(training.width, inputs[is_train], commands[is_train], lengths[is_train])
     parameters = list(network.parameters())
-    x = network.normalise(torch.tensor(inputs, dtype=torch.float32))
-    y = torch.tensor(lengths, dtype=torch.float32)
+    pose = torch.tensor(inputs, dtype=torch.float32)
+    x, angle, tip = network.normalise(pose), pose[:, :1], pose[:, 1:4]
+    command = torch.tensor(commands, dtype=torch.float32)
+    stretch = torch.tensor(lengths - commands, dtype=torch.float32)
+    pulls = (command - network.middle) / network.half_range
+    most_spare = torch.tensor(SLACK * (lengths <= commands), dtype=torch.float32) / network.half_range
     rows = torch.tensor(np.flatnonzero(is_train))
     others = torch.tensor(np.flatnonzero(~is_train))
     shuffle = torch.Generator().manual_seed(training.seed)
@@ -65,24 +72,29 @@ def train(
     steps = training.epochs * batches
     schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, lambda step: rate(step / max(1, steps)))
 
-    def slopes(part: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
+    def slopes(part: torch.Tensor, spare: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
         """Gradient of the objective on these rows, summed over them, and their tip errors, m."""
-        delta = network.unclipped(x[part]) - y[part]
+        commands, stretches = network.unclipped(x[part])
+        delta = commands - command[part]
         moved = loss(part, delta)
         size = (moved.square().sum(dim=1) + ROUNDING**2).sqrt()
-        objective = size.sum() + TIE * delta.abs().mean(dim=1).sum()
+        missed = network.foresee(angle[part], pulls[part] + spare * most_spare[part]) - tip[part]
+        foreseen = (missed.square().sum(dim=1) + ROUNDING**2).sqrt()
+        stretched = (stretches - stretch[part]).abs().mean(dim=1)
+        objective = (size + foreseen + TIE * delta.abs().mean(dim=1) + STRETCH * stretched).sum()
         return torch.autograd.grad(objective, parameters), moved.detach()[:, :3].norm(dim=1)
 
     @torch.no_grad()
     def tip_error(part: torch.Tensor) -> torch.Tensor:
-        return loss(part, network.unclipped(x[part]) - y[part])[:, :3].norm(dim=1)
+        return loss(part, network.unclipped(x[part])[0] - command[part])[:, :3].norm(dim=1)
 
     with ThreadPoolExecutor(min(PARTS, thread_count()), initializer=torch.set_num_threads, initargs=(1,)) as pool:
         for epoch in range(1, training.epochs + 1):
             total = 0.0
             order = rows[torch.randperm(len(rows), generator=shuffle)]
             for batch in order[: batches * training.batch].split(training.batch):
-                gradients, errors = zip(*pool.map(slopes, batch.chunk(PARTS)), strict=True)
+                spare = torch.rand(len(batch), most_spare.shape[1], generator=shuffle)
+                gradients, errors = zip(*pool.map(slopes, batch.chunk(PARTS), spare.chunk(PARTS)), strict=True)
                 for parameter, *parts in zip(parameters, *gradients, strict=True):
                     parameter.grad = sum(parts) / len(batch)
                 optimizer.step()

@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
+from scipy.spatial.transform import Rotation
 
+from trunkline.frames import wxyz_from_rotation
 from trunkline.simulation.motion import batch_of
 
 LONGEST_STEP = 0.005  # s
@@ -22,17 +24,23 @@ RAMP, RAMP_STEPS = 1.0, 50  # s in which tendons are drawn in, and in how many s
 
 @dataclass
 class Settled:
-    """B simulations at rest: tip position in the base frame, m (B, 3), joint angles, rad (B, nq), tension, N (B, K),
-    and whether each had come to rest in the time given (B,)."""
+    """B simulations at rest: position, m (B, 3), and quaternion, w first (B, 4), of the tip in the base frame, joint
+    angles, rad (B, nq), tension, N (B, K), and whether each had come to rest in the time given (B,)."""
 
     position: np.ndarray
+    quaternion: np.ndarray
     qpos: np.ndarray
     tensions: np.ndarray
     rested: np.ndarray
 
 
 def settle(
-    model: mujoco.MjModel, commands: np.ndarray, gravity: np.ndarray, seconds: float = 40.0, tip_site: str = "tip"
+    model: mujoco.MjModel,
+    commands: np.ndarray,
+    gravity: np.ndarray,
+    seconds: float = 40.0,
+    rest_speed: float = FINE_SPEED,
+    tip_site: str = "tip",
 ) -> Settled:
     """Let the model hang, draw its tendons in, and step until it rests: the reference for the statics.
 
@@ -40,14 +48,12 @@ def settle(
         commands: target path lengths of the position actuators, m. Shape (B, K), K in the order of the actuators.
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate once the tendons are drawn in.
+        rest_speed: rad/s of the fastest joint, at rest.
     """
     model = copy.copy(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     batch = batch_of(model, len(commands))
-    base = model.body_parentid[np.flatnonzero(model.body_jntnum)[0]]
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    to_world = data.xmat[base].reshape(3, 3)  # an identified mount may be turned
+    origin, to_world = base_frame(model)
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
     straight = model.tendon_length0[model.actuator_trnid[:, 0]]
     if model.na:
@@ -57,14 +63,23 @@ def settle(
     for share in np.arange(1, RAMP_STEPS + 1) / RAMP_STEPS:
         control[:] = straight + share * (commands - straight)
         batch.step(nstep=int(np.ceil(RAMP / RAMP_STEPS / timestep)))
-    moving, _ = come_to_rest(batch, timestep, seconds, FINE_SPEED)
-    site, force = batch.bind("site_xpos"), batch.bind("actuator_force")
-    position = batch.bind("xpos")
+    moving, _ = come_to_rest(batch, timestep, seconds, rest_speed)
+    site, turn, force = batch.bind("site_xpos"), batch.bind("site_xmat"), batch.bind("actuator_force")
     batch.forward()
-    tips = (site[:, model.site(tip_site).id] - position[:, base]) @ to_world
+    tip = model.site(tip_site).id
+    rotation = Rotation.from_matrix(to_world.T @ turn[:, tip].reshape(-1, 3, 3))
     rested = np.ones(len(commands), dtype=bool)
     rested[moving] = False
-    return Settled(tips, batch.bind("qpos").copy(), -force.copy(), rested)
+    position = (site[:, tip] - origin) @ to_world
+    return Settled(position, wxyz_from_rotation(rotation), batch.bind("qpos").copy(), -force.copy(), rested)
+
+
+def base_frame(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+    """Position in the world, m, and rotation matrix to it of the body that carries the arm: a mount may be turned."""
+    base = model.body_parentid[np.flatnonzero(model.body_jntnum)[0]]
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return data.xpos[base].copy(), data.xmat[base].reshape(3, 3).copy()
 
 
 def relax(batch: Batch, model: mujoco.MjModel, step_factor: float = 1.0) -> float:

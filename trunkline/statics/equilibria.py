@@ -28,6 +28,8 @@ class Equilibrium:
         quaternion: orientation of the tip in the base frame, w first and not negative. Shape (B, 4).
         lengths: path length of each tendon, slack ones included, m. Shape (B, K).
         tensions: N, not negative. Shape (B, K).
+        commands: what position actuators are sent so that they hold this, l - T / kp: a slack tendon's path length,
+            less than it where a motor pulls, m. Shape (B, K).
         residual: largest joint torque out of balance, N m. Shape (B,).
         iterations: of Newton's method, all steps of the continuation together. Shape (B,).
         converged: whether this is a stable equilibrium to tolerance. Shape (B,).
@@ -39,6 +41,7 @@ class Equilibrium:
     quaternion: np.ndarray
     lengths: np.ndarray
     tensions: np.ndarray
+    commands: np.ndarray
     residual: np.ndarray
     iterations: np.ndarray
     converged: np.ndarray
@@ -155,6 +158,9 @@ def room(chain: Chain, count: int) -> Found:
 def equilibria(chain: Chain, found: Found) -> Equilibrium:
     """What the kernels found, with the pose of the tip in place of the last unit's."""
     rotation = Rotation.from_matrix(found.rotation, assume_valid=True)
-    values = found._asdict() | {"position": found.position + found.rotation @ chain.tip}
+    values = found._asdict() | {
+        "position": found.position + found.rotation @ chain.tip,
+        "commands": found.lengths - found.tensions / chain.gain,
+    }
     del values["rotation"]
     return Equilibrium(quaternion=wxyz_from_rotation(rotation * rotation_from_wxyz(chain.tip_quaternion)), **values)

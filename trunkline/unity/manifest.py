@@ -57,7 +57,10 @@ class Model(_Block):
     integrator: str
     names: Names
     rest_lengths: dict[str, float] = Field(description="path length of each tendon, arm straight, m")
-    control: str = "each actuator's control is the path length of its tendon in m; it pulls and never pushes"
+    control: str = (
+        "each actuator's control is a command in m: it pulls with kp (path length - command) N and never pushes, so "
+        "under tension the path stays longer than the command by tension / kp"
+    )
     springs: list[JointLaw] = Field(
         description="of hinges, polynomials that the importer cannot read: CalibratedSprings.cs restores them"
     )
@@ -79,8 +82,9 @@ class Network(_Block):
     input_meaning: str = (
         "gravity angle, rad; tip position, m, and orientation in the base frame (not Unity's)"
     )
-    output: str
-    output_order: list[str] = Field(description="path length of each tendon, m: the actuators' controls")
+    outputs: dict[str, str] = Field(description="what each is; `commands` are the actuators' controls, m")
+    output_order: list[str] = Field(description="the tendons, in the order of the columns of commands and lengths")
+    doubt_beyond: float = Field(gt=0, description="m; the arm cannot take the pose if `tip` is further from it")
     operators: list[str]
 
 

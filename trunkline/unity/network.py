@@ -31,10 +31,10 @@ def describe_network(
     if outputs != tendons:
         raise InputError(f"{source}: found outputs {outputs}, expected those of the model's actuators, {tendons}")
     widths = [_widths(values) for values in (model.graph.input, model.graph.output)]
-    if widths != [[len(inputs)], [len(outputs)]]:
+    if widths != [[len(inputs)], [len(outputs), len(outputs), 3]]:
         raise InputError(
             f"{source}: found inputs of width {widths[0]} and outputs of width {widths[1]}, expected one"
-            f" input ({', '.join(inputs)}) and one output ({', '.join(outputs)})"
+            f" input ({', '.join(inputs)}) and commands and lengths of {', '.join(outputs)}, and a tip"
         )
     opset = max(entry.version for entry in model.opset_import)
     block = Network(
@@ -42,8 +42,9 @@ def describe_network(
         opset=opset,
         input_order=inputs,
         input=model.graph.input[0].name,
-        output=model.graph.output[0].name,
+        outputs={value.name: _text(model, value.name, source) for value in model.graph.output},
         output_order=outputs,
+        doubt_beyond=float(_text(model, "doubt_beyond_m", source)),
         operators=sorted({node.op_type for node in model.graph.node}),
     )
     external = any(uses_external_data(tensor) for tensor in model.graph.initializer)
@@ -52,10 +53,14 @@ def describe_network(
 
 def _names(model: onnx.ModelProto, key: str, source: str) -> list[str]:
     """What the network's training wrote on the columns of its inputs or outputs."""
+    return json.loads(_text(model, key, source))
+
+
+def _text(model: onnx.ModelProto, key: str, source: str) -> str:
     texts = [entry.value for entry in model.metadata_props if entry.key == key]
     if not texts:
         raise InputError(f"{source}: found no {key!r} in the file's metadata, expected a network of train_ik")
-    return json.loads(texts[0])
+    return texts[0]
 
 
 def _widths(values) -> list[int]:

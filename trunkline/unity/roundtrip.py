@@ -30,7 +30,7 @@ def curl(model: mujoco.MjModel, duration: float, pull: float) -> np.ndarray:
     """Controls that pull tendon 1 up to `pull` m and let go again while the others pay out as much.
 
     Returns:
-        Tendon lengths to command, m. Shape (steps, nu).
+        Commands, m. Shape (steps, nu).
     """
     if model.nu == 0 or np.any(model.actuator_trntype != mujoco.mjtTrn.mjTRN_TENDON):
         raise InputError(f"calibrated MJCF: found {model.nu} actuators, expected one on each tendon")

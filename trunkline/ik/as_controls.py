@@ -1,0 +1,167 @@
+"""What a user gets: the network's commands sent to MuJoCo, which is stepped until the arm rests.
+
+Targets are poses in which MuJoCo itself came to rest, at gravity angles that no sample has, one or two neighbouring
+motors pulling by random amounts. No statics of ours is part of the score.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Annotated
+
+import mujoco
+import numpy as np
+from pydantic import Field, PositiveFloat
+
+from trunkline.dataset.sampling import around_the_arm
+from trunkline.frames import gravity_in_base
+from trunkline.simulation.drive import drive
+from trunkline.simulation.rest import settle
+from trunkline.statics.chain import Chain
+
+REST_SPEED = 1e-6  # rad/s of the fastest joint of an arm that rests: tips are some 1e-6 m from it
+NEAR_LIMIT = 0.95  # share of its largest force at which a motor is near it: there other commands hold the same pose
+TAUT_SHARE = 0.2  # of the deepest pulls, where all motors pull: more bends hardly more and presses the units together
+SHARE = 0.01  # of the arm's length; a larger error is worth a warning
+
+Ask = Callable[[np.ndarray], dict[str, np.ndarray]]  # as `ask.ask`, of one network
+
+
+@dataclass
+class AsControls:
+    """See conf/train_ik/config.yaml.
+
+    targets: in all; some of them are left out where a motor is near its limit. timed: how many of them are also driven
+    without friction, to see how long that takes. seconds: longest time to rest.
+    """
+
+    targets: Annotated[int, Field(ge=8, le=100_000)]
+    timed: Annotated[int, Field(ge=1, le=100_000)]
+    seconds: Annotated[PositiveFloat, Field(le=120)]
+
+
+def draw_targets(
+    model: mujoco.MjModel,
+    chain: Chain,
+    angles: np.ndarray,
+    deepest: np.ndarray,
+    count: int,
+    rng: np.random.Generator,
+    others_pay_out: bool = True,
+) -> np.ndarray:
+    """Poses in which MuJoCo rests without friction under one or two neighbouring motors, none near its limit.
+
+    Args:
+        angles: rad; gravity angles are drawn between the least and the largest.
+        deepest: of each tendon, how far it is drawn in at most, m. Shape (K,).
+        others_pay_out: whether motors that do not pull give way; else they stay where the straight arm has them, and
+            pull against the others as the arm bends: shapes that the data set has none of.
+
+    Returns:
+        Inputs of the network, rad and m. Shape (N, 8), N at most `count`.
+    """
+    gravity = rng.uniform(angles.min(), angles.max(), count)
+    first = rng.integers(chain.tendons, size=count)
+    order = around_the_arm(chain)
+    place = np.argsort(order)
+    second = order[(place[first] + 1) % chain.tendons]
+    pulls = np.zeros((count, chain.tendons))
+    pulls[np.arange(count), first] = rng.uniform(0, 1, count)
+    pulls[np.arange(count), second] = np.where(rng.random(count) < 0.5, rng.uniform(0, 1, count), 0.0)
+    idle = pulls == 0
+    commands = chain.straight_lengths - pulls * deepest + idle * others_pay_out * chain.length
+    rest = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), rest_speed=REST_SPEED)
+    tensions = rest.tensions[:, np.argsort(model.actuator_trnid[:, 0])]
+    good = rest.rested & (tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
+    return np.column_stack([gravity, rest.position, rest.quaternion])[good]
+
+
+@dataclass
+class Reached:
+    """How N targets were met by the commands for them.
+
+    Attributes:
+        position: distance of the tip from its target at the end, m; NaN where MuJoCo found none. Shape (N,).
+        doubtful: where the answer said so. Shape (N,).
+        seconds: until the tip stayed near its end; NaN where it was not looked at or never did. Shape (N,).
+        rested: whether the arm was at rest at the end. Shape (N,).
+    """
+
+    position: np.ndarray
+    doubtful: np.ndarray
+    seconds: np.ndarray
+    rested: np.ndarray
+
+    def metrics(self, length: float) -> dict:
+        """Summary; a target without an end counts as missed by the arm's `length`, m."""
+        position = np.where(np.isfinite(self.position), self.position, length)
+        far = position > SHARE * length
+        return {
+            "position_error_mm": {
+                "median": np.median(position) * 1e3,
+                "p95": np.quantile(position, 0.95) * 1e3,
+                "max": position.max() * 1e3,
+            },
+            "beyond_1pct": int(far.sum()),
+            "beyond_1pct_unsaid": int((far & ~self.doubtful).sum()),
+            "doubted": float(self.doubtful.mean()),
+            "rested": float(self.rested.mean()),
+        } | ({"seconds_to_rest": self.time_to_rest()} if np.isfinite(self.seconds).any() else {})
+
+    def time_to_rest(self) -> dict:
+        """Median and 95th percentile, s; what never rested counts as longer than all others."""
+        seconds = np.where(np.isfinite(self.seconds), self.seconds, np.inf)
+        found = {"median": np.quantile(seconds, 0.5), "p95": np.quantile(seconds, 0.95)}
+        return {name: value if np.isfinite(value) else None for name, value in found.items()}
+
+
+def score(
+    model: mujoco.MjModel,
+    chain: Chain,
+    ask: Ask,
+    angles: np.ndarray,
+    deepest: np.ndarray,
+    settings: AsControls,
+    rng: np.random.Generator,
+) -> dict:
+    """The network's commands as sent, without and with friction, and for shapes that the data set has none of.
+
+    Args:
+        ask: the network, (N, 8) to its answer.
+        angles, deepest: as in `draw_targets`.
+    """
+    targets = draw_targets(model, chain, angles, deepest, settings.targets, rng)
+    taut = draw_targets(model, chain, angles, TAUT_SHARE * deepest, settings.timed, rng, others_pay_out=False)
+    few = targets[: settings.timed]
+    return {
+        "targets": len(targets),
+        "frictionless": settled(model, ask, targets).metrics(chain.length)
+        | {"seconds_to_rest": driven(model, ask, few, settings.seconds, friction=False).time_to_rest()},
+        "friction": driven(model, ask, targets, settings.seconds).metrics(chain.length),
+        "all_taut": {"targets": len(taut)} | settled(model, ask, taut).metrics(chain.length),
+    }
+
+
+def settled(model: mujoco.MjModel, ask: Ask, targets: np.ndarray) -> Reached:
+    """The commands of the network for `targets` (N, 8), each at rest without friction."""
+    answer = ask(targets)
+    rest = settle(
+        model, answer["commands"][:, model.actuator_trnid[:, 0]], gravity_in_base(targets[:, 0]), rest_speed=REST_SPEED
+    )
+    return _reached(targets, answer, np.where(rest.rested[:, None], rest.position, np.nan))
+
+
+def driven(
+    model: mujoco.MjModel, ask: Ask, targets: np.ndarray, seconds: float, friction: bool = True
+) -> Reached:
+    """The commands of the network for `targets` (N, 8), sent at once to the straight arm, which moves as it does."""
+    answer = ask(targets)
+    found = drive(
+        model, answer["commands"][:, model.actuator_trnid[:, 0]], gravity_in_base(targets[:, 0]), seconds, friction
+    )
+    return replace(_reached(targets, answer, found.end), seconds=found.seconds_to_rest, rested=found.rested)
+
+
+def _reached(targets: np.ndarray, answer: dict[str, np.ndarray], tips: np.ndarray) -> Reached:
+    position = np.linalg.norm(tips - targets[:, 1:4], axis=1)
+    nothing = np.full(len(targets), np.nan)
+    return Reached(position, answer["doubtful"], nothing, np.isfinite(position))

@@ -1,0 +1,91 @@
+"""Driving: from the straight arm, commands are sent at once and the model moves as it does until it rests."""
+
+import copy
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from trunkline.simulation.motion import batch_of, move
+from trunkline.simulation.rest import base_frame, longest_step
+
+LOOK = 0.25  # s between looks at the tips
+WINDOW = 4  # looks in which a tip has moved no more than STILL: a swing of up to 2 s shows in them
+STILL = 1e-4  # m
+NEAR = 1e-3  # m, from its end, within which a tip counts as there
+
+
+@dataclass
+class Driven:
+    """B drives.
+
+    Attributes:
+        tips: in the base frame at every LOOK s, held once at rest, m. Shape (B, F, 3). NaN once MuJoCo has warned.
+        rested: whether the tip came to rest in the time given. Shape (B,).
+    """
+
+    tips: np.ndarray
+    rested: np.ndarray
+
+    @property
+    def end(self) -> np.ndarray:
+        """Where the tips were at last, m. Shape (B, 3)."""
+        return self.tips[:, -1]
+
+    @property
+    def seconds_to_rest(self) -> np.ndarray:
+        """From when on each tip stayed within NEAR of its end, s; NaN where it never rested. Shape (B,)."""
+        away = np.linalg.norm(self.tips - self.tips[:, -1:], axis=2) > NEAR
+        last = away.shape[1] - np.argmax(away[:, ::-1], axis=1)
+        return np.where(self.rested, LOOK * np.where(away.any(axis=1), last, 0), np.nan)
+
+
+def drive(
+    model: mujoco.MjModel,
+    commands: np.ndarray,
+    gravity: np.ndarray,
+    seconds: float,
+    friction: bool = True,
+    tip_site: str = "tip",
+) -> Driven:
+    """Send commands to the straight arm and step it until its tip rests, with the model's own damping.
+
+    The time step is the longest that joint limits allow: where the arm comes to rest does not depend on it.
+
+    Args:
+        commands: of the position actuators, m. Shape (B, K), K in the order of the actuators.
+        gravity: in the base frame, m/s². Shape (3,) or (B, 3).
+        seconds: longest time to simulate.
+        friction: whether tendons and joints have the model's dry friction.
+    """
+    model = copy.copy(model)
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    model.opt.timestep = LOOK / np.ceil(LOOK / longest_step(model))
+    if not friction:
+        model.tendon_frictionloss[:], model.dof_frictionloss[:] = 0, 0
+    every, looks = round(LOOK / model.opt.timestep), round(seconds / LOOK)
+    origin, to_world = base_frame(model)
+    batch = batch_of(model, len(commands))
+    batch.expand("opt.gravity")[:] = gravity @ to_world.T
+    if model.na:
+        batch.bind("act")[:] = model.tendon_length0[model.actuator_trnid[:, 0]]
+    site = model.site(tip_site).id
+    tips = np.full((len(commands), looks, 3), np.nan)
+    moving = np.arange(len(commands), dtype=np.int32)
+    for look in range(looks):
+        controls = np.repeat(commands[moving, None], every, axis=1)
+        found = move(batch, controls, ("site_xpos",), every, every - 1, ids=moving)["site_xpos"][:, 0, site]
+        tips[moving, look] = (found - origin) @ to_world
+        moving = moving[~batch.warning[moving].any(axis=(1, 2))]
+        if look >= WINDOW:
+            spread = np.ptp(tips[moving, look - WINDOW : look + 1], axis=1)
+            still = np.linalg.norm(spread, axis=1) <= STILL
+            tips[moving[still], look + 1 :] = tips[moving[still], look, None]
+            moving = moving[~still]
+        if not len(moving):
+            break
+    warned = batch.warning.any(axis=(1, 2))
+    tips[warned, -1] = np.nan
+    rested = ~warned
+    rested[moving] = False
+    return Driven(tips, rested)
