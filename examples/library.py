@@ -10,6 +10,7 @@ import numpy as np
 import onnxruntime
 
 from trunkline.frames import gravity_in_base
+from trunkline.ik.ask import ask
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium, forward
 
@@ -21,7 +22,7 @@ tensions = np.zeros((1, chain.tendons))
 tensions[0, 0] = 5.0  # N, on the first tendon alone
 rest = equilibrium(chain, tensions, gravity)
 pose = np.concatenate([tilt[:, None], rest.position, rest.quaternion], axis=1)  # (1, 8), base frame, w first
-lengths = onnxruntime.InferenceSession(network).run(None, {"pose": pose.astype(np.float32)})[0]
+lengths = ask(onnxruntime.InferenceSession(network), pose)["lengths"]  # a pose that is none is an InputError
 reached = forward(chain, lengths.astype(float), gravity)
 print("tip (m):", rest.position[0].round(4))
 print("lengths (m):", lengths[0].round(4))

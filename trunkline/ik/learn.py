@@ -12,6 +12,7 @@ from pydantic import Field, NonNegativeFloat, PositiveInt
 
 from trunkline.dataset.columns import length_columns, tension_columns
 from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension, turn_by_tension
+from trunkline.ik.ask import ask
 from trunkline.ik.network import INPUTS, InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.polish import polish
@@ -129,7 +130,7 @@ def fit(table: pd.DataFrame, tendons: int, learning: Learning) -> tuple[InverseK
 
 def answers(runtime: onnxruntime.InferenceSession, inputs: np.ndarray) -> np.ndarray:
     """Lengths (N, K), m, that the exported network gives for `inputs` (N, 8)."""
-    return runtime.run(None, {"pose": inputs.astype(np.float32)})[0]
+    return ask(runtime, inputs)["lengths"]
 
 
 def polished_errors(chain: Chain, held_out: pd.DataFrame, runtime, polishing: Polish, seed: int) -> TipErrors:
