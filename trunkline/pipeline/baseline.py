@@ -119,8 +119,8 @@ def main(root: Path = Path("."), words: list[str] | None = None) -> int:
         raise InputError("found no commit, expected a clone with Git, to say of which commit the metrics are")
     changed = _output(root, "status", "--porcelain", "--untracked-files=no")
     if changed:
-        raise InputError(f"found changes that are not committed ({changed.splitlines()[0].split()[-1]}), expected none: "
-                         "a baseline is a commit of its own")  # fmt: skip
+        first = changed.splitlines()[0].split()[-1]
+        raise InputError(f"{first}: found changes that are not committed, expected none: a baseline has its own commit")
     for file in limit_files(root):
         path = baseline_file(file)
         before = read_baseline(path) if path.is_file() else None
