@@ -1,4 +1,4 @@
-"""`python -m trunkline.pipeline.readme`: write the graph, the tables of results and the pictures anew.
+"""`python -m trunkline.pipeline.readme`: write the graph, all tables of results and the pictures anew.
 
 Generated blocks stand between `<!-- name -->` and `<!-- /name -->`.
 """
@@ -17,6 +17,7 @@ from trunkline.pipeline.baseline import baseline_file, read_baseline
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.lab_table import lab_table
 from trunkline.pipeline.limits import Limit, lookup, metrics_folder, read_limits
+from trunkline.pipeline.results import block
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
 PICTURES = {
@@ -167,7 +168,7 @@ def with_blocks(text: str, blocks: dict[str, str]) -> str:
 
 
 def generate(root: Path) -> dict[Path, str]:
-    """README.md, the examples' own and the page on intervals, with their generated blocks as they should be."""
+    """README.md, the examples' own and the pages on results, with their generated blocks as they should be."""
     examples = {}
     for name in EXAMPLES:
         folder = root / "examples" / name
@@ -176,7 +177,11 @@ def generate(root: Path) -> dict[Path, str]:
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
     blocks = {root / "README.md": own | examples}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
-    blocks[root / "docs" / "results" / "intervals.md"] = {"lab": lab_table(root)}
+    for page in sorted((root / "docs").rglob("*.md")):
+        names = re.findall(r"^<!-- (results/\w+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        if names:
+            blocks[page] = {name: block(root / "docs" / f"{name}.json") for name in names}
+    blocks.setdefault(root / "docs" / "results" / "intervals.md", {})["lab"] = lab_table(root)
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}
 
 
