@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.identification.__main__ import PARTS
 from trunkline.errors import InputError
 from trunkline.pipeline.results import block, commit_of, recorded
 
@@ -53,10 +54,15 @@ def test_a_run_that_fails_or_is_not_to_be_kept_leaves_the_file_alone(project):
         print("whole")
     with recorded("study", keep=False, root=project):
         print("quick")
-    with pytest.raises(InputError), recorded("study", root=project):
+    with pytest.raises(InputError, match="no data"):
+        fail(project)
+    assert stored(project)["lines"] == ["whole"]
+
+
+def fail(project):
+    with recorded("study", root=project):
         print("half")
         raise InputError("no data")
-    assert stored(project)["lines"] == ["whole"]
 
 
 def test_results_of_code_that_is_not_committed_say_so(project):
@@ -71,13 +77,30 @@ def test_results_of_code_that_is_not_committed_say_so(project):
 @pytest.mark.parametrize("text", ["", "{}", "[]", '{"command": "", "lines": []}'])
 def test_a_file_that_is_none_is_one_line(tmp_path, text):
     (tmp_path / "study.json").write_text(text)
-    for name in ("study.json", "another.json"):
-        with pytest.raises(InputError, match=f"{name}: .*expected JSON with command, commit and lines"):
-            block(tmp_path / name)
+    with pytest.raises(InputError, match="study.json: .*expected JSON with command, commit and lines"):
+        block(tmp_path / "study.json")
+    assert block(tmp_path / "another.json") == "(no run is kept yet)"
+
+
+def test_every_study_and_benchmark_keeps_its_results_and_every_kept_one_is_shown():
+    code = "".join(file.read_text(encoding="utf-8") for name in ("studies", "benchmarks") for file in modules(name))
+    named = set(re.findall(r'recorded\("(\w+)"', code)) | {"choices_part"}
+    named |= {f"identification_{part}" for part in PARTS}
+    pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md"))
+    shown = re.findall(r"^<!-- results/(\w+) -->$", pages, re.MULTILINE)
+    assert sorted(shown) == sorted(named)
+    assert {file.stem for file in FILES} <= named
+    runs = [file for name in ("studies", "benchmarks") for file in modules(name) if "__main__" in file.read_text()]
+    assert len(runs) >= 15
+    assert [file for file in runs if "recorded(" not in file.read_text()] == []
+
+
+def modules(name):
+    return (ROOT / name).rglob("*.py")
 
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
-def test_a_result_is_of_a_command_and_a_commit_and_shown(file):
+def test_a_result_is_of_a_command_and_a_commit(file):
     found = json.loads(file.read_text(encoding="utf-8"))
     modules = re.findall(r"python -m ((?:studies|benchmarks)\.[\w.]+)", found["command"])
     assert modules or found["command"] == "dvc repro"
@@ -85,8 +108,6 @@ def test_a_result_is_of_a_command_and_a_commit_and_shown(file):
         place = ROOT / module.replace(".", "/")
         assert place.with_suffix(".py").is_file() or (place / "__main__.py").is_file()
     assert re.fullmatch(r"[0-9a-f]{7}(, [0-9a-f]{7})*", found["commit"]), "made with changes that are not committed"
-    marker = f"<!-- results/{file.stem} -->"
-    assert sum(marker in page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md")) == 1
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)

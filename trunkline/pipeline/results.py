@@ -77,12 +77,14 @@ def block(path: Path) -> str:
     """The Markdown of a file of docs/results/: tables as they are, other lines as they were printed, and of what.
 
     Raises:
-        InputError: there is no such file, or it lacks a key.
+        InputError: it is no such file. One that is not there is a study that has not been run since files are kept.
     """
+    if not path.is_file():
+        return "(no run is kept yet)"
     try:
         found = json.loads(path.read_text(encoding="utf-8"))
         command, commit, lines = found["command"], found["commit"], found["lines"]
-    except (FileNotFoundError, ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: {error!r}, expected JSON with command, commit and lines of a study") from None
     parts = []
     for is_table, group in groupby(lines, key=lambda line: line.startswith("|")):
