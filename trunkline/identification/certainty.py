@@ -38,8 +38,8 @@ def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves 
     Residuals of one trial hang together (the model is wrong in the same way from frame to frame), so a formula for
     independent ones, as in `mujoco.sysid`, promises far too much: where a handful of trials tells a mean, its
     intervals seldom hold the truth, these as often as they should (`python -m studies.intervals`). The sandwich over
-    trials (Liang, Zeger 1986) answers a trial's weight as if the others' curvature were all of it; a trial that weighs much has
-    drawn the estimate to itself, and with a handful of trials that makes it too sure. Trials are taken as
+    trials (Liang, Zeger 1986) answers a trial's weight as if the others' curvature were all of it; a trial that weighs
+    much has drawn the estimate to itself, and with a handful of trials that makes it too sure. Trials are taken as
     independent, with T - 1 degrees of freedom. What one trial alone determines has no interval.
 
     Args:

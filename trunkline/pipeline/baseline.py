@@ -1,5 +1,4 @@
-"""`python -m trunkline.pipeline.baseline "why"` (`make baseline REASON="why"`): make the metrics of this commit the
-values near which the gate keeps them.
+"""`python -m trunkline.pipeline.baseline "why"`: the metrics of this commit become those that the gate keeps near to.
 
 `baseline.json` lies beside each `limits.yaml`. Nothing else changes it, so that many commits, each a little worse, end
 at the gate as one that is as much worse. It keeps why it was ever changed, of which commit, and what got worse by it.
@@ -108,7 +107,7 @@ def _output(folder: Path, *arguments: str) -> str | None:
 
 @in_one_line
 def main(root: Path = Path("."), words: list[str] | None = None) -> int:
-    parser = ArgumentParser(prog="trunkline.pipeline.baseline", description=__doc__.splitlines()[0])
+    parser = ArgumentParser(prog="trunkline.pipeline.baseline", description="Make the committed metrics the baseline.")
     parser.add_argument("reason", help="why these values are to be the baseline")
     reason = " ".join(parser.parse_args(words).reason.split())
     require_checkout(root)

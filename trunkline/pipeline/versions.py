@@ -42,7 +42,7 @@ def locked_versions(root: Path) -> dict[str, str]:
 
 def locked_otherwise(root: Path) -> list[str]:
     """One line per library that the lock files pin to another version than `root / "versions.yaml"` names."""
-    named = OmegaConf.load(root / FILE)
+    named = dict(OmegaConf.load(root / FILE).items())
     return [
         f"{name}: {FILE} names {named.get(name)}, {', '.join(LOCKS)} pin {locked} (run `make requirements`)"
         for name, locked in locked_versions(root).items()
