@@ -8,7 +8,7 @@ REQUIREMENTS := requirements.lock requirements-torch.txt
 PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: demo test types gate lock readme setup stale requirements clean
+.PHONY: demo test types gate baseline lock readme setup stale requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
@@ -24,6 +24,9 @@ types: setup         ## check the types of the library and the stages
 
 gate: setup          ## compare the metrics with tests/limits.yaml
 	python -m trunkline.pipeline.gate
+
+baseline: setup      ## make the committed metrics the gate's baseline: make baseline REASON="..."
+	@python -m trunkline.pipeline.baseline "$$REASON"
 
 lock: setup          ## check that dvc.lock belongs to the code, params.yaml, the libraries and the metrics
 	python -m trunkline.pipeline.lock

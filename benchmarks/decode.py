@@ -24,12 +24,14 @@ from trunkline.errors import InputError
 from trunkline.logs.definitions import RIGID_BODIES
 from trunkline.logs.log import read_log
 from trunkline.logs.pose_stream import pose_stream
+from trunkline.pipeline.results import recorded
 
 SCHEMA, BODIES, RATE = "mocap4r2_msgs/msg/RigidBodies", 19, 120
 START = 1_760_000_000_000_000_000  # ns
 CHUNK_HEAD = 9 + 32 + 4 + 4 + 8  # bytes: opcode and length, times, size and checksum, compression, length of the data
 
 
+@recorded("decode")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--frames", type=int, default=6000)

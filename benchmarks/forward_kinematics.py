@@ -15,6 +15,7 @@ from trunkline.dataset.sampling import pull_directions, sample_angle
 from trunkline.frames import gravity_in_base
 from trunkline.ik.polish import polish
 from trunkline.pipeline.inputs import read_model
+from trunkline.pipeline.results import recorded
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium, forward
@@ -23,6 +24,7 @@ from trunkline.threads import thread_count
 SETTLED, SOLVED, DIRECTIONS, STEPS = 48, 1000, 72, 100
 
 
+@recorded("forward_kinematics")
 def main(path: Path) -> None:
     model = read_model(path)
     chain = read_chain(model)

@@ -22,6 +22,7 @@ from trunkline.frames import gravity_in_base
 from trunkline.ik.bounded_least_squares import bounded_least_squares
 from trunkline.ik.polish import polish
 from trunkline.pipeline.inputs import read_model
+from trunkline.pipeline.results import recorded
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium
 
@@ -29,6 +30,7 @@ MODEL = Path("artifacts/identify_control/arm.xml")
 TARGETS, SINGLE, PROBLEMS = 400, 5000, 4000
 
 
+@recorded("inverse_kinematics")
 def main(path: Path) -> None:
     compare_least_squares()
     chain = read_chain(read_model(MODEL))

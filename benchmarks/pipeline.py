@@ -18,6 +18,7 @@ from typing import NamedTuple
 import yaml
 
 from trunkline.errors import InputError, in_one_line
+from trunkline.pipeline.results import recorded
 
 ROOT = Path(__file__).parents[1]
 
@@ -79,6 +80,7 @@ def copies(other: str, session: str, folder: Path, results: bool) -> dict[str, P
 
 
 @in_one_line
+@recorded("pipeline")
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--against", default="HEAD~1", help="the other commit")

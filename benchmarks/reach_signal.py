@@ -8,12 +8,14 @@ import time
 import numpy as np
 
 from trunkline.fields.grid import Lattice, blend
+from trunkline.pipeline.results import recorded
 from trunkline.reachability.reach_signal import packed, reach_signal
 
 POINTS, ROUNDS = 64, 200
 ANGLES = np.radians([0.0, 5.0])
 
 
+@recorded("reach_signal")
 def main() -> None:
     rng = np.random.default_rng(0)
     fields = rng.normal(size=(2, POINTS, POINTS, POINTS)).astype(np.float32)

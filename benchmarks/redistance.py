@@ -9,10 +9,12 @@ from importlib import import_module
 import numpy as np
 
 from trunkline.fields.grid import Lattice, redistance
+from trunkline.pipeline.results import recorded
 
 SPACING, RADIUS = 0.012, 0.4  # m, of the lattice and of a ball, whose distances are known
 
 
+@recorded("redistance")
 def main() -> None:
     skfmm = import_module("skfmm")  # by name: the tests of pyproject.toml take every import for a dependency
     lattice = Lattice.around([-RADIUS] * 3, [RADIUS] * 3, SPACING, 0.15)

@@ -22,6 +22,7 @@ from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solv
 from trunkline.panda.kinematics import Q_MAX, Q_MIN, mount_pose
 from trunkline.panda.mjcf import panda_spec
 from trunkline.pipeline.config import load_config
+from trunkline.pipeline.results import recorded
 from trunkline.reachability.maps import build_rigid
 
 STARTS = 60
@@ -31,6 +32,7 @@ MINK_STEPS = 200
 MINK_RATE = 1.0  # s a step: the whole error is aimed at
 
 
+@recorded("rigid_map")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--targets", type=int, default=10_000, help="for the batched solver")

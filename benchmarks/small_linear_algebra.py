@@ -14,6 +14,7 @@ import numpy as np
 
 from trunkline.frames import gravity_in_base
 from trunkline.pipeline.inputs import read_model
+from trunkline.pipeline.results import recorded
 from trunkline.statics.cables import solve_small
 from trunkline.statics.chain import read_chain
 from trunkline.statics.energy import Pull, evaluate, find_hessian
@@ -94,6 +95,7 @@ def library_product(calls, matrices):
     return total
 
 
+@recorded("small_linear_algebra")
 def main(path: Path) -> None:
     chain = read_chain(read_model(path))
     rng = np.random.default_rng(0)

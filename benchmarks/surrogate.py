@@ -6,10 +6,12 @@ import numpy as np
 from scipy.optimize import minimize
 
 from trunkline.identification.surrogate import Surrogate, bends_of, features_at, slopes_at
+from trunkline.pipeline.results import recorded
 
 TRIALS, PARAMETERS, RESIDUALS, FITS, ONE_BY_ONE = 11, 4, 200, 20_000, 100
 
 
+@recorded("surrogate")
 def main() -> None:
     rng = np.random.default_rng(1)
     features = features_at(np.zeros((1, PARAMETERS))).shape[1]

@@ -1,6 +1,6 @@
 """What every choice of model and method is worth: a Markdown table of errors on trials that no fit saw.
 
-    python -m studies.choices [--quick] [--only NAME ...] > choices.md
+    python -m studies.choices [--quick] [--only NAME ...]
 
 Needs the trials and the CAD model of the demo session (`make demo`). Each row changes one thing in the settings of
 params.yaml and conf/, runs the three stages one after the other, each on what the one before it found, and scores the
@@ -34,6 +34,7 @@ from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported
 from trunkline.pipeline.inputs import read_spec
+from trunkline.pipeline.results import recorded
 from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial
 
@@ -214,10 +215,11 @@ def main() -> int:
     heads = [f"{error}, {kind}s (mm)" for error in ("E_internal", "position") for kind in KINDS]
     heads += [f"CPU {stage.removeprefix('identify_')} (s)" for stage in STAGES]
     require_demo(CAD_MODEL)
-    print("| choice | " + " | ".join(heads) + " |\n|---|" + "---:|" * len(heads), flush=True)
     known: dict[str, Chain] = {}
-    for name in arguments.only:
-        print(row(CHOICES[name], arguments.quick, known), flush=True)
+    with recorded("choices" if arguments.only == list(CHOICES) else "choices_part", keep=not arguments.quick):
+        print("| choice | " + " | ".join(heads) + " |\n|---|" + "---:|" * len(heads), flush=True)
+        for name in arguments.only:
+            print(row(CHOICES[name], arguments.quick, known), flush=True)
     return 0
 
 

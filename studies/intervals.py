@@ -10,6 +10,7 @@ from scipy.stats import bootstrap as scipy_bootstrap
 
 from trunkline.identification.certainty import bootstrap, certainty
 from trunkline.identification.linearisation import Linearisation
+from trunkline.pipeline.results import recorded
 
 TRIALS, FRAMES, REPETITIONS = 6, 50, 400
 SCATTER, NOISE = 1.0, 0.3  # of trials, and of frames within one
@@ -30,6 +31,7 @@ def intervals(values: np.ndarray) -> dict[str, np.ndarray]:
     }
 
 
+@recorded("intervals")
 def main() -> None:
     rng = np.random.default_rng(1)
     held: dict[str, list] = {}
@@ -37,10 +39,11 @@ def main() -> None:
         values = rng.normal(0, SCATTER, (TRIALS, 1)) + rng.normal(0, NOISE, (TRIALS, FRAMES))
         for name, (low, high) in intervals(values).items():
             held.setdefault(name, []).append((low <= 0 <= high, high - low))
-    print(f"{TRIALS} trials, {REPETITIONS} repetitions; asked for: 95 %")
+    print(f"| {TRIALS} trials, {REPETITIONS} repetitions; asked for: 95 % | hold the truth | mean width |")
+    print("|---|---:|---:|")
     for name, rows in held.items():
         inside, width = np.mean(rows, axis=0)
-        print(f"{name:26s} hold the truth {100 * inside:3.0f} % of the time, mean width {width:.2f}")
+        print(f"| {name} | {100 * inside:.0f} % of the time | {width:.2f} |")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """How well each loss brings known parameters back from noisy releases: a Markdown table.
 
-    python -m studies.losses [--repetitions N] [--trials N] [--frames N] [--weight-velocity W] > losses.md
+    python -m studies.losses [--repetitions N] [--trials N] [--frames N] [--weight-velocity W]
 
 Needs the demo session up to `identify_damping` (`make demo`). The plant is the arm that this stage identified, let go
 from where the session's own releases start; the laboratory's noise comes on top, low-passed as `filter` does, over the
@@ -33,6 +33,7 @@ from trunkline.identification.search import descend
 from trunkline.identification.surrogate import surrogate
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.inputs import read_spec
+from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
 from trunkline.signals.smoothing import low_pass
 
@@ -171,9 +172,10 @@ def main() -> int:
     if arguments.weight_velocity is not None:
         weights = replace(case.fit.weights, weight_velocity=arguments.weight_velocity)
         case = replace(case, fit=replace(case.fit, weights=weights))
-    with contextlib.redirect_stdout(sys.stderr):
-        results = recover(case, read_spec(PLANT).compile(), read_noise(), arguments.repetitions)
-    print(table(list(case.fit.parameters), results))
+    with recorded("losses"):
+        with contextlib.redirect_stdout(sys.stderr):
+            results = recover(case, read_spec(PLANT).compile(), read_noise(), arguments.repetitions)
+        print(table(list(case.fit.parameters), results))
     for loss, found in results.items():
         print(f"{loss}: {found.converged} of {arguments.repetitions} searches converged", file=sys.stderr)
     return 0

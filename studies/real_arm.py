@@ -22,6 +22,7 @@ from trunkline.identification.identify import identify
 from trunkline.identification.problem import Bounds
 from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
+from trunkline.pipeline.results import recorded
 from trunkline.trials.take import Take, read_takes
 
 EXAMPLE = Path("examples/asl_trunk")
@@ -90,6 +91,7 @@ def as_stamped(take: Take) -> Take:
 
 
 @in_one_line
+@recorded("real_arm")
 def main() -> int:
     takes = read_takes(EXAMPLE / "data/processed/ingest")
     print(f"{'':45}  identify  validate: mean position error, and of the length")

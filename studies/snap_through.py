@@ -18,6 +18,7 @@ from trunkline.dataset.sampling import pull_directions
 from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt, save_figure
 from trunkline.frames import gravity_in_base
 from trunkline.pipeline.inputs import read_model
+from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
 from trunkline.statics.chain import Chain, read_chain
 from trunkline.statics.equilibria import equilibrium, equilibrium_paths
@@ -39,6 +40,7 @@ class Branches(NamedTuple):
     apart: np.ndarray
 
 
+@recorded("snap_through")
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("model", type=Path, nargs="?", default=Path("artifacts/identify_control/arm.xml"))

@@ -1,6 +1,6 @@
 """What width, epochs, batch and learning rate of the network's training are worth: a Markdown table.
 
-    python -m studies.training [--targets N] WIDTH,EPOCHS,BATCH,LEARNING_RATE ... > training.md
+    python -m studies.training [--targets N] WIDTH,EPOCHS,BATCH,LEARNING_RATE ...
 
 for instance `256,100,512,2e-3 256,45,512,5e-3`. Needs the samples and the calibrated arm (`make demo`). Tip errors are
 those after forward kinematics, of held-out samples and of targets between the gravity angles of the data set. Times
@@ -25,6 +25,7 @@ from trunkline.ik.score import tip_errors
 from trunkline.ik.tip_loss import tip_loss
 from trunkline.ik.training import Training, train
 from trunkline.pipeline.inputs import existing, read_model
+from trunkline.pipeline.results import recorded
 from trunkline.statics.chain import read_chain
 
 MODEL = Path("artifacts/identify_control/arm.xml")
@@ -43,6 +44,7 @@ def setting(text: str) -> Training:
 
 
 @in_one_line
+@recorded("training")
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("settings", type=setting, nargs="+")

@@ -13,6 +13,7 @@ import sys
 from benchmarks.identification import growth, rate, recipe, sysid
 from benchmarks.identification.case import QUICK, Size, read_case
 from trunkline.errors import in_one_line
+from trunkline.pipeline.results import recorded
 from trunkline.threads import thread_count
 
 PARTS = {"rate": rate.report, "recipe": recipe.report, "sysid": sysid.report, "growth": growth.report}
@@ -25,10 +26,10 @@ def main() -> int:
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="some of the parts")
     arguments = parser.parse_args()
     size = QUICK if arguments.quick else Size()
-    print(f"{thread_count()} threads; load average before: {os.getloadavg()[0]:.1f}", flush=True)
     for name in arguments.only:
-        PARTS[name](read_case, size)
-        sys.stdout.flush()
+        with recorded(f"identification_{name}", keep=not arguments.quick):
+            print(f"{thread_count()} threads; load average before: {os.getloadavg()[0]:.1f}", flush=True)
+            PARTS[name](read_case, size)
     return 0
 
 

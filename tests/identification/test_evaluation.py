@@ -1,5 +1,7 @@
 """Errors of a session whose trials are at rest and in motion."""
 
+import numpy as np
+
 from tests.support.matched_plant import release, segments_of, small_model, tilt
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import prepare
@@ -16,3 +18,13 @@ def test_only_trials_in_motion_have_a_velocity():
         kinds = found["by_experiment"]
         assert "e_velocity_mm_s" not in kinds["static_tilt"]
         assert found["e_velocity_mm_s"] == kinds["release"]["e_velocity_mm_s"]
+
+
+def test_trials_that_a_model_does_not_survive_are_counted():
+    model = small_model(4)
+    experiments = [prepare(release(model, angle, frames=20), model, 20) for angle in (0.2, 0.3)]
+    found = replay(model, experiments, segments_of(model))
+    assert found.diverged == 0
+    found.positions[1][-1, 0] = np.nan
+    assert found.diverged == 1
+    assert scores(found, experiments, "positions", WEIGHTS)["identify"]["e_position_mm"] > 1

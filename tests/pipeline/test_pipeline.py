@@ -5,6 +5,7 @@ import json
 import os
 import re
 import subprocess
+import sys
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from dvc.repo import Repo
 from omegaconf import OmegaConf
 
 from tests.support.stub_pipeline import StubPipeline
-from trunkline.pipeline import lock
+from trunkline.pipeline import lock, versions
 from trunkline.pipeline.config import SHARED, check_settings, group_options
 from trunkline.pipeline.versions import LIBRARIES
 
@@ -285,6 +286,42 @@ def test_lock_whose_stages_disagree_is_refused(clone):
     (clone / "dvc.lock").write_text(yaml.safe_dump(locked))
     expected = "identify_stiffness: read another artifacts/build_mjcf/arm.xml than build_mjcf wrote"
     assert expected in lock.mismatches(clone)
+
+
+@pytest.mark.parametrize(("name", "users"), [("torch", ["train_ik"]), ("scikit-image", ["reachability"])])
+def test_another_version_in_the_requirements_is_refused_until_its_stages_ran(pipeline, clone, name, users):
+    """By `make lock`, so by .ci/run: with versions.yaml left behind, and with it renewed and no new results."""
+    file = "requirements-torch.txt" if name == "torch" else "requirements.lock"
+    pinned = versions.locked_versions(clone)[name]
+    _set(file, f"\n{name}=={pinned}", f"\n{name}==99.0")(clone)
+    (problem,) = lock.mismatches(clone)
+    assert problem.startswith(f"{name}: versions.yaml names {pinned}, ")
+    assert "requirements.lock, requirements-torch.txt pin 99.0" in problem
+    assert versions.main(clone) == 0
+    problems = lock.mismatches(clone)
+    for stage in users:
+        assert f"{stage}: changed deps: versions.yaml: {{'{name}': 'modified'}}" in problems, problems
+    assert f"{name}: installed {pinned}, versions.yaml names 99.0" in problems
+    assert not any(line.startswith("filter: ") for line in problems)
+
+
+def test_continuous_integration_fails_where_one_of_its_commands_does(clone):
+    """.ci/run over the clone's own `make lock`; the other commands pass."""
+    targets = {name: "true" for name in ("types", "test", "gate")}
+    targets["lock"] = f"{sys.executable} -m trunkline.pipeline.lock"
+    (clone / "Makefile").write_text("".join(f"{name}:\n\t@{command}\n" for name, command in targets.items()))
+
+    def ci():
+        return subprocess.run([clone / ".ci/run"], capture_output=True, text=True, check=False)
+
+    done = ci()
+    assert done.returncode == 0, done.stdout + done.stderr
+    pinned = versions.locked_versions(clone)["scipy"]
+    _set("requirements.lock", f"\nscipy=={pinned}", "\nscipy==99.0")(clone)
+    done = ci()
+    assert done.returncode == 1
+    assert "lock: FAIL scipy: versions.yaml names" in done.stdout
+    assert "== make lock: failed" in done.stdout
 
 
 def _folder_and_name(address: str) -> tuple[str, str]:

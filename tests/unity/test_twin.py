@@ -269,6 +269,20 @@ def test_a_simulation_that_warns_breaks_a_rule(sources):
     assert [violation.element for violation in violations] == ["simulation"]
 
 
+def test_models_of_which_one_diverges_are_not_called_alike(sources, monkeypatch):
+    model = mujoco.MjModel.from_xml_string(sources.mjcf)
+    assert compare(model, model, TRAJECTORY)[0] == 0
+
+    def diverging(model, controls, tilt):
+        motion = simulate(model, controls, tilt)
+        motion.positions[-1] = np.nan
+        return motion
+
+    monkeypatch.setattr("trunkline.unity.twin.simulate", diverging)
+    with pytest.raises(InputError, match="found positions that are not finite"):
+        compare(model, model, TRAJECTORY)
+
+
 def test_a_network_of_another_shape_is_one_line(sources):
     sources.network.write_bytes(network(inputs=7))
     with pytest.raises(

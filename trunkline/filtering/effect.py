@@ -53,8 +53,8 @@ def summary(trials: list[Trial], effects: list[Effect]) -> dict:
         "filled_share": float(np.average([effect.filled_share for effect in effects], weights=weights)),
         "removed_position_mm": 1e3 * float(np.median([effect.position_noise for effect in effects])),
         "removed_orientation_deg": float(np.degrees(np.median(angles))) if angles else None,
-        "base_shift_mm": 1e3 * max(effect.base_shift for effect in effects),
-        "base_turn_deg": float(np.degrees(max(effect.base_turn for effect in effects))),
+        "base_shift_mm": 1e3 * np.max([effect.base_shift for effect in effects]),
+        "base_turn_deg": float(np.degrees(np.max([effect.base_turn for effect in effects]))),
         "static": static,
         "moving": moving,
     }

@@ -36,10 +36,10 @@ def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves 
     """Jackknife over trials: how far the estimate moves when one is left out (CV3; MacKinnon, Nielsen, Webb 2023).
 
     Residuals of one trial hang together (the model is wrong in the same way from frame to frame), so a formula for
-    independent ones, as in `mujoco.sysid`, promises far too much: where six trials tell a mean, its 95 % intervals
-    hold the truth 24 % of the time, these 97 % (`python -m studies.intervals`). The sandwich over trials (Liang,
-    Zeger 1986) answers a trial's weight as if the others' curvature were all of it; a trial that weighs much has
-    drawn the estimate to itself, and with a handful of trials that makes it too sure. Trials are taken as
+    independent ones, as in `mujoco.sysid`, promises far too much: where a handful of trials tells a mean, its
+    intervals seldom hold the truth, these as often as they should (`python -m studies.intervals`). The sandwich over
+    trials (Liang, Zeger 1986) answers a trial's weight as if the others' curvature were all of it; a trial that weighs
+    much has drawn the estimate to itself, and with a handful of trials that makes it too sure. Trials are taken as
     independent, with T - 1 degrees of freedom. What one trial alone determines has no interval.
 
     Args:
@@ -83,7 +83,7 @@ def bootstrap(linear: Linearisation, seed: int, moves: Moves | None = None) -> n
     """95 % intervals of the estimate by giving trials random weights, again and again (Rubin 1981).
 
     It cross-checks `certainty`: it takes no symmetry for granted, and no formula for what a trial's weight does.
-    scipy's `bootstrap` (BCa) draws whole trials; with six of them it holds the truth 88 % of the time, this 96 %
+    scipy's `bootstrap` (BCa) draws whole trials; with a handful of them it holds the truth too seldom
     (`python -m studies.intervals`).
     Draws scatter too little, by √((T - 1)/(T + 1)), and their percentiles know of no degrees of freedom. So these are
     taken further out, as Hesterberg (2015, expanded percentiles) does, where a mean of T numbers would get Student's

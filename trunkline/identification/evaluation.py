@@ -29,6 +29,11 @@ class Replay:
     positions: list[np.ndarray]
     length: float
 
+    @property
+    def diverged(self) -> int:
+        """How many of the trials it does not survive; in every error they count as the arm's length away."""
+        return sum(not np.isfinite(positions).all() for positions in self.positions)
+
 
 def replay(
     model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], step_factor: float = 1.0

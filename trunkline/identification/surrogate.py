@@ -42,7 +42,7 @@ class Surrogate:
     def _minimum(self, weights: np.ndarray) -> np.ndarray:
         """Damped Newton steps from d = 0, for all weights (B, T) at once. Shape (B, P).
 
-        A bootstrap asks for 20,000 of these small fits: scipy's trust-exact, one by one, takes 54 times as long to the
+        A bootstrap asks for thousands of these small fits: scipy's trust-exact, one by one, takes far longer to the
         same answers (`python -m benchmarks.surrogate`).
         """
         grams = np.einsum("bt,tfg->bfg", weights, self.grams)

@@ -59,6 +59,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     metrics |= {
         "evaluations": result.evaluations,
         "diverged": result.diverged,
+        "diverged_trials": {name: r.diverged for name, r in replays.items()},
         "at_bound": len(result.at_bound),
         "undetermined": len(undetermined(result, fit.parameters)),
         "converged": result.converged,
@@ -114,8 +115,8 @@ def _halved_step(model, experiments, segments, replayed: Replay, metrics: dict) 
         chosen = [(p, e) for p, e in zip(halved.positions, experiments, strict=True) if e.split == split]
         after = np.mean([internal_error(p, e.positions, e.measured) for p, e in chosen]) * 1e3
         change[split] = abs(float(after) - before) / before
-    furthest = max(
-        np.linalg.norm(a - b, axis=-1).max() for a, b in zip(halved.positions, replayed.positions, strict=True)
+    furthest = np.max(
+        [np.linalg.norm(a - b, axis=-1).max() for a, b in zip(halved.positions, replayed.positions, strict=True)]
     )
     return change | {"max_mm": float(furthest) * 1e3}
 

@@ -12,7 +12,7 @@ from dvc.repo import Repo
 
 from trunkline.errors import in_one_line
 from trunkline.pipeline.checkout import require_checkout
-from trunkline.pipeline.versions import installed_otherwise
+from trunkline.pipeline.versions import installed_otherwise, locked_otherwise
 
 ABSENT = ("deleted", "not in cache")  # DVC's words for a file that a clone without the cache lacks
 
@@ -20,7 +20,8 @@ ABSENT = ("deleted", "not in cache")  # DVC's words for a file that a clone with
 def mismatches(root: Path) -> list[str]:
     """One line per way in which the lock files disagree with the working tree or with themselves."""
     with Repo(str(root)) as repo:
-        return [*_unlocked(repo), *_changed(repo), *_inconsistent(repo), *installed_otherwise(root)]
+        found = [*_unlocked(repo), *_changed(repo), *_inconsistent(repo)]
+    return [*found, *locked_otherwise(root), *installed_otherwise(root)]
 
 
 def _unlocked(repo: Repo) -> list[str]:

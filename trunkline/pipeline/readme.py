@@ -1,4 +1,4 @@
-"""`python -m trunkline.pipeline.readme`: write the graph, the tables of results and the pictures anew.
+"""`python -m trunkline.pipeline.readme`: write the graph, all tables of results and the pictures anew.
 
 Generated blocks stand between `<!-- name -->` and `<!-- /name -->`.
 """
@@ -13,9 +13,11 @@ import networkx
 from dvc.repo import Repo
 
 from trunkline.errors import in_one_line
+from trunkline.pipeline.baseline import baseline_file, read_baseline
 from trunkline.pipeline.checkout import require_checkout
-from trunkline.pipeline.gate import Limit, Limits, lookup, read_limits
 from trunkline.pipeline.lab_table import lab_table
+from trunkline.pipeline.limits import Limit, lookup, metrics_folder, read_limits
+from trunkline.pipeline.results import block
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
 PICTURES = {
@@ -96,15 +98,17 @@ def pipeline_graph(root: Path) -> str:
     return "\n".join(lines)
 
 
-def results_table(root: Path, results: dict[str, list[tuple[str, str, str]]], limits: Limits) -> str:
-    """The metrics in the working tree as a Markdown table, beside the gate's bounds."""
-    lines = ["| measure | found | bound |", "|---|---:|---:|"]
+def results_table(file: Path, results: dict[str, list[tuple[str, str, str]]]) -> str:
+    """The metrics in the working tree that `file` limits as a Markdown table, beside goals and the gate's bounds."""
+    limits, baseline = read_limits(file), read_baseline(baseline_file(file))
+    lines = ["| measure | found | goal | `make gate` |", "|---|---:|---:|---:|"]
     for stage, rows in results.items():
-        path = root / "artifacts" / stage / "metrics.json"
+        path = metrics_folder(file) / "artifacts" / stage / "metrics.json"
         metrics = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
         for what, key, unit in rows:
             found = f"{_number(lookup(metrics, key))} {unit}".strip()
-            lines.append(f"| {what} | {found} | {_bound(limits.get(stage, {}).get(key))} |")
+            limit, before = limits.get(stage, {}).get(key), baseline.metrics.get(stage, {}).get(key)
+            lines.append(f"| {what} | {found} | {_goal(limit)} | {_bound(limit, before)} |")
     return "\n".join(lines)
 
 
@@ -127,15 +131,20 @@ def identification_table(root: Path) -> str:
     return "\n".join(lines)
 
 
-def _bound(limit: Limit | None) -> str:
+def _goal(limit: Limit | None) -> str:
     if limit is None:
         return ""
-    if limit.equals is not None:
-        return f"{limit.equals}"
-    words = [f"≤ {_number(limit.max)}" if limit.max is not None else f"≥ {_number(limit.min)}"]
-    if limit.below is not None:
-        words.append(f"{limit.below.factor:g}× below {limit.below.key.partition('.')[0].upper()}")
+    words = [f"{limit.equals}"] if limit.equals is not None else []
+    words += [f"≤ {_number(limit.max)}"] if limit.max is not None else []
+    words += [f"≥ {_number(limit.min)}"] if limit.min is not None else []
+    words += [f"{limit.below.factor:g}× below {limit.below.key.partition('.')[0].upper()}"] if limit.below else []
     return ", ".join(words)
+
+
+def _bound(limit: Limit | None, before: float | None) -> str:
+    if limit is None or before is None:
+        return f"{limit.equals}" if limit and limit.equals is not None else ""
+    return f"{'≤' if limit.rises else '≥'} {_number(limit.bound(before))}"
 
 
 def _number(value: float | None) -> str:
@@ -159,16 +168,20 @@ def with_blocks(text: str, blocks: dict[str, str]) -> str:
 
 
 def generate(root: Path) -> dict[Path, str]:
-    """README.md, the examples' own and the page on intervals, with their generated blocks as they should be."""
+    """README.md, the examples' own and the pages on results, with their generated blocks as they should be."""
     examples = {}
     for name in EXAMPLES:
         folder = root / "examples" / name
-        examples[name] = results_table(folder, EXAMPLE_RESULTS, read_limits(folder / "limits.yaml"))
-    results = results_table(root, RESULTS, read_limits(root / "tests" / "limits.yaml"))
+        examples[name] = results_table(folder / "limits.yaml", EXAMPLE_RESULTS)
+    results = results_table(root / "tests" / "limits.yaml", RESULTS)
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
     blocks = {root / "README.md": own | examples}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
-    blocks[root / "docs" / "results" / "intervals.md"] = {"lab": lab_table(root)}
+    for page in sorted((root / "docs").rglob("*.md")):
+        names = re.findall(r"^<!-- (results/\w+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        if names:
+            blocks[page] = {name: block(root / "docs" / f"{name}.json") for name in names}
+    blocks.setdefault(root / "docs" / "results" / "intervals.md", {})["lab"] = lab_table(root)
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}
 
 

@@ -40,6 +40,16 @@ def locked_versions(root: Path) -> dict[str, str]:
     return {name: pinned[name] for name in LIBRARIES}
 
 
+def locked_otherwise(root: Path) -> list[str]:
+    """One line per library that the lock files pin to another version than `root / "versions.yaml"` names."""
+    named = dict(OmegaConf.load(root / FILE).items())
+    return [
+        f"{name}: {FILE} names {named.get(name)}, {', '.join(LOCKS)} pin {locked} (run `make requirements`)"
+        for name, locked in locked_versions(root).items()
+        if named.get(name) != locked
+    ]
+
+
 def installed_otherwise(root: Path) -> list[str]:
     """One line per library that is installed in another version than `root / "versions.yaml"` names.
 

@@ -88,10 +88,10 @@ def check_maps(
     found = check_hybrid(maps, chain, tips_at, spot_check, seed)
     done("spot check")
     moved = {name: moved_voxels(one.mesh, one.field, one.lattice) for name, one in maps.in_space().items()}
-    moved["soft"] = max(
+    moved["soft"] = float(np.max([
         moved_voxels(mesh, maps.soft.at(angle), maps.soft.lattice)
         for mesh, angle in zip(maps.soft.meshes, maps.soft.mesh_angles, strict=True)
-    )
+    ]))
     done("meshes")
     return Check(agreement(claimed, reachable), points, claimed, reachable, heldout, found, moved)
 

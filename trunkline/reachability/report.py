@@ -16,7 +16,7 @@ def heldout_table(check: Check) -> pd.DataFrame:
 
 
 def summary(maps: Maps, check: Check) -> dict:
-    """The maps in a few numbers, for metrics.json."""
+    """The maps in a few numbers, for metrics.json; NaN, which Python's own `min` and `max` may pass over, stays."""
     soft = maps.soft.meshes
     space = {name: mesh_summary(one.mesh, check.moved[name]) for name, one in maps.in_space().items()}
     found = {
@@ -26,9 +26,9 @@ def summary(maps: Maps, check: Check) -> dict:
     return found | {
         "rigid": check.rigid._asdict() | space["rigid"],
         "soft": {
-            "heldout_iou_min": min(one.iou for one in check.heldout),
-            "heldout_reachable_min": min(one.reachable for one in check.heldout),
-            "heldout_beyond_max": max(one.beyond for one in check.heldout),
+            "heldout_iou_min": np.min([one.iou for one in check.heldout]),
+            "heldout_reachable_min": np.min([one.reachable for one in check.heldout]),
+            "heldout_beyond_max": np.max([one.beyond for one in check.heldout]),
             "watertight": all(mesh.is_closed() for mesh in soft),
             "triangles": max(len(mesh.faces) for mesh in soft),
             "moved_voxels": check.moved["soft"],

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat
 
+from trunkline.errors import InputError
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize_joints
 from trunkline.unity.manifest import Manifest, Versions, describe_model, hashes
@@ -136,10 +137,17 @@ def movement(model: mujoco.MjModel, trajectory: Trajectory) -> tuple[np.ndarray,
 
 def compare(first: mujoco.MjModel, second: mujoco.MjModel, trajectory: Trajectory) -> tuple[float, int]:
     """Largest distance of any body between two models on the trajectory, over all its gravity angles, in mm,
-    and how many warnings MuJoCo counted while it simulated the second."""
+    and how many warnings MuJoCo counted while it simulated the second.
+
+    Raises:
+        InputError: one of them diverges, so that no distance says anything.
+    """
     controls = curl(first, trajectory.duration, trajectory.pull)
     largest, warnings = 0.0, 0
     for tilt in trajectory.tilts:
         expected, found = (simulate(model, controls, tilt) for model in (first, second))
-        largest, warnings = max(largest, float(deviation(expected, found).max())), warnings + found.warnings
+        furthest = float(deviation(expected, found).max())
+        if not np.isfinite(furthest):
+            raise InputError(f"a curl at a gravity angle of {tilt:g} rad: found positions that are not finite")
+        largest, warnings = max(largest, furthest), warnings + found.warnings
     return round(1e3 * largest, 6), warnings
