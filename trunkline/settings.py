@@ -1,16 +1,18 @@
 """Settings are the library's own dataclasses: the types of their fields are the ranges that a value must keep.
 
-What a function is set by is a plain dataclass beside it, as `statics`' or `ik`'s are, with `PositiveFloat`,
-`Annotated[int, Field(ge=8)]`, `Literal` and, for rules between fields, a `__post_init__` that raises ValueError.
+What a function is set by is a plain dataclass beside it, as `statics`' or `ik`'s are, with `Literal`,
+`Annotated[int, Field(ge=8, le=100)]` and, for rules between fields, a `__post_init__` that raises ValueError.
+Every number has both ends: beyond them lies what nobody means, or what no computer finishes (a test asks for them).
 Code may build it freely. What comes from files is checked as a whole, from the class that `settings` decorates down.
 """
 
-from typing import TypeVar, dataclass_transform
+from typing import Annotated, TypeVar, dataclass_transform
 
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
 Schema = TypeVar("Schema")
+Seed = Annotated[int, Field(ge=0, le=2**32 - 1)]  # what every generator of random numbers takes
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(Field,))

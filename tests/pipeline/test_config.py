@@ -1,13 +1,15 @@
 """Settings: what people type is composed, checked, and refused in one line that names the key."""
 
 import runpy
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import pytest
 from omegaconf import OmegaConf
-from pydantic import Field
+from pydantic import Field, TypeAdapter, ValidationError
+from pydantic_core import CoreConfig, SchemaValidator
 
 from trunkline.errors import InputError
 from trunkline.identification.settings import IdentificationSettings
@@ -238,7 +240,7 @@ def test_unknown_keys_are_refused_at_every_level(stage, tmp_path):
 
 
 def test_the_stand_in_lab_refuses_unknown_keys_too(tmp_path):
-    schema = runpy.run_path(str(ROOT / "demo" / "record.py"), run_name="record")["Config"]
+    schema = LAB
     load_config(schema, "record", ROOT / "demo")
     (tmp_path / "conf").symlink_to(ROOT / "demo" / "conf")
     for path in [(), *_nested(schema)]:
@@ -247,6 +249,52 @@ def test_the_stand_in_lab_refuses_unknown_keys_too(tmp_path):
         OmegaConf.save(params, tmp_path / "params.yaml")
         with pytest.raises(InputError, match=".".join(["record", *path, "tpyo: unknown key"])):
             load_config(schema, "record", tmp_path)
+
+
+LAB = runpy.run_path(str(ROOT / "demo" / "record.py"), run_name="record")["Config"]
+
+
+@pytest.mark.parametrize("stage", [*STAGES, "record"])
+def test_every_number_has_two_ends_and_is_finite(stage):
+    """A setting without an upper bound is a stage that never ends, or that ends for want of memory."""
+    schema = TypeAdapter(LAB if stage == "record" else _schema(stage)).core_schema
+    for path, node, config in _numbers(schema, stage, {}):
+        low, high = node.get("ge", node.get("gt")), node.get("le", node.get("lt"))
+        assert low is not None and high is not None and low < high, f"{path}: {node}, expected both ends"
+        validator = SchemaValidator(node, CoreConfig(**config))
+        for text in ("NaN", "Infinity", "-Infinity", "1e300", "-1e300", str(10**30)):
+            with pytest.raises(ValidationError):
+                validator.validate_json(text)
+
+
+def test_a_number_without_an_end_is_found():
+    @dataclass
+    class Part:
+        fine: Annotated[float, Field(ge=0, le=1)]
+        open_list: list[Annotated[int, Field(ge=1)]]
+
+    @settings
+    class Open:
+        parts: dict[str, Part]
+        bare: float | None
+
+    found = [path for path, node, _ in _numbers(TypeAdapter(Open).core_schema, "x", {}) if "le" not in node]
+    assert len(found) == 2 and "open_list" in found[0] and "bare" in found[1]
+
+
+def _numbers(node: Any, path: str, config: dict) -> Iterator[tuple[str, dict, dict]]:
+    """Every number in a pydantic schema, with the configuration that it is checked under."""
+    if isinstance(node, list | tuple):
+        for part in node:
+            yield from _numbers(part, path, config)
+    if not isinstance(node, dict):
+        return
+    if node.get("type") in ("int", "float", "decimal", "complex"):
+        yield path, node, config
+    config = node.get("config", config)
+    for key, part in node.items():
+        if key not in ("metadata", "config", "cls", "fields") or (key == "fields" and isinstance(part[0], dict)):
+            yield from _numbers(part, f"{path}.{node.get('name', key)}", config)
 
 
 def _schema(stage: str) -> type:

@@ -8,7 +8,7 @@ import onnx
 import onnxruntime
 import pandas as pd
 import torch
-from pydantic import Field, NonNegativeFloat, PositiveInt
+from pydantic import Field
 
 from trunkline.dataset.columns import length_columns, tension_columns
 from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension, turn_by_tension
@@ -26,17 +26,17 @@ from trunkline.statics.chain import Chain
 class Unseen:
     """Targets between the gravity angles of the data set: pulls around the arm, tips along each, how many in all."""
 
-    directions: Annotated[int, Field(ge=8)]
-    steps: Annotated[int, Field(ge=8)]
-    samples: Annotated[int, Field(ge=100)]
+    directions: Annotated[int, Field(ge=8, le=10000)]
+    steps: Annotated[int, Field(ge=8, le=10_000)]
+    samples: Annotated[int, Field(ge=100, le=1_000_000)]
 
 
 @dataclass
 class Polish:
     """Gauss-Newton from the network's answers: for how many held-out targets, and of how many steps at most."""
 
-    targets: PositiveInt
-    steps: PositiveInt
+    targets: Annotated[int, Field(ge=1, le=1_000_000)]
+    steps: Annotated[int, Field(ge=1, le=100)]
 
 
 @dataclass(kw_only=True)
@@ -46,10 +46,10 @@ class Learning(Training):
     lever: m; the loss counts a turn of the tip by 1 rad as this much distance. outside: targets far off.
     """
 
-    lever: NonNegativeFloat
+    lever: Annotated[float, Field(ge=0, le=1)]
     unseen: Unseen
     polish: Polish
-    outside: PositiveInt
+    outside: Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 @dataclass

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.signals.clock import FrameFit, OffsetFit
@@ -18,10 +18,10 @@ class Limits:
     clock_offset: s, the largest looked for between motors and cameras.
     """
 
-    duration: PositiveFloat
+    duration: Annotated[float, Field(gt=0, le=3600)]
     coverage: Annotated[float, Field(gt=0, le=1)]
-    disorder: PositiveFloat
-    clock_offset: PositiveFloat
+    disorder: Annotated[float, Field(gt=0, le=60)]
+    clock_offset: Annotated[float, Field(gt=0, le=60)]
 
 
 @dataclass
