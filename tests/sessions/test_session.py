@@ -109,5 +109,5 @@ def test_missing_keys_and_files(tmp_path):
         read_session(session(tmp_path / "bare", {"base": "base"}))
     with pytest.raises(InputError, match="session.yaml: not readable as YAML"):
         read_session(session(tmp_path / "broken", "trials: [\n"))
-    with pytest.raises(InputError, match=r"session.yaml: the file: found \[1, 2\]"):
+    with pytest.raises(InputError, match="session.yaml: found a list, expected `key: value` lines"):
         read_session(session(tmp_path / "list", "[1, 2]"))

@@ -1,11 +1,12 @@
 """What pydantic found wrong, as one line that names the key."""
 
-import difflib
 import re
 from collections.abc import Iterator
 from typing import Any
 
 from pydantic import TypeAdapter
+
+from trunkline.errors import nearest
 
 UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
 # pydantic's names for a number out of its range, and JSON schema's for the end that it passed
@@ -88,8 +89,3 @@ def _ends(node: dict) -> str:
         return ""
     above, below = "more than " * ("minimum" not in node), "less than " * ("maximum" not in node)
     return f"{above}{low:.10g} to {below}{high:.10g}"
-
-
-def nearest(found: str, valid: list[str]) -> str:
-    matches = difflib.get_close_matches(found, valid, n=1)
-    return f", did you mean {matches[0]!r}?" if matches else ""
