@@ -1,6 +1,7 @@
 """Settings: what people type is composed, checked, and refused in one line that names the key."""
 
 import runpy
+import subprocess
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -9,12 +10,11 @@ from typing import Annotated, Any, Literal
 import pytest
 from omegaconf import OmegaConf
 from pydantic import Field, TypeAdapter, ValidationError
-from pydantic_core import CoreConfig, SchemaValidator
 
 from trunkline.errors import InputError
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.config import check_settings, compose_settings, group_options, load_config
-from trunkline.pipeline.settings import check_once
+from trunkline.pipeline.settings import check_once, require_session
 from trunkline.settings import settings
 
 ROOT = Path(__file__).parents[2]
@@ -36,7 +36,7 @@ class Arm:
 @dataclass
 class Rod:
     kind: Literal["rod"]
-    width: float
+    width: Annotated[float, Field(gt=0, le=9)]
 
 
 @dataclass
@@ -105,6 +105,9 @@ def test_groups_values_and_interpolations_compose(project):
         ("{arm: spirla, count: 3}", "fit.arm: found 'spirla', expected one of spiral, straight, did you mean"),
         ("{arm: {length: 1}, count: 3}", "fit.arm: found {'length': 1}, expected one of spiral, straight"),
         ("[1, 2]", "fit: found [1, 2], expected a section"),
+        ("{arm: spiral, count: 3, 4: 5}", "params.yaml: fit: found the key 4, expected a name"),
+        ("{arm: spiral, count: 3, spans: {1: {length: 1, tip: 0}}}", "fit.spans: found the key 1, expected a name"),
+        ("{arm: spiral, count: 3, part: {kind: rod, width: 2000}}", "width: found 2000, expected more than 0 to 9"),
         ("{arm: spiral, count: 3", "params.yaml: not readable as YAML"),
         ("{arm: spiral, count: 3, spans: {low: {length: 1, tip: 0, tpyo: 1}}}", "fit.spans.low.tpyo: unknown key"),
         ("{arm: spiral, count: 3, spans: {low: {length: '1', tip: 0}}}", "fit.spans.low.length: found '1', expected a"),
@@ -261,7 +264,7 @@ def test_every_number_has_two_ends_and_is_finite(stage):
     for path, node, config in _numbers(schema, stage, {}):
         low, high = node.get("ge", node.get("gt")), node.get("le", node.get("lt"))
         assert None not in (low, high), f"{path}: {node}, expected both ends"
-        validator = SchemaValidator(node, CoreConfig(**config))
+        validator = type(TypeAdapter(float).validator)(node, config)
         for text in ("NaN", "Infinity", "-Infinity", "1e300", "-1e300", str(10**30)):
             with pytest.raises(ValidationError):
                 validator.validate_json(text)
@@ -334,3 +337,55 @@ def test_a_rule_between_fields_names_the_key_and_the_file_that_set_it(tmp_path):
     expected = "params.yaml: identify_stiffness.parameters.stiffness.low: found -0.3, expected more than 0"
     with pytest.raises(InputError, match=expected):
         load_config(IdentificationSettings, "identify_stiffness", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("samples: 120000", "samples: 1000000000000", "samples: found 1000000000000, expected 1000 to 10000000"),
+        ("- 10\n", "- 190\n", "fk_dataset.angles_deg.1: found 190, expected 0 to 180"),
+        ("- 10\n", "- 90\n", "angles_deg: found [0.0, 90.0, 20.0"),
+        ("seed: 1\n\ntrain_ik", "seed: 9223372036854775808\n\ntrain_ik", "expected 0 to 4294967295"),
+    ],
+)
+def test_a_value_that_no_computer_finishes_is_refused_with_its_range(tmp_path, old, new, message):
+    text = (ROOT / "params.yaml").read_text()
+    assert old in text
+    (tmp_path / "params.yaml").write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        load_config(_schema("fk_dataset"), "fk_dataset", tmp_path)
+    assert message in str(caught.value)
+
+
+def test_aliases_that_multiply_are_refused_at_once(project, tmp_path):
+    lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 40)]
+    for text, message in (("\n".join(lines), "values by aliases"), ("a: &a [*a]", "an alias within itself")):
+        (tmp_path / "params.yaml").write_text(text)
+        with pytest.raises(InputError, match=message):
+            load_config(Config, "fit", tmp_path)
+    assert project("{arm: spiral, count: &n 3, level: *n}").level == 3  # ordinary ones may be
+
+
+def test_a_session_that_is_not_there_is_named_with_those_that_are(tmp_path):
+    (tmp_path / "data/raw/arm_7").mkdir(parents=True)
+    (tmp_path / "data/raw/arm_7/session.yaml").touch()
+    (tmp_path / "data/raw/arm_8.dvc").touch()
+    for name in ("demo", "arm_7", "arm_8"):
+        (tmp_path / "params.yaml").write_text(f"ingest: {{session: {name}}}\n")
+        require_session(tmp_path)
+    (tmp_path / "params.yaml").write_text("ingest: {session: arm_9}\n")
+    with pytest.raises(InputError, match="ingest.session: found 'arm_9', expected .*: arm_7, arm_8, demo"):
+        require_session(tmp_path)
+
+
+def test_what_is_pulled_is_this_pipeline_and_its_sessions(tmp_path):
+    """Never the examples, which a team may not have run."""
+    for data, wanted in ((None, "demo/dvc.yaml"), ("arm_7", "data/raw/arm_7.dvc")):
+        if data is not None:
+            (tmp_path / "data/raw").mkdir(parents=True)
+            (tmp_path / f"data/raw/{data}.dvc").touch()
+        for verb in ("pull", "push"):
+            command = ["make", "--dry-run", "-f", str(ROOT / "Makefile"), verb]
+            said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False).stdout
+            assert said.splitlines()[-1] == f"dvc {verb} dvc.yaml {wanted}"
