@@ -93,12 +93,10 @@ def rewritten(change, late=False, **options):
         path = session / "release_a.mcap"
         with open(path, "rb") as file:
             reader = make_reader(file, decoder_factories=[DecoderFactory()])
-            read = [m for _, _, m, _ in reader.iter_decoded_messages()]
-            file.seek(0)
-            contents = [content for *_, content in reader.iter_decoded_messages()]
+            read = [found[2:] for found in reader.iter_decoded_messages(topics=["/rigid_bodies"])]
         with open(path, "wb") as file, RosWriter(file, **options) as writer:
             schema = writer.register_msgdef("mocap4r2_msgs/msg/RigidBodies", RIGID_BODIES)
-            for number, (message, content) in enumerate(zip(read, contents, strict=True)):
+            for number, (message, content) in enumerate(read):
                 change(number, content)
                 time = message.log_time + (2**63 if late else 0)
                 writer.write_message("/rigid_bodies", schema, content, time, message.publish_time, number)

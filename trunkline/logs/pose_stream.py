@@ -92,7 +92,7 @@ def pose_stream(
             samples, parents = in_one_frame(samples, _samples(fixed), list(parents), frame)
         stream = _gather(samples)
     stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - kept
-    stream.unnamed, stream.parents = unnamed, tuple(parents)
+    stream.unnamed, stream.parents, stream.twice = unnamed, tuple(parents), twice
     return stream
 
 

@@ -64,7 +64,7 @@ def read_all(file: BinaryIO, contents: Contents, damage: list[str], path: Path) 
 
     No more than one record, or one chunk's records, is in memory besides what `contents` keeps.
     """
-    end, unchunked = len(MAGIC), 0
+    end, unchunked = len(MAGIC), False
     for position, opcode, body in _records(file, len(MAGIC)):
         end = position + RECORD_HEADER.size + len(body)
         try:
@@ -82,7 +82,7 @@ def read_all(file: BinaryIO, contents: Contents, damage: list[str], path: Path) 
             elif opcode == Opcode.DATA_END:
                 crc = DataEnd.read(_stream(body)).data_section_crc
                 if crc and crc == _checksum(file, position):
-                    contents.unchecked = unchunked = 0
+                    contents.unchecked = 0
                 elif crc:
                     if unchunked:
                         found = "wrong checksum over messages outside chunks"
@@ -92,7 +92,8 @@ def read_all(file: BinaryIO, contents: Contents, damage: list[str], path: Path) 
             elif opcode == Opcode.STATISTICS:
                 contents.expected = Statistics.read(_stream(body)).message_count
             else:
-                unchunked += opcode == Opcode.MESSAGE
+                unchunked |= opcode == Opcode.MESSAGE
+                contents.unchecked += opcode == Opcode.MESSAGE
                 _read_record(opcode, body, contents)
         except InputError:
             raise
@@ -100,7 +101,6 @@ def read_all(file: BinaryIO, contents: Contents, damage: list[str], path: Path) 
             name = f"{_record_name(opcode)} of {len(body)} bytes{_chunk_span(opcode, body)}"
             damage.append(f"{name} dropped: {_reason(error)}")
         file.seek(end)
-    contents.unchecked += unchunked
     return end
 
 

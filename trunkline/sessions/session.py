@@ -187,7 +187,7 @@ def _describe(error: ValidationError) -> str:
     problems = error.errors()
     # a union reports each of its branches; the deepest says what is wrong within the branch that was meant
     problem = max(problems, key=lambda p: (p["type"] in ("extra_forbidden", "value_error"), -problems.index(p)))
-    loc = [part for part in problem["loc"] if part not in ("str", "FixedBase")]  # without pydantic's choice of a branch
+    loc = [part for part in problem["loc"] if part != "str" and "FixedBase" not in str(part)]  # pydantic's branches
     key = ".".join(map(str, loc)) or "the file"
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     if problem["type"] == "missing":

@@ -74,7 +74,7 @@ def check_seen(positions: np.ndarray, names: list[str], least: float, where: str
     Or never in four frames in a row, which is what noise is measured by.
     """
     seen = np.isfinite(positions[..., 0]).mean(axis=0)
-    in_a_row = np.isfinite(np.diff(positions[..., 0], n=3, axis=0)).any(axis=0)
+    in_a_row = np.isfinite(np.diff(positions[..., 0], n=3, axis=0)).mean(axis=0) > 0
     for name, share, enough in zip(names, seen, in_a_row, strict=True):
         if share < least:
             dropped = [said for said in findings.repairs if " samples " in said and name in said]
