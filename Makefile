@@ -8,7 +8,7 @@ REQUIREMENTS := requirements.lock requirements-torch.txt
 PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: demo test types gate baseline lock readme setup stale requirements clean
+.PHONY: demo test types gate baseline lock readme pull push setup stale requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
@@ -33,6 +33,15 @@ lock: setup          ## check that dvc.lock belongs to the code, params.yaml, th
 
 readme: setup        ## regenerate the README's graph, table and picture
 	python -m trunkline.pipeline.readme
+
+# All but the examples: `dvc pull` alone fails where nobody ran and pushed those (docs/remotes.md).
+SHARED := dvc.yaml $(or $(wildcard data/raw/*.dvc),demo/dvc.yaml)
+
+pull: setup          ## bring the session and all results from the DVC remote
+	dvc pull $(SHARED)
+
+push: setup          ## send the session and all results to the DVC remote
+	dvc push $(SHARED)
 
 setup: $(STAMP)
 

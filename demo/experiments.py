@@ -4,13 +4,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import Field
 
 from trunkline.trials.recording import Planned
 
 Tilt = Annotated[float, Field(ge=0, le=180)]
 Azimuth = Annotated[float, Field(ge=0, lt=360)]
-Group = Annotated[list[PositiveInt], Field(min_length=1)]
+Group = Annotated[list[Annotated[int, Field(ge=1, le=12)]], Field(min_length=1)]
+Duration = Annotated[float, Field(gt=0, le=600)]
+Coordinate = Annotated[float, Field(ge=-100, le=100)]
 
 
 @dataclass
@@ -29,26 +31,26 @@ class Experiments:
     validate_every: about one in so many trials of each experiment is in the validate split.
     """
 
-    mount_position: tuple[float, float, float]
+    mount_position: tuple[Coordinate, Coordinate, Coordinate]
     tilts: Annotated[list[Tilt], Field(min_length=1)]
-    tilt_repeats: PositiveInt
-    tilt_scatter_deg: NonNegativeFloat
-    settle: PositiveFloat
-    steady_factor: Annotated[float, Field(ge=1)]
-    rest_duration: PositiveFloat
+    tilt_repeats: Annotated[int, Field(ge=1, le=100)]
+    tilt_scatter_deg: Annotated[float, Field(ge=0, le=90)]
+    settle: Duration
+    steady_factor: Annotated[float, Field(ge=1, le=1000)]
+    rest_duration: Duration
     release_directions: Annotated[list[Azimuth], Field(min_length=1)]
-    release_pull: PositiveFloat
-    release_factors: Annotated[list[PositiveFloat], Field(min_length=1)]
-    bend_duration: PositiveFloat
-    bend_settle: PositiveFloat
-    hold_duration: PositiveFloat
-    release_duration: PositiveFloat
-    curl_levels: Annotated[list[PositiveFloat], Field(min_length=1)]
+    release_pull: Annotated[float, Field(gt=0, le=1e5)]
+    release_factors: Annotated[list[Annotated[float, Field(gt=0, le=100)]], Field(min_length=1)]
+    bend_duration: Duration
+    bend_settle: Duration
+    hold_duration: Duration
+    release_duration: Duration
+    curl_levels: Annotated[list[Annotated[float, Field(gt=0, le=1000)]], Field(min_length=1)]
     curl_tendons: Annotated[list[Group], Field(min_length=1)]
-    curl_rest: PositiveFloat
-    curl_ramp: PositiveFloat
-    curl_hold: PositiveFloat
-    validate_every: Annotated[int, Field(ge=2)]
+    curl_rest: Duration
+    curl_ramp: Duration
+    curl_hold: Duration
+    validate_every: Annotated[int, Field(ge=2, le=1000)]
 
 
 def tilt_trials(experiments: Experiments) -> list[Planned]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from demo.truth import Truth
@@ -13,6 +13,8 @@ from trunkline.trials.recording import Planned
 
 BASE = "base"
 
+Milliseconds = Annotated[float, Field(gt=0, le=60_000)]
+Coordinate = Annotated[float, Field(ge=-100, le=100)]
 Share = Annotated[float, Field(ge=0, lt=1)]
 
 
@@ -30,25 +32,25 @@ class InstrumentSettings:
     epoch_s: the cameras' clock at the first trial's begin. pause_s: between trials.
     """
 
-    frame_rate: PositiveFloat
-    position_noise_mm: NonNegativeFloat
-    orientation_noise_deg: NonNegativeFloat
-    occlusions_per_s: NonNegativeFloat
-    occlusion_ms: tuple[PositiveFloat, PositiveFloat]
+    frame_rate: Annotated[float, Field(ge=1, le=2000)]
+    position_noise_mm: Annotated[float, Field(ge=0, le=1000)]
+    orientation_noise_deg: Annotated[float, Field(ge=0, le=180)]
+    occlusions_per_s: Annotated[float, Field(ge=0, le=1000)]
+    occlusion_ms: tuple[Milliseconds, Milliseconds]
     dropped_frames: Share
     outliers: Share
-    outlier_mm: NonNegativeFloat
-    outlier_deg: NonNegativeFloat
-    stamp_jitter_ms: NonNegativeFloat
-    delivery_ms: NonNegativeFloat
-    motor_rate: PositiveFloat
-    tendon_noise_mm: NonNegativeFloat
-    clock_offset_s: float
-    up: tuple[float, float, float]
-    heading_deg: float
-    origin: tuple[float, float, float]
-    epoch_s: PositiveInt
-    pause_s: PositiveFloat
+    outlier_mm: Annotated[float, Field(ge=0, le=10000)]
+    outlier_deg: Annotated[float, Field(ge=0, le=180)]
+    stamp_jitter_ms: Annotated[float, Field(ge=0, le=1000)]
+    delivery_ms: Annotated[float, Field(ge=0, le=10000)]
+    motor_rate: Annotated[float, Field(ge=1, le=10000)]
+    tendon_noise_mm: Annotated[float, Field(ge=0, le=1000)]
+    clock_offset_s: Annotated[float, Field(ge=-3600, le=3600)]
+    up: tuple[Coordinate, Coordinate, Coordinate]
+    heading_deg: Annotated[float, Field(ge=-360, le=360)]
+    origin: tuple[Coordinate, Coordinate, Coordinate]
+    epoch_s: Annotated[int, Field(ge=1, le=4_000_000_000)]
+    pause_s: Annotated[float, Field(gt=0, le=86_400)]
 
 
 @dataclass(kw_only=True)

@@ -5,10 +5,11 @@ Everything is simulated in the base frame with gravity turned, then placed in th
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Annotated
 
 import mujoco
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat
+from pydantic import Field
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
@@ -30,8 +31,8 @@ class Motors:
     rate_limit: m/s of cable. command_delay: s.
     """
 
-    rate_limit: PositiveFloat
-    command_delay: NonNegativeFloat
+    rate_limit: Annotated[float, Field(gt=0, le=100)]
+    command_delay: Annotated[float, Field(ge=0, le=10)]
 
 
 def record(

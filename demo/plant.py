@@ -9,11 +9,11 @@ from typing import Annotated
 
 import mujoco
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field
 
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import unit_properties
-from trunkline.arm.mjcf import unit_name
+from trunkline.arm.mjcf import Solref, unit_name
 from trunkline.frames import STANDARD_GRAVITY
 
 Share = Annotated[float, Field(gt=0, lt=1)]
@@ -33,24 +33,24 @@ class PlantSettings:
     armature: kg m². timestep: s. limit_solref: s and ratio, of the units closing on each other.
     """
 
-    modulus: PositiveFloat
-    density: PositiveFloat
+    modulus: Annotated[float, Field(ge=1e3, le=1e12)]
+    density: Annotated[float, Field(ge=1, le=30000)]
     core_ratio: Share
-    mass_factor: PositiveFloat
+    mass_factor: Annotated[float, Field(gt=0, le=100)]
     stiffness_scatter: Annotated[float, Field(ge=0, lt=1)]
-    hardening: NonNegativeFloat
-    damping_ratio: PositiveFloat
-    dry_friction: NonNegativeFloat
-    tendon_friction: NonNegativeFloat
-    cable_stiffness: PositiveFloat
-    cable_damping: NonNegativeFloat
-    max_force: PositiveFloat
+    hardening: Annotated[float, Field(ge=0, le=1e6)]
+    damping_ratio: Annotated[float, Field(gt=0, le=100)]
+    dry_friction: Annotated[float, Field(ge=0, le=10)]
+    tendon_friction: Annotated[float, Field(ge=0, le=1000)]
+    cable_stiffness: Annotated[float, Field(gt=0, le=1e7)]
+    cable_damping: Annotated[float, Field(ge=0, le=1e6)]
+    max_force: Annotated[float, Field(gt=0, le=1e5)]
     hole_ratio: Annotated[float, Field(gt=0, le=1)]
     link_ratio: Share
     link_mass_ratio: Share
-    armature: NonNegativeFloat
-    timestep: PositiveFloat
-    limit_solref: tuple[float, float]
+    armature: Annotated[float, Field(ge=0, le=1)]
+    timestep: Annotated[float, Field(ge=1e-5, le=0.01)]
+    limit_solref: Solref
 
 
 def build_plant(

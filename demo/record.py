@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PositiveFloat, PositiveInt
+from pydantic import Field
 
 from demo.experiments import PLANS, Experiments
 from demo.instruments import InstrumentSettings, measure
@@ -16,7 +16,7 @@ from trunkline.arm.mjcf import unit_name
 from trunkline.arm.spiral import spiral_chain
 from trunkline.pipeline.stage import output_folder, run_stage
 from trunkline.progress import progress
-from trunkline.settings import settings
+from trunkline.settings import Seed, settings
 from trunkline.trials.recording import Planned
 
 SESSION = Path("data/raw/demo")
@@ -24,17 +24,17 @@ SESSION = Path("data/raw/demo")
 
 @dataclass
 class Arm:
-    length: PositiveFloat
-    base_width: PositiveFloat
-    tip_width: PositiveFloat
-    units: PositiveInt
-    tendons: Annotated[int, Field(ge=3)]  # fewer cannot bend the arm to every side
-    tracked: Annotated[list[PositiveInt], Field(min_length=1)]
+    length: Annotated[float, Field(ge=0.01, le=10)]
+    base_width: Annotated[float, Field(gt=0, le=2)]
+    tip_width: Annotated[float, Field(gt=0, le=2)]
+    units: Annotated[int, Field(ge=1, le=500)]
+    tendons: Annotated[int, Field(ge=3, le=12)]  # fewer cannot bend the arm to every side
+    tracked: Annotated[list[Annotated[int, Field(ge=1, le=500)]], Field(min_length=1)]
 
 
 @settings
 class Config:
-    seed: int
+    seed: Seed
     arm: Arm
     plant: PlantSettings
     motors: Motors

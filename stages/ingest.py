@@ -3,19 +3,17 @@
 from pathlib import Path
 from typing import Literal
 
-from pydantic import Field
-
 from trunkline.errors import InputError
 from trunkline.figures.data import quality_figure
 from trunkline.figures.style import save_figure
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
-from trunkline.sessions.session import read_session
+from trunkline.sessions.session import SessionName, read_session
 from trunkline.settings import settings
 from trunkline.takes.agreement import align_clocks, settle_vertical
 from trunkline.takes.checks import Limits
 from trunkline.takes.intake import take_in
-from trunkline.takes.quality import judge, report, summary
+from trunkline.takes.quality import judge, remarks, report, summary
 from trunkline.trials.take import write_takes
 
 RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Path("artifacts/ingest")
@@ -23,7 +21,7 @@ RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Pat
 
 @settings
 class Config:
-    session: str = Field(min_length=1)
+    session: SessionName
     refused_trials: Literal["stop", "leave_out"]
     limits: Limits
 
@@ -47,6 +45,8 @@ def main(config: Config) -> None:
     settle_vertical(takes, findings, session)
     offset, spread = align_clocks(takes, [found.offset for found in findings])
     qualities = [judge(take, found) for take, found in zip(takes, findings, strict=True)]
+    for line in remarks(qualities):
+        print(f"ingest: {line}")
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
         write_takes(processed, takes)
         write_json(artifacts / "quality.json", report(qualities, refused, offset, spread))

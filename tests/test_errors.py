@@ -31,3 +31,10 @@ def test_a_reader_that_has_had_enough_is_no_error():
         command.stdout.close()
         assert command.stderr.read() == b""
         assert command.wait() == 1
+
+
+def test_a_full_disk_is_one_line_and_a_mistake_in_the_code_is_none():
+    command = ended('import errno\n    raise OSError(errno.ENOSPC, "No space left on device", "a.parquet")')
+    assert command.communicate()[1] == b"error: [Errno 28] No space left on device: 'a.parquet'\n"
+    assert command.returncode == 1
+    assert b"Traceback" in ended("raise FileNotFoundError(2, 'gone')").communicate()[1]

@@ -1,10 +1,14 @@
 """The exception that ends a stage or a command in one line, a user's mistake; the commonest is a missing file."""
 
+import difflib
+import errno
 import os
 import sys
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
+
+UNWRITABLE = {errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EACCES, errno.EFBIG}  # the disk's business, not the code's
 
 
 class InputError(Exception):
@@ -33,12 +37,20 @@ def in_one_line(main: Callable[..., int]) -> Callable[..., int]:
         except BrokenPipeError:
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left to flush at exit
             return 1
-        except InputError as error:
+        except (InputError, OSError) as error:
+            if isinstance(error, OSError) and error.errno not in UNWRITABLE:
+                raise
             sys.stdout.flush()
             print(f"error: {error}", file=sys.stderr)
             return 1
 
     return command
+
+
+def nearest(found: str, valid: list[str]) -> str:
+    """ ", did you mean 'x'?" for the one of `valid` that is most like `found`; empty where none is."""
+    matches = difflib.get_close_matches(found, valid, n=1)
+    return f", did you mean {matches[0]!r}?" if matches else ""
 
 
 def existing(path: str | Path) -> Path:

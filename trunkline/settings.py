@@ -1,16 +1,59 @@
 """Settings are the library's own dataclasses: the types of their fields are the ranges that a value must keep.
 
-What a function is set by is a plain dataclass beside it, as `statics`' or `ik`'s are, with `PositiveFloat`,
-`Annotated[int, Field(ge=8)]`, `Literal` and, for rules between fields, a `__post_init__` that raises ValueError.
+What a function is set by is a plain dataclass beside it, as `statics`' or `ik`'s are, with `Literal`,
+`Annotated[int, Field(ge=8, le=100)]` and, for rules between fields, a `__post_init__` that raises ValueError.
+Every number has both ends: beyond them lies what nobody means, or what no computer finishes (a test asks for them).
 Code may build it freely. What comes from files is checked as a whole, from the class that `settings` decorates down.
 """
 
-from typing import TypeVar, dataclass_transform
+from pathlib import Path
+from typing import Annotated, TypeVar, dataclass_transform
 
+import yaml
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 from pydantic import ConfigDict, Field
 from pydantic.dataclasses import dataclass
 
+from trunkline.errors import InputError
+
 Schema = TypeVar("Schema")
+Seed = Annotated[int, Field(ge=0, le=2**32 - 1)]  # what every generator of random numbers takes
+MOST_VALUES = 100_000  # in a file with its aliases written out; those of this project have hundreds
+
+
+def read_yaml(path: Path) -> DictConfig:
+    """A file of `key: value` lines, as OmegaConf reads YAML.
+
+    Raises:
+        InputError: there is no such file, it is no YAML, holds something else, or grows endlessly by its aliases.
+    """
+    try:
+        size = _size(yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader), {})
+        if size > MOST_VALUES:
+            raise InputError(f"{path}: found {size:.3g} values by aliases (&, *), expected at most {MOST_VALUES}")
+        config = OmegaConf.load(path)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: byte {error.start} is no UTF-8, expected a text file in UTF-8") from error
+    except RecursionError:
+        raise InputError(f"{path}: found an alias within itself, or lists in lists without end") from None
+    except (yaml.YAMLError, OmegaConfBaseException, OSError) as error:
+        raise InputError(f"{path}: not readable as YAML: {error}") from error
+    if not isinstance(config, DictConfig):
+        raise InputError(f"{path}: found a list, expected `key: value` lines")
+    return config
+
+
+def _size(node: yaml.Node | None, sizes: dict[int, int]) -> int:
+    """How many values a node has when its aliases are written out, without doing so."""
+    if node is None or isinstance(node, yaml.ScalarNode):
+        return 1
+    if id(node) not in sizes:
+        parts = [part for pair in node.value for part in pair] if isinstance(node, yaml.MappingNode) else node.value
+        sizes[id(node)] = 1 + sum(_size(part, sizes) for part in parts)
+    return sizes[id(node)]
 
 
 @dataclass_transform(kw_only_default=True, field_specifiers=(Field,))

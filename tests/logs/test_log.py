@@ -1,5 +1,6 @@
 """Logs, intact and damaged: what is read equals what was written, and what is lost is said."""
 
+import tracemalloc
 from io import BytesIO
 from pathlib import Path
 
@@ -180,3 +181,56 @@ def test_another_schema_on_a_topic_is_left_out_and_said(tmp_path):
     assert log.topics["/a"].messages == [bytes([number]) for number in range(30) if number % 3]
     (said,) = log.damage
     assert "/a: 10 messages of another schema (a_msgs/msg/B, cdr) left out, 20 are a_msgs/msg/A" in said
+
+
+def write_at(path: Path, times: list[int], **options) -> None:
+    with open(path, "wb") as file:
+        writer = Writer(file, **options)
+        writer.start()
+        for name in ("a_msgs/msg/A", "b_msgs/msg/Image"):
+            schema = writer.register_schema(name, "ros2msg", b"uint32 number")
+            channel = writer.register_channel("/" + name[0], "cdr", schema)
+            for time in times:
+                writer.add_message(channel, time, bytes(100_000), time)
+        writer.finish()
+
+
+def test_a_log_time_that_no_clock_shows_is_lost_and_said(tmp_path):
+    times = [1, 2, 2**63 - 1, 2**63, 2**64 - 1]
+    write_at(tmp_path / "log.mcap", times, compression=CompressionType.NONE)
+    log = read_log(tmp_path / "log.mcap")
+    assert log.topics["/a"].log_times.tolist() == [1, 2, 2**63 - 1]
+    assert "4 messages with a log time beyond the year 2262 lost" in log.damage
+
+
+@pytest.mark.parametrize(
+    ("options", "bare"),
+    [
+        ({}, False),
+        ({"enable_crcs": False}, True),
+        ({"use_chunking": False}, True),
+        ({"use_chunking": False, "enable_data_crcs": True}, False),
+        ({"enable_crcs": False, "enable_data_crcs": True}, False),
+    ],
+)
+def test_messages_that_no_checksum_covers_are_counted(tmp_path, options, bare):
+    write(tmp_path / "log.mcap", **options)
+    log = read_log(tmp_path / "log.mcap")
+    assert (log.count, log.unchecked, log.damage) == (COUNT, COUNT if bare else 0, [])
+
+
+def test_only_what_is_wanted_is_kept(tmp_path):
+    """Of a camera beside the poses, only the times: memory is bounded by what is kept, and by a chunk."""
+    path = tmp_path / "log.mcap"
+    write_at(path, list(range(200)), chunk_size=200_000, compression=CompressionType.NONE)
+    tracemalloc.start()
+    log = read_log(path, {"c_msgs/C"})
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert path.stat().st_size > 40e6
+    assert peak < 3e6
+    assert [len(topic.log_times) for topic in log.topics.values()] == [200, 200]
+    assert not any(topic.messages for topic in log.topics.values())
+    whole, some = read_log(path), read_log(path, {"a_msgs/A"})
+    assert some.topics["/a"].messages == whole.topics["/a"].messages
+    assert some.topics["/b"].messages == []

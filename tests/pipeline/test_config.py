@@ -1,18 +1,20 @@
 """Settings: what people type is composed, checked, and refused in one line that names the key."""
 
 import runpy
+import subprocess
+from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import pytest
 from omegaconf import OmegaConf
-from pydantic import Field
+from pydantic import Field, TypeAdapter, ValidationError
 
 from trunkline.errors import InputError
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.config import check_settings, compose_settings, group_options, load_config
-from trunkline.pipeline.settings import check_once
+from trunkline.pipeline.settings import check_once, require_session
 from trunkline.settings import settings
 
 ROOT = Path(__file__).parents[2]
@@ -34,7 +36,7 @@ class Arm:
 @dataclass
 class Rod:
     kind: Literal["rod"]
-    width: float
+    width: Annotated[float, Field(gt=0, le=9)]
 
 
 @dataclass
@@ -103,6 +105,9 @@ def test_groups_values_and_interpolations_compose(project):
         ("{arm: spirla, count: 3}", "fit.arm: found 'spirla', expected one of spiral, straight, did you mean"),
         ("{arm: {length: 1}, count: 3}", "fit.arm: found {'length': 1}, expected one of spiral, straight"),
         ("[1, 2]", "fit: found [1, 2], expected a section"),
+        ("{arm: spiral, count: 3, 4: 5}", "params.yaml: fit: found the key 4, expected a name"),
+        ("{arm: spiral, count: 3, spans: {1: {length: 1, tip: 0}}}", "fit.spans: found the key 1, expected a name"),
+        ("{arm: spiral, count: 3, part: {kind: rod, width: 2000}}", "width: found 2000, expected more than 0 to 9"),
         ("{arm: spiral, count: 3", "params.yaml: not readable as YAML"),
         ("{arm: spiral, count: 3, spans: {low: {length: 1, tip: 0, tpyo: 1}}}", "fit.spans.low.tpyo: unknown key"),
         ("{arm: spiral, count: 3, spans: {low: {length: '1', tip: 0}}}", "fit.spans.low.length: found '1', expected a"),
@@ -238,7 +243,7 @@ def test_unknown_keys_are_refused_at_every_level(stage, tmp_path):
 
 
 def test_the_stand_in_lab_refuses_unknown_keys_too(tmp_path):
-    schema = runpy.run_path(str(ROOT / "demo" / "record.py"), run_name="record")["Config"]
+    schema = LAB
     load_config(schema, "record", ROOT / "demo")
     (tmp_path / "conf").symlink_to(ROOT / "demo" / "conf")
     for path in [(), *_nested(schema)]:
@@ -247,6 +252,54 @@ def test_the_stand_in_lab_refuses_unknown_keys_too(tmp_path):
         OmegaConf.save(params, tmp_path / "params.yaml")
         with pytest.raises(InputError, match=".".join(["record", *path, "tpyo: unknown key"])):
             load_config(schema, "record", tmp_path)
+
+
+LAB = runpy.run_path(str(ROOT / "demo" / "record.py"), run_name="record")["Config"]
+
+
+@pytest.mark.parametrize("stage", [*STAGES, "record"])
+def test_every_number_has_two_ends_and_is_finite(stage):
+    """A setting without an upper bound is a stage that never ends, or that ends for want of memory."""
+    schema = TypeAdapter(LAB if stage == "record" else _schema(stage)).core_schema
+    for path, node, config in _numbers(schema, stage, {}):
+        low, high = node.get("ge", node.get("gt")), node.get("le", node.get("lt"))
+        assert None not in (low, high), f"{path}: {node}, expected both ends"
+        validator = type(TypeAdapter(float).validator)(node, config)
+        for text in ("NaN", "Infinity", "-Infinity", "1e300", "-1e300", str(10**30)):
+            with pytest.raises(ValidationError):
+                validator.validate_json(text)
+
+
+def test_a_number_without_an_end_is_found():
+    @dataclass
+    class Part:
+        fine: Annotated[float, Field(ge=0, le=1)]
+        open_list: list[Annotated[int, Field(ge=1)]]
+
+    @settings
+    class Open:
+        parts: dict[str, Part]
+        bare: float | None
+
+    found = [path for path, node, _ in _numbers(TypeAdapter(Open).core_schema, "x", {}) if "le" not in node]
+    assert len(found) == 2
+    assert "open_list" in found[0]
+    assert "bare" in found[1]
+
+
+def _numbers(node: Any, path: str, config: dict) -> Iterator[tuple[str, dict, dict]]:
+    """Every number in a pydantic schema, with the configuration that it is checked under."""
+    if isinstance(node, list | tuple):
+        for part in node:
+            yield from _numbers(part, path, config)
+    if not isinstance(node, dict):
+        return
+    if node.get("type") in ("int", "float", "decimal", "complex"):
+        yield path, node, config
+    config = node.get("config", config)
+    for key, part in node.items():
+        if key not in ("metadata", "config", "cls", "fields") or (key == "fields" and isinstance(part[0], dict)):
+            yield from _numbers(part, f"{path}.{node.get('name', key)}", config)
 
 
 def _schema(stage: str) -> type:
@@ -284,3 +337,55 @@ def test_a_rule_between_fields_names_the_key_and_the_file_that_set_it(tmp_path):
     expected = "params.yaml: identify_stiffness.parameters.stiffness.low: found -0.3, expected more than 0"
     with pytest.raises(InputError, match=expected):
         load_config(IdentificationSettings, "identify_stiffness", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("samples: 120000", "samples: 1000000000000", "samples: found 1000000000000, expected 1000 to 10000000"),
+        ("- 10\n", "- 190\n", "fk_dataset.angles_deg.1: found 190, expected 0 to 180"),
+        ("- 10\n", "- 90\n", "angles_deg: found [0.0, 90.0, 20.0"),
+        ("seed: 1\n\ntrain_ik", "seed: 9223372036854775808\n\ntrain_ik", "expected 0 to 4294967295"),
+    ],
+)
+def test_a_value_that_no_computer_finishes_is_refused_with_its_range(tmp_path, old, new, message):
+    text = (ROOT / "params.yaml").read_text()
+    assert old in text
+    (tmp_path / "params.yaml").write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        load_config(_schema("fk_dataset"), "fk_dataset", tmp_path)
+    assert message in str(caught.value)
+
+
+def test_aliases_that_multiply_are_refused_at_once(project, tmp_path):
+    lines = ["a0: &a0 [1, 1, 1, 1, 1, 1, 1, 1, 1]"]
+    lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 40)]
+    for text, message in (("\n".join(lines), "values by aliases"), ("a: &a [*a]", "an alias within itself")):
+        (tmp_path / "params.yaml").write_text(text)
+        with pytest.raises(InputError, match=message):
+            load_config(Config, "fit", tmp_path)
+    assert project("{arm: spiral, count: &n 3, level: *n}").level == 3  # ordinary ones may be
+
+
+def test_a_session_that_is_not_there_is_named_with_those_that_are(tmp_path):
+    (tmp_path / "data/raw/arm_7").mkdir(parents=True)
+    (tmp_path / "data/raw/arm_7/session.yaml").touch()
+    (tmp_path / "data/raw/arm_8.dvc").touch()
+    for name in ("demo", "arm_7", "arm_8"):
+        (tmp_path / "params.yaml").write_text(f"ingest: {{session: {name}}}\n")
+        require_session(tmp_path)
+    (tmp_path / "params.yaml").write_text("ingest: {session: arm_9}\n")
+    with pytest.raises(InputError, match="ingest.session: found 'arm_9', expected .*: arm_7, arm_8, demo"):
+        require_session(tmp_path)
+
+
+def test_what_is_pulled_is_this_pipeline_and_its_sessions(tmp_path):
+    """Never the examples, which a team may not have run."""
+    for data, wanted in ((None, "demo/dvc.yaml"), ("arm_7", "data/raw/arm_7.dvc")):
+        if data is not None:
+            (tmp_path / "data/raw").mkdir(parents=True)
+            (tmp_path / f"data/raw/{data}.dvc").touch()
+        for verb in ("pull", "push"):
+            command = ["make", "--dry-run", "-f", str(ROOT / "Makefile"), verb]
+            said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False).stdout
+            assert said.splitlines()[-1] == f"dvc {verb} dvc.yaml {wanted}"

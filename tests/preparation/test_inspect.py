@@ -1,10 +1,14 @@
 """Inspecting logs: what it says is what the log holds, and what it proposes can be ingested."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
 from tests.logs.test_schemas import CASES, write_foxglove, write_ros
 from tests.support.sessions import SEGMENTS, all_truths, instruments, record
+from tests.support.workbench import ROOT
 from trunkline.preparation.inspect import main
 from trunkline.sessions.session import read_session
 from trunkline.takes.checks import Limits
@@ -76,3 +80,11 @@ def test_a_damaged_log_is_described_as_such(tmp_path, capsys):
     path.write_bytes(b"nothing")
     assert main([str(path)]) == 1
     assert "found no MCAP file" in capsys.readouterr().err
+
+
+def test_a_reader_that_has_had_enough_ends_it_quietly(tmp_path):
+    record(tmp_path, all_truths()[:1], instruments())
+    command = [sys.executable, "-m", "trunkline.preparation.inspect", str(tmp_path)]
+    inspecting = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    inspecting.stdout.close()
+    assert inspecting.stderr.read() == b""

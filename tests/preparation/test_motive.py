@@ -7,6 +7,7 @@ import pytest
 
 from demo.instruments import measure
 from tests.support.sessions import SEGMENTS, instruments, release_truth
+from trunkline.errors import InputError
 from trunkline.preparation.export import read_export
 from trunkline.preparation.motive import main
 from trunkline.sessions.session import read_session
@@ -99,7 +100,9 @@ def test_the_start_of_the_capture_dates_the_log(tmp_path, measured):
 
 
 def spoil(path, old, new):
-    path.write_text(path.read_text(encoding="utf-8-sig").replace(old, new, 1))
+    text = path.read_text(encoding="utf-8-sig")
+    assert old in text
+    path.write_text(text.replace(old, new, 7 if old.startswith(",") else 1))
 
 
 @pytest.mark.parametrize(
@@ -109,6 +112,9 @@ def spoil(path, old, new):
         ("Coordinate Space,Global", "Coordinate Space,Local", "coordinate space: found Local, expected Global"),
         ("Frame,Time", "Bild,Zeit", "found no row that begins with Frame"),
         ("0,0.000000,", "0,0.000000,abc", "row 9: could not convert string to float: 'abc"),
+        ("\n4,0.033333,", "\n4,,", "row 13 lacks its frame number or time"),
+        ("Take Name", "Total Exported Frames,9999,Take Name", "the header says 9999 (Total Exported Frames)"),
+        (f",{SEGMENTS[1]}", f",{SEGMENTS[0]}", f"found Position X of the rigid body '{SEGMENTS[0]}' twice"),
     ],
 )
 def test_what_is_not_understood_is_one_line_and_writes_nothing(tmp_path, capsys, measured, old, new, message):
@@ -125,3 +131,19 @@ def test_angles_for_quaternions_are_refused(tmp_path, capsys, measured):
     path = write(tmp_path / "a.csv", measured, rotation="XYZ")
     assert main(["--session", str(tmp_path / "session"), str(path)]) == 1
     assert "rotation type: found XYZ, expected Quaternion" in capsys.readouterr().err
+
+
+def test_other_encodings_are_named(tmp_path, measured):
+    path = write(tmp_path / "a.csv", measured)
+    text = path.read_text(encoding="utf-8-sig").replace("Take Name,a", "Take Name,Prüfling")
+    for encoding, message in (("utf-16", "found text in UTF-16"), ("latin-1", "row 1 holds the byte 0xfc")):
+        path.write_bytes(text.encode(encoding))
+        with pytest.raises(InputError, match=message):
+            read_export(path)
+
+
+def test_a_whole_export_says_how_many_frames_it_has(tmp_path, measured):
+    path = write(tmp_path / "a.csv", measured)
+    count = len(read_export(path).stamps)
+    spoil(path, "Take Name", f"Total Exported Frames,{count},Take Name")
+    assert len(read_export(path).stamps) == count

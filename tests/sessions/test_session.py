@@ -80,7 +80,11 @@ def test_good_session(tmp_path):
             r"trials.1: window: found \[2.0, 1.0\], expected \[start, end\]",
         ),
         (("trials", 1, "name"), "tilt", r"trials.1.name: found 'tilt' again, expected each name once"),
-        (("trials", 1, "leevl"), 3, r"trials.1.leevl: unknown key"),
+        (("trials", 1, "leevl"), 3, r"trials.1.leevl: unknown key, did you mean 'level'\?"),
+        (("trials", 0, "experiment"), "relaese", r"trials.0.experiment: found 'relaese', .*did you mean 'release'\?"),
+        (("frame", "up"), "y", r"frame.up: found 'y', expected a list of numbers, such as \[0, 1, 0\]"),
+        (("base",), [0, 0, 0], r"base: found \[0, 0, 0\], expected a body's name, or \{position: \[x, y, z\]\}"),
+        (("base",), {"positoin": [0, 0, 0]}, r"base.positoin: unknown key, did you mean 'position'\?"),
         (("trials",), [], r"trials: found \[\], expected"),
         (("frame", "up"), [0, 0, 0], r"frame: up: found the zero vector"),
         (("frame", "up"), [0, 1], r"frame.up.2: missing"),
@@ -100,6 +104,9 @@ def test_mistakes(tmp_path, path, value, message):
 def test_missing_keys_and_files(tmp_path):
     with pytest.raises(InputError, match="nowhere: no such folder"):
         read_session(tmp_path / "nowhere")
+    session(tmp_path / "arm_7")
+    with pytest.raises(InputError, match=r"nowhere: no such folder, .*; found arm_7"):
+        read_session(tmp_path / "nowhere")
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match="empty: found 0 logs and no session.yaml"):
         read_session(tmp_path / "empty")
@@ -109,5 +116,5 @@ def test_missing_keys_and_files(tmp_path):
         read_session(session(tmp_path / "bare", {"base": "base"}))
     with pytest.raises(InputError, match="session.yaml: not readable as YAML"):
         read_session(session(tmp_path / "broken", "trials: [\n"))
-    with pytest.raises(InputError, match=r"session.yaml: the file: found \[1, 2\]"):
+    with pytest.raises(InputError, match="session.yaml: found a list, expected `key: value` lines"):
         read_session(session(tmp_path / "list", "[1, 2]"))

@@ -1,12 +1,17 @@
 """The ingest stage: what it writes, and that a bad session ends in one line and nothing half-written."""
 
+import errno
 import json
 
 import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+from mcap_ros2.writer import Writer as RosWriter
 
 from stages import ingest
 from tests.support.sessions import SEGMENTS
 from tests.support.workbench import workbench
+from trunkline.logs.definitions import RIGID_BODIES
 from trunkline.pipeline.stage import run_stage
 from trunkline.trials.take import read_takes
 
@@ -81,6 +86,37 @@ def never(session):
     path.write_text(path.read_text() + "segments: {unit_08: unit_08, unit_09: unit_09}\n")
 
 
+def rewritten(change, late=False, **options):
+    """What writes release_a.mcap anew after `change` of each message of poses (number, content)."""
+
+    def spoil(session):
+        path = session / "release_a.mcap"
+        with open(path, "rb") as file:
+            reader = make_reader(file, decoder_factories=[DecoderFactory()])
+            read = [found[2:] for found in reader.iter_decoded_messages(topics=["/rigid_bodies"])]
+        with open(path, "wb") as file, RosWriter(file, **options) as writer:
+            schema = writer.register_msgdef("mocap4r2_msgs/msg/RigidBodies", RIGID_BODIES)
+            for number, (message, content) in enumerate(read):
+                change(number, content)
+                time = message.log_time + (2**63 if late else 0)
+                writer.write_message("/rigid_bodies", schema, content, time, message.publish_time, number)
+
+    return spoil
+
+
+def no_bodies_in_every_second(number, content):
+    content.rigidbodies = content.rigidbodies[: None if number % 2 else 0]
+
+
+def turned_by_nothing(number, content):
+    for body in content.rigidbodies:
+        body.pose.orientation.w *= 3
+
+
+def twice(number, content):
+    content.rigidbodies = [*content.rigidbodies, *content.rigidbodies]
+
+
 @pytest.mark.parametrize(
     ("spoil", "culprits"),
     [
@@ -88,7 +124,11 @@ def never(session):
         (truncate, ["curl_40.mcap", "cut off at byte 3000"]),
         (no_mcap, ["tilt_60.mcap", "found no MCAP file"]),
         (missing, ["session.yaml", "trials.2.file", "release_a.mcap"]),
-        (never, ["tilt_00.mcap", "'unit_09' never appears"]),
+        (never, ["tilt_00.mcap", "'unit_09' never appears", "`segments` in session.yaml"]),
+        (rewritten(no_bodies_in_every_second), ["release_a.mcap", "never in four in a row"]),
+        (rewritten(turned_by_nothing), ["release_a.mcap", "'base' is seen in 0.0 %", "unnormalised quaternion"]),
+        (rewritten(twice), ["release_a.mcap", "found 'base' twice in a message"]),
+        (rewritten(lambda number, content: None, late=True), ["release_a.mcap", "log time beyond the year 2262"]),
     ],
 )
 def test_bad_session_ends_in_one_line_and_leaves_nothing(project, capsys, spoil, culprits):
@@ -131,7 +171,10 @@ def test_a_trial_can_be_left_out_and_is_reported(project, capsys):
     [
         ("session: demo", "sesion: demo", "ingest.sesion: unknown key, did you mean 'session'?"),
         ("session: demo", "session: 3", "ingest.session: found 3"),
-        ("session: demo", "session: nowhere", "data/raw/nowhere: no such folder"),
+        ("session: demo", "session: ..", "ingest.session: found '..', expected the name of a folder"),
+        ("session: demo", "session: .", "ingest.session: found '.', expected the name of a folder"),
+        ("session: demo", "session: ../x", "ingest.session: found '../x', expected the name of a folder"),
+        ("session: demo", "session: nowhere", "a session.yaml; found demo"),
         ("session: demo", "session: demo\n  limits: {coverage: 1.5}", "ingest.limits.coverage: found 1.5"),
     ],
 )
@@ -141,3 +184,25 @@ def test_bad_settings_are_one_line(project, capsys, old, new, message):
     assert code == 1
     assert message in stderr
     assert stderr.count("\n") == 1
+
+
+def test_logs_without_checksums_are_said(project, capsys):
+    run_stage("ingest", ingest.Config, ingest.main)
+    assert "checksums" not in capsys.readouterr().out
+    rewritten(lambda number, content: None, enable_crcs=False)(project / "data/raw/demo")
+    run_stage("ingest", ingest.Config, ingest.main)
+    said = capsys.readouterr().out
+    assert "ingest: 1 of 4 logs have messages without checksums, such as release_a.mcap" in said
+    logs = json.loads((ingest.ARTIFACTS / "quality.json").read_text())["logs"]
+    assert logs["tilt_00.mcap"]["without_checksum"] == 0
+    assert logs["release_a.mcap"]["without_checksum"] == logs["release_a.mcap"]["messages"] > 0
+
+
+def test_a_full_disk_is_one_line_and_leaves_nothing(project, capsys, monkeypatch):
+    def full(*arguments):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(ingest, "write_takes", full)
+    code, stderr = run(capsys)
+    assert (code, stderr) == (1, "error: [Errno 28] No space left on device\n")
+    assert not any(path for folder in (project / "artifacts", project / "data/processed") for path in folder.iterdir())

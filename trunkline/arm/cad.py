@@ -8,7 +8,7 @@ from typing import Annotated
 
 import mujoco
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat, PositiveInt
+from pydantic import Field
 
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import UnitProperties
@@ -35,13 +35,13 @@ class Chain(ABC):
         segments: name of a tracked point to its distance from the mount along the straight arm, m.
     """
 
-    length: PositiveFloat
-    units: PositiveInt
-    damping_ratio: PositiveFloat
+    length: Annotated[float, Field(ge=0.01, le=10)]
+    units: Annotated[int, Field(ge=1, le=500)]
+    damping_ratio: Annotated[float, Field(gt=0, le=100)]
     tendons: Annotated[int, Field(ge=0, le=12)]
     hole_ratio: Annotated[float, Field(gt=0, le=1)]
-    tip_load: NonNegativeFloat
-    segments: dict[str, PositiveFloat]
+    tip_load: Annotated[float, Field(ge=0, le=100)]
+    segments: dict[str, Annotated[float, Field(gt=0, le=10)]]
 
     def __post_init__(self):
         for name, distance in self.segments.items():

@@ -10,7 +10,7 @@ from typing import Annotated
 
 import mujoco
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field
 
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import UnitProperties
@@ -19,6 +19,11 @@ from trunkline.frames import STANDARD_GRAVITY
 TENDON_RGBA = (0.15, 0.15, 0.15, 1)
 UNIT_RGBA = (0.93, 0.55, 0.2, 1)
 LOAD_RGBA = (0.4, 0.4, 0.45, 1)
+
+Coefficient = Annotated[float, Field(ge=-1e6, le=1e6)]  # negative ones are stiffness and damping themselves
+Share = Annotated[float, Field(ge=0, le=1)]
+Solref = tuple[Coefficient, Coefficient]
+Solimp = tuple[Share, Share, Share, Share, Annotated[float, Field(ge=1, le=100)]]
 
 
 @dataclass
@@ -32,10 +37,10 @@ class Actuation:
         time_constant: of the first-order filter on the commanded length, s.
     """
 
-    friction: NonNegativeFloat
-    kp: PositiveFloat
-    max_force: PositiveFloat
-    time_constant: PositiveFloat
+    friction: Annotated[float, Field(ge=0, le=1000)]
+    kp: Annotated[float, Field(gt=0, le=1e7)]
+    max_force: Annotated[float, Field(gt=0, le=1e5)]
+    time_constant: Annotated[float, Field(gt=0, le=10)]
 
 
 @dataclass(kw_only=True)
@@ -64,12 +69,12 @@ class Solver:
             limits and of tendon friction, fixed because they are part of what "friction" means.
     """
 
-    timestep: Annotated[float, Field(gt=0, le=0.01)]
-    armature: NonNegativeFloat
-    limit_solref: tuple[float, float]
-    limit_solimp: tuple[float, float, float, float, float]
-    friction_solref: tuple[float, float]
-    friction_solimp: tuple[float, float, float, float, float]
+    timestep: Annotated[float, Field(ge=1e-5, le=0.01)]
+    armature: Annotated[float, Field(ge=0, le=1)]
+    limit_solref: Solref
+    limit_solimp: Solimp
+    friction_solref: Solref
+    friction_solimp: Solimp
 
 
 def unit_name(index: int) -> str:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 from scipy.optimize import brentq
 
 from trunkline.arm.cad import Chain
@@ -20,10 +20,10 @@ class Spiral(Chain):
     """base_width, tip_width: m. modulus: Pa. density: kg/m³. core_ratio: core diameter over the unit's."""
 
     kind: Literal["spiral"]
-    base_width: PositiveFloat
-    tip_width: PositiveFloat
-    modulus: PositiveFloat
-    density: PositiveFloat
+    base_width: Annotated[float, Field(gt=0, le=2)]
+    tip_width: Annotated[float, Field(gt=0, le=2)]
+    modulus: Annotated[float, Field(ge=1e3, le=1e12)]
+    density: Annotated[float, Field(ge=1, le=30000)]
     core_ratio: Annotated[float, Field(gt=0, lt=1)]
 
     def chain(self) -> ChainGeometry:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 
 from trunkline.arm.cad import Chain
 from trunkline.arm.geometry import ChainGeometry
@@ -19,11 +19,11 @@ class Uniform(Chain):
     """
 
     kind: Literal["uniform"]
-    width: PositiveFloat
-    unit_masses: list[PositiveFloat]
+    width: Annotated[float, Field(gt=0, le=2)]
+    unit_masses: list[Annotated[float, Field(gt=0, le=100)]]
     joint_range_deg: Annotated[float, Field(gt=0, le=180)]
-    bending_stiffness: PositiveFloat | None = None
-    joint_stiffness: PositiveFloat | None = None
+    bending_stiffness: Annotated[float, Field(gt=0, le=1e5)] | None = None
+    joint_stiffness: Annotated[float, Field(gt=0, le=1e5)] | None = None
 
     def __post_init__(self):
         super().__post_init__()

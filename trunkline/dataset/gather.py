@@ -2,15 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 import mujoco
 import numpy as np
 import pandas as pd
-from pydantic import Field, NonNegativeInt, PositiveInt
+from pydantic import Field
 
 from trunkline.dataset.deviation import mujoco_deviation
 from trunkline.dataset.table import Density, sample_table, split
+from trunkline.settings import Seed
 from trunkline.statics.chain import Chain
 
 
@@ -22,17 +24,17 @@ class Sampling:
     check: samples that are compared with MuJoCo.
     """
 
-    samples: Annotated[int, Field(ge=1000)]
-    angles_deg: Annotated[list[float], Field(min_length=1)]
-    seed: NonNegativeInt
-    directions: Annotated[int, Field(ge=8)]
-    steps: Annotated[int, Field(ge=8)]
+    samples: Annotated[int, Field(ge=1000, le=10_000_000)]
+    angles_deg: Annotated[list[Annotated[float, Field(ge=0, le=180)]], Field(min_length=2)]
+    seed: Seed
+    directions: Annotated[int, Field(ge=8, le=10000)]
+    steps: Annotated[int, Field(ge=8, le=10000)]
     validate_share: Annotated[float, Field(gt=0, lt=1)]
-    check: PositiveInt
+    check: Annotated[int, Field(ge=1, le=100000)]
 
     def __post_init__(self) -> None:
-        if any(not 0 <= angle <= 180 for angle in self.angles_deg) or len(set(self.angles_deg)) < len(self.angles_deg):
-            raise ValueError(f"angles_deg: found {self.angles_deg}, expected different angles from 0 to 180")
+        if any(after <= before for before, after in pairwise(self.angles_deg)):
+            raise ValueError(f"angles_deg: found {self.angles_deg}, expected rising angles from 0 to 180")
 
 
 @dataclass

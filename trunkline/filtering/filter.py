@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field, NonNegativeFloat, PositiveFloat
+from pydantic import Field
 from scipy.ndimage import binary_dilation
 
 from trunkline.errors import InputError
@@ -26,11 +26,11 @@ class Filter:
     release: where a release starts: at its "onset", or once the arm is "free" and moves already, see `start`.
     """
 
-    rate: PositiveFloat
-    cutoff: PositiveFloat
+    rate: Annotated[float, Field(ge=1, le=2000)]
+    cutoff: Annotated[float, Field(gt=0, le=1000)]
     order: Annotated[int, Field(ge=1, le=10)]
-    longest_bridge: NonNegativeFloat
-    outlier_deviations: PositiveFloat
+    longest_bridge: Annotated[float, Field(ge=0, le=2)]
+    outlier_deviations: Annotated[float, Field(ge=1, le=1000)]
     release: Literal["onset", "free"]
 
     def __post_init__(self):

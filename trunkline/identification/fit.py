@@ -4,13 +4,14 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import mujoco
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import Field
 
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.optimizers import Optimizer
 from trunkline.identification.problem import Bounds, Problem
 from trunkline.identification.resting import RestShape
+from trunkline.settings import Seed
 
 
 @dataclass
@@ -18,16 +19,16 @@ class Rough:
     """A coarser look: a time step `step_factor` times the model's own, over the first `frames` of `trials` trials."""
 
     step_factor: Annotated[float, Field(ge=1, le=4)]
-    frames: PositiveInt
-    trials: PositiveInt
+    frames: Annotated[int, Field(ge=1, le=100000)]
+    trials: Annotated[int, Field(ge=1, le=10000)]
 
 
 @dataclass
 class Polish:
     """Least squares on whole trials at the model's own step."""
 
-    iterations: PositiveInt
-    tolerance: PositiveFloat
+    iterations: Annotated[int, Field(ge=1, le=10000)]
+    tolerance: Annotated[float, Field(gt=0, le=1)]
 
 
 @dataclass
@@ -36,7 +37,7 @@ class Method:
 
     optimizer: of the scalars, roughly. polish: of them, after it.
     fine: optimizer of the factors of every joint, within `per_joint_range` of 1. per_joint_deviation: by how much
-        joints are expected to scatter around 1, standard deviation; infinite for no such prior.
+        joints are expected to scatter around 1, standard deviation; infinite, from code alone, for no such prior.
     """
 
     optimizer: Optimizer
@@ -44,8 +45,8 @@ class Method:
     polish: Polish
     fine: Optimizer
     per_joint_range: Annotated[float, Field(gt=0, lt=1)]
-    per_joint_deviation: PositiveFloat
-    seed: NonNegativeInt
+    per_joint_deviation: Annotated[float, Field(gt=0, le=10)]
+    seed: Seed
 
 
 @dataclass

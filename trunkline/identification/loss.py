@@ -5,10 +5,10 @@ positions in the base frame, all in metres. `measured` (T, S) is False where the
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-from pydantic import NonNegativeFloat, PositiveFloat
+from pydantic import Field
 
 
 @dataclass
@@ -20,12 +20,12 @@ class LossWeights:
     weight_position, weight_velocity: w_pos and w_vel.
     """
 
-    delta_position: PositiveFloat
-    delta_velocity: PositiveFloat
-    epsilon: PositiveFloat
-    epsilon_velocity: PositiveFloat
-    weight_position: NonNegativeFloat
-    weight_velocity: NonNegativeFloat
+    delta_position: Annotated[float, Field(gt=0, le=1000)]
+    delta_velocity: Annotated[float, Field(gt=0, le=1000)]
+    epsilon: Annotated[float, Field(gt=0, le=10)]
+    epsilon_velocity: Annotated[float, Field(gt=0, le=10)]
+    weight_position: Annotated[float, Field(ge=0, le=1000)]
+    weight_velocity: Annotated[float, Field(ge=0, le=1000)]
 
 
 def huber(residual: np.ndarray, delta: float) -> np.ndarray:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import Field
 
 
 @dataclass
@@ -14,10 +14,10 @@ class LeastSquares:
     most. tolerance: relative decrease of the loss at the end.
     """
 
-    starts: NonNegativeInt
-    descents: PositiveInt
-    iterations: PositiveInt
-    tolerance: PositiveFloat
+    starts: Annotated[int, Field(ge=0, le=10000)]
+    descents: Annotated[int, Field(ge=1, le=1000)]
+    iterations: Annotated[int, Field(ge=1, le=10000)]
+    tolerance: Annotated[float, Field(gt=0, le=1)]
     method: Literal["least_squares"] = "least_squares"
 
     def steps(self) -> int:
@@ -32,10 +32,10 @@ class DifferentialEvolution:
     generations: at most. tolerance: standard deviation of the losses over their mean at the end.
     """
 
-    population: Annotated[int, Field(ge=5)]
-    population_per_parameter: NonNegativeInt
-    generations: PositiveInt
-    tolerance: PositiveFloat
+    population: Annotated[int, Field(ge=5, le=10000)]
+    population_per_parameter: Annotated[int, Field(ge=0, le=1000)]
+    generations: Annotated[int, Field(ge=1, le=100000)]
+    tolerance: Annotated[float, Field(gt=0, le=1)]
     method: Literal["differential_evolution"] = "differential_evolution"
 
     def steps(self) -> int:

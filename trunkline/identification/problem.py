@@ -2,10 +2,11 @@
 
 import time
 from dataclasses import dataclass
+from typing import Annotated
 
 import mujoco
 import numpy as np
-from pydantic import FiniteFloat
+from pydantic import Field
 
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
@@ -20,8 +21,8 @@ DIVERGED_LOSS = 1e3  # finite, and with sensible weights far above the loss of a
 class Bounds:
     """Range of a parameter in its own unit, low < high."""
 
-    low: FiniteFloat
-    high: FiniteFloat
+    low: Annotated[float, Field(ge=-1e9, le=1e9)]
+    high: Annotated[float, Field(ge=-1e9, le=1e9)]
 
     def __post_init__(self):
         if self.low >= self.high:

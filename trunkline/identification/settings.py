@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from pydantic import Field, NonNegativeInt, PositiveInt
+from pydantic import Field
 
 from trunkline.identification.fit import Method
 from trunkline.identification.loss import Loss
@@ -22,7 +22,7 @@ class IdentificationSettings(Method):
     experiments: to fit. reported: to score, those and others.
     """
 
-    frames: PositiveInt
+    frames: Annotated[int, Field(ge=1, le=100000)]
     command_delay: Annotated[float, Field(ge=0, le=1)]
     experiments: Experiments
     reported: Experiments
@@ -31,7 +31,7 @@ class IdentificationSettings(Method):
     loss: Loss
     parameters: Annotated[dict[ParameterName, Bounds], Field(min_length=1)]
     per_joint: list[PerJointName]
-    cross_validation_folds: NonNegativeInt
+    cross_validation_folds: Annotated[int, Field(ge=0, le=100)]
 
     def __post_init__(self):
         if not set(self.experiments) <= set(self.reported):

@@ -10,7 +10,7 @@ import onnx
 import onnxruntime
 import pandas as pd
 import torch
-from pydantic import Field, NonNegativeFloat, PositiveInt
+from pydantic import Field
 
 from trunkline.dataset.columns import command_columns, length_columns, tension_columns
 from trunkline.dataset.table import command_by_tension, sample_table, tip_by_tension, turn_by_tension
@@ -37,17 +37,17 @@ from trunkline.statics.chain import Chain
 class Unseen:
     """Targets between the gravity angles of the data set: pulls around the arm, tips along each, how many in all."""
 
-    directions: Annotated[int, Field(ge=8)]
-    steps: Annotated[int, Field(ge=8)]
-    samples: Annotated[int, Field(ge=100)]
+    directions: Annotated[int, Field(ge=8, le=10000)]
+    steps: Annotated[int, Field(ge=8, le=10_000)]
+    samples: Annotated[int, Field(ge=100, le=1_000_000)]
 
 
 @dataclass
 class Polish:
     """Gauss-Newton from the network's answers: for how many held-out targets, and of how many steps at most."""
 
-    targets: PositiveInt
-    steps: PositiveInt
+    targets: Annotated[int, Field(ge=1, le=1_000_000)]
+    steps: Annotated[int, Field(ge=1, le=100)]
 
 
 @dataclass(kw_only=True)
@@ -57,11 +57,11 @@ class Learning(Training):
     lever: m; the loss counts a turn of the tip by 1 rad as this much distance. outside: targets far off.
     """
 
-    lever: NonNegativeFloat
+    lever: Annotated[float, Field(ge=0, le=1)]
     unseen: Unseen
     as_controls: AsControls
     polish: Polish
-    outside: PositiveInt
+    outside: Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 @dataclass

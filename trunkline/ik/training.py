@@ -3,14 +3,16 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import torch
-from pydantic import NonNegativeInt, PositiveFloat, PositiveInt
+from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.ik.network import InverseKinematics
 from trunkline.ik.tip_loss import TipLoss
+from trunkline.settings import Seed
 from trunkline.threads import thread_count
 
 ROUNDING = 0.5e-3  # m, tip errors well under this count by their square, larger ones by their size
@@ -26,11 +28,11 @@ class Training:
     """Attributes: width: of the hidden layers; epochs; batch: samples; learning_rate: the largest, after a warm-up,
     from which a cosine takes it to a thousandth; seed: of weights and shuffling."""
 
-    width: PositiveInt
-    epochs: PositiveInt
-    batch: PositiveInt
-    learning_rate: PositiveFloat
-    seed: NonNegativeInt
+    width: Annotated[int, Field(ge=1, le=4096)]
+    epochs: Annotated[int, Field(ge=1, le=10_000)]
+    batch: Annotated[int, Field(ge=1, le=1_000_000)]
+    learning_rate: Annotated[float, Field(gt=0, le=1)]
+    seed: Seed
 
 
 def train(

@@ -37,7 +37,7 @@ class PoseStream:
     (T, B, 4) wxyz or None; NaN where absent. undecodable: messages that do not fit their schema, or that hold
     another number of poses than there are names. unnamed: poses in a message that nobody names, else None.
     parents: names of the frames that the poses are in, where messages say it for each; several, where nothing
-    connects them.
+    connects them. twice: a name that several poses of one message have, else None; such messages do not fit either.
     """
 
     stamps: np.ndarray
@@ -50,6 +50,7 @@ class PoseStream:
     undecodable: int = 0
     unnamed: int | None = None
     parents: tuple[str, ...] = ()
+    twice: str | None = None
 
 
 def pose_stream(
@@ -70,13 +71,14 @@ def pose_stream(
     Raises:
         ValueError: the messages cannot be read at all, or frames are no tree, or `frame` is none of them.
     """
-    unnamed, read = None, []
+    unnamed, twice, read = None, None, []
     for name, topic in topics.items():
         batches = list(_read_poses(topic))
         given = bodies if name is None else [name]
         if given is None and any(poses.names is None for _, poses in batches):
             unnamed = max(poses.positions.shape[-2] for _, poses in batches)
             given = [str(number + 1) for number in range(unnamed)]
+        twice = next((repeated for _, poses in batches if (repeated := _repeated(poses.names))), twice)
         read.append((topic, [part for batch in batches for part in _batches(*batch, topic, given)]))
     parents = {frame: None for _, batches in read for batch in batches for frame in batch.parents or ()}
     kept = sum(len(batch.rows) for _, batches in read for batch in batches)
@@ -90,8 +92,16 @@ def pose_stream(
             samples, parents = in_one_frame(samples, _samples(fixed), list(parents), frame)
         stream = _gather(samples)
     stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - kept
-    stream.unnamed, stream.parents = unnamed, tuple(parents)
+    stream.unnamed, stream.parents, stream.twice = unnamed, tuple(parents), twice
     return stream
+
+
+def _repeated(names: list[str] | np.ndarray | None) -> str | None:
+    """A name that a message, or one of a batch (..., S), has more than once."""
+    for some in [] if names is None else np.atleast_2d(names).tolist():
+        if len(set(some)) < len(some):
+            return max(some, key=some.count)
+    return None
 
 
 def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, Poses]]:

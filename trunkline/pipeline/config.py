@@ -18,8 +18,9 @@ from omegaconf.errors import InterpolationToMissingValueError, OmegaConfBaseExce
 from pydantic import TypeAdapter, ValidationError
 from yaml import YAMLError
 
-from trunkline.errors import InputError
-from trunkline.pipeline.mistakes import describe, nearest, path_of, rank
+from trunkline.errors import InputError, nearest
+from trunkline.pipeline.mistakes import describe, path_of, rank
+from trunkline.settings import read_yaml
 
 Schema = TypeVar("Schema")
 
@@ -67,8 +68,8 @@ def check_settings(root: str | Path = ".") -> list[str]:
         InputError: for the first bad value in any section, or a section of no stage in dvc.yaml.
     """
     root = Path(root)
-    params, stages = root / "params.yaml", list(_load(root / "dvc.yaml").stages)
-    for section in _load(params):
+    params, stages = root / "params.yaml", list(read_yaml(root / "dvc.yaml").stages)
+    for section in read_yaml(params):
         if section not in stages:
             raise InputError(f"{params}: {section}: no such stage in dvc.yaml{nearest(str(section), stages)}")
     files = [file for file in sorted(own_or_project(root, "stages").glob("*.py")) if file.stem in stages]
@@ -123,13 +124,22 @@ def own_or_project(root: Path, name: str) -> Path:
 
 
 def _read_section(path: Path, stage: str) -> dict[str, Any]:
-    params = _load(path)
+    params = read_yaml(path)
     if stage not in params:
         raise InputError(f"{path}: no section {stage!r}{nearest(stage, [str(key) for key in params])}")
     section = {} if params[stage] is None else _container(params)[stage]
     if not isinstance(section, dict):
         raise InputError(f"{path}: {stage}: found {section!r}, expected a section of `key: value` lines")
+    _expect_names(section, f"{path}: {stage}")
     return section
+
+
+def _expect_names(section: dict[Any, Any], where: str) -> None:
+    for key, value in section.items():
+        if not isinstance(key, str):
+            raise InputError(f"{where}: found the key {key!r}, expected a name")
+        if isinstance(value, dict):
+            _expect_names(value, f"{where}.{key}")
 
 
 def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str]:
@@ -147,20 +157,8 @@ def _choices(folder: Path, section: dict[str, Any], where: str) -> dict[str, str
 
 def _defaults(folder: Path) -> dict[str, str]:
     """Each group of the defaults list with the option that it names, often ???."""
-    entries = _container(_load(folder / "config.yaml")).get("defaults", [])
+    entries = _container(read_yaml(folder / "config.yaml")).get("defaults", [])
     return {group: option for entry in entries if isinstance(entry, dict) for group, option in entry.items()}
-
-
-def _load(path: Path) -> DictConfig:
-    try:
-        config = OmegaConf.load(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except (YAMLError, OmegaConfBaseException, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path}: not readable as YAML: {error}") from error
-    if not isinstance(config, DictConfig):
-        raise InputError(f"{path}: found a list, expected `key: value` lines")
-    return config
 
 
 def _container(config: DictConfig, resolve: bool = False) -> dict[Any, Any]:

@@ -1,12 +1,21 @@
 """What pydantic found wrong, as one line that names the key."""
 
-import difflib
 import re
+from collections.abc import Iterator
 from typing import Any
 
 from pydantic import TypeAdapter
 
+from trunkline.errors import nearest
+
 UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
+# pydantic's names for a number out of its range, and JSON schema's for the end that it passed
+BEYOND = {
+    "greater_than": "exclusiveMinimum",
+    "greater_than_equal": "minimum",
+    "less_than": "exclusiveMaximum",
+    "less_than_equal": "maximum",
+}
 
 
 def path_of(problem: Any, composed: dict[str, Any]) -> list[str]:
@@ -49,10 +58,34 @@ def describe(problem: Any, adapter: TypeAdapter) -> str:
         expected = f"one of {problem['ctx']['expected_tags']}"
         valid = re.findall(r"'([^']*)'", expected)
         return f"{key}: found {found!r}, expected {expected}" + nearest(found, valid)
+    if problem["type"] in BEYOND:
+        expected = _range(problem, adapter) or expected
     valid = re.findall(r"'([^']*)'", expected) if problem["type"] == "literal_error" else []
     return f"found {found!r}, expected {expected}" + nearest(str(found), valid)
 
 
-def nearest(found: str, valid: list[str]) -> str:
-    matches = difflib.get_close_matches(found, valid, n=1)
-    return f", did you mean {matches[0]!r}?" if matches else ""
+def _range(problem: Any, adapter: TypeAdapter) -> str:
+    """Both ends of the range that a number is out of; empty where keys of that name have several."""
+    key = [part for part in problem["loc"] if isinstance(part, str)][-1:]
+    schema = adapter.json_schema()
+    named = [cls.get("properties", {}).get(*key) for cls in (schema, *schema.get("$defs", {}).values()) if key]
+    passed, (limit, *_) = BEYOND[problem["type"]], problem["ctx"].values()
+    found = {_ends(node) for node in _nodes(named) if node.get(passed) == limit}
+    return found.pop() if len(found) == 1 else ""
+
+
+def _nodes(schema: Any) -> Iterator[dict]:
+    """All parts of a JSON schema."""
+    if isinstance(schema, dict):
+        yield schema
+    for part in schema.values() if isinstance(schema, dict) else schema if isinstance(schema, list) else ():
+        yield from _nodes(part)
+
+
+def _ends(node: dict) -> str:
+    """The range that a part of a JSON schema gives; empty where it is open on one side."""
+    low, high = (node.get(end, node.get(f"exclusive{end.capitalize()}")) for end in ("minimum", "maximum"))
+    if low is None or high is None:
+        return ""
+    above, below = "more than " * ("minimum" not in node), "less than " * ("maximum" not in node)
+    return f"{above}{low:.10g} to {below}{high:.10g}"

@@ -4,9 +4,13 @@ import hashlib
 import sys
 from pathlib import Path
 
-from trunkline.errors import in_one_line
+from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.config import PROJECT, check_settings, own_or_project
+from trunkline.sessions.session import sessions_in
+from trunkline.settings import read_yaml
+
+LAB = "demo"  # the session that the stand-in lab records, see demo/dvc.yaml
 
 
 def check_once(root: Path = Path(".")) -> None:
@@ -37,10 +41,25 @@ def check_once(root: Path = Path(".")) -> None:
     passed.write_text(digest.hexdigest())
 
 
+def require_session(root: Path) -> None:
+    """Raise InputError unless the session of params.yaml is there, or comes: from the stand-in lab, or by `dvc pull`.
+
+    DVC, which looks for it before any stage runs, would only say that a path does not exist.
+    """
+    params, raw = read_yaml(root / "params.yaml"), root / "data" / "raw"
+    wanted = params.get("ingest", {}).get("session")
+    tracked = [file.stem for file in raw.glob("*.dvc")]
+    there = sorted({LAB, *tracked, *sessions_in(raw)})
+    if wanted is not None and wanted not in there:
+        expected = f"one of the sessions in {raw}: {', '.join(there)}{nearest(str(wanted), there)}"
+        raise InputError(f"{root / 'params.yaml'}: ingest.session: found {wanted!r}, expected {expected}")
+
+
 @in_one_line
 def main() -> int:
     require_checkout(Path("."))
     check_once()
+    require_session(Path("."))
     print("settings: in order")
     return 0
 

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from trunkline.errors import InputError
+from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.settings import check_once
 
@@ -30,14 +30,16 @@ def run_stage(
     so the results, otherwise depend on how many cores there are; `TRUNKLINE_THREADS` is for what does not.
     """
     started = time.monotonic()
-    try:
+
+    @in_one_line
+    def run() -> int:
         check_once()
         config = load_config(schema, name, root)
         with threadpool_limits(1, user_api="blas"):
             main(config)
-    except InputError as error:
-        sys.stdout.flush()
-        print(f"error: {error}", file=sys.stderr)
+        return 0
+
+    if run():
         sys.exit(1)
     peak_mib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # Linux counts in KiB
     print(f"{name}: done in {time.monotonic() - started:.1f} s, peak memory {peak_mib:.0f} MiB")

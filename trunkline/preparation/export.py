@@ -4,6 +4,7 @@ Header rows are found by what they hold, as versions of Motive differ in their n
 semicolons where numbers have decimal commas. Quaternions are x, y, z, w; an occluded body has empty cells.
 """
 
+import codecs
 import csv
 from datetime import UTC, datetime
 from pathlib import Path
@@ -24,8 +25,8 @@ def read_export(path: Path) -> PoseStream:
         InputError: naming the file and what is missing, or the row that cannot be read.
     """
     try:
-        rows = _rows(Path(path).read_text(encoding="utf-8-sig").splitlines())
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        rows = _rows(_text(Path(path)).splitlines())
+    except (OSError, csv.Error) as error:
         raise InputError(f"{path}: {error}, expected a CSV export of Motive") from error
     first = next((i for i, row in enumerate(rows) if len(row) > 2 and row[0].strip() == "Frame"), None)
     if first is None:
@@ -41,6 +42,10 @@ def read_export(path: Path) -> PoseStream:
     numbers = _numbers(path, rows, first + 1)
     if not len(numbers):
         raise InputError(f"{path}: found no frame below the header")
+    said = about.get("Total Exported Frames", "")
+    if said.isdigit() and len(numbers) < int(said):
+        found = f"found {len(numbers)} frames, the header says {said} (Total Exported Frames): the file is cut off"
+        raise InputError(f"{path}: {found}, expected a whole export")
 
     def gather(component: str, axes: str) -> np.ndarray | None:
         wanted = [(kind, name, component, axis) for name in names for axis in axes]
@@ -68,6 +73,18 @@ def read_export(path: Path) -> PoseStream:
         positions=scale * positions,
         quaternions=quaternions,
     )
+
+
+def _text(path: Path) -> str:
+    data = path.read_bytes()
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise InputError(f"{path}: found text in UTF-16, expected a CSV export of Motive in UTF-8")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        row = 1 + data.count(b"\n", 0, error.start)
+        found = f"row {row} holds the byte 0x{data[error.start]:02x}, as in Latin-1"
+        raise InputError(f"{path}: {found}, expected a CSV export of Motive in UTF-8") from error
 
 
 def _rows(lines: list[str]) -> list[list[str]]:
@@ -98,11 +115,16 @@ def _columns(path: Path, above: list[list[str]], axes: list[str]) -> dict[tuple[
     if names >= components:
         raise InputError(f"{path}: header: found no row of names between those of types and of Position")
     keys = zip(above[kinds], above[names], above[components], axes, strict=False)  # the shortest row ends them
-    return {
-        (kind.strip(), name.strip(), component.strip(), axis.strip()): column
-        for column, (kind, name, component, axis) in enumerate(keys)
-        if column >= 2 and component.strip()
-    }
+    found: dict[tuple[str, str, str, str], int] = {}
+    for column, key in enumerate(keys):
+        kind, name, component, axis = (part.strip() for part in key)
+        if column < 2 or not component:
+            continue
+        if (kind, name, component, axis) in found and component == "Position" and kind in ("Rigid Body", "Marker"):
+            twice = f"found {component} {axis} of the {kind.lower()} {name!r} twice"
+            raise InputError(f"{path}: header: {twice}, expected a name of its own for each")
+        found[kind, name, component, axis] = column
+    return found
 
 
 def _numbers(path: Path, rows: list[list[str]], first: int) -> np.ndarray:
@@ -114,10 +136,11 @@ def _numbers(path: Path, rows: list[list[str]], first: int) -> np.ndarray:
             numbers[index, : len(row)] = [float(cell) if cell.strip() else np.nan for cell in row]
         except ValueError as error:
             raise InputError(f"{path}: row {first + index + 1}: {error}") from error
-    numbers = numbers[np.isfinite(numbers).any(axis=1)]
-    if not np.isfinite(numbers[:, :2]).all():
-        raise InputError(f"{path}: a row lacks its frame number or time")
-    return numbers
+    filled = np.isfinite(numbers).any(axis=1)
+    lacking = np.flatnonzero(filled & ~np.isfinite(numbers[:, :2]).all(axis=1))
+    if len(lacking):
+        raise InputError(f"{path}: row {first + lacking[0] + 1} lacks its frame number or time")
+    return numbers[filled]
 
 
 def _start(about: dict[str, str]) -> int:

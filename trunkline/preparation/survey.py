@@ -36,7 +36,7 @@ def survey(path: Path) -> Survey:
     Raises:
         InputError: it cannot be read at all.
     """
-    found = Survey(read_log(path))
+    found = Survey(read_log(path, POSES.keys() | JOINTS.keys()))
     try:
         found.pose_topics = pose_topics(found.log, None)
         if found.pose_topics:
@@ -59,13 +59,15 @@ def describe(found: Survey) -> list[str]:
     """Lines for people to read."""
     log = found.log
     lines = [f"{log.path}"] + [f"  damaged: {damage}" for damage in log.damage]
+    if log.unchecked:
+        lines.append(f"  {log.unchecked} of {log.count} messages without a checksum: bits that flipped there go unseen")
     width = max((len(name) for name in log.topics), default=0)
     for topic in sorted(log.topics.values(), key=lambda topic: topic.name):
         schema = short_name(topic.schema)
         use = "poses" if schema in POSES else "joints" if schema in JOINTS else "not read"
         lines.append(
             f"  {topic.name:{width}}  {topic.schema or 'no schema'} ({topic.encoding}), {use}: "
-            f"{len(topic.messages)} messages{_pace(topic.log_times)}"
+            f"{len(topic.log_times)} messages{_pace(topic.log_times)}"
         )
     lines += [f"  {note}" for note in found.notes]
     if found.poses is not None and len(found.poses.stamps):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PositiveInt
+from pydantic import Field
 
 from trunkline.fields.grid import Lattice
 from trunkline.fields.mesh import Surface, contains, unsimplified
@@ -25,8 +25,8 @@ class LabelSettings:
     """See conf/reachability/config.yaml; margin in m."""
 
     count: Annotated[int, Field(ge=100, le=1_000_000)]
-    starts: PositiveInt
-    starts_in_doubt: PositiveInt
+    starts: Annotated[int, Field(ge=1, le=10000)]
+    starts_in_doubt: Annotated[int, Field(ge=1, le=10000)]
     margin: Annotated[float, Field(gt=0, le=1)]
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PositiveInt
+from pydantic import Field
 
 
 @dataclass(frozen=True)
@@ -18,7 +18,7 @@ class RigidSettings:
     voxel: Annotated[float, Field(ge=0.005, le=0.1)]
     closing: Annotated[float, Field(gt=0, le=0.2)]
     smoothing: Annotated[float, Field(ge=0, le=5)]
-    smallest: PositiveInt
+    smallest: Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 @dataclass(frozen=True)
@@ -27,13 +27,13 @@ class HybridSettings:
 
     voxel: Annotated[float, Field(ge=0.007, le=0.1)]
     smoothing: Annotated[float, Field(ge=0, le=5)]
-    smallest: PositiveInt
-    tilts_deg: list[float]
+    smallest: Annotated[int, Field(ge=1, le=1_000_000)]
+    tilts_deg: list[Annotated[float, Field(gt=0, le=120)]]
     tilted_poses: Annotated[int, Field(ge=1000, le=2**22)]
 
     def __post_init__(self) -> None:
-        if any(not 0 < tilt <= 120 for tilt in self.tilts_deg) or len(set(self.tilts_deg)) < len(self.tilts_deg):
-            raise ValueError(f"tilts_deg: found {self.tilts_deg}, expected different angles above 0, up to 120")
+        if len(set(self.tilts_deg)) < len(self.tilts_deg):
+            raise ValueError(f"tilts_deg: found {self.tilts_deg}, expected different angles")
 
     @property
     def tilts(self) -> list[float]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PositiveInt
+from pydantic import Field
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
@@ -30,7 +30,7 @@ class SoftShape:
     tolerance: Annotated[float, Field(gt=0, le=0.2)]
     closing: Annotated[float, Field(gt=0, le=0.2)]
     smoothing: Annotated[float, Field(ge=0, le=5)]
-    smallest: PositiveInt
+    smallest: Annotated[int, Field(ge=1, le=1_000_000)]
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class SoftSettings(SoftShape):
 
     voxel: Annotated[float, Field(ge=0.003, le=0.1)]
     angle_step_deg: Annotated[float, Field(ge=0.5, le=180)]
-    directions: Annotated[int, Field(ge=8)]
-    steps: Annotated[int, Field(ge=8)]
+    directions: Annotated[int, Field(ge=8, le=10000)]
+    steps: Annotated[int, Field(ge=8, le=10000)]
 
     @property
     def angle_step(self) -> float:

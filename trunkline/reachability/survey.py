@@ -4,21 +4,22 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
-from pydantic import Field, NonNegativeInt
+from pydantic import Field
 
 from trunkline.reachability.checks import Check, LabelSettings, SpotCheckSettings, check_maps
 from trunkline.reachability.maps import Maps, blend_angles, build_maps
 from trunkline.reachability.settings import HybridSettings, RigidSettings
 from trunkline.reachability.soft import SoftSettings
 from trunkline.reachability.tips import ArmTips
+from trunkline.settings import Seed
 
 
 @dataclass
 class Survey:
     """See conf/reachability/config.yaml. seed: of poses, of the points that are checked and of the solver's starts."""
 
-    most_triangles: Annotated[int, Field(ge=100)]
-    seed: NonNegativeInt
+    most_triangles: Annotated[int, Field(ge=100, le=10_000_000)]
+    seed: Seed
     rigid: RigidSettings
     labels: LabelSettings
     soft: SoftSettings

@@ -1,18 +1,35 @@
 """A session: a folder of MCAP logs and the session.yaml that says what they are."""
 
 import difflib
+import re
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from omegaconf import OmegaConf
-from omegaconf.errors import OmegaConfBaseException
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
-from yaml import YAMLError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
-from trunkline.errors import InputError
+from trunkline.errors import InputError, nearest
+from trunkline.settings import read_yaml
 from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
 
+
+def _folder_name(name: str) -> str:
+    if not name or name.startswith(".") or {"/", "\\"} & set(name):
+        raise ValueError(f"found {name!r}, expected the name of a folder, without a path")
+    return name
+
+
+SessionName = Annotated[str, AfterValidator(_folder_name)]
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
@@ -107,6 +124,13 @@ class Session(Entry):
     clock: Literal["stamp", "log", "frame"] = "stamp"
     trials: list[TrialEntry] = Field(min_length=1)
 
+    @field_validator("base", mode="before")
+    @classmethod
+    def _name_or_pose(cls, base):
+        if not isinstance(base, str | dict):
+            raise ValueError(f"found {base!r}, expected a body's name, or {{position: [x, y, z]}}")
+        return base
+
     @field_validator("tendons", mode="before")
     @classmethod
     def _by_place(cls, names):
@@ -122,6 +146,11 @@ class Session(Entry):
         return self
 
 
+def sessions_in(folder: Path) -> list[str]:
+    """Names of the sessions that a folder holds."""
+    return sorted(file.parent.name for file in folder.glob("[!.]*/session.yaml"))
+
+
 def read_session(folder: Path) -> Session:
     """Read and check `folder`/session.yaml.
 
@@ -132,13 +161,11 @@ def read_session(folder: Path) -> Session:
     path = folder / "session.yaml"
     logs = sorted(log.name for log in folder.glob("*.mcap")) if folder.is_dir() else None
     if logs is None:
-        raise InputError(f"{folder}: no such folder, expected a session of MCAP logs and a session.yaml")
+        there = ", ".join(sessions_in(folder.parent)) or "none yet"
+        raise InputError(f"{folder}: no such folder, expected a session of MCAP logs and a session.yaml; found {there}")
     if not path.is_file():
         raise InputError(f"{folder}: found {len(logs)} logs and no session.yaml, expected both")
-    try:
-        content = OmegaConf.to_container(OmegaConf.load(path), resolve=False)
-    except (YAMLError, OmegaConfBaseException, UnicodeDecodeError, OSError) as error:
-        raise InputError(f"{path}: not readable as YAML: {' '.join(str(error).split())}") from error
+    content = OmegaConf.to_container(read_yaml(path), resolve=False)
     try:
         session = Session.model_validate(content)
     except ValidationError as error:
@@ -160,14 +187,20 @@ def _describe(error: ValidationError) -> str:
     problems = error.errors()
     # a union reports each of its branches; the deepest says what is wrong within the branch that was meant
     problem = max(problems, key=lambda p: (p["type"] in ("extra_forbidden", "value_error"), -problems.index(p)))
-    key = ".".join(str(part) for part in problem["loc"]) or "the file"
+    loc = [part for part in problem["loc"] if part != "str" and "FixedBase" not in str(part)]  # pydantic's branches
+    key = ".".join(map(str, loc)) or "the file"
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     if problem["type"] == "missing":
         return f"{key}: missing, expected a value{more}"
     if problem["type"] == "extra_forbidden":
-        return f"{key}: unknown key{more}"
+        valid = [name for block in Entry.__subclasses__() for name in block.model_fields]
+        return f"{key}: unknown key{nearest(str(loc[-1]), valid)}{more}"
     if problem["type"] == "value_error":
         key = f"{key}: " if problem["loc"] else ""
         return f"{key}{problem['msg'].removeprefix('Value error, ')}{more}"
     expected = problem["msg"].removeprefix("Input should be ")
+    if problem["type"] == "tuple_type":
+        expected = "a list of numbers, such as [0, 1, 0]"
+    if problem["type"] == "literal_error":
+        expected += nearest(str(problem["input"]), re.findall(r"'([^']*)'", expected))
     return f"{key}: found {problem['input']!r}, expected {expected}{more}"

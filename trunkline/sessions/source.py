@@ -39,7 +39,7 @@ def open_log(path: Path, session: Session) -> Source:
     Raises:
         InputError: naming the file and the topic, where the poses are missing or the topics are not clear.
     """
-    log = read_log(path)
+    log = read_log(path, POSES.keys() | JOINTS.keys())
     topics = pose_topics(log, session.topics.poses)
     if not topics:
         found = ", ".join(f"{t.name} ({t.schema})" for t in log.topics.values()) or "no readable message"
@@ -56,7 +56,10 @@ def open_log(path: Path, session: Session) -> Source:
     if not len(poses.stamps):
         schema = next(iter(topics.values())).schema
         names = f" with {len(session.bodies)} `bodies`, as in session.yaml" if session.bodies else ""
-        raise InputError(f"{where}: no message fits its schema {schema}{names}")
+        found = f"no message fits its schema {schema}{names}"
+        if poses.twice is not None:
+            found = f"found {poses.twice!r} twice in a message, expected each body once"
+        raise InputError(f"{where}: {found}")
     if len(poses.parents) > 1 and session.frame.name is None:
         found = f"found poses in the frames {', '.join(poses.parents)}, which nothing connects"
         raise InputError(f"{where}: {found}, expected one, or its name in session.yaml: frame.name")

@@ -4,9 +4,10 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 
 from trunkline.errors import InputError
+from trunkline.logs.log import Log
 from trunkline.signals.clock import FrameFit, OffsetFit
 
 
@@ -18,10 +19,10 @@ class Limits:
     clock_offset: s, the largest looked for between motors and cameras.
     """
 
-    duration: PositiveFloat
+    duration: Annotated[float, Field(gt=0, le=3600)]
     coverage: Annotated[float, Field(gt=0, le=1)]
-    disorder: PositiveFloat
-    clock_offset: PositiveFloat
+    disorder: Annotated[float, Field(gt=0, le=60)]
+    clock_offset: Annotated[float, Field(gt=0, le=60)]
 
 
 @dataclass
@@ -29,6 +30,7 @@ class Findings:
     """What came out about a take. repairs, warnings: one sentence each; what a warning names is left as it is.
 
     frames: stamps over frame numbers. logged: stamps over log times in s. offset: of the motors' clock.
+    log: that the trial is from, without its messages.
     """
 
     repairs: list[str] = field(default_factory=list)
@@ -36,6 +38,7 @@ class Findings:
     frames: FrameFit | None = None
     logged: FrameFit | None = None
     offset: OffsetFit | None = None
+    log: Log | None = None
 
 
 def in_order(stamps: np.ndarray, disorder: float, where: str, findings: Findings) -> np.ndarray:

@@ -49,6 +49,7 @@ def _take(
         InputError: naming the file, and what is missing in it.
     """
     where = f"{source.log.path}: trial {trial.name}"
+    findings.log = source.log
     findings.repairs += [f"log: {damage}" for damage in source.log.damage]
     findings.repairs += [] if reference.note is None else [reference.note]
     stretch = read_stretch(source, trial, session, limits, where, findings)
@@ -56,7 +57,7 @@ def _take(
     columns = columns_of(source, bodies, where)
     positions, quaternions = good_samples(source.poses, stretch.rows, columns, reference.scale, bodies, findings)
     drop_frozen(positions, quaternions, bodies, findings)
-    check_seen(positions, bodies, limits.coverage, where)
+    check_seen(positions, bodies, limits.coverage, where, findings)
     base_positions, base_quaternions, positions, quaternions = split_base(
         session, positions, quaternions, f"{where}: {source.pose_topic}"
     )

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trunkline.logs.log import Log
 from trunkline.signals.smoothing import noise_level
 from trunkline.takes.checks import Findings
 from trunkline.trials.take import Take
@@ -58,12 +59,21 @@ def report(qualities: list[Quality], refused: dict[str, str], offset: float, spr
     return {
         "trials": {quality.take.name: _trial(quality) for quality in qualities},
         "refused": refused,
+        "logs": {log.path.name: {"messages": log.count, "without_checksum": log.unchecked} for log in _logs(qualities)},
         "clock": {
             "offset_s": offset,
             "spread_s": spread if np.isfinite(spread) else None,
             "trials": sum(quality.findings.offset is not None for quality in qualities),
         },
     }
+
+
+def remarks(qualities: list[Quality]) -> list[str]:
+    """What whoever runs a stage should know at once, a line each."""
+    logs = _logs(qualities)
+    bare = [log.path.name for log in logs if log.unchecked]
+    told = f"{len(bare)} of {len(logs)} logs have messages without checksums, such as {bare[0]}" if bare else ""
+    return [f"{told}: bits that flipped there go unseen (quality.json: logs)"] if bare else []
 
 
 def summary(qualities: list[Quality], refused: dict[str, str], offset: float, spread: float) -> dict:
@@ -85,6 +95,10 @@ def summary(qualities: list[Quality], refused: dict[str, str], offset: float, sp
         "clock_offset_ms": 1e3 * offset,
         "clock_spread_ms": 1e3 * spread if np.isfinite(spread) else None,
     }
+
+
+def _logs(qualities: list[Quality]) -> list[Log]:
+    return list({log.path: log for quality in qualities if (log := quality.findings.log)}.values())
 
 
 def _trial(quality: Quality) -> dict:

@@ -63,17 +63,27 @@ def columns_of(source: Source, names: list[str], where: str) -> list[int]:
     poses = source.poses
     for name in names:
         if name not in poses.names:
-            raise InputError(f"{where}: {name!r} never appears in {source.pose_topic}, found {', '.join(poses.names)}")
+            found = f"{name!r} never appears in {source.pose_topic}, found {', '.join(poses.names)}"
+            raise InputError(f"{where}: {found}, expected it, or `segments` in session.yaml that leaves it out")
     return [poses.names.index(name) for name in names]
 
 
-def check_seen(positions: np.ndarray, names: list[str], least: float, where: str) -> None:
-    """Refuse a trial with a body, of (T, B, 3), that is seen in less than the share `least` of the frames."""
+def check_seen(positions: np.ndarray, names: list[str], least: float, where: str, findings: Findings) -> None:
+    """Refuse a trial with a body, of (T, B, 3), that is seen in less than the share `least` of the frames.
+
+    Or never in four frames in a row, which is what noise is measured by.
+    """
     seen = np.isfinite(positions[..., 0]).mean(axis=0)
-    for name, share in zip(names, seen, strict=True):
+    in_a_row = np.isfinite(np.diff(positions[..., 0], n=3, axis=0)).mean(axis=0) > 0
+    for name, share, enough in zip(names, seen, in_a_row, strict=True):
         if share < least:
-            found = f"{name!r} is seen in {100 * share:.1f} % of {len(positions)} frames"
+            dropped = [said for said in findings.repairs if " samples " in said and name in said]
+            why = f" ({'; '.join(dropped)})" if dropped else ""
+            found = f"{name!r} is seen in {100 * share:.1f} % of {len(positions)} frames{why}"
             raise InputError(f"{where}: {found}, expected at least {100 * least:g} %")
+        if not enough:
+            found = f"{name!r} is seen in {100 * share:.1f} % of {len(positions)} frames, but never in four in a row"
+            raise InputError(f"{where}: {found}, expected messages that hold all bodies, one after the other")
 
 
 def split_base(session: Session, positions: np.ndarray, quaternions: np.ndarray | None, where: str):

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import mujoco
 import numpy as np
-from pydantic import Field, PositiveFloat
+from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.unity.importer import as_imported
@@ -43,9 +43,9 @@ class Trajectory:
         duration: s. pull: largest pull of tendon 1, m. tilts_deg: gravity angles.
     """
 
-    duration: PositiveFloat
-    pull: PositiveFloat
-    tilts_deg: Annotated[list[float], Field(min_length=1)]
+    duration: Annotated[float, Field(gt=0, le=60)]
+    pull: Annotated[float, Field(gt=0, le=1)]
+    tilts_deg: Annotated[list[Annotated[float, Field(ge=0, le=180)]], Field(min_length=1)]
 
     @property
     def tilts(self) -> list[float]:
