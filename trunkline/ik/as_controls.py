@@ -110,8 +110,8 @@ class Reached:
     def time_to_rest(self) -> dict:
         """Median and 95th percentile, s; what never rested counts as longer than all others."""
         seconds = np.where(np.isfinite(self.seconds), self.seconds, np.inf)
-        found = {"median": np.quantile(seconds, 0.5), "p95": np.quantile(seconds, 0.95)}
-        return {name: value if np.isfinite(value) else None for name, value in found.items()}
+        found = np.quantile(seconds, (0.5, 0.95), method="higher")  # between two infinities, nothing is interpolated
+        return {name: v if np.isfinite(v) else None for name, v in zip(("median", "p95"), found, strict=True)}
 
 
 def score(
@@ -147,7 +147,7 @@ def settled(model: mujoco.MjModel, ask: Ask, targets: np.ndarray) -> Reached:
     rest = settle(
         model, answer["commands"][:, model.actuator_trnid[:, 0]], gravity_in_base(targets[:, 0]), rest_speed=REST_SPEED
     )
-    return _reached(targets, answer, np.where(rest.rested[:, None], rest.position, np.nan))
+    return replace(_reached(targets, answer, rest.position), rested=rest.rested)
 
 
 def driven(
