@@ -7,10 +7,20 @@ from typing import Literal
 import numpy as np
 from omegaconf import OmegaConf
 from omegaconf.errors import OmegaConfBaseException
-from pydantic import BaseModel, ConfigDict, Field, FiniteFloat, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PrivateAttr,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 from yaml import YAMLError
 
 from trunkline.errors import InputError
+from trunkline.sessions.splits import check_shared
 from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
@@ -75,6 +85,13 @@ class TrialEntry(Entry):
     level: FiniteFloat | None = None
     split: Literal["identify", "validate"]
 
+    @field_validator("level", mode="before")
+    @classmethod
+    def _number(cls, level):
+        if isinstance(level, bool):
+            raise ValueError(f"found {str(level).lower()}, expected a number")
+        return level
+
     @model_validator(mode="after")
     def _complete(self):
         if self.window is not None and not self.window[0] < self.window[1]:
@@ -96,6 +113,7 @@ class Session(Entry):
     bodies: names of the poses, in order, where messages hold them without. A list of tendons does the same for numbers.
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
+    shared: what is to be said of trials that share data, by trial; see `check_shared`.
     """
 
     frame: MocapFrame
@@ -106,6 +124,11 @@ class Session(Entry):
     bodies: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"
     trials: list[TrialEntry] = Field(min_length=1)
+    _shared: dict[str, list[str]] = PrivateAttr(default_factory=dict)
+
+    @property
+    def shared(self) -> dict[str, list[str]]:
+        return self._shared
 
     @field_validator("tendons", mode="before")
     @classmethod
@@ -152,6 +175,7 @@ def read_session(folder: Path) -> Session:
     for index, name in enumerate(names):
         if name in names[:index]:
             raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
+    session._shared = check_shared(folder, session.trials)
     return session
 
 

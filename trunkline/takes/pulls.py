@@ -1,0 +1,102 @@
+"""Whether a trial's tendons did what its experiment means: against its level, and commands against measurements."""
+
+import numpy as np
+
+from trunkline.signals.clock import MIN_TRAVEL
+from trunkline.signals.smoothing import noise_level
+from trunkline.trials.experiments import EXPERIMENTS, PULL
+from trunkline.trials.take import Take
+
+FOLLOWS, FAILS = 0.9, 0.5  # correlations of a measured tendon with its command's, and with another's
+LATEST = 0.3  # s, of a lag that is looked for
+EARLY = 0.01  # s by which what is measured may come before its command
+NOISIER = 5.0  # times the measurements' noise, that no command has
+
+
+def check_pulls(take: Take, idle: float, factor: float) -> list[str]:
+    """What cannot be true of a take's tendons, a sentence each.
+
+    Args:
+        idle: m, by which tendons may move in an experiment that does not pull them.
+        factor: by which pulls may differ from the level, and measured from commanded ones.
+    """
+    said = []
+    for key, pulls in (("commands", take.commands), ("tendon positions", take.tendon_positions)):
+        if not pulls.size:
+            continue
+        wound = pulls - pulls[0]
+        most = int(np.argmax(np.abs(wound).max(axis=0)))
+        kind = EXPERIMENTS[take.experiment]
+        if kind.needs_motors and kind.level is PULL and take.level is not None:
+            said += _against_level(key, wound, 1e-3 * take.level, factor)
+        elif not kind.needs_motors and not kind.static and np.abs(wound).max() > idle:
+            found = f"{take.tendons[most]!r} is wound by {1e3 * np.abs(wound).max():.4g} mm"
+            said.append(f"experiment: {key}: {found}, expected a {take.experiment} without actuation")
+        if said:
+            return said
+    if take.commands.size and take.tendon_positions.size:
+        return _against_commands(take, factor)
+    return said
+
+
+def _against_level(key: str, wound: np.ndarray, level: float, factor: float) -> list[str]:
+    """A pull is positive, in metres, and about as far as the level says."""
+    pulled, let_out = wound.max(), -wound.min()
+    fits = [level / factor <= some <= level * factor for some in (pulled, let_out)]
+    if fits[0]:
+        return []
+    expected = f"expected about {level:.4g} m, as its level says, positive where a tendon is pulled in"
+    if fits[1]:
+        return [f"{key}: found pulls from {-let_out:.4g} to {pulled:.4g} m, {expected}: is the sign reversed?"]
+    hint = ": are they in mm?" if level / factor <= 1e-3 * max(pulled, let_out) <= level * factor else ""
+    return [f"{key}: found pulls of up to {max(pulled, let_out):.4g} m, {expected}{hint}"]
+
+
+def _against_commands(take: Take, factor: float) -> list[str]:
+    """Each tendon's measured position follows its own command, forwards, by about as much, and not ahead of it."""
+    time, measured = take.tendon_time, take.tendon_positions
+    commanded = np.stack([np.interp(time, take.command_time, one) for one in take.commands.T], axis=1)
+    said = []
+    for tendon, name in enumerate(take.tendons):
+        if max(np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])) < MIN_TRAVEL:
+            continue
+        alike = [_correlation(measured[:, tendon], command) for command in commanded.T]
+        best = int(np.argmax(alike))
+        expected = "expected a tendon to follow its own command"
+        if alike[tendon] < -FAILS:
+            said.append(f"tendons: {name!r} moves against its commands, {expected}: is the sign reversed?")
+        elif alike[tendon] < FAILS and alike[best] > FOLLOWS:
+            said.append(f"tendons: {name!r} follows the commands of {take.tendons[best]!r}, {expected}")
+        else:
+            ratio = np.ptp(measured[:, tendon]) / max(np.ptp(commanded[:, tendon]), 1e-12)
+            if not 1 / factor <= ratio <= factor:
+                found = f"{name!r} moves by {np.ptp(measured[:, tendon]):.4g} m where {np.ptp(commanded[:, tendon]):.4g}"
+                said.append(f"tendons: {found} m are commanded, {expected}, within a factor of {factor:g}")
+    return said or _exchanged(take, commanded)
+
+
+def _exchanged(take: Take, commanded: np.ndarray) -> list[str]:
+    """Measurements lag behind commands and have noise; where it is the other way about, topics are exchanged."""
+    most = int(np.argmax(np.ptp(commanded, axis=0)))
+    if np.ptp(commanded[:, most]) < MIN_TRAVEL or len(take.tendon_time) < 10:
+        return []
+    lags = np.arange(-LATEST, LATEST, 0.005)
+    time, measured = take.tendon_time, take.tendon_positions[:, most]
+    inside = (time > time[0] + LATEST) & (time < time[-1] - LATEST)
+    if inside.sum() < 10:
+        return []
+    shifted = [np.interp(time[inside] - lag, take.command_time, take.commands[:, most]) for lag in lags]
+    lag = float(lags[int(np.argmax([_correlation(measured[inside], one) for one in shifted]))])
+    noise = [float(noise_level(some)[most]) for some in (take.commands, take.tendon_positions)]
+    if lag >= -EARLY and not (lag <= EARLY and noise[0] > NOISIER * noise[1]):
+        return []
+    found = f"what is measured comes {-1e3 * lag:.0f} ms before its command" if lag < -EARLY else (
+        f"commands are noisier, by {1e3 * noise[0]:.2g} mm, than what is measured, by {1e3 * noise[1]:.2g} mm"
+    )
+    return [f"topics: {found}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
+
+
+def _correlation(one: np.ndarray, other: np.ndarray) -> float:
+    one, other = one - one.mean(), other - other.mean()
+    size = np.linalg.norm(one) * np.linalg.norm(other)
+    return float(one @ other / size) if size > 0 else 0.0
