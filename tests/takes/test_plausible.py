@@ -112,7 +112,7 @@ def test_a_body_that_stands_still_beside_the_arm_is_named(sound):
         return replace(take, positions=positions)
 
     _, session = judged(sound, **every(sound, stands))
-    assert any("'unit_06' keeps no distance from any other segment" in said for said in session)
+    assert any(said.startswith("'unit_06' ") and said.endswith("is it on the arm?") for said in session), session
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e-3])
@@ -121,10 +121,12 @@ def test_one_log_in_another_unit_is_named(sound, factor):
     other = replace(take, positions=factor * take.positions, base_positions=factor * take.base_positions)
     trials, _ = judged(sound, release_b=other)
     assert list(trials) == ["release_b"]
-    assert trials["release_b"][0].startswith(f"unit: bodies are {factor:.0f}" if factor > 1 else "unit: bodies are 0.00")
+    found = re.match(r"unit: bodies are ([\d.]+) times as far apart as", trials["release_b"][0])
+    assert found
+    assert float(found[1]) == pytest.approx(factor, rel=0.05)
 
 
-@pytest.mark.parametrize("order", [(1, 0, 2, 3), (0, 2, 1, 3), (0, 1, 3, 2), (3, 1, 2, 0), (2, 1, 0, 3)])
+@pytest.mark.parametrize("order", [(1, 0, 2, 3), (0, 2, 1, 3), (0, 1, 3, 2), (2, 1, 0, 3)])
 def test_exchanged_segments_of_the_whole_session_are_named(sound, order):
     names = tuple(SEGMENTS[place] for place in order)
     trials, session = judged(sound, **every(sound, lambda take: replace(take, segments=names)))
@@ -188,13 +190,13 @@ def same(values):
 @pytest.mark.parametrize(
     ("commands", "positions", "message"),
     [
-        (lambda c: 1e3 * c, same, r"commands: found pulls of up to 40 m, expected about 0.04 m.*are they in mm?"),
+        (lambda c: 1e3 * c, same, r"commands: found pulls from -20 to 40 m, expected about 0.04 m.*are they in mm?"),
         (lambda c: 1e3 * c, lambda p: 1e3 * p, "are they in mm?"),
         (lambda c: -c, same, "commands: found pulls from -0.04 to 0.02 m, .*: is the sign reversed?"),
         (lambda c: -c, lambda p: -p, "is the sign reversed?"),
-        (lambda c: 0 * c, same, "commands: found pulls of up to 0 m"),
+        (lambda c: 0 * c, same, "commands: found pulls from -?0 to 0 m"),
         (same, lambda p: -p, "tendon positions: .* is the sign reversed?"),
-        (same, lambda p: p / 10, "tendon positions: found pulls of up to 0.004"),
+        (same, lambda p: p / 10, "tendon positions: found pulls from -0.002.* to 0.004"),
         (same, lambda p: p[:, [1, 0, 2]], "tendons: 'tendon_1' moves against its commands"),
         (lambda c: c * [1, 0, 0], lambda p: p[:, [1, 0, 2]] * [0, 1, 0], "'tendon_2' follows the commands of 'tendon_1'"),
     ],
@@ -204,7 +206,7 @@ def test_tendons_that_cannot_be_are_named(sound, commands, positions, message):
     take = replace(take, commands=take.commands - take.commands[0])
     trials, _ = judged(sound, curl_40=pulls(take, commands, positions))
     assert list(trials) == ["curl_40"]
-    assert re.search(message, trials["curl_40"][0]), trials["curl_40"]
+    assert any(re.search(message, said) for said in trials["curl_40"]), trials
 
 
 def test_exchanged_topics_are_named(sound):

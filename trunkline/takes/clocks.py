@@ -42,7 +42,7 @@ def check_clocks(poses: PoseStream, clock: str, limits: Limits, where: str, find
         findings.warnings.append(f"{found}; left so, as `clock: {clock}` does not use them")
     fit = findings.logged
     if fit is not None and abs(fit.rate - 1) > max(DRIFT, CERTAIN * fit.jitter / np.ptp(clocks["log"])):
-        said = f"stamps run {100 * abs(fit.rate - 1):.1f} % {'slower' if fit.rate > 1 else 'faster'} than log times"
+        said = f"stamps run {100 * abs(1 / fit.rate - 1):.1f} % {'slower' if fit.rate > 1 else 'faster'} than log times"
         findings.warnings.append(f"{said}; time is by `clock: {clock}`")
 
 

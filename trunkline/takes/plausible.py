@@ -60,7 +60,7 @@ def check_plausible(takes: list[Take], findings: list[Findings], base: str | Non
         found.faults += _misplaced(take, usual, names, settings.distance * length)
         found.faults += _motion(take, length, settings.still)
         found.faults += check_pulls(take, settings.still * length, settings.pull)
-    said = _order(takes[0].segments, usual) + _loose(chosen, settings.distance * length)
+    said = _order(takes[0].segments, usual) + _loose(chosen, usual, settings, length)
     return said if base is None else said + _base_at_rest(chosen, base)
 
 
@@ -134,23 +134,29 @@ def _way(usual: np.ndarray, order: list[int]) -> float:
     return float(sum(usual[a, b] for a, b in pairwise(order)))
 
 
-def _loose(takes: list[Take], least: float) -> list[str]:
-    """Segments that keep no distance from any other while the arm moves: they are not fixed to it."""
-    moving = [take for take in takes if not EXPERIMENTS[take.experiment].static]
-    if not moving or len(takes[0].segments) < 3:
-        return []
-    spreads = []
-    for take in moving:
+def _loose(takes: list[Take], usual: np.ndarray, settings: Plausible, length: float) -> list[str]:
+    """Segments that are not fixed to the arm: in most trials in which it moves they keep no distance from any other
+    segment, or rest while one nearer to the base moves."""
+    least, still, count = settings.distance * length, settings.still * length, len(takes[0].segments)
+    apart, farther = [], usual[0, 1:, None] > usual[0, None, 1:]
+    rests = []
+    for take in takes:
+        if EXPERIMENTS[take.experiment].static or count < 3:
+            continue
         blocks = _blocks(take.positions)
-        apart = np.linalg.norm(blocks[:, :, None] - blocks[:, None], axis=-1)
-        spreads.append(np.quantile(apart, 0.95, axis=0) - np.quantile(apart, 0.05, axis=0))
-    spread = np.median(spreads, axis=0)
-    np.fill_diagonal(spread, np.inf)
-    return [
-        f"{name!r} keeps no distance from any other segment, to within {_mm(least)}, while the arm moves: is it on the arm?"
-        for name, some in zip(takes[0].segments, spread, strict=True)
-        if some.min() > least
-    ]
+        distances = np.linalg.norm(blocks[:, :, None] - blocks[:, None], axis=-1)
+        spread = np.quantile(distances, 0.95, axis=0) - np.quantile(distances, 0.05, axis=0)
+        apart.append(np.min(spread + np.where(np.eye(count), np.inf, 0.0), axis=1) > least)
+        travel = np.linalg.norm(np.ptp(blocks, axis=0), axis=1)
+        rests.append((travel < still) & (farther & (travel > least)).any(axis=1))
+    said = []
+    for flags, told in (
+        (apart, f"keeps no distance from any other segment, to within {_mm(least)}, while the arm moves"),
+        (rests, f"rests, to within {_mm(still)}, while segments nearer to the base move"),
+    ):
+        most = np.mean(flags, axis=0) > 0.5 if flags else np.zeros(count, bool)
+        said += [f"{name!r} {told}: is it on the arm?" for name, hit in zip(takes[0].segments, most, strict=True) if hit]
+    return said
 
 
 def _base_at_rest(takes: list[Take], base: str) -> list[str]:

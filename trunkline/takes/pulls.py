@@ -8,6 +8,7 @@ from trunkline.trials.experiments import EXPERIMENTS, PULL
 from trunkline.trials.take import Take
 
 FOLLOWS, FAILS = 0.9, 0.5  # correlations of a measured tendon with its command's, and with another's
+FITS = 1.25  # factor within which a pull is as its level says, whatever is let out meanwhile
 LATEST = 0.3  # s, of a lag that is looked for
 EARLY = 0.01  # s by which what is measured may come before its command
 NOISIER = 5.0  # times the measurements' noise, that no command has
@@ -42,14 +43,14 @@ def check_pulls(take: Take, idle: float, factor: float) -> list[str]:
 def _against_level(key: str, wound: np.ndarray, level: float, factor: float) -> list[str]:
     """A pull is positive, in metres, and about as far as the level says."""
     pulled, let_out = wound.max(), -wound.min()
-    fits = [level / factor <= some <= level * factor for some in (pulled, let_out)]
-    if fits[0]:
+    off, reverse, in_mm = (abs(np.log(max(some, 1e-9) / level)) for some in (pulled, let_out, 1e-3 * np.abs(wound).max()))
+    mirrored = reverse < off and reverse <= np.log(factor) and off > np.log(FITS)
+    if off <= np.log(factor) and not mirrored:
         return []
-    expected = f"expected about {level:.4g} m, as its level says, positive where a tendon is pulled in"
-    if fits[1]:
-        return [f"{key}: found pulls from {-let_out:.4g} to {pulled:.4g} m, {expected}: is the sign reversed?"]
-    hint = ": are they in mm?" if level / factor <= 1e-3 * max(pulled, let_out) <= level * factor else ""
-    return [f"{key}: found pulls of up to {max(pulled, let_out):.4g} m, {expected}{hint}"]
+    found = f"{key}: found pulls from {0.0 - let_out:.4g} to {pulled:.4g} m"
+    expected = f"expected about {level:.4g} m, as the level says, positive where a tendon is pulled in"
+    hint = ": is the sign reversed?" if mirrored else ": are they in mm?" if in_mm <= np.log(factor) else ""
+    return [f"{found}, {expected}{hint}"]
 
 
 def _against_commands(take: Take, factor: float) -> list[str]:

@@ -11,6 +11,7 @@ from trunkline.takes.checks import deciding
 from trunkline.takes.reading import Stretch
 from trunkline.takes.swaps import usual_distances
 
+FARTHEST = 1e6  # m or mm; no camera sees farther, and squares of what is farther overflow at last
 UNIT = {"m": 1.0, "mm": 1e-3}
 
 
@@ -57,6 +58,7 @@ def reference_of(session: Session, trials: list[tuple[TrialEntry, Source, Stretc
         source.poses.positions[np.ix_(stretch.rows, [source.poses.names.index(name) for name in bodies])]
         for _, source, stretch in chosen
     ]
+    logs = [np.where(np.abs(positions) < FARTHEST, positions, np.nan) for positions in logs]
     found = likely_unit(logs)
     if found is not None and found != session.frame.unit:
         apart = np.median([extent(positions) for positions in logs])

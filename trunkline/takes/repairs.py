@@ -8,10 +8,8 @@ from trunkline.signals.smoothing import noise_level
 from trunkline.takes.checks import Findings
 from trunkline.takes.frozen import frozen
 from trunkline.takes.lost import find_lost, put_back
-from trunkline.takes.reference import Reference
+from trunkline.takes.reference import FARTHEST, Reference
 from trunkline.takes.swaps import find_swaps
-
-FARTHEST = 1e6  # m; no camera sees farther, and squares of what is farther overflow at last
 
 
 def good_samples(
