@@ -85,7 +85,8 @@ def missing(session):
 
 def mislabel(session):
     path = session / "session.yaml"
-    path.write_text(path.read_text().replace("release_a.mcap, experiment: release", "release_a.mcap, experiment: static_tilt, level: 0"))
+    right, wrong = "release_a.mcap, experiment: release", "release_a.mcap, experiment: static_tilt, level: 0"
+    path.write_text(path.read_text().replace(right, wrong))
 
 
 def never(session):

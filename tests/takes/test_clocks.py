@@ -17,7 +17,7 @@ RATE, START = 120.0, 1_760_000_000_000_000_000
 
 
 def log(seed=0, count=600, drop=0.02, drift=1e-4, stall=None, gap=None):
-    """Clocks of an ordinary log: jittered stamps, late messages, dropped frames; a stall of the recorder, or a pause."""
+    """Clocks of a log: jittered stamps, late messages, dropped frames; a recorder that stalls, or a pause."""
     rng = np.random.default_rng(seed)
     frames = np.flatnonzero(rng.random(count) >= drop)
     if gap:

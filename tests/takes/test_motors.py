@@ -126,3 +126,15 @@ def test_two_estimates_of_the_clock_that_disagree_in_most_trials_are_said(tmp_pa
     assert first[0].startswith("clock: by the whole motion the motors' offset is +0.170 s from the one by the first")
     assert "+0.170 s in the median of 3 trials, expected at most 0.1 s" in second[0]
     assert third == []
+
+
+def test_commands_an_hour_off_are_refused_though_positions_are_there(tmp_path):
+    def ahead(m):
+        m.command_stamps[:] += 3_600_000_000_000
+
+    curl(tmp_path, ahead)
+    refused_curl(
+        tmp_path,
+        r"found \d+ messages on /tendon_commands, 3597.\d+ s after the poses and \d+ messages on /tendon_states, "
+        "expected commands and tendon positions within 1 s of the poses",
+    )

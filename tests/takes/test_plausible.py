@@ -198,7 +198,11 @@ def same(values):
         (same, lambda p: -p, "tendon positions: .* is the sign reversed?"),
         (same, lambda p: p / 10, "tendon positions: found pulls from -0.002.* to 0.004"),
         (same, lambda p: p[:, [1, 0, 2]], "tendons: 'tendon_1' moves against its commands"),
-        (lambda c: c * [1, 0, 0], lambda p: p[:, [1, 0, 2]] * [0, 1, 0], "'tendon_2' follows the commands of 'tendon_1'"),
+        (
+            lambda c: c * [1, 0, 0],
+            lambda p: p[:, [1, 0, 2]] * [0, 1, 0],
+            "'tendon_2' follows the commands of 'tendon_1",
+        ),
     ],
 )
 def test_tendons_that_cannot_be_are_named(sound, commands, positions, message):
@@ -207,6 +211,16 @@ def test_tendons_that_cannot_be_are_named(sound, commands, positions, message):
     trials, _ = judged(sound, curl_40=pulls(take, commands, positions))
     assert list(trials) == ["curl_40"]
     assert any(re.search(message, said) for said in trials["curl_40"]), trials
+
+
+def test_pulls_from_an_encoder_that_starts_anywhere_are_left(sound):
+    take = take_of(sound, "curl_40")
+    assert judged(sound, curl_40=replace(take, tendon_positions=take.tendon_positions + 1.7)) == ({}, [])
+    half = len(take.command_time) // 2
+    wound = take.tendon_time > take.command_time[half]
+    later = {"command_time": take.command_time[half:], "commands": take.commands[half:]}
+    later |= {"tendon_time": take.tendon_time[wound], "tendon_positions": take.tendon_positions[wound]}
+    assert judged(sound, curl_40=replace(take, **later)) == ({}, []), "a window that begins with the arm curled"
 
 
 def test_exchanged_topics_are_named(sound):
@@ -238,7 +252,7 @@ def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
     assert "'unit_06' is " in left.refused["release_a"]
     assert "release_a" not in [take.name for take in left.takes]
     kept = gathered("warn", "stop")
-    (said,) = [found.warnings for take, found in zip(kept.takes, kept.findings, strict=True) if take.name == "release_a"]
+    said = {take.name: found.warnings for take, found in zip(kept.takes, kept.findings, strict=True)}["release_a"]
     assert said[0].startswith("'unit_06' is ")
 
 
@@ -255,9 +269,8 @@ def test_a_level_that_the_base_contradicts_is_said(folder, sound):
 def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
     taken = [(t, some, Findings()) for name, (t, some, _) in sound.items() if name != "curl_60"]
     gathered = gather(taken, read_session(folder), PLAUSIBLE, "stop", "here")
-    assert all(
-        found.warnings == ["splits: no curl of the split validate, which the session has"] for found in gathered.findings
-    )
+    said = ["splits: no curl of the split validate, which the session has"]
+    assert all(found.warnings == said for found in gathered.findings)
 
 
 def test_usual_distances_of_other_splits_are_said(tmp_path):

@@ -26,7 +26,8 @@ def check_shared(folder: Path, trials: list["TrialEntry"]) -> dict[str, list[str
         one, other = first.window or whole, second.window or whole
         if max(one[0], other[0]) >= min(one[1], other[1]):
             continue
-        files = "one file" if first.file == second.file else f"{first.file} and {second.file}, which hold the same bytes"
+        one_name = first.file == second.file
+        files = "one file" if one_name else f"{first.file} and {second.file}, which hold the same bytes"
         windows = "" if first.window is second.window is None else f" in {_window(one)} and {_window(other)}"
         found = f"trials {first.name} and {second.name} share data: {files}{windows}"
         if first.split != second.split:

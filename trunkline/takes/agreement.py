@@ -3,7 +3,7 @@
 import numpy as np
 
 from trunkline.sessions.session import FixedBase, Session
-from trunkline.signals.clock import OffsetFit, agree_on_offset
+from trunkline.signals.clock import agree_on_offset
 from trunkline.takes.checks import Findings
 from trunkline.takes.vertical import check_levels, check_vertical
 from trunkline.trials.take import Take
@@ -34,7 +34,8 @@ def align_clocks(takes: list[Take], findings: list[Findings], disagreement: floa
     middle = float(np.median(list(apart.values()) or [0.0]))
     for take, found in zip(takes, findings, strict=True):
         if abs(middle) > disagreement < abs(apart.get(take.name, 0.0)):
-            said = f"clock: by the whole motion the motors' offset is {apart[take.name]:+.3f} s from the one by the first"
+            own = apart[take.name]
+            said = f"clock: by the whole motion the motors' offset is {own:+.3f} s from the one by the first"
             expected = f"{middle:+.3f} s in the median of {len(apart)} trials, expected at most {disagreement:g} s"
             found.warnings.append(f"{said}, {expected}: does the arm rest before its tendons move?")
     return offset, spread

@@ -35,7 +35,8 @@ def check_clocks(poses: PoseStream, clock: str, limits: Limits, where: str, find
         other = early if wrong == late else late
         size = step.size if wrong == late else -step.size
         seconds = clocks[late][step.at - 1] - clocks[late][0]
-        found = f"{WORDS[wrong]} jump by {size:+.3f} s at message {step.at}, after {seconds:.2f} s, against {WORDS[other]}"
+        place = f"at message {step.at}, after {seconds:.2f} s, against {WORDS[other]}"
+        found = f"{WORDS[wrong]} jump by {size:+.3f} s {place}"
         if wrong in USED[clock]:
             others = " or ".join(f"`clock: {name}`" for name, used in USED.items() if wrong not in used)
             raise InputError(f"{where}: {found}, expected a clock that runs evenly, such as {others} in session.yaml")

@@ -81,8 +81,8 @@ def check_motors(
             raise InputError(f"{where}: topics.{key}: found {name!r}, which no log has, expected one of: {others}")
     streams = (source.commands, source.tendon_positions)
     within = [motors.commands.size > 0, motors.tendon_positions.size > 0]
-    lost = [stream is not None and len(stream.stamps) and not some for stream, some in zip(streams, within, strict=True)]
-    if any(within) and not any(lost):
+    lost = [stream for stream, some in zip(streams, within, strict=True) if stream and len(stream.stamps) and not some]
+    if any(within) and not lost:
         return
     recorder = _by_recorder(source, session)
     found = [

@@ -97,7 +97,8 @@ def _motion(take: Take, length: float, still: float) -> list[str]:
     most = int(np.argmax(travel))
     if static == (travel[most] <= still * length):
         return []
-    found = f"{take.segments[most]!r} moves by {_mm(travel[most])}, {100 * travel[most] / length:.2g} % of the arm's length"
+    share = 100 * travel[most] / length
+    found = f"{take.segments[most]!r} moves by {_mm(travel[most])}, {share:.2g} % of the arm's length"
     expected = f"expected {'at most' if static else 'more than'} {100 * still:g} % in a {take.experiment}"
     others = ", ".join(name for name, kind in EXPERIMENTS.items() if kind.static != static)
     return [f"experiment: {found}, {expected}: is it another experiment ({others})?"]
@@ -155,7 +156,8 @@ def _loose(takes: list[Take], usual: np.ndarray, settings: Plausible, length: fl
         (rests, f"rests, to within {_mm(still)}, while segments nearer to the base move"),
     ):
         most = np.mean(flags, axis=0) > 0.5 if flags else np.zeros(count, bool)
-        said += [f"{name!r} {told}: is it on the arm?" for name, hit in zip(takes[0].segments, most, strict=True) if hit]
+        hit = [name for name, some in zip(takes[0].segments, most, strict=True) if some]
+        said += [f"{name!r} {told}: is it on the arm?" for name in hit]
     return said
 
 

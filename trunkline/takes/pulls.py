@@ -21,29 +21,29 @@ def check_pulls(take: Take, idle: float, factor: float) -> list[str]:
         idle: m, by which tendons may move in an experiment that does not pull them.
         factor: by which pulls may differ from the level, and measured from commanded ones.
     """
-    said = []
-    for key, pulls in (("commands", take.commands), ("tendon positions", take.tendon_positions)):
-        if not pulls.size:
-            continue
-        wound = pulls - pulls[0]
-        most = int(np.argmax(np.abs(wound).max(axis=0)))
-        kind = EXPERIMENTS[take.experiment]
-        if kind.needs_motors and kind.level is PULL and take.level is not None:
-            said += _against_level(key, wound, 1e-3 * take.level, factor)
-        elif not kind.needs_motors and not kind.static and np.abs(wound).max() > idle:
-            found = f"{take.tendons[most]!r} is wound by {1e3 * np.abs(wound).max():.4g} mm"
-            said.append(f"experiment: {key}: {found}, expected a {take.experiment} without actuation")
-        if said:
-            return said
+    kind = EXPERIMENTS[take.experiment]
+    if kind.needs_motors and kind.level is PULL and take.level is not None:
+        for key, pulls in (("commands", take.commands), ("tendon positions", take.tendon_positions)):
+            # from the straight arm, or where encoders start anywhere, from the trial's begin
+            said = [_against_level(key, pulls - zero, 1e-3 * take.level, factor) for zero in (0.0, pulls[:1])]
+            if pulls.size and all(said):
+                return said[1]
+    elif not kind.needs_motors and not kind.static and take.commands.size:  # a loose tendon may well move by itself
+        wound = np.ptp(take.commands, axis=0)
+        most = int(np.argmax(wound))
+        if wound[most] > idle:
+            found = f"{take.tendons[most]!r} is wound by {1e3 * wound[most]:.4g} mm"
+            return [f"experiment: commands: {found}, expected a {take.experiment} without actuation"]
     if take.commands.size and take.tendon_positions.size:
         return _against_commands(take, factor)
-    return said
+    return []
 
 
 def _against_level(key: str, wound: np.ndarray, level: float, factor: float) -> list[str]:
     """A pull is positive, in metres, and about as far as the level says."""
-    pulled, let_out = wound.max(), -wound.min()
-    off, reverse, in_mm = (abs(np.log(max(some, 1e-9) / level)) for some in (pulled, let_out, 1e-3 * np.abs(wound).max()))
+    pulled, let_out = wound.max(initial=0.0), -wound.min(initial=0.0)
+    sizes = (pulled, let_out, 1e-3 * max(pulled, let_out))
+    off, reverse, in_mm = (abs(np.log(max(size, 1e-9) / level)) for size in sizes)
     mirrored = reverse < off and reverse <= np.log(factor) and off > np.log(FITS)
     if off <= np.log(factor) and not mirrored:
         return []
@@ -69,10 +69,10 @@ def _against_commands(take: Take, factor: float) -> list[str]:
         elif alike[tendon] < FAILS and alike[best] > FOLLOWS:
             said.append(f"tendons: {name!r} follows the commands of {take.tendons[best]!r}, {expected}")
         else:
-            ratio = np.ptp(measured[:, tendon]) / max(np.ptp(commanded[:, tendon]), 1e-12)
-            if not 1 / factor <= ratio <= factor:
-                found = f"{name!r} moves by {np.ptp(measured[:, tendon]):.4g} m where {np.ptp(commanded[:, tendon]):.4g}"
-                said.append(f"tendons: {found} m are commanded, {expected}, within a factor of {factor:g}")
+            moves, asked = np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])
+            if not asked / factor <= moves <= asked * factor:
+                found = f"{name!r} moves by {moves:.4g} m where {asked:.4g} m are commanded"
+                said.append(f"tendons: {found}, {expected}, within a factor of {factor:g}")
     return said or _exchanged(take, commanded)
 
 
@@ -91,9 +91,9 @@ def _exchanged(take: Take, commanded: np.ndarray) -> list[str]:
     noise = [float(noise_level(some)[most]) for some in (take.commands, take.tendon_positions)]
     if lag >= -EARLY and not (lag <= EARLY and noise[0] > NOISIER * noise[1]):
         return []
-    found = f"what is measured comes {-1e3 * lag:.0f} ms before its command" if lag < -EARLY else (
-        f"commands are noisier, by {1e3 * noise[0]:.2g} mm, than what is measured, by {1e3 * noise[1]:.2g} mm"
-    )
+    found = f"commands are noisier, by {1e3 * noise[0]:.2g} mm, than what is measured, by {1e3 * noise[1]:.2g} mm"
+    if lag < -EARLY:
+        found = f"what is measured comes {-1e3 * lag:.0f} ms before its command"
     return [f"topics: {found}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
 
 

@@ -55,7 +55,7 @@ def reference_of(session: Session, trials: list[tuple[TrialEntry, Source, Stretc
         told = "the unit and the usual distances between bodies are of trials of other splits"
         reference.warnings.append(f"no trial of the split identify can be read: {told}")
     logs = [
-        source.poses.positions[np.ix_(stretch.rows, [source.poses.names.index(name) for name in bodies])]
+        source.poses.positions[np.ix_(stretch.rows, np.array([source.poses.names.index(name) for name in bodies], int))]
         for _, source, stretch in chosen
     ]
     logs = [np.where(np.abs(positions) < FARTHEST, positions, np.nan) for positions in logs]
