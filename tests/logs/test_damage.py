@@ -28,7 +28,7 @@ def session(folder, change=None, truths=None, settings=CLEAN):
     folder.mkdir(exist_ok=True)
     measured = [
         measure(truth, settings, np.random.default_rng(seed), 30.0 * seed)
-        for seed, truth in enumerate(truths or [release_truth(), static_truth(30.0), curl_truth()])
+        for seed, truth in enumerate(truths or [release_truth(), static_truth(30.0), curl_truth(split="identify")])
     ]
     if change:
         change(measured[0])
