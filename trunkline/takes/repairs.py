@@ -29,7 +29,7 @@ def good_samples(
     present = poses.present[cells]
     finite = np.isfinite(positions).all(axis=-1)
     far = finite & np.any(np.abs(positions) > FARTHEST, axis=-1)
-    nowhere = finite & np.all(positions == 0, axis=-1)
+    nowhere = np.asarray(finite & np.all(positions == 0, axis=-1))
     if reference.base is not None and nowhere[:, 0].sum() == finite[:, 0].sum():
         nowhere[:, 0] = False
     _tell_dropped(far, f"with a position beyond {FARTHEST:g} m", names, findings)
