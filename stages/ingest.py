@@ -1,7 +1,7 @@
 """Read the session's MCAP logs: trials as Parquet, and a report on the quality of the data."""
 
+import sys
 from pathlib import Path
-from typing import Literal
 
 from trunkline.errors import InputError
 from trunkline.figures.data import quality_figure
@@ -10,10 +10,11 @@ from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.sessions.session import SessionName, read_session
 from trunkline.settings import settings
-from trunkline.takes.agreement import align_clocks, settle_vertical
 from trunkline.takes.checks import Limits
+from trunkline.takes.gathering import Refusal, gather
 from trunkline.takes.intake import take_in
-from trunkline.takes.quality import judge, remarks, report, summary
+from trunkline.takes.plausible import Plausible
+from trunkline.takes.quality import by_sentence, judge, remarks, report, summary
 from trunkline.trials.take import write_takes
 
 RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Path("artifacts/ingest")
@@ -22,36 +23,32 @@ RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Pat
 @settings
 class Config:
     session: SessionName
-    refused_trials: Literal["stop", "leave_out"]
+    refused_trials: Refusal
     limits: Limits
+    plausible: Plausible
 
 
 def main(config: Config) -> None:
     folder = RAW / config.session
     session = read_session(folder)
-    takes, findings, refused = [], [], {}
     with progress(len(session.trials), "ingest", "trials") as bar:
+        taken = []
         for trial, take, found in take_in(folder, session, config.limits):
-            if isinstance(take, InputError):
-                if config.refused_trials == "stop":
-                    raise take
-                refused[trial.name] = str(take)
-            else:
-                takes.append(take)
-                findings.append(found)
+            if isinstance(take, InputError) and config.refused_trials == "stop":
+                raise take
+            taken.append((trial, take, found))
             bar.update(1, trial=trial.name)
-    if not takes:
-        raise InputError(f"{folder}: all {len(refused)} trials refused, the first: {next(iter(refused.values()))}")
-    settle_vertical(takes, findings, session)
-    offset, spread = align_clocks(takes, [found.offset for found in findings])
-    qualities = [judge(take, found) for take, found in zip(takes, findings, strict=True)]
+    gathered = gather(taken, session, config.plausible, config.refused_trials, f"{folder}")
+    qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
     for line in remarks(qualities):
         print(f"ingest: {line}")
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
-        write_takes(processed, takes)
-        write_json(artifacts / "quality.json", report(qualities, refused, offset, spread))
-        write_json(artifacts / "metrics.json", summary(qualities, refused, offset, spread))
-        save_figure(quality_figure(qualities, refused, offset, spread), artifacts / "quality.png")
+        write_takes(processed, gathered.takes)
+        write_json(artifacts / "quality.json", report(qualities, gathered))
+        write_json(artifacts / "metrics.json", summary(qualities, gathered))
+        save_figure(quality_figure(qualities, gathered), artifacts / "quality.png")
+    for line in by_sentence(qualities, lambda found: found.warnings):
+        print(f"ingest: warning: {line}", file=sys.stderr)
 
 
 if __name__ == "__main__":

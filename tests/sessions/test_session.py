@@ -68,6 +68,7 @@ def test_good_session(tmp_path):
             r"trials.0: level: missing, expected the nominal level of a static_tilt",
         ),
         (("trials", 0, "level"), float("nan"), r"trials.0.level: found nan, expected a finite number"),
+        (("trials", 0, "level"), True, r"trials.0.level: found true, expected a number"),
         (("trials", 0, "level"), 200, r"trials.0: level: found 200, expected 0 to 180, the degrees of tilt"),
         (
             ("trials", 0),

@@ -38,18 +38,25 @@ def set_param(project, old, new):
 
 
 def test_takes_report_and_metrics(project, capsys):
-    assert run(capsys) == (0, "")
+    code, said = run(capsys)
+    assert code == 0
+    told = [line.removeprefix("ingest: warning: ") for line in said.splitlines()]
+    assert [line.split(":")[1].strip() for line in told] == ["splits", "splits", "clock"], "a session of four trials"
     takes = read_takes(ingest.PROCESSED)
     assert [take.name for take in takes] == ["tilt_00", "tilt_60", "release_a", "curl_40"]
     assert {take.segments for take in takes} == {SEGMENTS}
     metrics = json.loads((ingest.ARTIFACTS / "metrics.json").read_text())
     assert metrics["trials"] == 4
-    assert metrics["refused"] == metrics["repairs"] == 0
+    assert metrics["refused"] == 0
+    assert metrics["repairs"] == {"identify": 0, "validate": 0, "total": 0}
+    assert metrics["warnings"] == 3 * 4
     assert metrics["position_noise_mm"] == pytest.approx(0.3, rel=0.15)
     assert metrics["orientation_noise_deg"] == pytest.approx(0.3, rel=0.15)
     assert metrics["clock_offset_ms"] == pytest.approx(-137, abs=8)
     assert metrics["rate_hz"] == pytest.approx(120, rel=1e-3)
     report = json.loads((ingest.ARTIFACTS / "quality.json").read_text())
+    for trial in report["trials"].values():
+        assert [f"all trials: {warning}" for warning in trial["warnings"]] == told
     assert report["trials"]["release_a"]["stamp_jitter_ms"] == pytest.approx(1.0, rel=0.3)
     assert set(report["trials"]["release_a"]["coverage"]) == set(SEGMENTS)
     assert (ingest.ARTIFACTS / "quality.png").stat().st_size > 20_000
@@ -79,6 +86,12 @@ def no_mcap(session):
 
 def missing(session):
     (session / "release_a.mcap").unlink()
+
+
+def mislabel(session):
+    path = session / "session.yaml"
+    right, wrong = "release_a.mcap, experiment: release", "release_a.mcap, experiment: static_tilt, level: 0"
+    path.write_text(path.read_text().replace(right, wrong))
 
 
 def never(session):
@@ -124,6 +137,7 @@ def twice(number, content):
         (truncate, ["curl_40.mcap", "cut off at byte 3000"]),
         (no_mcap, ["tilt_60.mcap", "found no MCAP file"]),
         (missing, ["session.yaml", "trials.2.file", "release_a.mcap"]),
+        (mislabel, ["release_a.mcap: trial release_a: experiment: 'unit_08' moves by", "in a static_tilt"]),
         (never, ["tilt_00.mcap", "'unit_09' never appears", "`segments` in session.yaml"]),
         (rewritten(no_bodies_in_every_second), ["release_a.mcap", "never in four in a row"]),
         (rewritten(turned_by_nothing), ["release_a.mcap", "'base' is seen in 0.0 %", "unnormalised quaternion"]),

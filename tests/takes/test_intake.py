@@ -71,7 +71,7 @@ def test_takes_carry_what_was_measured(tmp_path):
         "the frame clock has no jitter"
     )
     np.testing.assert_array_equal(take.commands, m.commands[: len(take.commands)])
-    assert align_clocks([take], [findings.offset])[0] == pytest.approx(-0.137, abs=3e-3)
+    assert align_clocks([take], [findings], 0.1)[0] == pytest.approx(-0.137, abs=3e-3)
     assert take.clock_offset == pytest.approx(-0.137, abs=3e-3)
 
 

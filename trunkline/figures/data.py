@@ -12,7 +12,8 @@ from matplotlib.patches import Patch
 from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, PARTLY, SEEN, UNSEEN, VALIDATE
 from trunkline.signals.base_frame import average_base, to_base_frame
 from trunkline.signals.runs import stretches
-from trunkline.takes.quality import Quality
+from trunkline.takes.gathering import Gathered
+from trunkline.takes.quality import Quality, by_sentence
 from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
@@ -22,10 +23,9 @@ LEAST_JITTER = 0.1  # ms, of the axis: less is none
 COLORS = dict(zip(EXPERIMENTS, cycle((MEASURED, IDENTIFIED, VALIDATE, INITIAL)), strict=False))
 
 
-def quality_figure(
-    qualities: list[Quality], refused: dict[str, str], offset: float, spread: float
-) -> Figure:
+def quality_figure(qualities: list[Quality], gathered: Gathered) -> Figure:
     """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals."""
+    refused, offset, spread = gathered.refused, gathered.offset, gathered.spread
     figure = plt.figure(figsize=(14, 13))
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 2))[0]
     _coverage(left.subplots(), qualities)
@@ -75,7 +75,7 @@ def quality_figure(
 
     words.axis("off")
     lines = [f"refused {name}: {reason}" for name, reason in refused.items()]
-    lines += _by_sentence(qualities)
+    lines += by_sentence(qualities, lambda found: [f"check {said}" for said in found.warnings] + found.repairs)
     wrapped = [part for line in lines for part in textwrap.wrap(line, 78)] or ["nothing"]
     more = [f"… and {len(wrapped) - 14} lines more in quality.json"] if len(wrapped) > 14 else []
     words.set_title("Refused, repaired, and to be checked")
@@ -86,17 +86,6 @@ def quality_figure(
     kinds = {quality.take.experiment for quality in qualities}
     jitter.legend(handles=[Patch(color=COLORS[name], label=name) for name in COLORS if name in kinds], ncols=3)
     return figure
-
-
-def _by_sentence(qualities: list[Quality]) -> list[str]:
-    """What was repaired and what looks wrong, once for all trials of which it is said."""
-    said: dict[str, list[str]] = {}
-    for quality in qualities:
-        for sentence in [f"check {text}" for text in quality.findings.warnings] + quality.findings.repairs:
-            said.setdefault(sentence, []).append(quality.take.name)
-    every = len(qualities)
-    who = ["all trials" if len(names) == every > 1 else ", ".join(names) for names in said.values()]
-    return [f"{names}: {sentence}" for names, sentence in zip(who, said, strict=True)]
 
 
 def _coverage(axes, qualities: list[Quality]) -> None:

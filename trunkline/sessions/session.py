@@ -13,12 +13,14 @@ from pydantic import (
     ConfigDict,
     Field,
     FiniteFloat,
+    PrivateAttr,
     ValidationError,
     field_validator,
     model_validator,
 )
 
 from trunkline.errors import InputError, nearest
+from trunkline.sessions.splits import check_shared
 from trunkline.settings import read_yaml
 from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
 
@@ -92,6 +94,13 @@ class TrialEntry(Entry):
     level: FiniteFloat | None = None
     split: Literal["identify", "validate"]
 
+    @field_validator("level", mode="before")
+    @classmethod
+    def _number(cls, level):
+        if isinstance(level, bool):
+            raise ValueError(f"found {str(level).lower()}, expected a number")
+        return level
+
     @model_validator(mode="after")
     def _complete(self):
         if self.window is not None and not self.window[0] < self.window[1]:
@@ -113,6 +122,7 @@ class Session(Entry):
     bodies: names of the poses, in order, where messages hold them without. A list of tendons does the same for numbers.
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
+    shared: what is to be said of trials that share data, by trial; see `check_shared`.
     """
 
     frame: MocapFrame
@@ -123,6 +133,11 @@ class Session(Entry):
     bodies: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"
     trials: list[TrialEntry] = Field(min_length=1)
+    _shared: dict[str, list[str]] = PrivateAttr(default_factory=dict)
+
+    @property
+    def shared(self) -> dict[str, list[str]]:
+        return self._shared
 
     @field_validator("base", mode="before")
     @classmethod
@@ -179,6 +194,7 @@ def read_session(folder: Path) -> Session:
     for index, name in enumerate(names):
         if name in names[:index]:
             raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
+    session._shared = check_shared(folder, session.trials)
     return session
 
 

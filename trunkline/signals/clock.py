@@ -9,6 +9,7 @@ from trunkline.trials.start import onset
 
 LAG = 0.2  # s, the most by which the arm's lag may put a fit of the whole motion off
 MIN_TRAVEL = 5e-3  # m; a tendon that moves less says nothing about time
+CERTAIN = 0.3  # of the tendons' motion that a fit may leave unexplained, against what it leaves on average
 SHAPE_MODES = 5  # principal motions of the arm that explain the tendons, with their products
 
 
@@ -30,6 +31,10 @@ class OffsetFit:
     offset: float
     ratio: float
     onset: float | None = None
+
+    @property
+    def certain(self) -> bool:
+        return self.ratio < CERTAIN
 
 
 def fit_frames(stamps: np.ndarray, frames: np.ndarray) -> FrameFit:
@@ -127,13 +132,13 @@ def agree_on_offset(fits: list[OffsetFit]) -> tuple[float, float]:
 
     First motions decide where there are any. (0, inf) where no trial tells.
     """
-    sure = [fit for fit in fits if fit.ratio < 0.3]
+    sure = [fit for fit in fits if fit.certain]
     first = [fit.onset for fit in sure if fit.onset is not None]
-    certain = np.array(first or [fit.offset for fit in sure])
-    if not len(certain):
+    offsets = np.array(first or [fit.offset for fit in sure])
+    if not len(offsets):
         return 0.0, np.inf
-    offset = float(np.median(certain))
-    return offset, float(1.4826 * np.median(np.abs(certain - offset)))
+    offset = float(np.median(offsets))
+    return offset, float(1.4826 * np.median(np.abs(offsets - offset)))
 
 
 def _shape_features(columns: np.ndarray) -> np.ndarray:

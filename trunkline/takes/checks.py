@@ -1,7 +1,8 @@
 """What a trial must have, and what is said about one that had to be repaired."""
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -9,6 +10,8 @@ from pydantic import Field
 from trunkline.errors import InputError
 from trunkline.logs.log import Log
 from trunkline.signals.clock import FrameFit, OffsetFit
+
+Item = TypeVar("Item")
 
 
 @dataclass
@@ -29,16 +32,30 @@ class Limits:
 class Findings:
     """What came out about a take. repairs, warnings: one sentence each; what a warning names is left as it is.
 
+    faults: what cannot be true of the arm and the experiment, a sentence each; see `plausible`.
+    where: the file and the trial, for messages.
     frames: stamps over frame numbers. logged: stamps over log times in s. offset: of the motors' clock.
     log: that the trial is from, without its messages.
     """
 
     repairs: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    faults: list[str] = field(default_factory=list)
+    where: str = ""
     frames: FrameFit | None = None
     logged: FrameFit | None = None
     offset: OffsetFit | None = None
     log: Log | None = None
+
+
+def deciding(items: Iterable[Item], split: Callable[[Item], str]) -> tuple[list[Item], bool]:
+    """(those of the split `identify`, whether there are none of it and all decide instead).
+
+    What a session's trials agree on changes all of them, so those that are to be unseen until they score have no say.
+    """
+    items = list(items)
+    chosen = [item for item in items if split(item) == "identify"]
+    return (chosen, False) if chosen else (items, bool(items))
 
 
 def in_order(stamps: np.ndarray, disorder: float, where: str, findings: Findings) -> np.ndarray:

@@ -9,7 +9,7 @@ from trunkline.sessions.source import Source, open_log
 from trunkline.signals.clock import OffsetFit, estimate_offset, first_motion_offset
 from trunkline.takes.checks import Findings, Limits
 from trunkline.takes.motors import check_motors, read_motors
-from trunkline.takes.reading import check_seen, columns_of, read_stretch, split_base
+from trunkline.takes.reading import Stretch, check_seen, columns_of, read_stretch, split_base
 from trunkline.takes.reference import Reference, reference_of
 from trunkline.takes.repairs import drop_frozen, good_samples, untangle, with_lost_time
 from trunkline.trials.experiments import EXPERIMENTS
@@ -22,40 +22,61 @@ def take_in(folder: Path, session: Session, limits: Limits) -> Iterator[tuple[Tr
     Every take has the same segments: those that session.yaml maps, or all that any log shows.
     """
     logs: dict[str, Source | InputError] = {}
-    for trial in session.trials:
-        if trial.file not in logs:
-            try:
-                logs[trial.file] = open_log(folder / trial.file, session)
-            except InputError as error:
-                logs[trial.file] = error
-    reference = reference_of(session, [source for source in logs.values() if isinstance(source, Source)])
-    for trial in session.trials:
-        source, findings = logs[trial.file], Findings()
-        if isinstance(source, InputError):
-            yield trial, source, findings
+    read: list[tuple[Source, Stretch] | InputError] = []
+    findings = [Findings(warnings=list(session.shared.get(trial.name, []))) for trial in session.trials]
+    for trial, found in zip(session.trials, findings, strict=True):
+        try:
+            if trial.file not in logs:
+                logs[trial.file] = _opened(folder / trial.file, session)
+            source = logs[trial.file]
+            if isinstance(source, InputError):
+                raise source
+            found.where = f"{source.log.path}: trial {trial.name}"
+            found.log = source.log
+            found.repairs += [f"log: {damage}" for damage in source.log.damage]
+            read.append((source, read_stretch(source, trial, session, limits, found)))
+        except InputError as error:
+            read.append(error)
+    usable = [(trial, *some) for trial, some in zip(session.trials, read, strict=True) if isinstance(some, tuple)]
+    reference = reference_of(session, usable)
+    for trial, some, found in zip(session.trials, read, findings, strict=True):
+        if isinstance(some, InputError):
+            yield trial, some, found
             continue
         try:
-            yield trial, _take(source, trial, session, reference, limits, findings), findings
+            yield trial, _take(*some, trial, session, reference, limits, found), found
         except InputError as error:
-            yield trial, error, findings
+            yield trial, error, found
+
+
+def _opened(path: Path, session: Session) -> Source | InputError:
+    """A log, decoded; or why it cannot be, for all of its trials."""
+    try:
+        return open_log(path, session)
+    except InputError as error:
+        return error
 
 
 def _take(
-    source: Source, trial: TrialEntry, session: Session, reference: Reference, limits: Limits, findings: Findings
+    source: Source,
+    stretch: Stretch,
+    trial: TrialEntry,
+    session: Session,
+    reference: Reference,
+    limits: Limits,
+    findings: Findings,
 ) -> Take:
-    """Read, check and repair one trial.
+    """Check and repair one trial.
 
     Raises:
         InputError: naming the file, and what is missing in it.
     """
-    where = f"{source.log.path}: trial {trial.name}"
-    findings.log = source.log
-    findings.repairs += [f"log: {damage}" for damage in source.log.damage]
-    findings.repairs += [] if reference.note is None else [reference.note]
-    stretch = read_stretch(source, trial, session, limits, where, findings)
+    where = findings.where
+    findings.repairs += reference.repairs
+    findings.warnings += reference.warnings
     bodies = reference.bodies
     columns = columns_of(source, bodies, where)
-    positions, quaternions = good_samples(source.poses, stretch.rows, columns, reference.scale, bodies, findings)
+    positions, quaternions = good_samples(source.poses, stretch.rows, columns, reference, findings)
     drop_frozen(positions, quaternions, bodies, findings)
     check_seen(positions, bodies, limits.coverage, where, findings)
     base_positions, base_quaternions, positions, quaternions = split_base(

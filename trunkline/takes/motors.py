@@ -68,7 +68,8 @@ def check_motors(
     limits: Limits,
     where: str,
 ) -> None:
-    """Where nothing pulls within reach of the poses: raises InputError with what there is instead.
+    """Where nothing pulls within reach of the poses, or a topic's messages are all out of it: raises InputError with
+    what there is instead.
 
     Args: joint_topics: of all logs of the session.
     """
@@ -78,21 +79,21 @@ def check_motors(
         name = getattr(session.topics, key)
         if name is not None and name not in joint_topics:
             raise InputError(f"{where}: topics.{key}: found {name!r}, which no log has, expected one of: {others}")
-    if motors.commands.size or motors.tendon_positions.size:
+    streams = (source.commands, source.tendon_positions)
+    within = [motors.commands.size > 0, motors.tendon_positions.size > 0]
+    lost = [stream for stream, some in zip(streams, within, strict=True) if stream and len(stream.stamps) and not some]
+    if any(within) and not lost:
         return
     recorder = _by_recorder(source, session)
     found = [
         f"no {role} topic"
         if stream is None
-        else f"{len(stream.stamps)} messages on {stream.topic}{_distance(stream, recorder, stretch)}"
-        for stream, role in zip((source.commands, source.tendon_positions), ROLES, strict=True)
+        else f"{len(stream.stamps)} messages on {stream.topic}{'' if some else _distance(stream, recorder, stretch)}"
+        for stream, role, some in zip(streams, ROLES, within, strict=True)
     ]
-    expected = f"expected commands or tendon positions within {limits.clock_offset:g} s of the poses"
-    topics = (
-        f" among: {', '.join(source.joint_topics) or 'none'} ({kind})"
-        if not any((source.commands, source.tendon_positions))
-        else ""
-    )
+    both = "and" if any(within) else "or"
+    expected = f"expected commands {both} tendon positions within {limits.clock_offset:g} s of the poses"
+    topics = f" among: {', '.join(source.joint_topics) or 'none'} ({kind})" if not any(streams) else ""
     raise InputError(f"{where}: found {' and '.join(found)}{topics}, {expected}")
 
 

@@ -1,5 +1,6 @@
 """How good a session's data are: what was seen, how noisy it is, what was repaired and what refused."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from trunkline.logs.log import Log
 from trunkline.signals.smoothing import noise_level
 from trunkline.takes.checks import Findings
+from trunkline.takes.gathering import Gathered
 from trunkline.trials.take import Take
 
 
@@ -54,15 +56,26 @@ def judge(take: Take, findings: Findings) -> Quality:
     )
 
 
-def report(qualities: list[Quality], refused: dict[str, str], offset: float, spread: float) -> dict:
+def by_sentence(qualities: list[Quality], said: Callable[[Findings], list[str]]) -> list[str]:
+    """What is said of takes, each sentence once, with the trials of which it is said."""
+    names: dict[str, list[str]] = {}
+    for quality in qualities:
+        for sentence in said(quality.findings):
+            names.setdefault(sentence, []).append(quality.take.name)
+    every = len(qualities)
+    who = ["all trials" if len(trials) == every > 1 else ", ".join(trials) for trials in names.values()]
+    return [f"{trials}: {sentence}" for trials, sentence in zip(who, names, strict=True)]
+
+
+def report(qualities: list[Quality], gathered: Gathered) -> dict:
     """The quality report, per trial and for the session; None where there is nothing to measure."""
     return {
         "trials": {quality.take.name: _trial(quality) for quality in qualities},
-        "refused": refused,
+        "refused": gathered.refused,
         "logs": {log.path.name: {"messages": log.count, "without_checksum": log.unchecked} for log in _logs(qualities)},
         "clock": {
-            "offset_s": offset,
-            "spread_s": spread if np.isfinite(spread) else None,
+            "offset_s": gathered.offset,
+            "spread_s": gathered.spread if np.isfinite(gathered.spread) else None,
             "trials": sum(quality.findings.offset is not None for quality in qualities),
         },
     }
@@ -76,14 +89,19 @@ def remarks(qualities: list[Quality]) -> list[str]:
     return [f"{told}: bits that flipped there go unseen (quality.json: logs)"] if bare else []
 
 
-def summary(qualities: list[Quality], refused: dict[str, str], offset: float, spread: float) -> dict:
-    """The session in a few numbers, for metrics.json."""
+def summary(qualities: list[Quality], gathered: Gathered) -> dict:
+    """The session in a few numbers, for metrics.json. repairs: their number by split, and in all."""
     angles = [quality.angle_noise for quality in qualities if quality.angle_noise is not None]
     gaps = np.concatenate([quality.gaps for quality in qualities])
+    repairs = dict.fromkeys(("total", *(quality.take.split for quality in qualities)), 0)
+    for quality in qualities:
+        for split in ("total", quality.take.split):
+            repairs[split] += len(quality.findings.repairs)
     return {
         "trials": len(qualities),
-        "refused": len(refused),
-        "repairs": sum(len(quality.findings.repairs) for quality in qualities),
+        "refused": len(gathered.refused),
+        "repairs": repairs,
+        "warnings": sum(len(quality.findings.warnings) for quality in qualities),
         "poses": sum(len(quality.take.time) * (len(quality.take.segments) + 1) for quality in qualities),
         "coverage": float(np.mean([quality.coverage.mean() for quality in qualities])),
         "dropped_frames": sum(quality.dropped for quality in qualities),
@@ -92,8 +110,8 @@ def summary(qualities: list[Quality], refused: dict[str, str], offset: float, sp
         "rate_hz": float(1 / np.median([quality.interval for quality in qualities])),
         "position_noise_mm": 1e3 * float(np.median([quality.position_noise for quality in qualities])),
         "orientation_noise_deg": float(np.degrees(np.median(angles))) if angles else None,
-        "clock_offset_ms": 1e3 * offset,
-        "clock_spread_ms": 1e3 * spread if np.isfinite(spread) else None,
+        "clock_offset_ms": 1e3 * gathered.offset,
+        "clock_spread_ms": 1e3 * gathered.spread if np.isfinite(gathered.spread) else None,
     }
 
 
@@ -105,6 +123,7 @@ def _trial(quality: Quality) -> dict:
     take, findings = quality.take, quality.findings
     return {
         "experiment": take.experiment,
+        "split": take.split,
         "frames": len(take.time),
         "duration_s": float(take.time[-1]),
         "rate_hz": 1 / quality.interval,

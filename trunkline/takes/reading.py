@@ -12,6 +12,7 @@ from trunkline.sessions.session import FixedBase, Session, TrialEntry
 from trunkline.sessions.source import Source
 from trunkline.signals.clock import FrameFit, fit_frames
 from trunkline.takes.checks import Findings, Limits, in_order
+from trunkline.takes.clocks import check_clocks
 
 
 @dataclass
@@ -29,19 +30,20 @@ class Stretch:
 
 
 def read_stretch(
-    source: Source, trial: TrialEntry, session: Session, limits: Limits, where: str, findings: Findings
+    source: Source, trial: TrialEntry, session: Session, limits: Limits, findings: Findings
 ) -> Stretch:
     """Date a log's frames by the clock that the session names, and cut out the trial.
 
     Raises:
         InputError: time runs back, or too little is left.
     """
-    poses = source.poses
+    poses, where = source.poses, findings.where
     if poses.undecodable:
         findings.repairs.append(f"{poses.undecodable} messages that do not fit their schema dropped")
     findings.logged = _log_fit(poses)
     stamps, findings.frames = _stamps(poses, session.clock, where, source.pose_topic)
     rows = in_order(stamps, limits.disorder, f"{where}: {source.pose_topic}", findings)
+    check_clocks(poses, session.clock, limits, f"{where}: {source.pose_topic}", findings)
     epoch = int(stamps[rows[0]])
     time = (stamps[rows] - epoch) * 1e-9
     if trial.window is not None:

@@ -8,7 +8,7 @@ from trunkline.signals.smoothing import noise_level
 from trunkline.takes.checks import Findings
 from trunkline.takes.frozen import frozen
 from trunkline.takes.lost import find_lost, put_back
-from trunkline.takes.reference import Reference
+from trunkline.takes.reference import FARTHEST, Reference
 from trunkline.takes.swaps import find_swaps
 
 
@@ -16,14 +16,26 @@ def good_samples(
     poses: PoseStream,
     rows: np.ndarray,
     columns: list[int],
-    scale: float,
-    names: list[str],
+    reference: Reference,
     findings: Findings,
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    """Positions in metres and unit quaternions of the bodies in `columns`, NaN where either is no good."""
+    """Positions in metres and unit quaternions of the bodies in `columns`, NaN where either is no good.
+
+    A body exactly at the origin is one that a driver does not see, but for a base that is the origin throughout.
+    """
+    names = reference.bodies
     cells = np.ix_(rows, np.array(columns, int))
-    positions = scale * poses.positions[cells]
+    positions = reference.scale * poses.positions[cells]
     present = poses.present[cells]
+    finite = np.isfinite(positions).all(axis=-1)
+    far = finite & np.any(np.abs(positions) > FARTHEST, axis=-1)
+    nowhere = np.asarray(finite & np.all(positions == 0, axis=-1))
+    if reference.base is not None and nowhere[:, 0].sum() == finite[:, 0].sum():
+        nowhere[:, 0] = False
+    _tell_dropped(far, f"with a position beyond {FARTHEST:g} m", names, findings)
+    _tell_dropped(nowhere, "exactly at the origin, where a driver puts what it does not see,", names, findings)
+    positions[far | nowhere] = np.nan
+    present &= ~(far | nowhere)
     good = np.isfinite(positions).all(axis=-1)
     quaternions = None
     if poses.quaternions is not None:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from trunkline.signals.base_frame import average_base
+from trunkline.takes.checks import Findings
 from trunkline.trials.experiments import EXPERIMENTS, TILT
 from trunkline.trials.take import Take
 
@@ -13,21 +14,30 @@ SPREAD = 20.0  # degrees between levels, so that not every direction on a cone f
 HANGS, LIES = np.radians(30), np.radians(60)  # from the vertical: an arm that hangs, and one that does not
 
 
-def check_vertical(takes: list[Take], measured_base: bool) -> tuple[np.ndarray | None, str | None]:
-    """(the vertical (3,) to take instead, or None; what to tell, or None).
+def check_vertical(takes: list[Take], measured_base: bool) -> tuple[np.ndarray | None, str | None, bool]:
+    """(the vertical (3,) to take instead, or None; what to tell, or None; whether other splits than identify decided).
 
-    It is replaced only where static trials at several tilts fit exactly one other axis of the frame.
+    It is replaced only where static trials at several tilts fit exactly one other axis of the frame: those of the
+    split `identify`, and only where those cannot tell, all of them.
 
     Args:
         measured_base: whether a body marks the mount; otherwise its orientation follows from the vertical itself.
     """
-    tilted = (take for take in takes if EXPERIMENTS[take.experiment].level is TILT)
-    static = [(take, take.level) for take in tilted if take.level is not None]
-    if not static or not measured_base:
-        return None, _check_hanging(takes)
-    up = takes[0].up
-    levels = np.radians([level for _, level in static])
-    z = np.array([average_base(t.base_positions, t.base_quaternions).rotation.apply([0, 0, 1]) for t, _ in static])
+    tilted = [take for take in takes if EXPERIMENTS[take.experiment].level is TILT and take.level is not None]
+    if not tilted or not measured_base:
+        return None, _check_hanging(takes), False
+    own = [take for take in tilted if take.split == "identify"]
+    up, said = _by_tilts(own) if own else (None, None)
+    if len(own) == len(tilted) or up is not None or (own and said is None):
+        return up, said, False
+    up, by_all = _by_tilts(tilted)
+    return (None, said, False) if up is None and own else (up, by_all, up is not None)
+
+
+def _by_tilts(static: list[Take]) -> tuple[np.ndarray | None, str | None]:
+    """(another vertical that these tilts prove, or None; what to tell, or None where the declared one fits)."""
+    up, levels = static[0].up, np.radians([take.level for take in static if take.level is not None])
+    z = np.array([_axis(take) for take in static])
     off = _misfit(z, up, levels)
     if off <= OFF:
         return None, None
@@ -37,6 +47,21 @@ def check_vertical(takes: list[Take], measured_base: bool) -> tuple[np.ndarray |
     if misfits[best] < FITS and misfits[second] > OFF and np.ptp(np.degrees(levels)) >= SPREAD:
         return AXES[best], f"{found}, {np.degrees(misfits[best]):.1f}° with {_show(AXES[best])}, which was taken"
     return None, f"{found}, and no other axis fits: check the levels, `frame.up` and `base` in session.yaml"
+
+
+def check_levels(takes: list[Take], findings: list[Findings]) -> None:
+    """Warn of each tilt whose base is not inclined as its level says, by the vertical that the takes have."""
+    for take, found in zip(takes, findings, strict=True):
+        if EXPERIMENTS[take.experiment].level is TILT and take.level is not None:
+            tilt = np.degrees(np.arccos(np.clip(_axis(take) @ take.up, -1, 1)))
+            if abs(tilt - take.level) > np.degrees(OFF):
+                expected = f"expected at most {np.degrees(OFF):.0f}° between them"
+                found.warnings.append(f"level: found {take.level:g}, but the base is tilted by {tilt:.0f}°, {expected}")
+
+
+def _axis(take: Take) -> np.ndarray:
+    """The base's z axis (3,) in the motion-capture frame."""
+    return average_base(take.base_positions, take.base_quaternions).rotation.apply([0, 0, 1])
 
 
 def _misfit(z: np.ndarray, up: np.ndarray, levels: np.ndarray) -> float:

@@ -1,0 +1,291 @@
+"""Data that read well and are wrong: each fault is named, with trial and body or key; sound sessions are left alone."""
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from demo.instruments import measure
+from demo.recorder import write_log, write_session
+from tests.support.sessions import SEGMENTS, TENDONS, curl_truth, instruments, record, release_truth, static_truth
+from trunkline.errors import InputError
+from trunkline.sessions.session import read_session
+from trunkline.takes.checks import Findings, Limits
+from trunkline.takes.gathering import gather
+from trunkline.takes.intake import take_in
+from trunkline.takes.plausible import Plausible, check_plausible
+
+LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+PLAUSIBLE = Plausible(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
+SHARED = Path(__file__).parents[3] / "shared" / "data" / "asl_trunk"
+
+
+def truths():
+    """Each experiment in both splits."""
+    return [
+        static_truth(0.0),
+        static_truth(60.0, "validate"),
+        replace(static_truth(30.0), name="tilt_30"),
+        release_truth(),
+        replace(release_truth("validate"), name="release_b"),
+        curl_truth(40.0, "identify"),
+        curl_truth(60.0),
+    ]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sound")
+    record(folder, truths(), instruments())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sound(folder):
+    """What `take_in` gives of a sound session; by trial."""
+    return {trial.name: (trial, take, found) for trial, take, found in take_in(folder, read_session(folder), LIMITS)}
+
+
+def judged(sound, base="base", **changed):
+    """(what is said of each trial, of the session) after `changed` takes, by trial."""
+    takes = [changed.get(name, take) for name, (_, take, _) in sound.items()]
+    findings = [Findings() for _ in takes]
+    session = check_plausible(takes, findings, base, PLAUSIBLE)
+    return {take.name: found.faults for take, found in zip(takes, findings, strict=True) if found.faults}, session
+
+
+def take_of(sound, name):
+    return sound[name][1]
+
+
+def every(sound, change):
+    return {name: change(take) for name, (_, take, _) in sound.items()}
+
+
+def moved(take, body, offset):
+    positions = take.positions.copy()
+    positions[:, body] += offset
+    return replace(take, positions=positions)
+
+
+def test_a_sound_session_has_no_fault_and_no_warning(folder, sound):
+    assert judged(sound) == ({}, [])
+    gathered = gather(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
+    assert [found.repairs + found.warnings for found in gathered.findings] == [[]] * len(sound)
+
+
+def test_real_recordings_have_no_fault(tmp_path):
+    if not SHARED.is_dir():
+        pytest.skip("needs the recordings in ../shared/data/asl_trunk")
+    logs = sorted(SHARED.glob("*.mcap"))
+    for log in logs:
+        (tmp_path / log.name).symlink_to(log)
+    lines = [f"  - {{file: {log.name}, experiment: release, split: identify}}" for log in logs]
+    head = ["frame: {up: [0, 1, 0]}", "base: {position: [0.1015, 0.0, 0.105]}", "trials:"]
+    (tmp_path / "session.yaml").write_text("\n".join(head + lines) + "\n")
+    session = read_session(tmp_path)
+    gathered = gather(take_in(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
+    assert len(gathered.takes) == 13
+    assert [found.warnings for found in gathered.findings] == [[]] * 13
+
+
+@pytest.mark.parametrize("name", ["tilt_30", "release_a", "release_b", "curl_60"])
+@pytest.mark.parametrize("body", range(4))
+def test_a_body_that_is_off_is_named(sound, name, body):
+    trials, session = judged(sound, **{name: moved(take_of(sound, name), body, [0.0, 0.3, 0.4])})
+    assert list(trials) == [name]
+    (said,) = [said for said in trials[name] if "expected neighbours at distances" in said]
+    assert said.startswith(f"{SEGMENTS[body]!r} is ")
+    assert session == []
+
+
+def test_a_body_that_is_off_by_little_is_left(sound):
+    assert judged(sound, release_a=moved(take_of(sound, "release_a"), 2, [0.0, 0.01, 0.0])) == ({}, [])
+
+
+def test_a_body_that_stands_still_beside_the_arm_is_named(sound):
+    def stands(take):
+        positions = take.positions.copy()
+        positions[:, 2] = take.base_positions + [0.0, -0.25, 0.0]
+        return replace(take, positions=positions)
+
+    _, session = judged(sound, **every(sound, stands))
+    assert any(said.startswith("'unit_06' ") and said.endswith("is it on the arm?") for said in session), session
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_one_log_in_another_unit_is_named(sound, factor):
+    take = take_of(sound, "release_b")
+    other = replace(take, positions=factor * take.positions, base_positions=factor * take.base_positions)
+    trials, _ = judged(sound, release_b=other)
+    assert list(trials) == ["release_b"]
+    found = re.match(r"unit: bodies are ([\d.]+) times as far apart as", trials["release_b"][0])
+    assert found
+    assert float(found[1]) == pytest.approx(factor, rel=0.05)
+
+
+@pytest.mark.parametrize("order", [(1, 0, 2, 3), (0, 2, 1, 3), (0, 1, 3, 2), (2, 1, 0, 3)])
+def test_exchanged_segments_of_the_whole_session_are_named(sound, order):
+    names = tuple(SEGMENTS[place] for place in order)
+    trials, session = judged(sound, **every(sound, lambda take: replace(take, segments=names)))
+    assert trials == {}
+    assert len(session) == 1
+    assert "check `segments` in session.yaml" in session[0]
+    for found, name in zip(SEGMENTS, names, strict=True):
+        assert (found == name) or repr(name) in session[0]
+
+
+@pytest.mark.parametrize("names", [SEGMENTS[::-1], ("root", "a", "b", "tip"), ("7", "b8", "c9", "1")])
+def test_segments_named_from_the_tip_or_without_numbers_are_left(sound, names):
+    assert judged(sound, **every(sound, lambda take: replace(take, segments=names))) == ({}, [])
+
+
+def test_a_base_that_moves_while_a_segment_rests_is_named(sound):
+    def exchange(take):
+        positions, quaternions = take.positions.copy(), take.quaternions.copy()
+        positions[:, 0], quaternions[:, 0] = take.base_positions, take.base_quaternions
+        changed = {"base_positions": take.positions[:, 0], "base_quaternions": take.quaternions[:, 0]}
+        names = ("base", *take.segments[1:])
+        return replace(take, positions=positions, quaternions=quaternions, segments=names, **changed)
+
+    _, session = judged(sound, base="unit_02", **every(sound, exchange))
+    assert session[-1].startswith("base: 'unit_02' moves by ")
+    assert "while 'base' moves by" in session[-1]
+
+
+@pytest.mark.parametrize(
+    ("name", "experiment", "level", "message"),
+    [
+        ("release_a", "static_tilt", 0.0, r"expected at most 2 % in a static_tilt: is it another experiment \(release"),
+        ("curl_40", "static_tilt", 0.0, "expected at most 2 % in a static_tilt"),
+        ("tilt_00", "release", None, "expected more than 2 % in a release: is it another experiment"),
+        ("curl_40", "release", None, "commands: 'tendon_1' is wound by 40 mm, expected a release without actuation"),
+        ("tilt_00", "curl", 40.0, "expected more than 2 % in a curl"),
+    ],
+)
+def test_a_trial_labelled_as_another_experiment_is_named(sound, name, experiment, level, message):
+    trials, _ = judged(sound, **{name: replace(take_of(sound, name), experiment=experiment, level=level)})
+    assert list(trials) == [name]
+    assert any(re.search(message, said) for said in trials[name]), trials
+
+
+def test_a_static_tilt_in_which_the_arm_swings_is_named(sound):
+    take = take_of(sound, "tilt_30")
+    swing = np.sin(2 * np.pi * 1.5 * take.time)[:, None, None] * [[0.01], [0.02], [0.03], [0.035]] * [1.0, 0.0, 0.0]
+    trials, _ = judged(sound, tilt_30=replace(take, positions=take.positions + swing))
+    assert list(trials) == ["tilt_30"]
+    assert "experiment: 'unit_08' moves by 6" in trials["tilt_30"][-1] or "moves by 7" in trials["tilt_30"][-1]
+
+
+def pulls(take, commands, positions):
+    return replace(take, commands=commands(take.commands), tendon_positions=positions(take.tendon_positions))
+
+
+def same(values):
+    return values
+
+
+@pytest.mark.parametrize(
+    ("commands", "positions", "message"),
+    [
+        (lambda c: 1e3 * c, same, r"commands: found pulls from -20 to 40 m, expected about 0.04 m.*are they in mm?"),
+        (lambda c: 1e3 * c, lambda p: 1e3 * p, "are they in mm?"),
+        (lambda c: -c, same, "commands: found pulls from -0.04 to 0.02 m, .*: is the sign reversed?"),
+        (lambda c: -c, lambda p: -p, "is the sign reversed?"),
+        (lambda c: 0 * c, same, "commands: found pulls from -?0 to 0 m"),
+        (same, lambda p: -p, "tendon positions: .* is the sign reversed?"),
+        (same, lambda p: p / 10, "tendon positions: found pulls from -0.002.* to 0.004"),
+        (same, lambda p: p[:, [1, 0, 2]], "tendons: 'tendon_1' moves against its commands"),
+        (
+            lambda c: c * [1, 0, 0],
+            lambda p: p[:, [1, 0, 2]] * [0, 1, 0],
+            "'tendon_2' follows the commands of 'tendon_1",
+        ),
+    ],
+)
+def test_tendons_that_cannot_be_are_named(sound, commands, positions, message):
+    take = take_of(sound, "curl_40")
+    take = replace(take, commands=take.commands - take.commands[0])
+    trials, _ = judged(sound, curl_40=pulls(take, commands, positions))
+    assert list(trials) == ["curl_40"]
+    assert any(re.search(message, said) for said in trials["curl_40"]), trials
+
+
+def test_pulls_from_an_encoder_that_starts_anywhere_are_left(sound):
+    take = take_of(sound, "curl_40")
+    assert judged(sound, curl_40=replace(take, tendon_positions=take.tendon_positions + 1.7)) == ({}, [])
+    half = len(take.command_time) // 2
+    wound = take.tendon_time > take.command_time[half]
+    later = {"command_time": take.command_time[half:], "commands": take.commands[half:]}
+    later |= {"tendon_time": take.tendon_time[wound], "tendon_positions": take.tendon_positions[wound]}
+    assert judged(sound, curl_40=replace(take, **later)) == ({}, []), "a window that begins with the arm curled"
+
+
+def test_exchanged_topics_are_named(sound):
+    take = take_of(sound, "curl_40")
+    assert take.tendons == TENDONS
+    time = {"command_time": take.tendon_time, "tendon_time": take.command_time}
+    noisy = replace(take, commands=take.tendon_positions, tendon_positions=take.commands, **time)
+    assert "commands are noisier" in judged(sound, curl_40=noisy)[0]["curl_40"][0]
+    early = replace(take, tendon_time=take.tendon_time - 0.05)
+    (said,) = judged(sound, curl_40=early)[0]["curl_40"]
+    assert said.startswith("topics: what is measured comes 50 ms before its command: are `commands` and")
+    late = replace(take, tendon_time=take.tendon_time + 0.05)
+    assert judged(sound, curl_40=late) == ({}, [])
+
+
+def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
+    trial, take, found = sound["release_a"]
+    session = read_session(folder)
+
+    def gathered(otherwise, refused_trials):
+        taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
+        taken["release_a"] = trial, moved(take, 2, 0.5), replace(found, warnings=[], faults=[])
+        return gather(taken.values(), session, replace(PLAUSIBLE, otherwise=otherwise), refused_trials, "here")
+
+    with pytest.raises(InputError, match=r"release_a\.mcap: trial release_a: 'unit_06' is "):
+        gathered("refuse", "stop")
+    left = gathered("refuse", "leave_out")
+    assert list(left.refused) == ["release_a"]
+    assert "'unit_06' is " in left.refused["release_a"]
+    assert "release_a" not in [take.name for take in left.takes]
+    kept = gathered("warn", "stop")
+    said = {take.name: found.warnings for take, found in zip(kept.takes, kept.findings, strict=True)}["release_a"]
+    assert said[0].startswith("'unit_06' is ")
+
+
+def test_a_level_that_the_base_contradicts_is_said(folder, sound):
+    trial, take, _ = sound["tilt_60"]
+    taken = {name: (t, some, Findings()) for name, (t, some, _) in sound.items()}
+    taken["tilt_60"] = trial, replace(take, level=10.0), Findings()
+    gathered = gather(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
+    said = {take.name: found.warnings for take, found in zip(gathered.takes, gathered.findings, strict=True)}
+    assert said["tilt_60"][0].startswith("level: found 10, but the base is tilted by 60°")
+    assert not any(said[name] for name in said if name != "tilt_60")
+
+
+def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
+    taken = [(t, some, Findings()) for name, (t, some, _) in sound.items() if name != "curl_60"]
+    gathered = gather(taken, read_session(folder), PLAUSIBLE, "stop", "here")
+    said = ["splits: no curl of the split validate, which the session has"]
+    assert all(found.warnings == said for found in gathered.findings)
+
+
+def test_usual_distances_of_other_splits_are_said(tmp_path):
+    record(tmp_path, [release_truth("validate"), static_truth(0.0, "validate")], instruments())
+    for _, _, found in take_in(tmp_path, read_session(tmp_path), LIMITS):
+        assert "no trial of the split identify can be read: the unit and the usual" in found.warnings[0]
+
+
+@pytest.mark.parametrize("value", [0.0, 1e300])
+def test_a_body_nowhere_is_not_taken_for_seen(tmp_path, value):
+    m = measure(release_truth(), instruments(occlusions_per_s=0, outliers=0), np.random.default_rng(0))
+    m.positions[:, 3] = value
+    write_log(tmp_path / f"{m.name}.mcap", m)
+    write_session(tmp_path, [m], instruments())
+    ((_, error, found),) = take_in(tmp_path, read_session(tmp_path), LIMITS)
+    assert isinstance(error, InputError)
+    assert "trial release_a: 'unit_06' is seen in 0.0 %" in str(error)
+    assert any("(unit_06)" in said for said in found.repairs)

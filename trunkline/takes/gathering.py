@@ -1,0 +1,90 @@
+"""All takes of a session together: which are used, and what only their comparison tells."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+from trunkline.errors import InputError
+from trunkline.sessions.session import FixedBase, Session, TrialEntry
+from trunkline.takes.agreement import align_clocks, settle_vertical
+from trunkline.takes.checks import Findings
+from trunkline.takes.plausible import Plausible, check_plausible
+from trunkline.trials.experiments import EXPERIMENTS
+from trunkline.trials.take import Take
+
+Refusal = Literal["stop", "leave_out"]
+
+
+@dataclass
+class Gathered:
+    """takes, findings: of the trials that are used. refused: why a trial is not, by its name.
+
+    offset, spread: s, of the motors' clock; spread is inf where no trial tells.
+    """
+
+    takes: list[Take] = field(default_factory=list)
+    findings: list[Findings] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)
+    offset: float = 0.0
+    spread: float = float("inf")
+
+
+def gather(
+    taken: Iterable[tuple[TrialEntry, Take | InputError, Findings]],
+    session: Session,
+    plausible: Plausible,
+    refused_trials: Refusal,
+    where: str,
+) -> Gathered:
+    """Compare a session's takes, as `take_in` gives them, and settle what they have in common.
+
+    Args: where: the session's folder, for messages.
+
+    Raises:
+        InputError: a trial is refused and none may be left out, none is left, or the whole session cannot be true.
+    """
+    gathered = Gathered()
+
+    def refuse(name: str, error: InputError) -> None:
+        if refused_trials == "stop":
+            raise error
+        gathered.refused[name] = str(error)
+
+    for trial, take, found in taken:
+        if isinstance(take, InputError):
+            refuse(trial.name, take)
+        else:
+            gathered.takes.append(take)
+            gathered.findings.append(found)
+    base = None if isinstance(session.base, FixedBase) else session.base
+    session_faults = check_plausible(gathered.takes, gathered.findings, base, plausible) if gathered.takes else []
+    if plausible.otherwise == "refuse":
+        for take, found in zip(gathered.takes, gathered.findings, strict=True):
+            if found.faults:
+                refuse(take.name, InputError(f"{found.where}: {'; '.join(found.faults)}"))
+        if session_faults:
+            raise InputError(f"{where}: {'; '.join(session_faults)}")
+        used = [not found.faults for found in gathered.findings]
+        gathered.takes = [take for take, use in zip(gathered.takes, used, strict=True) if use]
+        gathered.findings = [found for found, use in zip(gathered.findings, used, strict=True) if use]
+    if not gathered.takes:
+        first = next(iter(gathered.refused.values()))
+        raise InputError(f"{where}: all {len(gathered.refused)} trials refused, the first: {first}")
+    missing = _missing(gathered.takes)
+    for found in gathered.findings:
+        found.warnings += found.faults + session_faults + missing
+    settle_vertical(gathered.takes, gathered.findings, session)
+    gathered.offset, gathered.spread = align_clocks(gathered.takes, gathered.findings, plausible.clock)
+    return gathered
+
+
+def _missing(takes: list[Take]) -> list[str]:
+    """Experiments that a split of the session lacks, a sentence each."""
+    splits = dict.fromkeys(take.split for take in takes)
+    done = {(take.experiment, take.split) for take in takes}
+    return [
+        f"splits: no {experiment} of the split {split}, which the session has"
+        for experiment in EXPERIMENTS
+        for split in splits
+        if (experiment, split) not in done and any(kind == experiment for kind, _ in done)
+    ]

@@ -1,0 +1,103 @@
+"""Whether a trial's tendons did what its experiment means: against its level, and commands against measurements."""
+
+import numpy as np
+
+from trunkline.signals.clock import MIN_TRAVEL
+from trunkline.signals.smoothing import noise_level
+from trunkline.trials.experiments import EXPERIMENTS, PULL
+from trunkline.trials.take import Take
+
+FOLLOWS, FAILS = 0.9, 0.5  # correlations of a measured tendon with its command's, and with another's
+FITS = 1.25  # factor within which a pull is as its level says, whatever is let out meanwhile
+LATEST = 0.3  # s, of a lag that is looked for
+EARLY = 0.01  # s by which what is measured may come before its command
+NOISIER = 5.0  # times the measurements' noise, that no command has
+
+
+def check_pulls(take: Take, idle: float, factor: float) -> list[str]:
+    """What cannot be true of a take's tendons, a sentence each.
+
+    Args:
+        idle: m, by which tendons may move in an experiment that does not pull them.
+        factor: by which pulls may differ from the level, and measured from commanded ones.
+    """
+    kind = EXPERIMENTS[take.experiment]
+    if kind.needs_motors and kind.level is PULL and take.level is not None:
+        for key, pulls in (("commands", take.commands), ("tendon positions", take.tendon_positions)):
+            # from the straight arm, or where encoders start anywhere, from the trial's begin
+            said = [_against_level(key, pulls - zero, 1e-3 * take.level, factor) for zero in (0.0, pulls[:1])]
+            if pulls.size and all(said):
+                return said[1]
+    elif not kind.needs_motors and not kind.static and take.commands.size:  # a loose tendon may well move by itself
+        wound = np.ptp(take.commands, axis=0)
+        most = int(np.argmax(wound))
+        if wound[most] > idle:
+            found = f"{take.tendons[most]!r} is wound by {1e3 * wound[most]:.4g} mm"
+            return [f"experiment: commands: {found}, expected a {take.experiment} without actuation"]
+    if take.commands.size and take.tendon_positions.size:
+        return _against_commands(take, factor)
+    return []
+
+
+def _against_level(key: str, wound: np.ndarray, level: float, factor: float) -> list[str]:
+    """A pull is positive, in metres, and about as far as the level says."""
+    pulled, let_out = wound.max(initial=0.0), -wound.min(initial=0.0)
+    sizes = (pulled, let_out, 1e-3 * max(pulled, let_out))
+    off, reverse, in_mm = (abs(np.log(max(size, 1e-9) / level)) for size in sizes)
+    mirrored = reverse < off and reverse <= np.log(factor) and off > np.log(FITS)
+    if off <= np.log(factor) and not mirrored:
+        return []
+    found = f"{key}: found pulls from {0.0 - let_out:.4g} to {pulled:.4g} m"
+    expected = f"expected about {level:.4g} m, as the level says, positive where a tendon is pulled in"
+    hint = ": is the sign reversed?" if mirrored else ": are they in mm?" if in_mm <= np.log(factor) else ""
+    return [f"{found}, {expected}{hint}"]
+
+
+def _against_commands(take: Take, factor: float) -> list[str]:
+    """Each tendon's measured position follows its own command, forwards, by about as much, and not ahead of it."""
+    time, measured = take.tendon_time, take.tendon_positions
+    commanded = np.stack([np.interp(time, take.command_time, one) for one in take.commands.T], axis=1)
+    said = []
+    for tendon, name in enumerate(take.tendons):
+        if max(np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])) < MIN_TRAVEL:
+            continue
+        alike = [_correlation(measured[:, tendon], command) for command in commanded.T]
+        best = int(np.argmax(alike))
+        expected = "expected a tendon to follow its own command"
+        if alike[tendon] < -FAILS:
+            said.append(f"tendons: {name!r} moves against its commands, {expected}: is the sign reversed?")
+        elif alike[tendon] < FAILS and alike[best] > FOLLOWS:
+            said.append(f"tendons: {name!r} follows the commands of {take.tendons[best]!r}, {expected}")
+        else:
+            moves, asked = np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])
+            if not asked / factor <= moves <= asked * factor:
+                found = f"{name!r} moves by {moves:.4g} m where {asked:.4g} m are commanded"
+                said.append(f"tendons: {found}, {expected}, within a factor of {factor:g}")
+    return said or _exchanged(take, commanded)
+
+
+def _exchanged(take: Take, commanded: np.ndarray) -> list[str]:
+    """Measurements lag behind commands and have noise; where it is the other way about, topics are exchanged."""
+    most = int(np.argmax(np.ptp(commanded, axis=0)))
+    if np.ptp(commanded[:, most]) < MIN_TRAVEL or len(take.tendon_time) < 10:
+        return []
+    lags = np.arange(-LATEST, LATEST, 0.005)
+    time, measured = take.tendon_time, take.tendon_positions[:, most]
+    inside = (time > time[0] + LATEST) & (time < time[-1] - LATEST)
+    if inside.sum() < 10:
+        return []
+    shifted = [np.interp(time[inside] - lag, take.command_time, take.commands[:, most]) for lag in lags]
+    lag = float(lags[int(np.argmax([_correlation(measured[inside], one) for one in shifted]))])
+    noise = [float(noise_level(some)[most]) for some in (take.commands, take.tendon_positions)]
+    if lag >= -EARLY and not (lag <= EARLY and noise[0] > NOISIER * noise[1]):
+        return []
+    found = f"commands are noisier, by {1e3 * noise[0]:.2g} mm, than what is measured, by {1e3 * noise[1]:.2g} mm"
+    if lag < -EARLY:
+        found = f"what is measured comes {-1e3 * lag:.0f} ms before its command"
+    return [f"topics: {found}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
+
+
+def _correlation(one: np.ndarray, other: np.ndarray) -> float:
+    one, other = one - one.mean(), other - other.mean()
+    size = np.linalg.norm(one) * np.linalg.norm(other)
+    return float(one @ other / size) if size > 0 else 0.0
