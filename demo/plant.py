@@ -108,6 +108,7 @@ def build_plant(
         body.add_site(name=f"{name}_center", pos=[0, 0, center])
         _add_holes(body, name, settings.hole_ratio * chain.widths[index] / 2, center, cables)
         bottom = -(length - half_link)
+    body.add_site(name="tip", pos=[0, 0, bottom])
     return spec.compile()
 
 

@@ -11,7 +11,7 @@ from trunkline.figures.style import save_figure
 from trunkline.ik.learn import Learning, learn
 from trunkline.ik.network import INPUTS
 from trunkline.ik.report import histogram, summary
-from trunkline.pipeline.inputs import read_model
+from trunkline.pipeline.inputs import load_rig, read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.settings import settings
 from trunkline.statics.chain import read_chain
@@ -27,7 +27,8 @@ def main(config: Learning) -> None:
     model = read_model(MODEL)
     chain = read_chain(model)
     table = read_samples(SAMPLES, chain.tendons, "split")
-    learned = learn(model, chain, table, config)
+    rig = None if config.rig is None else load_rig("train_ik.rig", config.rig)
+    learned = learn(model, chain, table, config, rig)
 
     with output_folder(ARTIFACTS) as folder:
         onnx.save(learned.exported, str(folder / "ik.onnx"))

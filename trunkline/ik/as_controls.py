@@ -18,11 +18,14 @@ from trunkline.simulation.drive import drive
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain
 
-REST_SPEED = 1e-6  # rad/s of the fastest joint of an arm that rests: tips are some 1e-6 m from it
+REST_SPEED = 1e-5  # rad/s of the fastest joint of an arm that rests: tips are some 1e-6 m from it
 NEAR_LIMIT = 0.95  # share of its largest force at which a motor is near it: there other commands hold the same pose
 TAUT_SHARE = 0.2  # of the deepest pulls, where all motors pull: more bends hardly more and presses the units together
 SHARE = 0.01  # of the arm's length; a larger error is worth a warning
+DOUBT = 0.8 * SHARE  # from which on a foreseen miss is a reason to doubt: what is foreseen has an error of its own
+PULL_SHARE = 0.8  # of the deepest pulls of the samples: together, two of them are near the motors' limits
 
+Rig = Callable[[np.ndarray, np.ndarray], np.ndarray]  # commands (N, K), m, and gravity (N, 3), m/s², to tips (N, 3), m
 Ask = Callable[[np.ndarray], dict[str, np.ndarray]]  # as `ask.ask`, of one network
 
 
@@ -31,11 +34,12 @@ class AsControls:
     """See conf/train_ik/config.yaml.
 
     targets: in all; some of them are left out where a motor is near its limit. timed: how many of them are also driven
-    without friction, to see how long that takes. seconds: longest time to rest.
+    without friction, to see how long that takes. on_rig: how many a rig is sent. seconds: longest time to rest.
     """
 
     targets: Annotated[int, Field(ge=8, le=100_000)]
     timed: Annotated[int, Field(ge=1, le=100_000)]
+    on_rig: Annotated[int, Field(ge=1, le=100_000)]
     seconds: Annotated[PositiveFloat, Field(le=120)]
 
 
@@ -122,23 +126,37 @@ def score(
     deepest: np.ndarray,
     settings: AsControls,
     rng: np.random.Generator,
-) -> dict:
+    rig: Rig | None = None,
+) -> tuple[dict, dict | None]:
     """The network's commands as sent, without and with friction, and for shapes that the data set has none of.
 
     Args:
         ask: the network, (N, 8) to its answer.
         angles, deepest: as in `draw_targets`.
+        rig: the arm that the model is of.
+
+    Returns:
+        Metrics of the model, and of the rig beside the model's with friction on the same targets.
     """
-    targets = draw_targets(model, chain, angles, deepest, settings.targets, rng)
+    targets = draw_targets(model, chain, angles, PULL_SHARE * deepest, settings.targets, rng)
     taut = draw_targets(model, chain, angles, TAUT_SHARE * deepest, settings.timed, rng, others_pay_out=False)
     few = targets[: settings.timed]
-    return {
+    with_friction = driven(model, ask, targets, settings.seconds)
+    on_model = {
         "targets": len(targets),
         "frictionless": settled(model, ask, targets).metrics(chain.length)
         | {"seconds_to_rest": driven(model, ask, few, settings.seconds, friction=False).time_to_rest()},
-        "friction": driven(model, ask, targets, settings.seconds).metrics(chain.length),
+        "friction": with_friction.metrics(chain.length),
         "all_taut": {"targets": len(taut)} | settled(model, ask, taut).metrics(chain.length),
     }
+    if rig is None:
+        return on_model, None
+    few = targets[: settings.on_rig]
+    answer = ask(few)
+    on_rig = _reached(few, answer, rig(answer["commands"].astype(float), gravity_in_base(few[:, 0])))
+    summary = on_rig.metrics(chain.length)
+    twin = np.quantile(with_friction.position[: len(few)], (0.5, 0.95)) * 1e3
+    return on_model, {"targets": len(few)} | summary | {"twin_mm": {"median": twin[0], "p95": twin[1]}}
 
 
 def settled(model: mujoco.MjModel, ask: Ask, targets: np.ndarray) -> Reached:

@@ -14,7 +14,7 @@ from pydantic import Field
 
 from trunkline.dataset.columns import command_columns, length_columns, tension_columns
 from trunkline.dataset.table import command_by_tension, sample_table, tip_by_tension, turn_by_tension
-from trunkline.ik.as_controls import SHARE, AsControls, score
+from trunkline.ik.as_controls import DOUBT, AsControls, Rig, score
 from trunkline.ik.ask import ask
 from trunkline.ik.network import INPUTS, OUTPUTS, InverseKinematics
 from trunkline.ik.onnx import to_onnx
@@ -55,6 +55,7 @@ class Learning(Training):
     """The training and what it is scored on, see conf/train_ik/config.yaml.
 
     lever: m; the loss counts a turn of the tip by 1 rad as this much distance. outside: targets far off.
+    rig: module whose `reach` drives the arm itself, as `as_controls.Rig`; none for an arm that no module drives.
     """
 
     lever: Annotated[float, Field(ge=0, le=1)]
@@ -62,6 +63,7 @@ class Learning(Training):
     as_controls: AsControls
     polish: Polish
     outside: Annotated[int, Field(ge=1, le=1_000_000)]
+    rig: str | None
 
 
 @dataclass
@@ -70,7 +72,7 @@ class Learned:
 
     held_out: the samples that no training saw. errors: of the exported network's commands, for them ("held out") and
     for targets at "unseen angles". as_lengths: of its lengths, for the latter, held by cables. as_controls: what comes
-    of its commands in MuJoCo. polished: of some held-out targets after Gauss-Newton steps from its answers.
+    of its commands in MuJoCo, on_plant: on the arm itself. polished: of some held-out targets after Gauss-Newton steps.
     outside: how many targets far off there are, beyond_range: how far (m) any answer to them leaves the tendons' range.
     difference: between the network and what was exported, m, at most.
     """
@@ -82,23 +84,26 @@ class Learned:
     errors: dict[str, TipErrors]
     as_lengths: TipErrors
     as_controls: dict
+    on_plant: dict | None
     polished: TipErrors
     outside: int
     beyond_range: float
     difference: float
 
 
-def learn(model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Learning) -> Learned:
+def learn(
+    model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Learning, rig: Rig | None = None
+) -> Learned:
     """Train on the samples of `table` that are not held out, and score on those that are and on others.
 
     Args:
-        model: whose `chain` it is.
+        model: whose `chain` it is. rig: what drives the arm itself.
     """
     network, curve = fit(table, chain, learning)
     held_out = table[table["split"] == "validate"]
     angles = np.unique(table["theta_g"])
     unseen = unseen_targets(chain, angles, learning.unseen, learning.seed)
-    exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], SHARE * chain.length)
+    exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], DOUBT * chain.length)
     runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
     errors, difference, found = {}, 0.0, {}
     for name, targets in (("held out", held_out), ("unseen angles", unseen)):
@@ -116,7 +121,7 @@ def learn(model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Le
     known = table.loc[table["split"] == "train", command_columns(chain.tendons)].to_numpy()
     print("train_ik: sending commands to MuJoCo until the arm rests", flush=True)
     deepest = chain.straight_lengths - known.min(axis=0)
-    sent = score(model, chain, partial(ask, runtime), angles, deepest, learning.as_controls, rng)
+    sent, on_plant = score(model, chain, partial(ask, runtime), angles, deepest, learning.as_controls, rng, rig)
     return Learned(
         network=network,
         exported=exported,
@@ -125,6 +130,7 @@ def learn(model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Le
         errors=errors,
         as_lengths=as_lengths,
         as_controls=sent,
+        on_plant=on_plant,
         polished=polished,
         outside=len(far),
         beyond_range=beyond_range(far, known),

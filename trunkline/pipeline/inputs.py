@@ -1,5 +1,7 @@
 """Files that a stage reads: there, and readable, or one line that says what was expected."""
 
+from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
 
 import mujoco
@@ -31,3 +33,15 @@ def read_model(path: str | Path) -> mujoco.MjModel:
     if not model.ntendon:
         raise InputError(f"{path}: found no tendons, expected at least one: an arm without ends with identify_damping")
     return model
+
+
+def load_rig(key: str, module: str) -> Callable:
+    """`reach` of a module that drives the arm itself, see `ik.as_controls.Rig`. Each lab has its own.
+
+    Raises:
+        InputError: naming the settings' `key`, if there is no such module or it has no `reach`.
+    """
+    try:
+        return import_module(module).reach
+    except (ModuleNotFoundError, AttributeError) as error:
+        raise InputError(f"{key}: found {module!r}: {error}; expected a module with a function `reach`") from error

@@ -1,0 +1,102 @@
+"""Commands as a user sends them: exact ones bring MuJoCo's tip home, lengths sent in their place do not."""
+
+import numpy as np
+import pytest
+
+from tests.support.bent_chain import stump
+from trunkline.frames import gravity_in_base
+from trunkline.ik.as_controls import AsControls, draw_targets, driven, score, settled
+from trunkline.ik.polish import polish
+from trunkline.simulation.drive import drive
+from trunkline.statics.chain import read_chain
+
+ANGLES = np.radians([0.0, 60.0])
+
+
+@pytest.fixture(scope="module")
+def model():
+    return stump()
+
+
+@pytest.fixture(scope="module")
+def chain(model):
+    return read_chain(model)
+
+
+@pytest.fixture(scope="module")
+def targets(model, chain):
+    found = draw_targets(model, chain, ANGLES, np.full(3, 0.01), 12, np.random.default_rng(0))
+    assert len(found) >= 6
+    return found
+
+
+def exact(chain, wrong: str | None = None):
+    """What a perfect network would answer, of the statics; with `wrong`, lengths for commands."""
+
+    def ask(poses):
+        first = np.tile(chain.straight_lengths, (len(poses), 1))
+        found = polish(chain, poses, first, steps=30)
+        commands = found.lengths if wrong else found.commands
+        return {"commands": commands, "lengths": found.lengths, "tip": poses[:, 1:4], "doubtful": found.steps < 0}
+
+    return ask
+
+
+def test_exact_commands_settle_on_their_targets_and_lengths_do_not(model, chain, targets):
+    home = settled(model, exact(chain), targets)
+    assert home.rested.all()
+    assert home.position.max() < 2e-5
+    short = settled(model, exact(chain, "lengths"), targets)
+    assert np.median(short.position) > 10 * home.position.max()
+
+
+def test_a_drive_without_friction_ends_where_settling_does_and_says_when(model, chain, targets):
+    found = driven(model, exact(chain), targets, 20.0, friction=False)
+    assert found.rested.all()
+    assert found.position.max() < 3e-4
+    assert ((found.seconds > 0) & (found.seconds < 20)).all()
+
+
+def test_what_did_not_rest_is_counted_and_its_time_is_none(model, chain, targets):
+    found = driven(model, exact(chain), targets, 0.5)
+    metrics = found.metrics(chain.length)
+    assert metrics["rested"] == 0
+    assert found.time_to_rest() == {"median": None, "p95": None}
+
+
+def test_errors_beyond_one_percent_are_counted_with_what_was_said(model, chain, targets):
+    def careless(poses):
+        answer = exact(chain)(poses)
+        answer["commands"] = answer["commands"] + [0.0, 0.0, -0.01]
+        answer["doubtful"] = np.arange(len(poses)) == 0
+        return answer
+
+    found = settled(model, careless, targets)
+    metrics = found.metrics(chain.length)
+    far = found.position > 0.01 * chain.length
+    assert metrics["beyond_1pct"] == far.sum() > 1
+    assert metrics["beyond_1pct_unsaid"] == far[1:].sum()
+
+
+def test_the_score_has_the_rig_beside_the_model(model, chain):
+    asked = []
+
+    def rig(commands, gravity):
+        asked.append(len(commands))
+        return drive(model, commands, gravity, 10.0).end + [1e-3, 0, 0]
+
+    settings = AsControls(targets=12, timed=8, on_rig=4, seconds=10.0)
+    rng = np.random.default_rng(0)
+    on_model, on_plant = score(model, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, rng, rig)
+    assert asked == [4]
+    assert on_model["targets"] <= 12
+    assert on_plant["targets"] == 4
+    assert 0.5 < on_plant["position_error_mm"]["median"] < 1.5
+    assert on_model["frictionless"]["position_error_mm"]["max"] < 0.02
+    assert score(model, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, rng)[1] is None
+
+
+def test_tips_of_a_drive_are_in_the_base_frame(model, chain, targets):
+    answer = exact(chain)(targets)
+    found = drive(model, answer["commands"], gravity_in_base(targets[:, 0]), 20.0, friction=False)
+    np.testing.assert_allclose(found.end, targets[:, 1:4], atol=3e-4)
