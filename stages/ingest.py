@@ -47,6 +47,8 @@ def main(config: Config) -> None:
     settle_vertical(takes, findings, session)
     offset, spread = align_clocks(takes, [found.offset for found in findings])
     qualities = [judge(take, found) for take, found in zip(takes, findings, strict=True)]
+    for take, found in zip(takes, findings, strict=True):
+        take.repairs = len(found.repairs)
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
         write_takes(processed, takes)
         write_json(artifacts / "quality.json", report(qualities, refused, offset, spread))

@@ -8,6 +8,7 @@ from stages import ingest
 from tests.support.sessions import SEGMENTS
 from tests.support.workbench import workbench
 from trunkline.pipeline.stage import run_stage
+from trunkline.trials.splits import SPLITS
 from trunkline.trials.take import read_takes
 
 
@@ -34,7 +35,7 @@ def set_param(project, old, new):
 
 def test_takes_report_and_metrics(project, capsys):
     assert run(capsys) == (0, "")
-    takes = read_takes(ingest.PROCESSED)
+    takes = read_takes(ingest.PROCESSED, SPLITS)
     assert [take.name for take in takes] == ["tilt_00", "tilt_60", "release_a", "curl_40"]
     assert {take.segments for take in takes} == {SEGMENTS}
     metrics = json.loads((ingest.ARTIFACTS / "metrics.json").read_text())

@@ -12,6 +12,7 @@ from yaml import YAMLError
 
 from trunkline.errors import InputError
 from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
+from trunkline.trials.splits import SplitName
 
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
@@ -73,7 +74,7 @@ class TrialEntry(Entry):
     window: tuple[FiniteFloat, FiniteFloat] | None = None
     experiment: ExperimentName
     level: FiniteFloat | None = None
-    split: Literal["identify", "validate"]
+    split: SplitName
 
     @model_validator(mode="after")
     def _complete(self):

@@ -6,6 +6,7 @@ from trunkline.sessions.session import FixedBase, Session
 from trunkline.signals.clock import OffsetFit, agree_on_offset
 from trunkline.takes.checks import Findings
 from trunkline.takes.vertical import check_vertical
+from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.take import Take
 
 
@@ -16,7 +17,7 @@ def align_clocks(takes: list[Take], fits: list[OffsetFit | None]) -> tuple[float
     where those for identification tell nothing.
     """
     told = [(take.split, fit) for take, fit in zip(takes, fits, strict=True) if fit is not None]
-    offset, spread = agree_on_offset([fit for split, fit in told if split == "identify"])
+    offset, spread = agree_on_offset([fit for split, fit in told if split == IDENTIFY])
     if not np.isfinite(spread):
         offset, spread = agree_on_offset([fit for _, fit in told])
     for take in takes:
