@@ -25,5 +25,6 @@ def score_figure(tables: dict[str, pd.DataFrame], metrics: dict[str, dict]) -> F
         axis.axhline(metrics[stage]["noise_floor_mm"], color=MEASURED, linestyle=":", label="noise floor")
         axis.set_xticks(np.arange(len(names)), names, rotation=60, ha="right", fontsize=8)
     axes[0, 0].set_ylabel("mean position error (mm)")
-    axes[0, 0].legend(fontsize=8)
+    if any(map(len, tables.values())):
+        next(axis for axis in axes[0] if axis.lines).legend(fontsize=8)
     return figure

@@ -49,7 +49,7 @@ def replay(
 def scores(
     replayed: Replay, experiments: list[Experiment], loss: str | None = None, weights: LossWeights | None = None
 ) -> dict[str, dict]:
-    """By split the loss, if one is asked for, and the errors, each the mean over `trials` trials.
+    """By split the loss, if one is asked for, and the errors, each the mean over `trials` trials, some `_worst` too.
 
     `by_experiment` has the same for every kind; `without_repaired` where `ingest` repaired some of the split's trials,
     `repaired` of them. Where a simulation diverged, its segments count as the arm's length away along every axis.
@@ -96,7 +96,9 @@ def errors_of(
 
 
 def _mean(rows: list[dict[str, float]]) -> dict[str, float]:
-    """Of each error over the trials that have it: the arm has a velocity in moving ones alone."""
+    """Of each error over the trials that have it: the arm has a velocity in moving ones alone. And of the worst."""
     errors = dict.fromkeys(key for row in rows for key in row)
     means = {key: float(np.mean([row[key] for row in rows if key in row])) for key in errors}
-    return means | {"trials": len(rows)}
+    worst = {f"{name}_worst_mm": max(row[f"{name}_mm"] for row in rows if f"{name}_mm" in row)
+             for name in ("e_position", "e_tip") if f"{name}_mm" in errors}  # fmt: skip
+    return means | worst | {"trials": len(rows)}
