@@ -169,7 +169,7 @@ def test_the_arm_is_fully_bent_when_it_is_let_go():
     ("key", "value", "message"),
     [
         ("experiments.validate_every", 1, "found 1, expected greater than or equal to 2"),
-        ("experiments.validate_every", 50, "validate_every: found 50, expected trials of .* in the splits identify and val"),
+        ("experiments.validate_every", 50, "validate_every: found 50, expected trials of .* in the splits "),
         ("experiments.tilt_repeats", 0, "found 0"),
         ("experiments.curl_hold", 0.0, "curl_hold: found 0.0"),
         ("experiments.curl_levels", [20.0, -40.0], "curl_levels.1: found -40.0"),

@@ -32,4 +32,5 @@ def _last_shape(experiment: Experiment) -> np.ndarray:
     frames, segments = experiment.measured.shape
     last = frames - 1 - np.argmax(experiment.measured[::-1], axis=0)
     shape = experiment.positions[last, np.arange(segments)]
-    return np.where(experiment.measured.any(axis=0)[:, None], shape, np.nan)
+    never = ~np.logical_or.reduce(experiment.measured, axis=0)
+    return np.where(never[:, None], np.nan, shape)
