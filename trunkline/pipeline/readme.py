@@ -30,23 +30,8 @@ EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README an
 PAPER = {"cad": "89.8 mm (17 %)", "identified": "15.8 mm (3 %)"}
 MODELS = {"cad": "CAD", "coarse": "coarse: one scalar each", "identified": "identified: with factors"}
 
-# stage: [(what it is, dotted key in metrics.json, unit)]; trials are of the split `validate`
+# stage: [(what it is, dotted key in metrics.json, unit)]
 RESULTS = {
-    "identify_stiffness": [
-        ("Static tilts: E_internal", "identified.validate.e_internal_mm", "mm"),
-        ("… mean position error", "identified.validate.e_position_mm", "mm"),
-    ],
-    "identify_damping": [
-        ("Releases: E_internal", "identified.validate.e_internal_mm", "mm"),
-        ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
-        ("… mean position error", "identified.validate.e_position_mm", "mm"),
-    ],
-    "identify_control": [
-        ("Releases and curls: E_internal", "identified.validate.e_internal_mm", "mm"),
-        ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
-        ("… mean position error", "identified.validate.e_position_mm", "mm"),
-        ("… E_internal of the CAD model", "cad.validate.e_internal_mm", "mm"),
-    ],
     "fk_dataset": [
         ("Equilibria in the data set", "samples", ""),
         ("FK against MuJoCo settled to rest: median", "mujoco_deviation_mm.median", "mm"),
@@ -71,7 +56,6 @@ RESULTS = {
 SCORES = [
     ("static tilts", "identify_stiffness", "by_experiment.static_tilt."),
     ("releases", "identify_damping", "by_experiment.release."),
-    ("releases, after all three stages", "identify_control", "by_experiment.release."),
     ("curls", "identify_control", "by_experiment.curl."),
     ("releases and curls", "identify_control", ""),
 ]
@@ -82,13 +66,10 @@ EXAMPLE_RESULTS = {
         ("… of the arm's length", "identify_damping.identified.test.e_position_pct", "%"),
         ("… of the null model", "identify_damping.null.test.e_position_mm", "mm"),
         ("… tip error", "identify_damping.identified.test.e_tip_mm", "mm"),
-        ("… of the arm's length", "identify_damping.identified.test.e_tip_pct", "%"),
     ],
     "identify_damping": [
         ("Releases of `validate`: mean position error", "identified.validate.e_position_mm", "mm"),
         ("… of the arm's length", "identified.validate.e_position_pct", "%"),
-        ("… E_internal", "identified.validate.e_internal_mm", "mm"),
-        ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
         ("… position error without repaired trials", "identified.validate.without_repaired.e_position_mm", "mm"),
         ("Releases of `identify`: mean position error", "identified.identify.e_position_mm", "mm"),
     ],
