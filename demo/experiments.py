@@ -1,18 +1,30 @@
-"""The experiments of the paper's table, as a plan: which trials there are, and which are kept for validation."""
+"""The experiments of the paper's table, as a plan: which trials there are, and what each is kept for."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated
 
 from pydantic import Field
 
 from trunkline.trials.recording import Planned
+from trunkline.trials.splits import IDENTIFY, VALIDATE
 
 Tilt = Annotated[float, Field(ge=0, le=180)]
 Azimuth = Annotated[float, Field(ge=0, lt=360)]
 Group = Annotated[list[Annotated[int, Field(ge=1, le=12)]], Field(min_length=1)]
+Level = Annotated[float, Field(gt=0, le=1000)]
 Duration = Annotated[float, Field(gt=0, le=600)]
 Coordinate = Annotated[float, Field(ge=-100, le=100)]
+
+
+@dataclass
+class ForTest:
+    """Tilts, directions, levels and tendons of the test split, as in `Experiments`: none is in another split."""
+
+    tilts: Annotated[list[Tilt], Field(min_length=1)]
+    release_directions: Annotated[list[Azimuth], Field(min_length=1)]
+    curl_levels: Annotated[list[Level], Field(min_length=1)]
+    curl_tendons: Annotated[list[Group], Field(min_length=1)]
 
 
 @dataclass
@@ -28,7 +40,8 @@ class Experiments:
     of hold and `release_duration` after letting go.
     curl_levels: pulled by each of `curl_tendons` (lists of tendons pulled together); a cycle is `curl_rest`, a
     ramp of `curl_ramp`, a hold of `curl_hold`, the ramp back and a rest of `curl_hold`.
-    validate_every: about one in so many trials of each experiment is in the validate split.
+    validate_every: about one in so many trials of each experiment is in the validate split, the others in identify.
+    test: what is done anew for the test split; everything else is as above.
     """
 
     mount_position: tuple[Coordinate, Coordinate, Coordinate]
@@ -45,12 +58,17 @@ class Experiments:
     bend_settle: Duration
     hold_duration: Duration
     release_duration: Duration
-    curl_levels: Annotated[list[Annotated[float, Field(gt=0, le=1000)]], Field(min_length=1)]
+    curl_levels: Annotated[list[Level], Field(min_length=1)]
     curl_tendons: Annotated[list[Group], Field(min_length=1)]
     curl_rest: Duration
     curl_ramp: Duration
     curl_hold: Duration
     validate_every: Annotated[int, Field(ge=2, le=1000)]
+    test: ForTest
+
+    def tested(self) -> "Experiments":
+        """What is done for the test split."""
+        return replace(self, tilt_repeats=1, **vars(self.test))
 
 
 def tilt_trials(experiments: Experiments) -> list[Planned]:
@@ -106,4 +124,4 @@ PLANS: dict[str, tuple[str, Callable[[Experiments], list[Planned]]]] = {
 def _split(row: int, index: int, experiments: Experiments) -> str:
     """One in every `validate_every` trials of a row is for validation, in each row one further along."""
     every = experiments.validate_every
-    return "validate" if index % every == row % every else "identify"
+    return VALIDATE if index % every == row % every else IDENTIFY

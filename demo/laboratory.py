@@ -3,7 +3,7 @@
 Everything is simulated in the base frame with gravity turned, then placed in the world (z-up).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Annotated
 
@@ -19,6 +19,7 @@ from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.progress import progress
 from trunkline.simulation.motion import batch_of, move
 from trunkline.trials.recording import Planned
+from trunkline.trials.splits import TEST
 
 SAMPLE_RATE = 500.0  # Hz, of the truth that the instruments see
 LOOSE = 0.3  # m of cable paid out, far more than any bend takes up
@@ -42,20 +43,27 @@ def record(
     tendons: int,
     tracked: list[str],
     rng: np.random.Generator,
+    test_rng: np.random.Generator,
 ) -> list[Truth]:
-    """Do all experiments.
+    """Do all experiments, those of the test split last.
 
     Args:
         plant: from `build_plant`; 1 / SAMPLE_RATE is a multiple of its step.
         tendons: how many the plant has.
         tracked: names of the tracked units.
-        rng: draws how well the lab sets the tilts.
+        rng, test_rng: draw how well the lab sets the tilts; the latter for the test split, whose trials therefore
+            change no other.
     """
-    return [
-        *record_tilts(plant, experiments, tendons, tracked, rng),
-        *record_releases(plant, experiments, tendons, tracked),
-        *record_curls(plant, motors, experiments, tendons, tracked),
-    ]
+
+    def done(planned: Experiments, draws: np.random.Generator) -> list[Truth]:
+        return [
+            *record_tilts(plant, planned, tendons, tracked, draws),
+            *record_releases(plant, planned, tendons, tracked),
+            *record_curls(plant, motors, planned, tendons, tracked),
+        ]
+
+    tested = done(experiments.tested(), test_rng)
+    return [*done(experiments, rng), *(replace(truth, split=TEST) for truth in tested)]
 
 
 def record_tilts(plant, experiments: Experiments, tendons: int, tracked, rng) -> list[Truth]:
@@ -87,7 +95,10 @@ def record_releases(plant, experiments: Experiments, tendons: int, tracked) -> l
     paths = _simulate("releases", plant, [Rotation.identity()] * len(trials), controls)
     view = _View(plant, experiments.mount_position, tracked)
     skipped = round((bend + experiments.bend_settle) * SAMPLE_RATE)
-    return [view.truth(trial, Rotation.identity(), path[skipped:]) for trial, path in zip(trials, paths, strict=True)]
+    return [
+        view.truth(trial, Rotation.identity(), path[skipped:], experiments.hold_duration)
+        for trial, path in zip(trials, paths, strict=True)
+    ]
 
 
 def record_curls(plant, motors: Motors, experiments: Experiments, tendons: int, tracked) -> list[Truth]:
@@ -110,7 +121,7 @@ def record_curls(plant, motors: Motors, experiments: Experiments, tendons: int, 
     view = _View(plant, experiments.mount_position, tracked)
     truths = []
     for index, trial in enumerate(trials):
-        truth = view.truth(trial, Rotation.identity(), paths[index])
+        truth = view.truth(trial, Rotation.identity(), paths[index], experiments.curl_rest)
         truth.tendons = tuple(f"tendon_{k + 1}" for k in range(tendons))
         sampled = slice(None, len(truth.time) * stride, stride)
         truth.command_time, truth.commands = time[sampled], commands[index, sampled]
@@ -183,7 +194,7 @@ class _View:
     mount_position: tuple[float, float, float]
     tracked: list[str]
 
-    def truth(self, trial: Planned, mount: Rotation, angles: np.ndarray) -> Truth:
+    def truth(self, trial: Planned, mount: Rotation, angles: np.ndarray, begin: float = 0.0) -> Truth:
         """The trial with joint angles (T, nq), under a mount turned by `mount` (world ← base)."""
         data = mujoco.MjData(self.plant)
         sites = [self.plant.site(f"{segment}_center").id for segment in self.tracked]
@@ -204,6 +215,7 @@ class _View:
             positions=origin + mount.apply(positions.reshape(-1, 3)).reshape(positions.shape),
             quaternions=wxyz_from_rotation(mount * local).reshape(*positions.shape[:2], 4),
             tendons=(),
+            begin=begin,
             command_time=np.empty(0),
             commands=np.empty((0, 0)),
             tendon_positions=np.empty((len(angles), 0)),

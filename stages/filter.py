@@ -11,6 +11,7 @@ from trunkline.filtering.filter import Filter, filter_take
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.settings import settings
+from trunkline.trials.splits import SPLITS
 from trunkline.trials.take import read_takes
 from trunkline.trials.trial import write_trials
 
@@ -20,7 +21,7 @@ Config = settings(Filter)
 
 
 def main(config: Filter) -> None:
-    takes = read_takes(INGEST)
+    takes = read_takes(INGEST, SPLITS)
     trials, effects = [], []
     with progress(len(takes), "filter", "trials") as bar:
         for take in takes:

@@ -40,6 +40,8 @@ def main(config: Config) -> None:
             bar.update(1, trial=trial.name)
     gathered = gather(taken, session, config.plausible, config.refused_trials, f"{folder}")
     qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
+    for take, found in zip(gathered.takes, gathered.findings, strict=True):
+        take.repairs = len(found.repairs)
     for line in remarks(qualities):
         print(f"ingest: {line}")
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:

@@ -36,6 +36,7 @@ from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.results import recorded
 from trunkline.trials.experiments import is_static
+from trunkline.trials.splits import VALIDATE
 from trunkline.trials.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")
@@ -199,9 +200,9 @@ def fewer(experiments: list[Experiment], trials: int) -> list[Experiment]:
 def row(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> str:
     """One line of the table."""
     found = chain(choice, is_quick, known)
-    unseen = [e for e in found.experiments if e.split == "validate"]
+    unseen = [e for e in found.experiments if e.split == VALIDATE]
     replayed = replay(found.model, unseen, found.fit.segments)
-    table = scores(replayed, unseen, found.fit.loss, found.fit.weights)["validate"]["by_experiment"]
+    table = scores(replayed, unseen, found.fit.loss, found.fit.weights)[VALIDATE]["by_experiment"]
     errors = [f"{table[kind][key]:.3f}" for key in ("e_internal_mm", "e_position_mm") for kind in KINDS]
     return "| " + " | ".join([choice.title, *errors, *(f"{seconds:.0f}" for seconds in found.spent)]) + " |"
 

@@ -23,6 +23,7 @@ from trunkline.identification.problem import Bounds
 from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.results import recorded
+from trunkline.trials.splits import DECIDING, IDENTIFY, VALIDATE
 from trunkline.trials.take import Take, read_takes
 
 EXAMPLE = Path("examples/asl_trunk")
@@ -73,8 +74,8 @@ def error(case: Case, takes: list[Take]) -> tuple[float, float, float]:
     with contextlib.redirect_stdout(io.StringIO()):
         found = identify("", model, experiments, fit)
     table = scores(replay(found.models["identified"], experiments, fit.segments), experiments, fit.loss, fit.weights)
-    unseen = table["validate"]
-    return table["identify"]["e_position_mm"], unseen["e_position_mm"], unseen["e_position_pct"]
+    unseen = table[VALIDATE]
+    return table[IDENTIFY]["e_position_mm"], unseen["e_position_mm"], unseen["e_position_pct"]
 
 
 def arm(case: Case) -> mujoco.MjModel:
@@ -93,7 +94,7 @@ def as_stamped(take: Take) -> Take:
 @in_one_line
 @recorded("real_arm")
 def main() -> int:
-    takes = read_takes(EXAMPLE / "data/processed/ingest")
+    takes = read_takes(EXAMPLE / "data/processed/ingest", DECIDING)
     print(f"{'':45}  identify  validate: mean position error, and of the length")
     for name, case in cases().items():
         identify_mm, validate_mm, share = error(case, takes)

@@ -25,6 +25,7 @@ from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported
 from trunkline.pipeline.inputs import read_spec
+from trunkline.trials.splits import IDENTIFY, VALIDATE
 
 # every stage, and the model that it begins with
 STAGES = {
@@ -80,7 +81,7 @@ class Case:
         replayed = replay(
             with_parameters(self.model, values_of(self.fit.parameters, vector)), self.unseen, self.fit.segments
         )
-        table = scores(replayed, self.unseen, self.fit.loss, self.fit.weights)["validate"]
+        table = scores(replayed, self.unseen, self.fit.loss, self.fit.weights)[VALIDATE]
         return f"validate: E_internal {table['e_internal_mm']:.3f} mm, position {table['e_position_mm']:.2f} mm"
 
 
@@ -146,8 +147,8 @@ def read_case(stage: str, size: Size) -> Case:
     chosen = [e.shortened(size.frames) for e in experiments if e.kind in config.experiments]
     return Case(
         model=model,
-        experiments=spread([e for e in chosen if e.split == "identify"], size.trials),
-        unseen=[e for e in chosen if e.split == "validate"],
+        experiments=spread([e for e in chosen if e.split == IDENTIFY], size.trials),
+        unseen=[e for e in chosen if e.split == VALIDATE],
         fit=fit,
     )
 

@@ -12,6 +12,7 @@ from trunkline.frames import gravity_in_base
 from trunkline.identification.experiment import SLACK, Experiment
 from trunkline.identification.pose_fit import PoseFit
 from trunkline.pipeline.config import load_config
+from trunkline.trials.splits import IDENTIFY
 
 CANDIDATES = 10
 BEND = np.radians(270)  # of the whole arm
@@ -64,7 +65,7 @@ def bent_release(model: mujoco.MjModel, frames: int, frame_step: float) -> tuple
     experiment = Experiment(
         name="bent",
         kind="release",
-        split="identify",
+        split=IDENTIFY,
         gravity=gravity_in_base(0.0),
         start=start,
         lead=frame_step,

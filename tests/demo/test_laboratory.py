@@ -10,7 +10,7 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from demo.experiments import curl_trials, release_trials, tilt_trials
+from demo.experiments import PLANS, ForTest, curl_trials, release_trials, tilt_trials
 from demo.laboratory import SAMPLE_RATE, record, record_releases
 from demo.plant import build_plant
 from demo.record import Config
@@ -27,6 +27,7 @@ SHORT = replace(
     CONFIG.experiments, tilts=[0.0, 90.0], tilt_repeats=1, settle=0.05, rest_duration=0.05,
     release_directions=[0.0, 90.0], bend_duration=0.05, bend_settle=0.02, hold_duration=0.033, release_duration=0.1,
     curl_levels=[20.0], curl_tendons=[[1]], curl_rest=0.0515, curl_ramp=0.1, curl_hold=0.05,
+    test=ForTest(tilts=[45.0], release_directions=[60.0], curl_levels=[30.0], curl_tendons=[[3]]),
 )  # fmt: skip
 
 
@@ -36,20 +37,39 @@ def arm(units, seed):
     return build_plant(chain, CONFIG.plant, a.tendons, np.random.default_rng(seed))
 
 
-def session(seed):
+def session(seed, plan=SHORT):
     tracked = [unit_name(index) for index in (1, 3, 5)]
-    return record(arm(UNITS, seed), CONFIG.motors, SHORT, 3, tracked, np.random.default_rng(seed))
+    rngs = np.random.default_rng(seed).spawn(2)
+    return record(arm(UNITS, seed), CONFIG.motors, plan, 3, tracked, *rngs)
 
 
 def test_a_seed_is_one_session_and_another_seed_is_another():
     first, again, other = session(1), session(1), session(2)
-    assert [truth.name for truth in first] == ["tilt_000_a", "tilt_090_a", "release_000", "release_090", "curl_1_020"]
+    names = ["tilt_000_a", "tilt_090_a", "release_000", "release_090", "curl_1_020"]
+    assert [truth.name for truth in first] == [*names, "tilt_045_a", "release_060", "curl_3_030"]
+    assert [truth.split == "test" for truth in first] == [False] * 5 + [True] * 3
     for a, b, c in zip(first, again, other, strict=True):
         np.testing.assert_array_equal(a.positions, b.positions)
         np.testing.assert_array_equal(a.base_quaternion, b.base_quaternion)
         np.testing.assert_array_equal(a.tendon_positions, b.tendon_positions)
         assert np.abs(a.positions[-1] - c.positions[-1]).max() > 1e-6, a.name
     assert np.abs(first[0].base_quaternion - other[0].base_quaternion).max() > 1e-4
+
+
+def test_the_test_split_changes_no_other_trial():
+    more = replace(SHORT.test, tilts=[20.0, 45.0], release_directions=[60.0, 200.0])
+    for one, other in zip(session(1)[:5], session(1, replace(SHORT, test=more)), strict=False):
+        for key, value in vars(one).items():
+            np.testing.assert_array_equal(value, getattr(other, key), err_msg=key)
+
+
+def test_nothing_of_the_test_split_is_done_in_another():
+    tests = CONFIG.experiments
+    for plan in (tests, tests.tested()):
+        assert {trial.experiment for _, trials in PLANS.values() for trial in trials(plan)} == set(PLANS)
+    for key in ("tilts", "release_directions", "curl_levels", "curl_tendons"):
+        for value in getattr(tests.test, key):
+            assert value not in getattr(tests, key), key
 
 
 def test_every_array_of_a_trial_is_on_its_clock():
@@ -60,7 +80,7 @@ def test_every_array_of_a_trial_is_on_its_clock():
 
 
 def test_motors_lag_behind_their_commands():
-    curl = session(1)[-1]
+    curl = session(1)[4]
     command, wound = curl.commands[:, 0], curl.tendon_positions[:, 0]
     late = round(CONFIG.motors.command_delay * SAMPLE_RATE)
     rising = np.flatnonzero(command > 0)[0]
@@ -149,7 +169,7 @@ def test_the_arm_is_fully_bent_when_it_is_let_go():
     ("key", "value", "message"),
     [
         ("experiments.validate_every", 1, "found 1, expected greater than or equal to 2"),
-        ("experiments.validate_every", 50, "validate_every: found 50, expected trials of .* in both splits"),
+        ("experiments.validate_every", 50, "validate_every: found 50, expected trials of .* in the splits "),
         ("experiments.tilt_repeats", 0, "found 0"),
         ("experiments.curl_hold", 0.0, "curl_hold: found 0.0"),
         ("experiments.curl_levels", [20.0, -40.0], "curl_levels.1: found -40.0"),

@@ -36,7 +36,7 @@ def test_the_public_csv_becomes_a_session_that_ingest_reads(public, tmp_path):
     folder = tmp_path / "session"
     assert make_session(public, folder) == 13
     session = read_session(folder)
-    assert [trial.split for trial in session.trials] == ["identify"] * 9 + ["validate"] * 4
+    assert [trial.split for trial in session.trials] == ["identify", "identify", "test"] * 3 + ["validate"] * 4
     positions = read_csv(public)
     for number, (_, take, found) in enumerate(take_in(folder, session, LIMITS)):
         assert (take.segments, take.tendons, take.quaternions) == (("1", "2", "3"), (), None)

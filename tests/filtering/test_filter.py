@@ -12,6 +12,7 @@ from tests.support.sessions import CURL_BEGIN, RELEASE, all_truths
 from tests.support.workbench import workbench
 from trunkline.frames import gravity_in_base, rotation_from_wxyz
 from trunkline.pipeline.stage import run_stage
+from trunkline.trials.splits import SPLITS
 from trunkline.trials.trial import read_trials
 
 
@@ -25,7 +26,7 @@ def results(tmp_path_factory):
         run_stage("filter", filter_stage.Config, filter_stage.main)
         metrics = json.loads((filter_stage.ARTIFACTS / "metrics.json").read_text())
         assert (filter_stage.ARTIFACTS / "filter.png").stat().st_size > 20_000
-        return {trial.name: trial for trial in read_trials(filter_stage.PROCESSED)}, metrics
+        return {trial.name: trial for trial in read_trials(filter_stage.PROCESSED, SPLITS)}, metrics
 
 
 def in_base_frame(truth, time):

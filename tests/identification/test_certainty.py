@@ -134,9 +134,9 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
     rows = parameter_table(found, bounds)["parameters"]
     limits = [bounds["force_range"].low, bounds["force_range"].high]
     assert rows["force_range"]["undetermined"]
-    assert rows["force_range"]["interval_95"] == pytest.approx(limits)
-    assert rows["force_range"]["bootstrap_95"] == pytest.approx(limits)
-    low, high = rows["kp"]["interval_95"]
+    assert rows["force_range"]["interval_95_given_model"] == pytest.approx(limits)
+    assert rows["force_range"]["bootstrap_95_given_model"] == pytest.approx(limits)
+    low, high = rows["kp"]["interval_95_given_model"]
     assert bounds["kp"].low < low < rows["kp"]["value"] < high < bounds["kp"].high
 
 
@@ -154,7 +154,7 @@ def test_factors_that_one_trial_alone_determines_have_no_width(tmp_path):
     )
     write_json(tmp_path / "parameters.json", parameter_table(found, bounds))
     table = json.loads((tmp_path / "parameters.json").read_text())
-    assert table["per_joint"]["stiffness"]["half_width_95"] == [None] * 3
+    assert table["per_joint"]["stiffness"]["half_width_95_given_model"] == [None] * 3
     assert table["parameters"]["stiffness"]["undetermined"]
 
 

@@ -1,81 +1,24 @@
 """How often the truth lies inside the reported 95 % intervals, over seeded repetitions at a reduced size.
 
-Noise is the laboratory's, as the filter stage leaves it: 0.3 mm white per axis and 0.3°, positions low-passed at 20 Hz,
-static tilts averaged over their frames. Without the low-pass, steps from frame to frame are noisy, and the velocity
-term, which is relative to the measured step, then favours too much damping by 1 %, with an interval of 1 %.
+From near the truth, so that the intervals alone are tried; `python -m studies.coverage` searches over the whole range.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
-import mujoco
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
-from scipy.spatial.transform import Rotation
 from scipy.stats import binom
 from scipy.stats import t as student
 
-from tests.support.matched_plant import FRAME, curl, release, segments_of, small_model, tilt
-from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+from tests.support.matched_plant import segments_of, small_model
+from tests.support.noisy_trials import STAGES, TRIALS, WEIGHTS, measured, with_values
 from trunkline.identification.certainty import bootstrap, certainty
 from trunkline.identification.experiment import prepare
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.parameters import candidate_fields, set_fields
 from trunkline.identification.problem import Bounds, Problem
 from trunkline.identification.search import descend
 from trunkline.identification.surrogate import surrogate
-from trunkline.trials.trial import Trial
 
-REPETITIONS, TRIALS, FRAMES = 20, 6, 60
-NOISE = 0.3e-3, np.radians(0.3)  # m and rad, per axis
-LOW_PASS = butter(4, 20.0, fs=1 / FRAME, output="sos")
-MARGIN = 30  # frames, beyond which the low-pass's ends are not felt
-WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-
-
-@dataclass
-class Stage:
-    """True values, and noise-free trials of a model that has them."""
-
-    true: dict[str, float]
-    trials: Callable[[mujoco.MjModel], list[Trial]]
-
-
-def tilts(truth: mujoco.MjModel) -> list[Trial]:
-    return [tilt(truth, angle) for angle in np.linspace(20, 90, TRIALS)]
-
-
-def releases(truth: mujoco.MjModel) -> list[Trial]:
-    bends = np.linspace(0.15, 0.35, TRIALS) * np.resize([1, -1], TRIALS)
-    return [release(truth, bend, frames=FRAMES) for bend in bends]
-
-
-def curls(truth: mujoco.MjModel) -> list[Trial]:
-    """From gentle ones to some that reach the force range: the last four of six."""
-    levels = np.linspace(20, 60, TRIALS)
-    return [curl(truth, level, frames=FRAMES, tendon=index % 3) for index, level in enumerate(levels)]
-
-
-STAGES = {
-    "stiffness": Stage({"stiffness": 2.0, "hardening": 1.5}, tilts),
-    "damping": Stage({"damping": 0.07, "tendon_friction": 0.5, "friction_time": 0.03}, releases),
-    "control": Stage({"kp": 600.0, "kv": 25.0, "force_range": 1.6, "time_constant": 0.05}, curls),
-}
-
-
-def measured(trial: Trial, rng: np.random.Generator) -> Trial:
-    """A noise-free trial as motion capture and filter see it."""
-    moving, segments, _ = trial.positions.shape
-    frames = FRAMES if moving == 1 else moving
-    noise = rng.normal(0, NOISE[0], (frames + 2 * MARGIN, segments, 3))
-    noise = sosfiltfilt(LOW_PASS, noise, axis=0)[MARGIN:-MARGIN]
-    turns = rng.normal(0, NOISE[1], (frames, segments, 3))
-    if moving == 1:
-        noise, turns = noise.mean(axis=0, keepdims=True), turns.mean(axis=0, keepdims=True)
-    turned = rotation_from_wxyz(trial.quaternions.reshape(-1, 4)) * Rotation.from_rotvec(turns.reshape(-1, 3))
-    quaternions = wxyz_from_rotation(turned).reshape(trial.quaternions.shape)
-    return replace(trial, positions=trial.positions + noise, quaternions=quaternions)
+REPETITIONS, FRAMES = 20, 60
 
 
 @dataclass
@@ -98,9 +41,7 @@ ONCE = [pytest.param(name, marks=pytest.mark.xdist_group(f"coverage {name}")) fo
 @pytest.fixture(scope="module", params=ONCE)
 def repetitions(request) -> Repetitions:
     stage, model = STAGES[request.param], small_model(4)
-    truth = model.__copy__()
-    set_fields(truth, candidate_fields(model, {name: np.array([value]) for name, value in stage.true.items()}))
-    clean = stage.trials(truth)
+    clean = stage.trials(with_values(model, stage.true), FRAMES)
     bounds = {name: Bounds(value / 10, value * 10) for name, value in stage.true.items()}
     exact, rng = np.log(list(stage.true.values())), np.random.default_rng(1)
     errors, widths, resampled = [], [], []

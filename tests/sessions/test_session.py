@@ -59,8 +59,8 @@ def test_good_session(tmp_path):
         ),
         (
             ("trials", 0, "split"),
-            "test",
-            r"trials.0.split: found 'test', expected 'identify' or 'validate'",
+            "train",
+            r"trials.0.split: found 'train', expected 'identify', 'validate' or 'test'",
         ),
         (
             ("trials", 0, "level"),

@@ -13,6 +13,7 @@ from tests.support.sessions import SEGMENTS
 from tests.support.workbench import workbench
 from trunkline.logs.definitions import RIGID_BODIES
 from trunkline.pipeline.stage import run_stage
+from trunkline.trials.splits import SPLITS
 from trunkline.trials.take import read_takes
 
 
@@ -42,7 +43,7 @@ def test_takes_report_and_metrics(project, capsys):
     assert code == 0
     told = [line.removeprefix("ingest: warning: ") for line in said.splitlines()]
     assert [line.split(":")[1].strip() for line in told] == ["splits", "splits", "clock"], "a session of four trials"
-    takes = read_takes(ingest.PROCESSED)
+    takes = read_takes(ingest.PROCESSED, SPLITS)
     assert [take.name for take in takes] == ["tilt_00", "tilt_60", "release_a", "curl_40"]
     assert {take.segments for take in takes} == {SEGMENTS}
     metrics = json.loads((ingest.ARTIFACTS / "metrics.json").read_text())

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from trunkline.errors import InputError
+from trunkline.trials.splits import SPLITS
 from trunkline.trials.take import Take, read_takes, write_takes
 from trunkline.trials.trial import Trial, read_trials, write_trials
 
@@ -26,6 +27,7 @@ def trial(name, frames, segments, tendons, oriented):
         commands=RNG.normal(size=(frames, tendons)),
         tendon_positions=RNG.normal(size=(frames, tendons)),
         start=0.5,
+        repairs=2,
     )
 
 
@@ -48,6 +50,7 @@ def take(name, frames, segments, tendons, commands, oriented):
         tendon_time=np.arange(2 * commands) / 200,
         tendon_positions=RNG.normal(size=(2 * commands, tendons)),
         clock_offset=-0.137,
+        repairs=1,
     )
 
 
@@ -64,7 +67,7 @@ def take(name, frames, segments, tendons, commands, oriented):
 )
 def test_round_trip(tmp_path, rows, write, read):
     write(tmp_path, rows)
-    found = read(tmp_path)
+    found = read(tmp_path, SPLITS)
     assert len(found) == len(rows)
     for one, other in zip(rows, found, strict=True):
         for key, value in vars(one).items():
@@ -77,7 +80,7 @@ def test_round_trip(tmp_path, rows, write, read):
 @pytest.mark.parametrize(("read", "stage"), [(read_takes, "ingest"), (read_trials, "filter")])
 def test_missing_tables_name_the_file_and_the_stage_to_run(tmp_path, read, stage):
     with pytest.raises(InputError, match=rf"trials\.parquet: no such file, .*dvc repro {stage}"):
-        read(tmp_path)
+        read(tmp_path, SPLITS)
     (tmp_path / "trials.parquet").write_bytes(b"")
     with pytest.raises(InputError, match=rf"trials\.parquet: not readable as Parquet, .*dvc repro {stage}"):
-        read(tmp_path)
+        read(tmp_path, SPLITS)

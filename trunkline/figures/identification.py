@@ -108,7 +108,7 @@ def parameter_figure(
                             textcoords="offset points", ha="center", fontsize=9)
     axes[0, 0].set(xlim=(0, 1), ylim=(-0.6, len(identification.values) - 0.2), xlabel="place in the range searched",
                    yticks=range(len(identification.values)), yticklabels=list(identification.values),
-                   title="Parameters, 95 % intervals")
+                   title="Parameters, 95 % intervals given the model")
     for name, factors in identification.factors.items():
         axes[0, 1].bar(np.arange(1, len(factors) + 1), (factors - 1) * 100, color=IDENTIFIED)
         axes[0, 1].set(xlabel="unit, from the base", ylabel="%", title=f"Per-joint factors of {name}, minus 1")

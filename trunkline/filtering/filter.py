@@ -82,6 +82,7 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
         tendons=take.tendons,
         commands=commands,
         tendon_positions=wound,
+        repairs=take.repairs,
     )
     kind, motion = EXPERIMENTS[take.experiment], None
     if kind.static:

@@ -9,6 +9,7 @@ from trunkline.identification.experiment import Experiment
 from trunkline.identification.fit import Fit
 from trunkline.identification.identify import Identification, identify
 from trunkline.identification.optimizers import LeastSquares
+from trunkline.trials.splits import IDENTIFY
 
 
 def cross_validate(
@@ -30,7 +31,7 @@ def cross_validate(
     Returns:
         "coarse" and "identified", each with `e_internal_mm` and `e_position_mm`, means over all left-out trials.
     """
-    seen = [e for e in experiments if e.split == "identify"]
+    seen = [e for e in experiments if e.split == IDENTIFY]
     near = replace(fit.method, optimizer=LeastSquares(starts=0, descents=1, iterations=1, tolerance=1.0))
     rows: dict[str, list] = {"coarse": [], "identified": []}
     for fold in range(folds):
@@ -40,7 +41,7 @@ def cross_validate(
         found = identify(title, result.models["coarse"], kept, replace(fit, method=near))
         for name, table in rows.items():
             model = found.models[name]
-            found_scores = scores(replay(model, left_out, fit.segments), left_out, fit.loss, fit.weights)["identify"]
+            found_scores = scores(replay(model, left_out, fit.segments), left_out, fit.loss, fit.weights)[IDENTIFY]
             table.append((len(left_out), found_scores))
     return {
         name: {

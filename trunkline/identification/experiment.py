@@ -34,6 +34,7 @@ class Experiment:
         positions: measured segments, m, base frame. Shape (T, S, 3).
         measured: where they count. Shape (T, S).
         fit: how well the start matches the measurement.
+        repaired: whether `ingest` changed anything in the trial.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Experiment:
     measured: np.ndarray
     frame_step: float
     fit: PoseFit
+    repaired: bool = False
 
     @property
     def frames(self) -> int:
@@ -95,6 +97,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         measured=measured,
         frame_step=step,
         fit=fit,
+        repaired=trial.repairs > 0,
     )
 
 

@@ -16,6 +16,7 @@ from trunkline.identification.resting import RestShape, spring_references
 from trunkline.identification.search import Convergence, Found, descend, search
 from trunkline.identification.surrogate import surrogate
 from trunkline.progress import progress
+from trunkline.trials.splits import IDENTIFY
 
 COARSER_TOLERANCE = 1e-2  # relative decrease of the loss at a coarser step, whose minimum lies elsewhere anyway
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
@@ -55,7 +56,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
         model: the model that the stage begins with.
     """
     method, parameters, per_joint, rest = fit.method, fit.parameters, fit.per_joint, fit.rest
-    seen = [e for e in experiments if e.split == "identify"]
+    seen = [e for e in experiments if e.split == IDENTIFY]
     short = [e.shortened(method.rough.frames) for e in _few(seen, method.rough.trials)]
     rough, exact = fit.problem(model, short, method.rough.step_factor), fit.problem(model, seen)
     searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}

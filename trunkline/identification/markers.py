@@ -5,6 +5,7 @@ import numpy as np
 
 from trunkline.identification.experiment import measured_pose, start_frames
 from trunkline.identification.pose_fit import POSITION_SIGMA, PoseProblem, fit_pose
+from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.trial import Trial
 
 MARKER_SIGMA = 2e-3  # m, how far beside its segment's axis a marker is expected; holds back what no pose tells
@@ -14,7 +15,7 @@ ROUNDS = 3  # of fitting poses and moving markers; a round solves for both, but 
 def with_measured_markers(model: mujoco.MjModel, trials: list[Trial]) -> mujoco.MjModel:
     """A copy of `model` whose tracked sites are where the trials to identify from saw them in their start poses."""
     model = model.__copy__()
-    seen = [trial for trial in trials if trial.split == "identify"]
+    seen = [trial for trial in trials if trial.split == IDENTIFY]
     sites = [model.site(f"{name}_center").id for name in seen[0].segments]
     model.site_sameframe[sites] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # else a site at its body's origin stays there
     moved = np.zeros((len(sites), 3))

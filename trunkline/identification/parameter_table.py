@@ -15,7 +15,8 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
 
     A value is the scalar of the scaling law; the model's joint i has that times α^{3(i-1)} times its factor.
     Intervals are given what earlier stages found, and those of factors given the scalars; they end where the range
-    does. `bootstrap_95` cross-checks `interval_95` by resampling trials.
+    does. `bootstrap_95_given_model` cross-checks `interval_95_given_model` by resampling trials. "Given model": they
+    hold the truth if the model is right; what biases every trial alike shows in none of them.
     """
     names, certainty = list(result.values), result.certainty
     initial, vague = result.models["initial"], undetermined(result, bounds)
@@ -24,8 +25,10 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
             "value": value,
             "unit": PARAMETERS[name].unit,
             "initial": PARAMETERS[name].read(initial),
-            "interval_95": _within(name, bounds, PARAMETERS[name].coordinate(value) + ENDS * certainty.half_width[i]),
-            "bootstrap_95": _within(name, bounds, result.bootstrap[:, i]),
+            "interval_95_given_model": _within(
+                name, bounds, PARAMETERS[name].coordinate(value) + ENDS * certainty.half_width[i]
+            ),
+            "bootstrap_95_given_model": _within(name, bounds, result.bootstrap[:, i]),
             "range": [bounds[name].low, bounds[name].high],
             "at_bound": name in result.at_bound,
             "undetermined": name in vague,
@@ -62,6 +65,6 @@ def _factor_table(result: Identification) -> dict:
     assert result.factor_certainty is not None, "factors are searched and judged together"
     widths = result.factor_certainty.half_width.reshape(len(result.factors), -1).tolist()
     return {
-        name: {"factor": factors, "half_width_95": [half if np.isfinite(half) else None for half in width]}
+        name: {"factor": factors, "half_width_95_given_model": [half if np.isfinite(half) else None for half in width]}
         for (name, factors), width in zip(result.factors.items(), widths, strict=True)
     }

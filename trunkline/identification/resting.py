@@ -11,6 +11,7 @@ from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import STIFFNESS_FIELDS, Fields
 from trunkline.identification.pose_fit import fit_pose
 from trunkline.trials.experiments import EXPERIMENTS
+from trunkline.trials.splits import IDENTIFY
 
 LAST = 0.5  # s at the end of a release in which it has to be at rest
 SAME_GRAVITY = 0.5  # m/s², 3° of tilt
@@ -67,7 +68,7 @@ def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], segments
     """
     shapes, gravities = [], []
     for experiment in experiments:
-        if not EXPERIMENTS[experiment.kind].hangs or experiment.split != "identify":
+        if not EXPERIMENTS[experiment.kind].hangs or experiment.split != IDENTIFY:
             continue
         last = slice(-max(round(LAST / experiment.frame_step), 1), None)
         positions = np.where(experiment.measured[last, :, None], experiment.positions[last], np.nan)

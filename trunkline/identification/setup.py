@@ -10,6 +10,7 @@ from trunkline.identification.markers import with_measured_markers
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.resting import resting_shape
 from trunkline.identification.settings import IdentificationSettings
+from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.trial import Trial
 
 
@@ -46,6 +47,6 @@ def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.M
 
 def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:
     """Refuse to leave out more groups of trials than there are trials to identify from."""
-    trials = sum(e.split == "identify" for e in fitted)
+    trials = sum(e.split == IDENTIFY for e in fitted)
     if folds > trials:
         raise InputError(f"{stage}.cross_validation_folds: found {folds}, expected at most {trials}, one a trial")

@@ -10,18 +10,20 @@ import numpy as np
 from trunkline.errors import InputError, existing
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import Replay, replay, scores
-from trunkline.identification.experiment import Experiment
 from trunkline.identification.identify import Identification, identify, with_parameters
 from trunkline.identification.loss import internal_error
+from trunkline.identification.null_model import hanging_still
 from trunkline.identification.parameter_table import parameter_table, undetermined
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Bounds
 from trunkline.identification.saving import save_model
+from trunkline.identification.scoring import Compared, start_fit
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import check_folds, check_parameters, set_up
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json
 from trunkline.trials.experiments import is_static
+from trunkline.trials.splits import DECIDING, VALIDATE
 from trunkline.trials.trial import Trial, read_trials
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
@@ -55,7 +57,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         for field in ("qpos_spring", "site_pos", "site_sameframe"):  # rest shape and markers are no matter of scalars
             getattr(models["coarse"], field)[:] = getattr(model, field)
     replays = {name: replay(m, experiments, segments) for name, m in models.items()}
-    metrics = {name: scores(r, experiments, fit.loss, fit.weights) for name, r in replays.items()}
+    compared = replays | {"null": hanging_still(experiments, replays["identified"])}
+    metrics = {name: scores(r, experiments, fit.loss, fit.weights) for name, r in compared.items()}
     metrics |= {
         "evaluations": result.evaluations,
         "diverged": result.diverged,
@@ -63,7 +66,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         "at_bound": len(result.at_bound),
         "undetermined": len(undetermined(result, fit.parameters)),
         "converged": result.converged,
-        "start_fit": _start_fit(experiments),
+        "start_fit": start_fit(experiments),
     }
     if any(e.frames > 1 for e in experiments):
         metrics["halved_step"] = _halved_step(
@@ -78,7 +81,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     artifacts = Path("artifacts") / stage
     with output_folder(artifacts) as folder:
         (folder / "arm.xml").write_text(identified)
-        write_json(folder / "parameters.json", parameter_table(result, fit.parameters))
+        table = parameter_table(result, fit.parameters) | {"compared": vars(Compared.of(config))}
+        write_json(folder / "parameters.json", table)
         write_json(folder / "metrics.json", metrics)
         write_plots(folder, result, fit.parameters, experiments, segments, replays)
 
@@ -110,7 +114,7 @@ def _halved_step(model, experiments, segments, replayed: Replay, metrics: dict) 
     """
     halved = replay(model, experiments, segments, step_factor=0.5)
     change = {}
-    for split in ("identify", "validate"):
+    for split in DECIDING:
         before = metrics["identified"][split]["e_internal_mm"]
         chosen = [(p, e) for p, e in zip(halved.positions, experiments, strict=True) if e.split == split]
         after = np.mean([internal_error(p, e.positions, e.measured) for p, e in chosen]) * 1e3
@@ -119,16 +123,6 @@ def _halved_step(model, experiments, segments, replayed: Replay, metrics: dict) 
         [np.linalg.norm(a - b, axis=-1).max() for a, b in zip(halved.positions, replayed.positions, strict=True)]
     )
     return change | {"max_mm": float(furthest) * 1e3}
-
-
-def _start_fit(experiments: list[Experiment]) -> dict[str, float]:
-    """How far the poses from which simulations start are from the measured ones."""
-    residuals = [e.fit.residuals[np.isfinite(e.fit.residuals)] * 1e3 for e in experiments]
-    return {
-        "mean_mm": float(np.mean([r.mean() for r in residuals])),
-        "max_mm": float(np.max([r.max() for r in residuals])),
-        "unconverged": sum(not e.fit.converged for e in experiments),
-    }
 
 
 def _gain(metrics: dict) -> dict[str, float]:
@@ -152,7 +146,7 @@ def write_plots(folder: Path, result: Identification, bounds, experiments, segme
     save_figure(plots.convergence_figure(result), folder / "convergence.png")
     units = {name: PARAMETERS[name].unit for name in result.values}
     save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
-    validate = [i for i, e in enumerate(experiments) if e.split == "validate"]
+    validate = [i for i, e in enumerate(experiments) if e.split == VALIDATE]
     moving = [i for i in validate if experiments[i].frames > 1]
     if "stiffness" in result.values:  # shapes at rest: static ones, or how releases end
         table = curves.shape_table([experiments[i] for i in validate], _select(shown, validate), segments)
@@ -175,10 +169,10 @@ def _select(replays: dict[str, Replay], indices: list[int]) -> dict[str, Replay]
 
 
 def read_reported(config: IdentificationSettings) -> list[Trial]:
-    """The session's trials of the reported kinds, which all track the same segments."""
-    trials = [t for t in read_trials(TRIALS) if t.experiment in config.reported]
+    """The session's trials of the reported kinds, which all track the same segments; none of the split test."""
+    trials = [t for t in read_trials(TRIALS, DECIDING) if t.experiment in config.reported]
     for kind in config.experiments:
-        for split in ("identify", "validate"):
+        for split in DECIDING:
             if not any(t.experiment == kind and t.split == split for t in trials):
                 raise InputError(f"session.yaml: found no {kind} trial with split {split}, expected at least one")
     segments = trials[0].segments

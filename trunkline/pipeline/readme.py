@@ -15,9 +15,10 @@ from dvc.repo import Repo
 from trunkline.errors import in_one_line
 from trunkline.pipeline.baseline import baseline_file, read_baseline
 from trunkline.pipeline.checkout import require_checkout
-from trunkline.pipeline.lab_table import lab_table
 from trunkline.pipeline.limits import Limit, lookup, metrics_folder, read_limits
 from trunkline.pipeline.results import block
+from trunkline.pipeline.truth_table import error_table, truth_table
+from trunkline.trials.splits import DECIDING, TEST
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
 PICTURES = {
@@ -31,23 +32,8 @@ EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README an
 PAPER = {"cad": "89.8 mm (17 %)", "identified": "15.8 mm (3 %)"}
 MODELS = {"cad": "CAD", "coarse": "coarse: one scalar each", "identified": "identified: with factors"}
 
-# stage: [(what it is, dotted key in metrics.json, unit)]; trials are of the split `validate`
+# stage: [(what it is, dotted key in metrics.json, unit)]
 RESULTS = {
-    "identify_stiffness": [
-        ("Static tilts: E_internal", "identified.validate.e_internal_mm", "mm"),
-        ("… mean position error", "identified.validate.e_position_mm", "mm"),
-    ],
-    "identify_damping": [
-        ("Releases: E_internal", "identified.validate.e_internal_mm", "mm"),
-        ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
-        ("… mean position error", "identified.validate.e_position_mm", "mm"),
-    ],
-    "identify_control": [
-        ("Releases and curls: E_internal", "identified.validate.e_internal_mm", "mm"),
-        ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
-        ("… mean position error", "identified.validate.e_position_mm", "mm"),
-        ("… E_internal of the CAD model", "cad.validate.e_internal_mm", "mm"),
-    ],
     "fk_dataset": [
         ("Equilibria in the data set", "samples", ""),
         ("FK against MuJoCo settled to rest: median", "mujoco_deviation_mm.median", "mm"),
@@ -74,12 +60,25 @@ RESULTS = {
 }
 
 
+# what it is, the stage whose model is scored, and where its row begins below `test`
+SCORES = [
+    ("static tilts", "identify_stiffness", "by_experiment.static_tilt."),
+    ("releases", "identify_damping", "by_experiment.release."),
+    ("curls", "identify_control", "by_experiment.curl."),
+    ("releases and curls", "identify_control", ""),
+]
+
 EXAMPLE_RESULTS = {
+    "score": [
+        ("Releases of `test`: mean position error", "identify_damping.identified.test.e_position_mm", "mm"),
+        ("… of the arm's length", "identify_damping.identified.test.e_position_pct", "%"),
+        ("… of the null model", "identify_damping.null.test.e_position_mm", "mm"),
+        ("… tip error", "identify_damping.identified.test.e_tip_mm", "mm"),
+    ],
     "identify_damping": [
         ("Releases of `validate`: mean position error", "identified.validate.e_position_mm", "mm"),
         ("… of the arm's length", "identified.validate.e_position_pct", "%"),
-        ("… E_internal", "identified.validate.e_internal_mm", "mm"),
-        ("… of the arm's length", "identified.validate.e_internal_pct", "%"),
+        ("… position error without repaired trials", "identified.validate.without_repaired.e_position_mm", "mm"),
         ("Releases of `identify`: mean position error", "identified.identify.e_position_mm", "mm"),
     ],
 }
@@ -130,10 +129,31 @@ def identification_table(root: Path) -> str:
     for model, words in MODELS.items():
         cells = []
         for error in ("e_internal", "e_position"):
-            for split in ("identify", "validate"):
+            for split in DECIDING:
                 millimetres, share = (lookup(metrics, f"{model}.{split}.{error}_{unit}") for unit in ("mm", "pct"))
                 cells.append(f"{_number(millimetres)} mm ({_number(share)} %)")
         lines.append(f"| {words} | {' | '.join(cells)} | {PAPER.get(model, '')} |")
+    return "\n".join(lines)
+
+
+def score_table(root: Path) -> str:
+    """Errors on the trials of the split test, by kind of experiment, of the stage that identifies from it."""
+    path = root / "artifacts" / "score" / "metrics.json"
+    metrics = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    lines = [
+        "| trials of `test` | E_internal | position error | tip error | position: CAD | null model | noise floor |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for what, stage, below in SCORES:
+        found = f"{stage}.identified.{TEST}.{below}"
+        cells = [f"{_number(lookup(metrics, f'{found}{error}_mm'))} mm" for error in ("e_internal", "e_position")]
+        tip, share = (_number(lookup(metrics, f"{found}e_tip_{unit}")) for unit in ("mm", "pct"))
+        cells.append(f"{tip} mm ({share} %)")
+        others = [f"{stage}.{model}.{TEST}.{below}e_position_mm" for model in ("cad", "null")]
+        kind = below.removeprefix("by_experiment.").rstrip(".")
+        others.append(f"{stage}.noise_floor_by_experiment_mm.{kind}" if kind else f"{stage}.noise_floor_mm")
+        cells += [f"{_number(lookup(metrics, key))} mm" for key in others]
+        lines.append(f"| {what} | {' | '.join(cells)} |")
     return "\n".join(lines)
 
 
@@ -181,13 +201,15 @@ def generate(root: Path) -> dict[Path, str]:
         examples[name] = results_table(folder / "limits.yaml", EXAMPLE_RESULTS)
     results = results_table(root / "tests" / "limits.yaml", RESULTS)
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
+    own["score"] = score_table(root)
     blocks = {root / "README.md": own | examples}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
     for page in sorted((root / "docs").rglob("*.md")):
         names = re.findall(r"^<!-- (results/\w+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
         if names:
             blocks[page] = {name: block(root / "docs" / f"{name}.json") for name in names}
-    blocks.setdefault(root / "docs" / "results" / "intervals.md", {})["lab"] = lab_table(root)
+    truth = {"truth": truth_table(root), "errors": error_table(root)}
+    blocks.setdefault(root / "docs" / "results" / "intervals.md", {}).update(truth)
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}
 
 

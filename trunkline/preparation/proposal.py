@@ -9,6 +9,7 @@ from trunkline.preparation.survey import Survey
 from trunkline.signals.clock import MIN_TRAVEL
 from trunkline.signals.units import likely_unit
 from trunkline.trials.experiments import EXPERIMENTS, PULL, TILT
+from trunkline.trials.splits import IDENTIFY, VALIDATE
 
 BASE_NAMES = ("base", "mount", "root", "origin")
 RESTING = 5e-3  # m; a trial whose every body stays within this, but for its worst hundredth, is at rest
@@ -54,7 +55,7 @@ def propose(surveys: list[Survey], up: tuple[int, int, int] | None = None) -> st
     for index, (path, experiment, level) in enumerate(trials):
         later = [other for _, other, _ in trials[index + 1 :]]
         earlier = [other for _, other, _ in trials[:index]]
-        split = "validate" if experiment in earlier and experiment not in later else "identify"
+        split = VALIDATE if experiment in earlier and experiment not in later else IDENTIFY
         told = "" if level is None else f", level: {level:g}"
         lines.append(f"  - {{file: {_quoted(path.name)}, experiment: {experiment}{told}, split: {split}}}")
     return "\n".join(lines) + "\n"

@@ -23,6 +23,7 @@ from trunkline.errors import InputError, nearest
 from trunkline.sessions.splits import check_shared
 from trunkline.settings import read_yaml
 from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
+from trunkline.trials.splits import SplitName
 
 
 def _folder_name(name: str) -> str:
@@ -92,7 +93,7 @@ class TrialEntry(Entry):
     window: tuple[FiniteFloat, FiniteFloat] | None = None
     experiment: ExperimentName
     level: FiniteFloat | None = None
-    split: Literal["identify", "validate"]
+    split: SplitName
 
     @field_validator("level", mode="before")
     @classmethod

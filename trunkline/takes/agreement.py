@@ -6,6 +6,7 @@ from trunkline.sessions.session import FixedBase, Session
 from trunkline.signals.clock import agree_on_offset
 from trunkline.takes.checks import Findings
 from trunkline.takes.vertical import check_levels, check_vertical
+from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.take import Take
 
 
@@ -19,7 +20,7 @@ def align_clocks(takes: list[Take], findings: list[Findings], disagreement: floa
         disagreement: s, by which the session's two estimates, by the first and by the whole motion, may differ.
     """
     told = [(take, found.offset) for take, found in zip(takes, findings, strict=True) if found.offset is not None]
-    chosen = [(take, fit) for take, fit in told if take.split == "identify"]
+    chosen = [(take, fit) for take, fit in told if take.split == IDENTIFY]
     offset, spread = agree_on_offset([fit for _, fit in chosen])
     if not np.isfinite(spread) and told:
         chosen = told

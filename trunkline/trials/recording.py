@@ -9,8 +9,8 @@ import numpy as np
 class Planned:
     """What the experimenter says of a trial.
 
-    name: unique within the session. experiment: one of `experiments.EXPERIMENTS`. split: what the trial is for,
-    "identify" or "validate". level: nominal, in the unit of its experiment; None where there is none.
+    name: unique within the session. experiment: one of `experiments.EXPERIMENTS`. split: what the trial may be used
+    for, one of `splits.SPLITS`. level: nominal, in the unit of its experiment; None where there is none.
     """
 
     name: str

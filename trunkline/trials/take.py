@@ -23,6 +23,7 @@ class Take(Recording):
     in the motion-capture frame, NaN where there is no good sample.
     command_time (Tc,), tendon_time (Tm,): s on the motors' clock, which reads time - clock_offset.
     commands (Tc, K), tendon_positions (Tm, K): m of pull.
+    repairs: how many `ingest` made in it.
     """
 
     up: np.ndarray
@@ -31,6 +32,7 @@ class Take(Recording):
     command_time: np.ndarray
     tendon_time: np.ndarray
     clock_offset: float = 0.0
+    repairs: int = 0
 
 
 SCHEMA = pa.schema(
@@ -41,6 +43,7 @@ SCHEMA = pa.schema(
         "level": pa.float64(),
         "up": pa.list_(pa.float64()),
         "clock_offset": pa.float64(),
+        "repairs": pa.int64(),
         "frames": pa.int64(),
         "commands": pa.int64(),
         "tendon_positions": pa.int64(),
@@ -64,6 +67,7 @@ def write_takes(folder: Path, takes: list[Take]) -> None:
                 "level": take.level,
                 "up": take.up.tolist(),
                 "clock_offset": float(take.clock_offset),
+                "repairs": take.repairs,
                 "frames": len(take.time),
                 "commands": len(take.command_time),
                 "tendon_positions": len(take.tendon_time),
@@ -90,8 +94,8 @@ def write_takes(folder: Path, takes: list[Take]) -> None:
     pq.write_table(pa.concat_tables(commands), folder / "commands.parquet")
 
 
-def read_takes(folder: Path) -> list[Take]:
-    """The takes that `write_takes` wrote into `folder`, in the same order. Raises InputError as `read_tables`."""
+def read_takes(folder: Path, splits: tuple[str, ...]) -> list[Take]:
+    """The takes of `splits` that `write_takes` wrote into `folder`, in the same order; InputError as `read_tables`."""
     rows, poses, pulls = read_tables(folder, "ingest")
     takes, pose_row, pull_row = [], 0, 0
     for row in rows:
@@ -126,6 +130,7 @@ def read_takes(folder: Path) -> list[Take]:
                 tendon_time=motors["tendon"][0],
                 tendon_positions=motors["tendon"][1],
                 clock_offset=row["clock_offset"],
+                repairs=row["repairs"],
             )
         )
-    return takes
+    return [take for take in takes if take.split in splits]

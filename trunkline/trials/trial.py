@@ -27,12 +27,14 @@ class Trial(Recording):
     commands, tendon_positions: (T, K) m of pull from the straight arm's path length, on the same clock.
     start: s, when it begins: the detected release, or the beginning of the curl cycle; 0 for a static trial.
     in_motion: whether the arm moves at `start` already.
+    repairs: how many `ingest` made in it.
     """
 
     gravity: np.ndarray
     measured: np.ndarray
     start: float = 0.0
     in_motion: bool = False
+    repairs: int = 0
 
 
 def write_trials(folder: Path, trials: list[Trial]) -> None:
@@ -47,6 +49,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "gravity": list(map(float, trial.gravity)),
             "start": float(trial.start),
             "in_motion": trial.in_motion,
+            "repairs": trial.repairs,
             "frames": len(trial.time),
             "segments": list(trial.segments),
             "tendons": list(trial.tendons),
@@ -63,6 +66,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "gravity": pa.list_(pa.float64()),
             "start": pa.float64(),
             "in_motion": pa.bool_(),
+            "repairs": pa.int64(),
             "frames": pa.int64(),
             "segments": pa.list_(pa.string()),
             "tendons": pa.list_(pa.string()),
@@ -84,8 +88,11 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
     pq.write_table(pa.concat_tables(commands), Path(folder) / "commands.parquet")
 
 
-def read_trials(folder: Path) -> list[Trial]:
-    """The trials that `write_trials` wrote into `folder`, in the same order. Raises InputError as `read_tables`."""
+def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
+    """The trials of `splits` that `write_trials` wrote into `folder`, in the same order; InputError as `read_tables`.
+
+    Only the stage `score` may ask for the test split.
+    """
     rows, poses, commands = read_tables(folder, "filter")
     trials, pose_row, command_row = [], 0, 0
     for row in rows:
@@ -113,6 +120,7 @@ def read_trials(folder: Path) -> list[Trial]:
                 tendon_positions=command["position"].reshape(command_shape),
                 start=row["start"],
                 in_motion=row["in_motion"],
+                repairs=row["repairs"],
             )
         )
-    return trials
+    return [trial for trial in trials if trial.split in splits]

@@ -1,0 +1,52 @@
+"""Score the identified models on the trials of the split `test`: the only stage that reads them."""
+
+import json
+from pathlib import Path
+from typing import Literal
+
+from pydantic import Field, PositiveInt
+
+from trunkline.errors import existing
+from trunkline.figures.scoring import score_figure
+from trunkline.figures.style import save_figure
+from trunkline.identification.scoring import Compared, score
+from trunkline.pipeline.inputs import read_spec
+from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.progress import progress
+from trunkline.settings import settings
+from trunkline.trials.splits import IDENTIFY, TEST
+from trunkline.trials.trial import read_trials
+
+ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
+Stage = Literal["identify_stiffness", "identify_damping", "identify_control"]
+
+
+@settings
+class Config:
+    stages: list[Stage] = Field(min_length=1)
+    floor_poses: PositiveInt
+
+
+def main(config: Config) -> None:
+    trials = read_trials(TRIALS, (IDENTIFY, TEST))
+    cad = initial = read_spec(ARTIFACTS / "build_mjcf/arm.xml").compile()
+    metrics, tables = {}, {}
+    with progress(len(config.stages), "score", "stages") as bar:
+        for stage in config.stages:
+            folder = ARTIFACTS / stage
+            identified = read_spec(folder / "arm.xml").compile()
+            compared = Compared(**json.loads(existing(folder / "parameters.json").read_text())["compared"])
+            models = {"cad": cad, "initial": initial, "identified": identified}
+            metrics[stage], tables[stage] = score(models, trials, compared, config.floor_poses)
+            if not metrics[stage]:
+                kinds = " or ".join(compared.experiments)
+                print(f"score: {stage}: found no {kinds} with split {TEST}, expected one: nothing to score")
+            initial = identified
+            bar.update(1, stage=stage)
+    with output_folder(ARTIFACTS / "score") as folder:
+        write_json(folder / "metrics.json", metrics)
+        save_figure(score_figure(tables, metrics), folder / "errors.png")
+
+
+if __name__ == "__main__":
+    run_stage("score", Config, main)

@@ -1,0 +1,225 @@
+"""The split test is read by the stage `score` alone, and moves no number of any other."""
+
+import ast
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from stages import filter as filter_stage
+from stages import score as score_stage
+from tests.identification.test_stage import settings
+from tests.support.matched_plant import curl, release, small_model, tilt
+from tests.support.sessions import all_truths, instruments, record, static_truth
+from tests.support.small_arm import small_spec
+from trunkline.filtering.filter import Filter
+from trunkline.identification.saving import save_model
+from trunkline.pipeline.config import load_config
+from trunkline.pipeline.identify import run
+from trunkline.sessions.session import read_session
+from trunkline.takes.intake import take_in
+from trunkline.trials.splits import DECIDING, IDENTIFY, SPLITS, TEST, VALIDATE
+from trunkline.trials.take import write_takes
+from trunkline.trials.trial import Trial, read_trials, write_trials
+
+ROOT = Path(__file__).parents[2]
+FOLDERS = ("trunkline", "stages", "studies", "benchmarks", "examples", "demo")
+# who may name the split test, or all splits, and for what
+MAY_NAME = {
+    "demo/laboratory.py": {"TEST"},  # records it
+    "stages/filter.py": {"SPLITS"},  # filters every trial for itself
+    "stages/score.py": {"TEST"},  # reads it
+    "trunkline/identification/evaluation.py": {"SPLITS"},  # sorts what it is given
+    "trunkline/identification/scoring.py": {"TEST"},  # what the stage `score` calls
+    "trunkline/pipeline/readme.py": {"TEST"},  # shows it
+    "trunkline/pipeline/truth_table.py": {"TEST"},  # shows it
+}
+# who says the same words of something else: the network's samples are split too; `identify` is also a function
+OTHERWISE = ("trunkline/dataset/", "trunkline/ik/", "trunkline/figures/network.py", "studies/training.py")
+OTHERWISE += ("benchmarks/identification/sysid.py",)
+
+
+def files() -> dict[str, ast.Module]:
+    paths = [path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))]
+    return {path.relative_to(ROOT).as_posix(): ast.parse(path.read_text(encoding="utf-8")) for path in paths}
+
+
+def test_the_splits_are_named_in_one_place():
+    """No other module of the data's way types a split's name, and no other than these names the split test."""
+    for name, tree in files().items():
+        if name == "trunkline/trials/splits.py":
+            continue
+        imported = {
+            alias.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and node.module == "trunkline.trials.splits"
+            for alias in node.names
+        }
+        assert imported & {"TEST", "SPLITS"} == MAY_NAME.get(name, set()), name
+        typed = {node.value for node in ast.walk(tree) if isinstance(node, ast.Constant)} & {IDENTIFY, VALIDATE, TEST}
+        if not name.startswith(OTHERWISE):
+            assert not typed, name
+
+
+def test_whoever_reads_trials_says_which_and_only_score_says_test():
+    calls = [
+        (name, ast.unparse(node.args[1]))
+        for name, tree in files().items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("read_trials", "read_takes")
+    ]
+    assert {(name, told) for name, told in calls if told != "DECIDING"} == {
+        ("stages/filter.py", "SPLITS"),
+        ("stages/score.py", "(IDENTIFY, TEST)"),
+    }
+    assert len(calls) >= 4
+    assert TEST not in DECIDING
+
+
+def test_no_other_stage_depends_on_trials():
+    for file in (ROOT / "dvc.yaml", ROOT / "examples/asl_trunk/dvc.yaml"):
+        stages = yaml.safe_load(file.read_text())["stages"]
+        folders = {"data/processed/ingest", "data/processed/filter"}
+        readers = {name for name, stage in stages.items() if folders & set(stage["deps"])}
+        assert readers <= {"filter", "identify_stiffness", "identify_damping", "identify_control", "score"}
+
+
+def test_trials_come_only_for_the_splits_that_are_asked_for(tmp_path):
+    model = small_model(4)
+    write_trials(tmp_path, [tilt(model, 30, split) for split in SPLITS])
+    for split in SPLITS:
+        assert [trial.split for trial in read_trials(tmp_path, (split,))] == [split]
+    with pytest.raises(TypeError):
+        read_trials(tmp_path)  # type: ignore[call-arg]
+
+
+@pytest.fixture
+def project(tmp_path, monkeypatch):
+    """A folder with a model; trials of all splits come from a model with other parameters."""
+    monkeypatch.chdir(tmp_path)
+    spec, model = small_spec(4), small_model(4)
+    spec.option.timestep = model.opt.timestep
+    spec.compile()
+    (tmp_path / "artifacts/build_mjcf").mkdir(parents=True)
+    (tmp_path / "artifacts/build_mjcf/arm.xml").write_text(save_model(spec, model))
+    (tmp_path / "data/processed/filter").mkdir(parents=True)
+    return tmp_path, model
+
+
+def trials_of(model) -> list[Trial]:
+    swings = [(0.2, IDENTIFY), (0.3, IDENTIFY), (0.25, VALIDATE), (0.35, TEST)]
+    return [
+        *(tilt(model, angle, split) for angle, split in ((30, IDENTIFY), (60, IDENTIFY), (45, VALIDATE), (75, TEST))),
+        *(release(model, bend, split, frames=40) for bend, split in swings),
+        *(curl(model, level, split, frames=40) for level, split in ((30, IDENTIFY), (40, VALIDATE), (50, TEST))),
+    ]
+
+
+def poisoned(trial: Trial) -> Trial:
+    """What would wreck every mean, fit and figure that it got into."""
+    broken = np.full_like(trial.positions, 1e6)
+    return replace(trial, positions=broken, gravity=-9 * trial.gravity, start=-5.0, name=f"poison_{trial.name}")
+
+
+def test_poison_in_the_split_test_moves_no_bit_of_an_identification_stage(project):
+    root, model = project
+    stages = {
+        "identify_stiffness": settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.5, 8.0)}, ["stiffness"]),
+        "identify_damping": settings(["release"], ["release"], {"damping": (0.01, 1.0)}),
+        "identify_control": settings(["curl"], ["release", "curl"], {"kp": (500.0, 4000.0)}),
+    }
+    written = {}
+    for poison in (False, True):
+        trials = [poisoned(t) if poison and t.split == TEST else t for t in trials_of(model)]
+        write_trials(root / "data/processed/filter", trials)
+        before = root / "artifacts/build_mjcf/arm.xml"
+        for stage, config in stages.items():
+            config = replace(config, optimizer=config.fine, rest_shape="unchanged")
+            run(stage, config, before)
+            before = root / "artifacts" / stage / "arm.xml"
+            written[stage, poison] = {file.name: file.read_bytes() for file in before.parent.iterdir()}
+            assert TEST not in json.loads(written[stage, poison]["metrics.json"])["identified"]
+    for stage in stages:
+        assert written[stage, True] == written[stage, False], stage
+
+
+def test_poison_in_the_split_test_moves_no_bit_of_the_other_filtered_trials(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    config = load_config(Filter, "filter", ROOT)
+    record(tmp_path / "raw", [*all_truths(), replace(static_truth(30.0), split=TEST)], instruments())
+    limits = load_config(__import__("stages.ingest").ingest.Config, "ingest", ROOT).limits
+    takes = [take for _, take, _ in take_in(tmp_path / "raw", read_session(tmp_path / "raw"), limits)]
+    found = []
+    for shift in (0.0, 1e3):
+        moved = [
+            replace(take, positions=take.positions * (1 + shift) + shift) if take.split == TEST else take
+            for take in takes
+        ]
+        filter_stage.INGEST.mkdir(parents=True, exist_ok=True)
+        write_takes(filter_stage.INGEST, moved)
+        filter_stage.main(config)
+        found.append(read_trials(filter_stage.PROCESSED, DECIDING))
+    assert len(found[0]) == 4
+    for one, other in zip(*found, strict=True):
+        for key, value in vars(one).items():
+            np.testing.assert_array_equal(value, getattr(other, key), err_msg=key)
+
+
+@pytest.fixture
+def scored(project):
+    """Models of two stages: the one of the trials, and another; and what `score` made of them."""
+    root, truth = project
+    wrong = truth.__copy__()
+    wrong.jnt_stiffness[:] *= 0.5
+    spec = small_spec(4)
+    spec.option.timestep = truth.opt.timestep
+    spec.compile()
+    trials = [replace(t, repairs=int(t.split == TEST and t.experiment == "release")) for t in trials_of(truth)]
+    write_trials(root / "data/processed/filter", trials)
+    compared = {"identify_stiffness": ["static_tilt"], "identify_damping": ["release", "static_tilt"]}
+    for stage, model in (("identify_stiffness", wrong), ("identify_damping", truth)):
+        folder = root / "artifacts" / stage
+        folder.mkdir()
+        (folder / "arm.xml").write_text(save_model(spec, model))
+        table = {"compared": {"experiments": compared[stage], "frames": 40, "command_delay": 0.0}}
+        (folder / "parameters.json").write_text(json.dumps(table))
+    config = score_stage.Config(stages=list(compared), floor_poses=3)
+    score_stage.main(config)
+    return root, config, json.loads((root / "artifacts/score/metrics.json").read_text())
+
+
+def test_score_tells_the_right_model_from_a_wrong_one_and_from_none(scored):
+    _, _, metrics = scored
+    damping = metrics["identify_damping"]
+    right, wrong, null = (damping[name]["test"] for name in ("identified", "initial", "null"))
+    for key in ("e_position_mm", "e_tip_mm", "e_tip_pct"):
+        assert right[key] < 0.2 * wrong[key], key
+        assert right[key] < 0.1 * null[key], key
+    assert set(right["by_experiment"]) == {"release", "static_tilt"}
+    assert right["trials"] == 2
+    assert 0 < damping["noise_floor_mm"] < 0.5 < null["e_position_mm"]
+    stiffness = metrics["identify_stiffness"]
+    assert stiffness["identified"]["test"]["e_position_mm"] == wrong["by_experiment"]["static_tilt"]["e_position_mm"]
+    assert list(stiffness["identified"]["test"]["by_experiment"]) == ["static_tilt"]
+
+
+def test_errors_come_with_and_without_repaired_trials(scored):
+    _, _, metrics = scored
+    found = metrics["identify_damping"]["identified"]["test"]
+    assert found["repaired"] == 1
+    assert found["without_repaired"]["e_position_mm"] == found["by_experiment"]["static_tilt"]["e_position_mm"]
+    only = metrics["identify_stiffness"]["identified"]["test"]
+    assert only["repaired"] == 0
+    assert "without_repaired" not in only
+
+
+def test_a_session_without_the_split_test_is_told_so(scored, capsys):
+    root, config, _ = scored
+    kept = read_trials(root / "data/processed/filter", DECIDING)
+    write_trials(root / "data/processed/filter", kept)
+    score_stage.main(config)
+    assert "identify_stiffness: found no static_tilt with split test" in capsys.readouterr().out
+    assert json.loads((root / "artifacts/score/metrics.json").read_text())["identify_stiffness"] == {}
