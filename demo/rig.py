@@ -12,8 +12,8 @@ from trunkline.pipeline.config import load_config
 from trunkline.simulation.drive import drive
 
 ROOT = Path(__file__).parent
-CALM = 4.0  # times the arm's damping: it comes to rest sooner, and in the same place
-SECONDS = 12.0
+CALM = 8.0  # times the arm's damping: it comes to rest sooner, and in the same place
+SECONDS = 8.0
 
 
 def reach(commands: np.ndarray, gravity: np.ndarray) -> np.ndarray:

@@ -3,13 +3,12 @@
 A small arm of known parameters makes noisy trials again and again (`tests/support/noisy_trials.py`). Each time its
 parameters are searched for as the stages do, by least squares, from a model whose own are drawn from the whole range,
 a tenth to ten times the truth, and get their intervals. One stage is done for a second plant too, which is not the
-model: heavier, with dry friction in its joints. Writes docs/results/coverage.md, in some ten minutes of one core.
+model: heavier, with dry friction in its joints. Takes some ten minutes of one core.
 """
 
 import argparse
 import sys
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -25,9 +24,9 @@ from trunkline.identification.optimizers import LeastSquares
 from trunkline.identification.problem import Bounds, Problem
 from trunkline.identification.search import descend, search
 from trunkline.identification.surrogate import surrogate
+from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
 
-PAGE = Path("docs/results/coverage.md")
 REPETITIONS = 200
 UNITS, STEPS = 3, 4  # of the arm, of a frame: small, so that so many repetitions take minutes
 FRAMES = {"stiffness": 1, "damping": 36, "control": 60}  # of a trial
@@ -105,34 +104,18 @@ def cover(name: str, is_matched: bool, repetitions: int) -> Coverage:
 def main() -> int:
     parser = argparse.ArgumentParser(prog="studies.coverage", description=__doc__.splitlines()[0])
     parser.add_argument("--repetitions", type=int, default=REPETITIONS)
-    parser.add_argument("--page", type=Path, default=PAGE, help="where the page is written")
     arguments = parser.parse_args()
-    lines: list[str] = []
-    for name, is_matched in (("damping", True), ("damping", False), ("stiffness", True), ("control", True)):
-        plant = "the model" if is_matched else "heavier, dry friction"
-        with threadpool_limits(1, user_api="blas"):  # many small problems: threads only get in each other's way
-            covered = cover(name, is_matched, arguments.repetitions)
-        lines += covered.rows(f"`identify_{name}`", plant)
-        numbers = {"units": UNITS, "trials": TRIALS, "range": RANGE, "heavier": 100 * (MASS_FACTOR - 1)}
-        text = TEXT.format(rows="\n".join(lines), repetitions=arguments.repetitions, **numbers)
-        arguments.page.write_text(text, encoding="utf-8")  # after every stage, as each takes minutes
+    with recorded("coverage", keep=arguments.repetitions >= REPETITIONS):
+        print(
+            "| stage | plant | parameter | holds it | median error | scatter | promised | off by half | not converged |"
+        )
+        print("|---|---|---|---:|---:|---:|---:|---:|---:|")
+        for name, is_matched in (("damping", True), ("damping", False), ("stiffness", True), ("control", True)):
+            plant = "the model" if is_matched else "heavier, dry friction"
+            with threadpool_limits(1, user_api="blas"):  # many small problems: threads only get in each other's way
+                covered = cover(name, is_matched, arguments.repetitions)
+            print("\n".join(covered.rows(f"`identify_{name}`", plant)), flush=True)
     return 0
-
-
-TEXT = """# How often intervals hold the truth
-
-Written by `python -m studies.coverage`: {repetitions} repetitions a row, on an arm of {units} units, {trials} noisy
-trials each. Searches begin anywhere from a tenth of the truth to {range:g} times it. Where the plant is the model,
-95 % is what was asked for. The mismatched plant is {heavier:.0f} % heavier and has the stand-in lab's
-dry friction in its joints; forces are then expected over that factor of mass.
-
-| stage | plant | parameter | holds it | median error | scatter | promised | off by half | not converged |
-|---|---|---|---:|---:|---:|---:|---:|---:|
-{rows}
-
-Errors are of ln(value). "Promised" is the median standard error, to be compared with the scatter. "Off by half":
-further than 0.5 in ln(value), that is in another minimum or where nothing is told.
-"""
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain
 
 REST_SPEED = 1e-5  # rad/s of the fastest joint of an arm that rests: tips are some 1e-6 m from it
+PATIENCE = 15.0  # s to rest for a pose that is to be a target; one that takes longer is between two shapes
 NEAR_LIMIT = 0.95  # share of its largest force at which a motor is near it: there other commands hold the same pose
 TAUT_SHARE = 0.2  # of the deepest pulls, where all motors pull: more bends hardly more and presses the units together
 SHARE = 0.01  # of the arm's length; a larger error is worth a warning
@@ -73,7 +74,9 @@ def draw_targets(
     pulls[np.arange(count), second] = np.where(rng.random(count) < 0.5, rng.uniform(0, 1, count), 0.0)
     idle = pulls == 0
     commands = chain.straight_lengths - pulls * deepest + idle * others_pay_out * chain.length
-    rest = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), rest_speed=REST_SPEED)
+    rest = settle(
+        model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), PATIENCE, rest_speed=REST_SPEED
+    )
     tensions = rest.tensions[:, np.argsort(model.actuator_trnid[:, 0])]
     good = rest.rested & (tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
     return np.column_stack([gravity, rest.position, rest.quaternion])[good]

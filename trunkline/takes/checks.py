@@ -10,6 +10,7 @@ from pydantic import Field
 from trunkline.errors import InputError
 from trunkline.logs.log import Log
 from trunkline.signals.clock import FrameFit, OffsetFit
+from trunkline.trials.splits import IDENTIFY
 
 Item = TypeVar("Item")
 
@@ -54,7 +55,7 @@ def deciding(items: Iterable[Item], split: Callable[[Item], str]) -> tuple[list[
     What a session's trials agree on changes all of them, so those that are to be unseen until they score have no say.
     """
     items = list(items)
-    chosen = [item for item in items if split(item) == "identify"]
+    chosen = [item for item in items if split(item) == IDENTIFY]
     return (chosen, False) if chosen else (items, bool(items))
 
 

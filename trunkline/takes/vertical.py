@@ -5,6 +5,7 @@ import numpy as np
 from trunkline.signals.base_frame import average_base
 from trunkline.takes.checks import Findings
 from trunkline.trials.experiments import EXPERIMENTS, TILT
+from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.take import Take
 
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
@@ -26,7 +27,7 @@ def check_vertical(takes: list[Take], measured_base: bool) -> tuple[np.ndarray |
     tilted = [take for take in takes if EXPERIMENTS[take.experiment].level is TILT and take.level is not None]
     if not tilted or not measured_base:
         return None, _check_hanging(takes), False
-    own = [take for take in tilted if take.split == "identify"]
+    own = [take for take in tilted if take.split == IDENTIFY]
     up, said = _by_tilts(own) if own else (None, None)
     if len(own) == len(tilted) or up is not None or (own and said is None):
         return up, said, False
