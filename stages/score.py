@@ -2,9 +2,9 @@
 
 import json
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, PositiveInt
+from pydantic import Field
 
 from trunkline.errors import existing
 from trunkline.figures.scoring import score_figure
@@ -24,7 +24,7 @@ Stage = Literal["identify_stiffness", "identify_damping", "identify_control"]
 @settings
 class Config:
     stages: list[Stage] = Field(min_length=1)
-    floor_poses: PositiveInt
+    floor_poses: Annotated[int, Field(ge=1, le=10_000)]
 
 
 def main(config: Config) -> None:

@@ -108,8 +108,8 @@ def project(tmp_path, monkeypatch):
     [
         ({"kind": "cone"}, "build_mjcf.arm: "),
         ({"lenght": 1}, "build_mjcf.arm.lenght: unknown key"),
-        ({"units": 0}, "build_mjcf.arm.units: found 0, expected greater than 0"),
-        ({"unit_masses": [0.1, -0.1]}, "build_mjcf.arm.unit_masses.1: found -0.1, expected greater than 0"),
+        ({"units": 0}, "build_mjcf.arm.units: found 0, expected 1 to 500"),
+        ({"unit_masses": [0.1, -0.1]}, "build_mjcf.arm.unit_masses.1: found -0.1, expected more than 0 to 100"),
         ({"unit_masses": [0.1, 0.1]}, "build_mjcf.arm: unit_masses: found 2, expected one for all"),
         ({"joint_stiffness": 1.0}, "build_mjcf.arm: found both, expected either bending_stiffness"),
         ({"bending_stiffness": None}, "build_mjcf.arm: found neither, expected either bending_stiffness"),

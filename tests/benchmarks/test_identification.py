@@ -95,6 +95,7 @@ def test_every_part_prints_its_rivals(case, capsys):
 
 def test_without_the_demo_it_says_what_to_run(monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "dvc.yaml").touch()  # the top of a checkout
     monkeypatch.setattr("sys.argv", ["identification"])
     assert benchmark.main() == 1
     assert "make demo" in capsys.readouterr().err

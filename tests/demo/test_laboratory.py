@@ -168,7 +168,7 @@ def test_the_arm_is_fully_bent_when_it_is_let_go():
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        ("experiments.validate_every", 1, "found 1, expected greater than or equal to 2"),
+        ("experiments.validate_every", 1, "found 1, expected 2 to 1000"),
         ("experiments.validate_every", 50, "validate_every: found 50, expected trials of .* in the splits "),
         ("experiments.tilt_repeats", 0, "found 0"),
         ("experiments.curl_hold", 0.0, "curl_hold: found 0.0"),

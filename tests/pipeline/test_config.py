@@ -386,6 +386,6 @@ def test_what_is_pulled_is_this_pipeline_and_its_sessions(tmp_path):
             (tmp_path / "data/raw").mkdir(parents=True)
             (tmp_path / f"data/raw/{data}.dvc").touch()
         for verb in ("pull", "push"):
-            command = ["make", "--dry-run", "-f", str(ROOT / "Makefile"), verb]
+            command = ["make", "--no-print-directory", "--dry-run", "-f", str(ROOT / "Makefile"), verb]
             said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False).stdout
             assert said.splitlines()[-1] == f"dvc {verb} dvc.yaml {wanted}"

@@ -272,7 +272,7 @@ def test_it_needs_no_history(project, tmp_path, monkeypatch, capsys):
         ("fit:\n  a: {min: -.inf}", "limits.yaml: fit: a.min: found -inf, expected a finite number"),
         ("fit:\n  a: {max: 1, slack: .inf}", "limits.yaml: fit: a.slack: found inf, expected a finite number"),
         ("fit:\n  a: {max: 1, factor: .nan}", "limits.yaml: fit: a.factor: found nan, expected a finite number"),
-        ("fit:\n  a: {max: 1, factor: 100}", "limits.yaml: fit: a.factor: found 100, expected less than or equal to 3"),
+        ("fit:\n  a: {max: 1, factor: 100}", "limits.yaml: fit: a.factor: found 100, expected 1 to 3"),
         ("fit:\n  a: {max: 1, below: {key: b, factor: .inf}}", "limits.yaml: fit: a.below.factor: found inf"),
         ("- a", "limits.yaml: "),
     ],

@@ -27,7 +27,7 @@ def good_samples(
     cells = np.ix_(rows, np.array(columns, int))
     positions = reference.scale * poses.positions[cells]
     present = poses.present[cells]
-    finite = np.isfinite(positions).all(axis=-1)
+    finite = np.asarray(np.isfinite(positions).all(axis=-1))
     far = finite & np.any(np.abs(positions) > FARTHEST, axis=-1)
     nowhere = np.asarray(finite & np.all(positions == 0, axis=-1))
     if reference.base is not None and nowhere[:, 0].sum() == finite[:, 0].sum():
