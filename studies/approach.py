@@ -10,7 +10,9 @@ dry as MuJoCo gets, for an arm that sticks.
 """
 
 import argparse
+import contextlib
 import copy
+import sys
 from pathlib import Path
 
 import mujoco
@@ -118,19 +120,21 @@ def main() -> None:
     pulling = np.linalg.norm(band.loaded - rest.position, axis=1)
     print(f"band of Coulomb friction, found for {known.sum()}: {three(band.width[known])} wide")
     print(f"its end after pulling: {three(pulling[known])} from the target")
-    pulled = friction[0] / chain.gain * (rest.tensions > 0)
-    after = " | ".join(f"after {seconds:g} s" for seconds in AFTER)
-    with progress(2 * len(WAYS), "approach", "ways") as bar:
+    rows: dict[str, list[str]] = {}
+    with contextlib.redirect_stdout(sys.stderr), progress(2 * len(WAYS), "approach", "ways") as bar:
         for title, driven in (("friction of the model", model), ("dry friction", dry(model))):
-            print(f"| {title} | {after} | at the end | within 1 mm, median | within 1 mm | rested |")
-            print("|---|---:|---:|---:|---:|---:|---:|---:|")
-            for name, (way, friction_too) in WAYS.items():
-                commands = rest.commands - pulled * friction_too
-                shares = way[:, None]
-                sent = chain.straight_lengths + shares * (commands[:, None] - chain.straight_lengths)
+            rows[title] = []
+            for name, (shares, friction_too) in WAYS.items():
+                commands = rest.commands - friction_too * friction[0] / chain.gain * (rest.tensions > 0)
+                sent = chain.straight_lengths + shares[:, None] * (commands[:, None] - chain.straight_lengths)
                 found = drive(driven, sent[..., model.actuator_trnid[:, 0]], gravity, arguments.seconds)
-                print(row(name, np.linalg.norm(found.tips - rest.position[:, None], axis=2), found.rested), flush=True)
+                errors = np.linalg.norm(found.tips - rest.position[:, None], axis=2)
+                rows[title].append(row(name, errors, found.rested))
                 bar.update(1)
+    for title, table in rows.items():
+        after = " | ".join(f"after {seconds:g} s" for seconds in AFTER)
+        print(f"| {title} | {after} | at the end | within 1 mm, median | within 1 mm | rested |")
+        print("|---|---:|---:|---:|---:|---:|---:|---:|", *table, sep="\n")
 
 
 if __name__ == "__main__":
