@@ -195,9 +195,9 @@ def test_trials_of_another_arm_are_refused():
     trial = release(model, 0.2, frames=5)
     for name in ("unit_99", "tip", "base"):
         trial.segments = (*trial.segments[:-1], name)
-        with pytest.raises(InputError, match=f"{name}.*unit_01 to unit_06.*`segments`"):
+        with pytest.raises(InputError, match=f"segments: trial release.*'{name}', expected.*unit_01, .*, unit_06"):
             prepare(trial, model, 5)
     trial = curl(model, 20, frames=5)
     trial.tendons = ("tendon_1", "tendon_2", "cable")
-    with pytest.raises(InputError, match="cable.*tendon_1 to tendon_3.*`tendons`"):
+    with pytest.raises(InputError, match="tendons: trial curl.*'cable', expected.*tendon_1, tendon_2, tendon_3"):
         prepare(trial, model, 5)

@@ -1,6 +1,7 @@
 """A whole identification stage on a plant that is the model: files, keys, recovery, threads."""
 
 import json
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -150,3 +151,25 @@ def test_tendon_parameters_of_an_arm_without_tendons_are_refused(project):
     config = settings(["release"], ["release"], {"damping": (0.01, 1.0), "tendon_friction": (0.1, 1.0)})
     with pytest.raises(InputError, match="identify_damping.parameters.tendon_friction: found it for an arm without"):
         run("identify_damping", config, root / "artifacts/build_mjcf/arm.xml")
+
+
+def test_exchanged_tendons_are_refused_before_the_first_stage_fits_anything(project):
+    root, model, write = project
+    pulled = curl(model, 40, frames=60)
+    columns = [1, 0, 2]
+    wrong = replace(
+        pulled, commands=pulled.commands[:, columns], tendon_positions=pulled.tendon_positions[:, columns]
+    )
+    write([tilt(model, 30), tilt(model, 75, "validate"), wrong])
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)}, markers="measured")
+    with pytest.raises(InputError, match="session.yaml: tendons: trial curl_40_0_identify: found 'tendon_2' wound"):
+        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
+
+
+def test_a_segment_that_the_model_lacks_is_named_before_markers_are_looked_for(project):
+    root, model, write = project
+    trials = [tilt(model, 30), tilt(model, 75, "validate")]
+    write([replace(trial, segments=("link_1", *trial.segments[1:])) for trial in trials])
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3, 12.0)}, markers="measured")
+    with pytest.raises(InputError, match="session.yaml: segments: trial tilt_30_identify: found 'link_1', .*unit_01"):
+        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")

@@ -68,7 +68,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         command_delay: s from a logged command to the motor that acts on it.
 
     Raises:
-        InputError: if a tracked segment or a commanded tendon is not in the model, or too little was measured.
+        InputError: if its segments and tendons are not those of the model, or too little was measured.
     """
     check_names(trial, model)
     static = is_static(trial.experiment)
@@ -155,15 +155,17 @@ def commanded_lengths(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
 
 
 def check_names(trial: Trial, model: mujoco.MjModel) -> None:
-    """Refuse a trial whose segments or tendons the model does not have."""
+    """Refuse a trial whose segments or tendons the model does not have, or that has only some of its tendons: those
+    that it leaves out may have pulled."""
     sites = [model.site(i).name for i in range(model.nsite)]
     units = [name.removesuffix("_center") for name in sites if name.endswith("_center") and name != "base_center"]
     tendons = [model.tendon(i).name for i in range(model.ntendon)]
-    for kind, found, expected in (("segment", trial.segments, units), ("tendon", trial.tendons, tendons)):
-        unknown = [name for name in found if name not in expected]
+    for key, found, names in (("segments", trial.segments, units), ("tendons", trial.tendons, tendons)):
+        unknown = [name for name in found if name not in names]
         if unknown:
-            valid = f"one of {expected[0]} to {expected[-1]}" if expected else "none, as the arm has none"
-            raise InputError(
-                f"trial {trial.name}: {kind} {unknown[0]!r} is not in the arm, expected {valid}; "
-                f"session.yaml can map the log's names under `{kind}s`"
-            )
+            valid = f"names of the model: {', '.join(names)}" if names else "none, as the arm has none"
+            raise InputError(f"session.yaml: {key}: trial {trial.name}: found {unknown[0]!r}, expected {valid}")
+    if trial.tendons and len(trial.tendons) < len(tendons):
+        expected = f"expected all of the model: {', '.join(tendons)}; slack ones as let out"
+        found = f"found {', '.join(trial.tendons)} alone"
+        raise InputError(f"session.yaml: tendons: trial {trial.name}: {found}, {expected}")

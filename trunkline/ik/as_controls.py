@@ -64,6 +64,19 @@ def draw_targets(
     Returns:
         Inputs of the network, rad and m. Shape (N, 8), N at most `count`.
     """
+    gravity, commands = draw_commands(chain, angles, deepest, count, rng, others_pay_out)
+    rest = settle(
+        model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), PATIENCE, rest_speed=REST_SPEED
+    )
+    tensions = rest.tensions[:, np.argsort(model.actuator_trnid[:, 0])]
+    good = rest.rested & (tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
+    return np.column_stack([gravity, rest.position, rest.quaternion])[good]
+
+
+def draw_commands(
+    chain: Chain, angles: np.ndarray, deepest: np.ndarray, count: int, rng: np.random.Generator, others_pay_out: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gravity angles, rad (count,), and commands, m (count, K), as `draw_targets` has them; its words."""
     gravity = rng.uniform(angles.min(), angles.max(), count)
     first = rng.integers(chain.tendons, size=count)
     order = around_the_arm(chain)
@@ -74,12 +87,7 @@ def draw_targets(
     pulls[np.arange(count), second] = np.where(rng.random(count) < 0.5, rng.uniform(0, 1, count), 0.0)
     idle = pulls == 0
     commands = chain.straight_lengths - pulls * deepest + idle * others_pay_out * chain.length
-    rest = settle(
-        model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), PATIENCE, rest_speed=REST_SPEED
-    )
-    tensions = rest.tensions[:, np.argsort(model.actuator_trnid[:, 0])]
-    good = rest.rested & (tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
-    return np.column_stack([gravity, rest.position, rest.quaternion])[good]
+    return gravity, commands
 
 
 @dataclass

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError, existing
+from trunkline.identification.checks import check_trials
 from trunkline.identification.cross_validation import cross_validate
 from trunkline.identification.evaluation import Replay, replay, scores
 from trunkline.identification.identify import Identification, identify, with_parameters
@@ -42,7 +43,10 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     spec = read_spec(model_path)
     model = spec.compile()
     check_parameters(stage, config, model)
-    model, experiments, fit = set_up(config, read_reported(config), model)
+    reported = read_reported(config)
+    # of an arm with tendons also the trials of later stages: a wrong name is told now, not after minutes
+    check_trials(read_trials(TRIALS) if model.ntendon else reported, model)
+    model, experiments, fit = set_up(config, reported, model)
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)
     if "stiffness" in fit.parameters and not any(map(is_static, config.experiments)):

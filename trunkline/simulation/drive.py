@@ -1,4 +1,4 @@
-"""Driving: from the straight arm, commands are sent at once and the model moves as it does until it rests."""
+"""Driving: from the straight arm, commands are sent and the model moves as it does until it rests."""
 
 import copy
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ LOOK = 0.25  # s between looks at the tips
 WINDOW = 4  # looks in which a tip has moved no more than STILL: a swing of up to 2 s shows in them
 STILL = 1e-4  # m
 NEAR = 1e-3  # m, from its end, within which a tip counts as there
+ROW = 0.01  # s between rows of a trajectory of commands
 
 
 @dataclass
@@ -53,7 +54,8 @@ def drive(
     The time step is the longest that joint limits allow: where the arm comes to rest does not depend on it.
 
     Args:
-        commands: of the position actuators, m. Shape (B, K), K in the order of the actuators.
+        commands: of the position actuators, m, sent at once. Shape (B, K), K in the order of the actuators. Or
+            trajectories, a row every ROW s and the last one held. Shape (B, T, K).
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate.
         friction: whether tendons and joints have the model's dry friction.
@@ -66,6 +68,8 @@ def drive(
     every, looks = round(LOOK / model.opt.timestep), round(seconds / LOOK)
     origin, to_world = base_frame(model)
     batch = batch_of(model, len(commands))
+    trajectories = commands if commands.ndim == 3 else commands[:, None]
+    last = (trajectories.shape[1] - 1) * ROW
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
     if model.na:
         batch.bind("act")[:] = model.tendon_length0[model.actuator_trnid[:, 0]]
@@ -73,11 +77,11 @@ def drive(
     tips = np.full((len(commands), looks, 3), np.nan)
     moving = np.arange(len(commands), dtype=np.int32)
     for look in range(looks):
-        controls = np.repeat(commands[moving, None], every, axis=1)
+        controls = _sent(trajectories[moving], (look * every + np.arange(every)) * model.opt.timestep)
         found = move(batch, controls, ("site_xpos",), every, every - 1, ids=moving)["site_xpos"][:, 0, site]
         tips[moving, look] = (found - origin) @ to_world
         moving = moving[~batch.warning[moving].any(axis=(1, 2))]
-        if look >= WINDOW:
+        if (look - WINDOW) * LOOK >= last:
             spread = np.ptp(tips[moving, look - WINDOW : look + 1], axis=1)
             still = np.linalg.norm(spread, axis=1) <= STILL
             tips[moving[still], look + 1 :] = tips[moving[still], look, None]
@@ -89,3 +93,12 @@ def drive(
     rested = ~warned
     rested[moving] = False
     return Driven(tips, rested)
+
+
+def _sent(trajectories: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Commands at `time`, s, on straight lines between the rows of trajectories (B, T, K). Shape (B, len(time), K)."""
+    place = np.minimum(time / ROW, trajectories.shape[1] - 1)
+    before = place.astype(int)
+    after = np.minimum(before + 1, trajectories.shape[1] - 1)
+    share = (place - before)[:, None]
+    return (1 - share) * trajectories[:, before] + share * trajectories[:, after]

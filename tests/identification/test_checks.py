@@ -1,0 +1,106 @@
+"""Trials of another arm, or of this one with its tendons' names wrong in both topics, are refused before any fit."""
+
+import itertools
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.support import matched_plant
+from tests.support.matched_plant import curl, release, small_model, tilt
+from trunkline.errors import InputError
+from trunkline.identification.checks import check_trials
+
+FRAMES = 60
+
+
+@pytest.fixture(scope="module")
+def model():
+    return small_model()
+
+
+@pytest.fixture(scope="module")
+def curls(model):
+    """One of each tendon, and one of two together, with cameras' noise."""
+    single = [curl(model, 40, frames=FRAMES, tendon=tendon, noise=3e-4) for tendon in range(3)]
+    return [*single, two_tendons(model)]
+
+
+def two_tendons(model):
+    pulls = np.full((FRAMES, 3), -matched_plant.SLACK)
+    pulls[:, 1:] = 0.03 * np.interp(np.arange(FRAMES) * matched_plant.FRAME, [0.1, 0.3, 1], [0, 1, 1])[:, None]
+    return matched_plant._trial(
+        model, "curl_2_3", "curl", "identify", 30, np.array([0, 0, -9.81]), FRAMES, np.zeros(model.nq), pulls, 3e-4,
+        np.random.default_rng(0),
+    )  # fmt: skip
+
+
+def with_columns(trial, columns):
+    """The trial with the names of its tendons exchanged, in commands and in measured positions alike."""
+    return replace(trial, commands=trial.commands[:, columns], tendon_positions=trial.tendon_positions[:, columns])
+
+
+def refused(trial, model):
+    try:
+        check_trials([trial], model)
+    except InputError:
+        return True
+    return False
+
+
+def test_trials_as_they_are_pass(model, curls):
+    check_trials([*curls, tilt(model, 60), release(model, 0.3, frames=20)], model)
+
+
+@pytest.mark.parametrize("columns", list(itertools.permutations(range(3)))[1:])
+def test_every_exchange_of_tendons_shows_in_the_curls_that_it_changes(model, curls, columns):
+    for trial, pulled in zip(curls, ({0}, {1}, {2}, {1, 2}), strict=True):
+        named = {columns.index(tendon) for tendon in pulled}
+        assert refused(with_columns(trial, list(columns)), model) == (named != pulled), trial.name
+
+
+def test_what_is_said_names_key_trial_and_both_tendons(model, curls):
+    said = "tendons: trial curl_40_0_identify: found 'tendon_2' wound by 40 mm .* to the side of 'tendon_1', expected"
+    with pytest.raises(InputError, match=said) as caught:
+        check_trials([with_columns(curls[0], [1, 0, 2])], model)
+    assert "\n" not in str(caught.value)
+
+
+def test_reversed_signs_show_where_the_other_tendons_are_let_out(model, curls):
+    wound = curls[0].commands[:, :1]
+    commands = np.concatenate([wound, -wound / 2, -wound / 2], axis=1)
+    assert not refused(replace(curls[0], commands=commands), model)
+    assert refused(replace(curls[0], commands=-commands), model)
+
+
+@pytest.mark.parametrize(("degrees", "wrong"), [(25, False), (-25, False), (120, True), (180, True)])
+def test_a_base_that_is_turned_about_the_arm_shows(model, curls, degrees, wrong):
+    turn = Rotation.from_euler("z", degrees, degrees=True)
+    for trial in curls[:3]:
+        positions = turn.apply(trial.positions.reshape(-1, 3)).reshape(trial.positions.shape)
+        assert refused(replace(trial, positions=positions, quaternions=None), model) == wrong
+
+
+def test_an_arm_that_hardly_moves_is_let_alone(model):
+    assert not refused(with_columns(curl(model, 2, frames=FRAMES), [1, 0, 2]), model)
+
+
+def test_the_deepest_pull_is_looked_at_where_cameras_saw_it(model, curls):
+    trial = replace(curls[0], measured=curls[0].measured.copy())
+    trial.measured[np.argmax(trial.commands[:, 0]) :] = False
+    check_trials([trial], model)
+    assert refused(with_columns(trial, [1, 0, 2]), model)
+
+
+def test_a_part_of_the_tendons_is_refused(model, curls):
+    some = replace(
+        curls[0], tendons=("tendon_1",), commands=curls[0].commands[:, :1],
+        tendon_positions=curls[0].tendon_positions[:, :1],
+    )  # fmt: skip
+    said = "session.yaml: tendons: trial curl_40_0_identify: found tendon_1 alone, expected all of the model: tendon_1,"
+    with pytest.raises(InputError, match=re.escape(said)):
+        check_trials([some], model)
+    none = replace(some, tendons=(), commands=np.empty((FRAMES, 0)), tendon_positions=np.empty((FRAMES, 0)))
+    check_trials([none], model)

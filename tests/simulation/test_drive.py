@@ -1,0 +1,37 @@
+"""Driving by trajectories of commands: their last row decides where a frictionless arm rests, the way there when."""
+
+import numpy as np
+import pytest
+
+from tests.support.matched_plant import small_model
+from trunkline.frames import gravity_in_base
+from trunkline.simulation.drive import LOOK, ROW, drive
+
+
+@pytest.fixture(scope="module")
+def model():
+    model = small_model(4)
+    model.dof_damping[:] *= 10
+    return model
+
+
+def test_a_trajectory_of_one_row_is_the_commands_sent_at_once(model):
+    commands = model.tendon_length0 - [[0.01, -0.02, -0.02], [-0.02, 0.008, -0.02]]
+    once, row = (drive(model, sent, gravity_in_base(0.5), 3.0).tips for sent in (commands, commands[:, None]))
+    np.testing.assert_array_equal(once, row)
+
+
+def test_a_slow_trajectory_arrives_late_at_the_same_place_and_is_waited_for(model):
+    straight, command = model.tendon_length0, model.tendon_length0 - [0.01, -0.02, -0.02]
+    waits = 3.0  # s at the straight arm's commands, longer than it takes to be found at rest
+    hold = np.tile(straight, (round(waits / ROW), 1))
+    shares = np.linspace(0, 1, round(1 / ROW) + 1)[:, None]
+    slow = np.concatenate([hold, straight + shares * (command - straight)])[None]
+    gravity = gravity_in_base(0.0)
+    there = drive(model, command[None], gravity, 12.0, friction=False)
+    late = drive(model, slow, gravity, 12.0, friction=False)
+    assert late.rested.all()
+    np.testing.assert_allclose(late.end, there.end, atol=1e-4)
+    waited = late.tips[0, : round(waits / LOOK)]
+    assert np.ptp(waited, axis=0).max() < 1e-3 < 0.1 * np.linalg.norm(there.end[0] - waited[-1])
+    assert there.seconds_to_rest[0] < waits < late.seconds_to_rest[0]
