@@ -64,7 +64,7 @@ RESULTS = {
         ("… 95th percentile", "position_error_mm.p95", "mm"),
     ],
     "reachability": [
-        ("Rigid map: share of points on which independent IK agrees", "rigid.accuracy", ""),
+        ("Rigid map: share of points on which IK agrees that knows nothing of it", "rigid.accuracy", ""),
         ("Soft maps: smallest overlap half-way between their angles", "soft.heldout_iou_min", ""),
     ],
     "package_unity": [
