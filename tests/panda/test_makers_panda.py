@@ -31,7 +31,7 @@ def test_frames_and_limits_are_the_makers(model):
 def test_collisions_are_the_makers_but_for_what_the_map_simplifies(model):
     """The base's sphere is larger than its capsule, and the plug beside the flange is left out."""
     plug = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_GEOM, "link7_1")
-    data, q = mujoco.MjData(model), np.random.default_rng(1).uniform(Q_MIN, Q_MAX, (1000, 7))
+    data, q = mujoco.MjData(model), np.random.default_rng(1).uniform(Q_MIN, Q_MAX, (3000, 7))
     touching, ours = [], clearance(q, OFFSET) < 0
     for pose in q:
         data.qpos[:] = pose

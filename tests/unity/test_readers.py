@@ -42,7 +42,7 @@ def turned_inside_out(obj: bytes) -> bytes:
 def shifted(obj: bytes) -> bytes:
     lines = [line.split() for line in obj.splitlines()]
     return b"\n".join(
-        b" ".join([a, b"%f" % (float(b) + 0.6), c, d] if a == b"v" else [a, b, c, d]) for a, b, c, d in lines
+        b" ".join([a, b"%f" % (float(b) + 1.0), c, d] if a == b"v" else [a, b, c, d]) for a, b, c, d in lines
     )
 
 
