@@ -8,6 +8,7 @@ from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.settings import settings
 from trunkline.unity.comparison import curled, read_models
 from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.readers import refusals
 from trunkline.unity.sources import read_sources
 from trunkline.unity.twin import MANIFEST, Label, Trajectory, assemble, compare
 
@@ -29,6 +30,9 @@ def main(config: Config) -> None:
         tarball = out / f"{config.name}-{config.version}.tgz"
         write_tarball(tarball, files)
         packed = read_tarball(tarball)
+        refused = refusals(packed)
+        for path, reason in refused.items():
+            print(f"package_unity: another reader refuses {path}: {reason}")
         (out / "manifest.json").write_bytes(packed[MANIFEST])
         models = read_models(sources.mjcf, packed)
         motion = curled(models, config.roundtrip)
@@ -37,6 +41,7 @@ def main(config: Config) -> None:
         metrics = {
             "rule_violations": len(violations),
             "roundtrip_max_deviation_mm": compare(models["calibrated"], models["packed"], config.roundtrip)[0],
+            "foreign_readers_failed": len(refused),
             "files": len(packed),
             "bytes": tarball.stat().st_size,
         }

@@ -15,7 +15,7 @@ from trunkline.fields.grid import (
     redistance,
     without_specks,
 )
-from trunkline.fields.mesh import contains, surface, unsimplified, write_obj
+from trunkline.fields.mesh import LEVEL, Surface, contains, surface, unsimplified, write_obj
 from trunkline.fields.mesh_distance import mesh_distance
 
 SPACING = 0.01  # m
@@ -168,3 +168,20 @@ def test_obj_reads_back_as_the_same_closed_mesh(tmp_path):
     assert read.is_watertight
     assert len(read.faces) == len(mesh.faces)
     assert read.volume == pytest.approx(mesh.mesh.volume, rel=1e-4)
+
+
+def test_a_surface_that_touches_lattice_points_reads_back_as_closed(tmp_path):
+    """Its vertices there have the same digits: as it comes from marching cubes, readers find it open."""
+    lattice = lattice_around(0.1)
+    middle = ball(lattice, 0.0)
+    nearest = np.abs(middle - 0.1).argmin()
+    touching = ball(lattice, middle.ravel()[nearest] - LEVEL * lattice.spacing - 1e-8)
+    raw, mesh = Surface(*unsimplified(touching, lattice)), surface(touching, lattice, 10**6, "reachability.rigid")
+    read = []
+    for name, shape in (("raw", raw), ("mesh", mesh)):
+        write_obj(tmp_path / f"{name}.obj", shape, name)
+        read.append(trimesh.load_mesh(tmp_path / f"{name}.obj"))
+    assert raw.is_closed()
+    assert not read[0].is_watertight
+    assert read[1].is_watertight
+    assert len(read[1].faces) == len(mesh.faces) < len(raw.faces)

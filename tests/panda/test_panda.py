@@ -49,6 +49,15 @@ def test_model_has_the_limits(model):
     np.testing.assert_allclose(model.jnt_range, np.column_stack([Q_MIN, Q_MAX]))
 
 
+def test_the_file_of_the_model_loads_as_the_model(model):
+    loaded = mujoco.MjModel.from_xml_string(panda_spec(OFFSET).to_xml())
+    np.testing.assert_array_equal(loaded.body_mass, model.body_mass)
+    for q in random_poses(20):
+        there, here = placed(loaded, q), placed(model, q)
+        np.testing.assert_allclose(there.site("mount").xpos, here.site("mount").xpos, atol=1e-6)  # of its digits
+        assert there.ncon == here.ncon
+
+
 def test_jacobian_by_finite_differences():
     q, step = random_poses(20), 1e-6
     frames = joint_frames(q)

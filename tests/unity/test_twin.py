@@ -351,6 +351,7 @@ def test_the_stage_writes_package_manifest_and_metrics(project, change):
     files, metrics = read_tarball(tarball), json.loads((out / "metrics.json").read_text())
     assert metrics == {
         "rule_violations": 0,
+        "foreign_readers_failed": 0,
         "roundtrip_max_deviation_mm": 0.0,
         "files": len(files),
         "bytes": tarball.stat().st_size,

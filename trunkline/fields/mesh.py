@@ -15,6 +15,7 @@ from trunkline.fields.grid import Lattice
 
 # Lattice points at exactly the level make marching cubes emit degenerate triangles and open edges.
 LEVEL = 1e-3  # voxels outside zero
+DIGITS = 6  # after the decimal point of a vertex in a file: a micrometre
 # Of the simplifier: the lowest that comes down to the triangles asked for moves the surface least.
 AGGRESSIVENESS = range(3, 10)
 
@@ -37,7 +38,7 @@ class Surface:
 
 
 def surface(field: np.ndarray, lattice: Lattice, most_triangles: int, settings: str) -> Surface:
-    """Closed mesh of the zero level of `field` on a 3-D `lattice`, with at most `most_triangles`.
+    """Closed mesh of the zero level of `field` on a 3-D `lattice`, with at most `most_triangles`, as it is `written`.
 
     `settings` is the section of params.yaml in which the field's `voxel` is set, for errors.
 
@@ -51,7 +52,7 @@ def surface(field: np.ndarray, lattice: Lattice, most_triangles: int, settings: 
         raise InputError(f"params.yaml: {settings}.voxel: found {lattice.spacing:g} m and an empty map, "
                          f"expected less, or a smaller {settings}.smallest")
     whole = unsimplified(field, lattice)
-    shape = Surface(*whole)
+    shape = written(*whole)
     for aggressiveness in AGGRESSIVENESS:
         if _is_small(shape, most_triangles):
             break
@@ -68,9 +69,23 @@ def _is_small(shape: Surface, most_triangles: int) -> bool:
 
 def _simplified(vertices: np.ndarray, faces: np.ndarray, triangles: int, aggressiveness: int) -> Surface:
     """Edges collapsed until `triangles` are left, or `aggressiveness` allows no more."""
-    return Surface(*fast_simplification.simplify(
+    return written(*fast_simplification.simplify(
         vertices.astype(np.float32), faces.astype(np.int32), target_count=triangles, agg=aggressiveness
     ))  # fmt: skip
+
+
+def written(vertices: np.ndarray, faces: np.ndarray) -> Surface:
+    """The mesh that a reader of its file makes, who takes vertices of the same digits for one.
+
+    `vertices` (V, 3) in m, `faces` (F, 3).
+    Where the surface passes a lattice point by less than those digits, marching cubes puts several vertices in one
+    place. Triangles between them have no area and are left out: with them the mesh reads as open.
+    """
+    rounded = np.round(vertices.astype(float), DIGITS)
+    _, first, place = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    kept = np.sort(first)
+    corners = np.searchsorted(kept, first[place.ravel()])[faces]
+    return Surface(rounded[kept], corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)])
 
 
 def unsimplified(field: np.ndarray, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
@@ -91,5 +106,5 @@ def contains(shape: Surface, points: np.ndarray) -> np.ndarray:
 
 def write_obj(path: str | Path, shape: Surface, title: str) -> None:
     """Write a Wavefront OBJ in m, to a micrometre; `title` goes into its first line."""
-    text = export_obj(shape.mesh, include_normals=False, include_color=False, header=f"{title}; m", digits=6)
+    text = export_obj(shape.mesh, include_normals=False, include_color=False, header=f"{title}; m", digits=DIGITS)
     Path(path).write_text(text.rstrip() + "\n", encoding="ascii")

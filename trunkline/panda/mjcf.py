@@ -32,6 +32,7 @@ def panda_spec(mount_offset: float) -> mujoco.MjSpec:
         position = [DH_A[joint], -np.sin(alpha) * DH_D[joint], np.cos(alpha) * DH_D[joint]]
         body = body.add_body(name=f"link_{joint + 1}", pos=position, quat=[np.cos(alpha / 2), np.sin(alpha / 2), 0, 0])
         body.explicitinertial, body.mass, body.inertia = True, PLACEHOLDER_MASS, PLACEHOLDER_INERTIA
+        body.ipos = [0, 0, 0]  # without a place, MuJoCo leaves the masses out of the file that it saves
         body.add_joint(name=f"joint_{joint + 1}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1],
                        range=[Q_MIN[joint], Q_MAX[joint]], limited=True)
         names[joint + 1] = _add_capsules(body, joint + 1, capsules.get(joint + 1, []))

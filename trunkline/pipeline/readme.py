@@ -46,7 +46,7 @@ RESULTS = {
         ("… sent to the lab's own arm: median", "on_plant.position_error_mm.median", "mm"),
     ],
     "reachability": [
-        ("Rigid map: share of points on which independent IK agrees", "rigid.accuracy", ""),
+        ("Rigid map: share of points on which IK agrees that knows nothing of it", "rigid.accuracy", ""),
         ("Soft maps: smallest overlap half-way between their angles", "soft.heldout_iou_min", ""),
     ],
     "package_unity": [

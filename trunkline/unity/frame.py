@@ -29,7 +29,7 @@ def unity_obj(vertices: np.ndarray, faces: np.ndarray) -> bytes:
         faces: vertex indices, counter-clockwise from outside. Shape (m, 3).
     """
     rotated = unity_position(vertices) * [-1, 1, 1]
-    lines = ["v {:.6g} {:.6g} {:.6g}".format(*vertex) for vertex in rotated]
+    lines = ["v {:.6f} {:.6f} {:.6f}".format(*vertex) for vertex in rotated]  # as many digits as they come with
     lines += ["f {} {} {}".format(*face) for face in np.asarray(faces) + 1]
     return ("\n".join(lines) + "\n").encode()
 

@@ -1,0 +1,92 @@
+"""The finished package, opened by readers that had no part in making it; and that they refuse what is wrong."""
+
+import shutil
+import subprocess
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.unity.test_twin import files, sources  # noqa: F401
+from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.readers import refusals
+from trunkline.unity.twin import MANIFEST, MODEL, NETWORK
+
+OBJ = "Runtime/Reachability/soft_030.obj"
+GRID = "Runtime/Reachability/soft_030.bytes"
+
+
+def test_no_reader_refuses_a_file_of_the_package(files, tmp_path):  # noqa: F811
+    write_tarball(tmp_path / "twin.tgz", files)
+    assert refusals(read_tarball(tmp_path / "twin.tgz")) == {}
+
+
+@pytest.mark.skipif(shutil.which("tar") is None, reason="no tar here")
+def test_tar_unpacks_the_same_files_and_the_model_loads_from_there(files, tmp_path):  # noqa: F811
+    write_tarball(tmp_path / "twin.tgz", files)
+    subprocess.run(["tar", "xzf", "twin.tgz"], cwd=tmp_path, check=True)
+    root = tmp_path / "package"
+    assert {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()} == files
+    assert mujoco.MjModel.from_xml_path(str(root / MODEL)).nu == 3
+
+
+def without_a_face(obj: bytes) -> bytes:
+    return obj.rstrip().rpartition(b"\n")[0] + b"\n"
+
+
+def turned_inside_out(obj: bytes) -> bytes:
+    lines = [line.split() for line in obj.splitlines()]
+    return b"\n".join(b" ".join([a, d, c, b] if a == b"f" else [a, b, c, d]) for a, b, c, d in lines) + b"\n"
+
+
+def shifted(obj: bytes) -> bytes:
+    lines = [line.split() for line in obj.splitlines()]
+    return b"\n".join(
+        b" ".join([a, b"%f" % (float(b) + 1.0), c, d] if a == b"v" else [a, b, c, d]) for a, b, c, d in lines
+    )
+
+
+def with_two_vertices_in_one_place(obj: bytes) -> bytes:
+    """As marching cubes leaves them: one vertex split in two of the same digits, with two flat triangles between."""
+    lines = obj.decode().splitlines()
+    vertices = [line for line in lines if line.startswith("v")]
+    faces = np.array([line.split()[1:] for line in lines if line.startswith("f")], int)
+    around = np.flatnonzero((faces == 1).any(axis=1))
+    twin = len(vertices) + 1
+    moved = faces[around[0]]  # one triangle goes over to the twin; two flat ones close the edges
+    turned = np.roll(moved, -int(np.flatnonzero(moved == 1)[0]))
+    _, second, third = turned.tolist()
+    faces[around[0]] = [twin, second, third]
+    faces = np.vstack([faces, [[1, second, twin], [1, twin, third]]])
+    return "\n".join([*vertices, vertices[0], *(f"f {a} {b} {c}" for a, b, c in faces)]).encode()
+
+
+@pytest.mark.parametrize(
+    ("path", "change"),
+    [
+        (OBJ, without_a_face),
+        (OBJ, turned_inside_out),
+        (OBJ, with_two_vertices_in_one_place),
+        (GRID, lambda data: data[:-2]),
+        (GRID, lambda data: (-np.abs(np.frombuffer(data, "<f2"))).tobytes()),
+        (GRID, lambda data: np.full(len(data) // 2, np.nan, "<f2").tobytes()),
+        (MODEL, lambda data: data.replace(b"<inertial", b"<site").replace(b"diaginertia", b"size")),
+        (NETWORK, lambda data: data[:-40]),
+        (NETWORK, lambda data: data.replace(b"MatMul", b"MatMal")),
+        (MANIFEST + ".meta", lambda data: b"guid: x\n"),
+        ("package.json", lambda data: data[:-4]),
+        ("Runtime/CalibratedSprings.cs", lambda data: data + b"}"),
+        ("README.md", lambda data: b"\xff"),
+    ],
+)
+def test_a_file_that_is_wrong_is_refused(files, path, change):  # noqa: F811
+    assert set(refusals(files | {path: change(files[path])})) == {path}
+
+
+def test_a_mesh_elsewhere_than_its_grid_is_seen(files):  # noqa: F811
+    found = refusals(files | {OBJ: shifted(files[OBJ])})
+    assert "off its surface" in found[GRID]
+
+
+def test_a_file_of_an_unknown_kind_is_no_readers(files):  # noqa: F811
+    assert refusals(files | {"a.xyz": b""}) == {"a.xyz": "no reader for files of its kind"}

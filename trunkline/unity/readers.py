@@ -1,0 +1,127 @@
+"""Every file of a finished package, opened by readers that had no part in making it.
+
+Meshes: trimesh, and MuJoCo's reader of OBJ files. Models: MuJoCo. The network: ONNX's checker, and its reference
+implementation beside onnxruntime. Grids: numpy, by the manifest's words alone, beside the meshes of the same name. The
+rest: JSON, YAML, text. Of C# only its brackets are counted: no compiler reads it here.
+"""
+
+import io
+import json
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+import onnx
+import onnxruntime
+import trimesh
+import yaml
+from onnx.reference import ReferenceEvaluator
+
+from trunkline.unity.twin import MANIFEST
+
+RUNTIMES_APART = 1e-5  # m or rad, of two runtimes on the same network
+POSES = 64  # on which they are compared
+MESH_OFF_GRID = 1.0  # lattice steps (the largest), of any vertex from the surface of the grid of its name
+ASSET = (
+    "<mujoco><asset><mesh name='m' file='{}' inertia='exact'/></asset>"
+    "<worldbody><body><geom type='mesh' mesh='m'/></body></worldbody></mujoco>"
+)
+
+
+def refusals(files: dict[str, bytes]) -> dict[str, str]:
+    """What a reader says against each of a package's `files` (contents by path) that one refuses."""
+    found = {}
+    for path, data in sorted(files.items()):
+        read = READERS.get(path[path.rfind("."):])
+        if read is None:
+            found[path] = "no reader for files of its kind"
+            continue
+        try:
+            read(path, data, files)
+        except Exception as error:  # whatever a reader raises, it has refused the file
+            found[path] = f"{type(error).__name__}: {error}"
+    return found
+
+
+def _mesh(path: str, data: bytes, files: dict[str, bytes]) -> None:
+    merged = trimesh.load_mesh(io.BytesIO(data), file_type="obj")
+    as_written = trimesh.load_mesh(io.BytesIO(data), file_type="obj", process=False)
+    for mesh in (merged, as_written):
+        if not mesh.is_watertight:
+            raise ValueError("trimesh finds it open")
+        if not mesh.is_winding_consistent or mesh.volume <= 0:
+            raise ValueError("trimesh finds faces that point inwards")
+    name = path.rsplit("/", 1)[-1]
+    model = mujoco.MjModel.from_xml_string(ASSET.format(name), {name: data})  # raises unless closed, faces outwards
+    if len(merged.faces) != len(as_written.faces) or model.mesh_facenum[0] != len(merged.faces):
+        raise ValueError("readers find different numbers of triangles")
+
+
+def _model(path: str, data: bytes, files: dict[str, bytes]) -> None:
+    model = mujoco.MjModel.from_xml_string(data.decode())
+    mujoco.mj_step(model, mujoco.MjData(model))
+
+
+def _network(path: str, data: bytes, files: dict[str, bytes]) -> None:
+    model = onnx.load_model_from_string(data)
+    onnx.checker.check_model(model, full_check=True)
+    (entry,) = model.graph.input
+    poses = np.random.default_rng(0).uniform(-0.5, 0.5, (POSES, entry.type.tensor_type.shape.dim[-1].dim_value))
+    poses[:, -4:] /= np.linalg.norm(poses[:, -4:], axis=1, keepdims=True)  # a quaternion
+    inputs = {entry.name: poses.astype(np.float32)}
+    session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
+    for first, second in zip(session.run(None, inputs), ReferenceEvaluator(model).run(None, inputs), strict=True):
+        apart = np.abs(first - second).max()
+        if not apart <= RUNTIMES_APART:
+            raise ValueError(f"onnxruntime and ONNX's reference are {apart:g} apart")
+
+
+def _grid(path: str, data: bytes, files: dict[str, bytes]) -> None:
+    manifest = json.loads(files[MANIFEST])
+    ((name, grid),) = [(name, grid) for name, grid in manifest["grids"].items() if grid["file"] == path]
+    values = np.frombuffer(data, "<f2").reshape(grid["shape"][::-1]).astype(float)  # z, y, x
+    if not np.isfinite(values).all() or not (values < 0).any() or not (values > 0).any():
+        raise ValueError("no signed distances: not finite, or of one sign")
+    if name in manifest["meshes"]:
+        vertices = trimesh.load_mesh(io.BytesIO(files[manifest["meshes"][name]["file"]]), file_type="obj").vertices
+        origin, spacing = np.array(grid["origin"]), np.array(grid["spacing"])
+        places = (vertices * [-1, 1, 1] - origin) / spacing  # as Unity imports them
+        nearest = np.clip(np.round(places), 0, np.array(grid["shape"]) - 1).astype(int)
+        x, y, z = nearest.T
+        away = np.linalg.norm(places - nearest, axis=1)  # at the border the set may reach half a cell out
+        off = np.abs(values[z, y, x]) / spacing.max() - away
+        if away.max() > np.sqrt(3) or off.max() > MESH_OFF_GRID:
+            raise ValueError("the mesh of its name lies off its surface")
+
+
+def _json(path: str, data: bytes, files: dict[str, bytes]) -> None:
+    json.loads(data)
+
+
+def _meta(path: str, data: bytes, files: dict[str, bytes]) -> None:
+    if not {"fileFormatVersion", "guid"} <= set(yaml.safe_load(data)):
+        raise ValueError("no file format and identifier")
+
+
+def _text(path: str, data: bytes, files: dict[str, bytes]) -> None:
+    data.decode()
+
+
+def _script(path: str, data: bytes, files: dict[str, bytes]) -> None:
+    text = data.decode()
+    for pair in ("{}", "()", "[]"):
+        if text.count(pair[0]) != text.count(pair[1]):
+            raise ValueError(f"brackets {pair} do not match")
+
+
+READERS: dict[str, Callable[[str, bytes, dict[str, bytes]], None]] = {
+    ".obj": _mesh,
+    ".xml": _model,
+    ".onnx": _network,
+    ".bytes": _grid,
+    ".json": _json,
+    ".asmdef": _json,
+    ".meta": _meta,
+    ".md": _text,
+    ".cs": _script,
+}
