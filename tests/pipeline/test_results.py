@@ -49,6 +49,13 @@ def test_what_is_printed_is_kept_with_its_command_and_commit(project, monkeypatc
     assert block(project / "docs/results/study.json") == f"{shown}(commit {commit})"
 
 
+def test_two_tables_one_after_the_other_stay_two(project):
+    with recorded("study", root=project):
+        print("| a |\n|---|\n| 1 |\n\n| b |\n|---|\n| 2 |")
+    shown = block(project / "docs/results/study.json")
+    assert shown.startswith("| a |\n|---|\n| 1 |\n\n| b |\n|---|\n| 2 |\n\n`python")
+
+
 def test_a_run_that_fails_or_is_not_to_be_kept_leaves_the_file_alone(project):
     with recorded("study", root=project):
         print("whole")

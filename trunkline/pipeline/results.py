@@ -6,6 +6,7 @@
 import contextlib
 import io
 import json
+import re
 import shlex
 import subprocess
 import sys
@@ -89,5 +90,5 @@ def block(path: Path) -> str:
     parts = []
     for is_table, group in groupby(lines, key=lambda line: line.startswith("|")):
         text = "\n".join(group)
-        parts.append(text if is_table else f"```\n{text}\n```")
+        parts.append(re.sub(r"\n(.+\n\|-)", r"\n\n\1", text) if is_table else f"```\n{text}\n```")  # a second header
     return "\n\n".join([*parts, f"`{command}`\n(commit {commit})"])
