@@ -2,8 +2,8 @@
 
 Source: `franka_description/robots/panda_arm.xacro` in franka_ros (self-collision capsules) and the pairs
 that the maker's MoveIt configuration does not rule out. Two simplifications keep the map round about joint 1:
-the base's capsule, which points backwards, is swept to a sphere that covers it, and the plug beside the
-flange is left out, since joint 7 turns it out of the way without moving the mount.
+the base's capsule, which points backwards, is a sphere that covers all but 18 mm of its back end, and the plug beside
+the flange is left out, since joint 7 turns it out of the way without moving the mount.
 """
 
 import numpy as np
