@@ -150,7 +150,7 @@ def score(
         Metrics of the model, and of the rig beside the model's with friction on the same targets.
     """
     targets = draw_targets(model, chain, angles, PULL_SHARE * deepest, settings.targets, rng)
-    taut = draw_targets(model, chain, angles, TAUT_SHARE * deepest, settings.timed, rng, others_pay_out=False)
+    taut = draw_targets(model, chain, angles, TAUT_SHARE * deepest, settings.targets // 4, rng, others_pay_out=False)
     few = targets[: settings.timed]
     with_friction = driven(model, ask, targets, settings.seconds)
     on_model = {
