@@ -72,8 +72,8 @@ def test_the_library_needs_its_dependencies_alone():
 @pytest.mark.parametrize(
     ("extra", "folders"),
     [
-        ("pipeline", ["trunkline", "stages", "demo", "studies", "examples/asl_trunk"]),
-        ("bench", ["benchmarks"]),
+        ("pipeline", ["trunkline", "stages", "demo", "examples/asl_trunk"]),
+        ("bench", ["benchmarks", "studies"]),
         ("test", ["tests"]),
     ],
 )

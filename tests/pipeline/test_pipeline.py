@@ -67,6 +67,8 @@ def test_a_stage_lists_its_settings(stages, address):
     groups = group_options(ROOT / "conf" / name)
     expected = {f"{folder}params.yaml": [name], f"conf/{name}/config.yaml": []}
     expected |= {options[section[group]].relative_to(ROOT).as_posix(): [] for group, options in groups.items()}
+    if section.get("rig") == "demo.rig":  # which reads the lab's settings
+        expected |= {"demo/params.yaml": ["record"], "demo/conf/record/config.yaml": []}
     params.pop("versions.yaml")  # the next test's
     assert params == expected
 
