@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from trunkline.arm.cad import CadArm
+from trunkline.arm.joints import Joints, add_elements
 from trunkline.arm.kinds import Arm
 from trunkline.arm.mjcf import Actuation, Solver
 from trunkline.figures.arm import arm_figure
@@ -19,18 +20,21 @@ MODELS = "build_mjcf/mjcf"  # folder below conf/ of arms that come as MJCF
 @settings
 class Config:
     arm: Arm
+    joints: Joints
     actuation: Actuation
     solver: Solver
 
 
 def cad_arm(config: Config) -> CadArm:
-    return config.arm.build(config.actuation, config.solver, own_or_project(Path("."), "conf") / MODELS)
+    arm = config.arm.build(config.actuation, config.solver, own_or_project(Path("."), "conf") / MODELS)
+    add_elements(arm.spec, config.joints, config.solver.armature)
+    return arm
 
 
 def main(config: Config) -> None:
     arm = cad_arm(config)
     model = arm.spec.compile()
-    if model.ntendon:  # refused here rather than hours later, by the first stage that needs the statics
+    if model.nu:  # refused here rather than hours later, by the first stage that needs the statics
         read_chain(model)
     with output_folder(ARTIFACTS) as folder:
         (folder / "arm.xml").write_text(arm.spec.to_xml())

@@ -12,7 +12,7 @@ from benchmarks.identification.case import Case, ReadCase, Size
 from benchmarks.identification.timing import Spent, alternate
 from trunkline.identification.parameters import Fields
 from trunkline.identification.population import Population
-from trunkline.simulation.motion import batch_of
+from trunkline.simulation.motion import batch_of, hold
 
 CANDIDATES = 12
 
@@ -69,8 +69,8 @@ def bare_batch(case: Case, fields: Fields, count: int, step_factor: float) -> tu
 
     def run() -> int:
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
-        batch.bind("qpos")[:] = repeat([e.start for e in experiments])
-        batch.bind("ctrl")[:] = batch.bind("act")[:] = repeat([e.controls[0] for e in experiments])
+        batch.bind("qpos")[:, : len(experiments[0].start)] = repeat([e.start for e in experiments])
+        hold(batch, case.model, repeat([e.controls[0] for e in experiments]))
         batch.expand("opt.timestep")[:] = repeat([e.lead / substeps for e in experiments])
         batch.step(nstep=substeps)
         batch.expand("opt.timestep")[:] = experiments[0].frame_step / substeps

@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 
 import mujoco
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from stages.build_mjcf import Config, main
 from tests.support.workbench import ROOT
 from trunkline.arm.from_file import FromFile
+from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.errors import InputError
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.saving import save_model
@@ -27,6 +29,7 @@ def project(tmp_path, monkeypatch):
     (tmp_path / "conf/build_mjcf/arm").mkdir(parents=True)
     for name in ("config.yaml", "arm/four_links.yaml"):
         (tmp_path / "conf/build_mjcf" / name).write_text((ROOT / "conf/build_mjcf" / name).read_text())
+    shutil.copytree(ROOT / "conf/build_mjcf/joints", tmp_path / "conf/build_mjcf/joints")
     (tmp_path / "conf/build_mjcf/mjcf").mkdir()
     (tmp_path / "params.yaml").write_text("build_mjcf: {arm: four_links, solver: {timestep: 0.002}}\n")
     monkeypatch.chdir(tmp_path)
@@ -58,6 +61,9 @@ def test_the_stage_builds_it_and_the_statics_read_it(project, tmp_path):
 def test_it_can_be_identified(name):
     """Every parameter can be set in it and saved."""
     spec = mujoco.MjSpec.from_string(FromFile("mjcf", FILE).build(None, None, MODELS).spec.to_xml())
+    add_elements(spec, Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)]), 1e-5)
+    for actuator in spec.actuators:
+        actuator.nsample = 100
     model = spec.compile()
     value = 1.3 * PARAMETERS[name].read(model) or 0.02
     set_fields(model, candidate_fields(model, {name: np.array([value])}))

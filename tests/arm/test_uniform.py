@@ -1,5 +1,7 @@
 """Chains of one diameter: tracked points, loads and no tendons, and the settings that make them."""
 
+import shutil
+
 import mujoco
 import numpy as np
 import pytest
@@ -93,6 +95,7 @@ def project(tmp_path, monkeypatch):
     source = OmegaConf.load("conf/build_mjcf/config.yaml")
     arms = {name: OmegaConf.load(f"conf/build_mjcf/arm/{name}.yaml") for name in ("asl_trunk", "spiral")}
     OmegaConf.save(source, conf / "config.yaml")
+    shutil.copytree("conf/build_mjcf/joints", conf / "joints")
     (tmp_path / "params.yaml").write_text("build_mjcf: {arm: arm, solver: {timestep: 0.002}}\n")
     monkeypatch.chdir(tmp_path)
 

@@ -5,18 +5,37 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_spec
+from trunkline.arm.joints import BRANCH, Branch, Joints, Slider, add_elements, all_elements, arm_hinges
 from trunkline.identification.parameters import PARAMETERS, Parameter, candidate_fields, set_fields, unit_of_hinge
 from trunkline.identification.saving import save_model
 
 VALUES = {
     "stiffness": 2.5, "hardening": 0.7, "joint_friction": 0.01, "damping": 0.02, "tendon_friction": 0.8,
     "friction_time": 0.03, "kp": 1500.0, "kv": 60.0, "force_range": 45.0, "time_constant": 0.08,
-    "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
+    "relaxation": 0.5, "relaxation_time": 0.7, "relaxation_2": 0.1, "relaxation_time_2": 3.0, "hysteresis": 0.4,
+    "yield_bend": 0.01, "rest_bend_x": 0.01, "rest_bend_y": -0.02, "rest_gradient_x": -0.01, "rest_gradient_y": 0.03,
+    "dead_time": 0.04, "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
 }  # fmt: skip
 
 
-def model_with(values: dict[str, float], factors: dict[str, np.ndarray] | None = None) -> mujoco.MjModel:
-    model = small_spec().compile()
+ELEMENTS = Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)])
+
+
+def full_spec() -> mujoco.MjSpec:
+    """A small arm that has every part that a parameter may belong to."""
+    spec = small_spec()
+    add_elements(spec, ELEMENTS, 1e-5)
+    for actuator in spec.actuators:
+        actuator.delay, actuator.nsample = 0.02, 100
+    return spec
+
+
+def start_model() -> mujoco.MjModel:
+    return full_spec().compile()
+
+
+def model_with(values: dict[str, float], factors=None, model: mujoco.MjModel | None = None) -> mujoco.MjModel:
+    model = model or start_model()
     set_fields(model, candidate_fields(model, {k: np.array([v]) for k, v in values.items()}, factors))
     return model
 
@@ -30,7 +49,7 @@ def test_what_is_written_is_read(name):
     model = model_with({name: VALUES[name]})
     assert PARAMETERS[name].read(model) == pytest.approx(VALUES[name])
     others = set(VALUES) - {name} - ({"joint_friction"} if name == "stiffness" else set())
-    start = small_spec().compile()
+    start = start_model()
     for other in others:  # nothing else moves
         assert PARAMETERS[other].read(model) == pytest.approx(PARAMETERS[other].read(start)), other
 
@@ -42,9 +61,13 @@ def test_all_at_once_in_any_order():
 
 
 def test_scaling_keeps_the_arm_s_proportions():
-    start, model = small_spec().compile(), model_with({"stiffness": 2.5, "damping": 0.02})
-    np.testing.assert_allclose(model.jnt_stiffness / start.jnt_stiffness, 2.5 / start.jnt_stiffness[0])
-    np.testing.assert_allclose(model.dof_damping / start.dof_damping, 0.02 / start.dof_damping[0])
+    start, model = start_model(), model_with({"stiffness": 2.5, "damping": 0.02})
+    arm, stiffer = slice(arm_hinges(start)), 2.5 / start.jnt_stiffness[0]
+    np.testing.assert_allclose(model.jnt_stiffness[arm] / start.jnt_stiffness[arm], stiffer)
+    np.testing.assert_allclose(model.dof_damping[arm] / start.dof_damping[arm], 0.02 / start.dof_damping[0])
+    for one in all_elements(start, BRANCH):  # branches are as stiff beside their springs as before, and as slow
+        np.testing.assert_allclose(model.tendon_stiffness[one.tendon] / start.tendon_stiffness[one.tendon], stiffer)
+        np.testing.assert_allclose(model.dof_damping[one.own] / start.dof_damping[one.own], stiffer)
 
 
 def test_candidates_do_not_mix():
@@ -58,15 +81,18 @@ def test_candidates_do_not_mix():
 
 
 def test_a_unit_s_factor_is_shared_by_its_two_hinges():
-    start = small_spec().compile()
+    start = start_model()
     factors = np.linspace(0.9, 1.1, 8)
     model = model_with({}, {"stiffness": factors[None]})
-    np.testing.assert_allclose(model.jnt_stiffness / start.jnt_stiffness, np.repeat(factors, 2))
+    np.testing.assert_allclose(model.jnt_stiffness[:16] / start.jnt_stiffness[:16], np.repeat(factors, 2))
+    for one in all_elements(start, BRANCH):
+        grown = model.tendon_stiffness[one.tendon] / start.tendon_stiffness[one.tendon]
+        np.testing.assert_allclose(grown, np.repeat(factors, 2))
     assert unit_of_hinge(model).tolist() == [index // 2 for index in range(16)]
 
 
 def test_hardening_makes_the_torque_k_times_q_plus_h_q_cubed():
-    model = model_with({"stiffness": 3.0, "hardening": 0.7, "damping": 0.0})
+    model = model_with({"stiffness": 3.0, "hardening": 0.7, "damping": 0.0}, model=small_spec().compile())
     data = mujoco.MjData(model)
     data.qpos[0] = -0.4
     mujoco.mj_forward(model, data)
@@ -77,7 +103,8 @@ def test_a_longer_friction_time_lets_a_hook_creep_straight_sooner():
     """Friction that holds any hook is regularised: a stuck tendon creeps, the faster the longer its time constant."""
     left = []  # share of the hook, after some time
     for friction_time in (0.01, 0.03, 0.1):
-        model = model_with({"tendon_friction": 5.0, "friction_time": friction_time, "damping": 0.05})
+        values = {"tendon_friction": 5.0, "friction_time": friction_time, "damping": 0.05}
+        model = model_with(values, model=small_spec().compile())
         model.opt.gravity[:] = 0
         data = mujoco.MjData(model)
         data.qpos[1::2] = 0.1
@@ -93,7 +120,7 @@ def test_a_longer_friction_time_lets_a_hook_creep_straight_sooner():
 @pytest.mark.parametrize("name", PARAMETERS)
 def test_every_parameter_survives_saving(name):
     """Also one that is declared tomorrow: what it writes has a place in MJCF, alone or beside others."""
-    spec = small_spec()
+    spec = full_spec()
     model = spec.compile()
     value = 1.3 * PARAMETERS[name].read(model) or 0.02
     set_fields(model, candidate_fields(model, {name: np.array([value])}))
@@ -112,7 +139,7 @@ def test_a_parameter_without_a_place_in_mjcf_is_refused(monkeypatch):
 
 
 def test_a_saved_model_has_the_parameters():
-    spec = small_spec()
+    spec = full_spec()
     model = spec.compile()
     factors = {"stiffness": np.linspace(0.9, 1.1, 8)[None]}
     set_fields(model, candidate_fields(model, {k: np.array([v]) for k, v in VALUES.items()}, factors))

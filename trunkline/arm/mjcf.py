@@ -17,6 +17,7 @@ from trunkline.arm.material import UnitProperties
 from trunkline.frames import STANDARD_GRAVITY
 
 TENDON_RGBA = (0.15, 0.15, 0.15, 1)
+LONGEST_DEAD_TIME = 0.2  # s; what a motor remembers of its commands
 UNIT_RGBA = (0.93, 0.55, 0.2, 1)
 LOAD_RGBA = (0.4, 0.4, 0.45, 1)
 
@@ -35,12 +36,14 @@ class Actuation:
         kp: position gain, N/m.
         max_force: largest pull F, N; a tendon cannot push.
         time_constant: of the first-order filter on the commanded length, s.
+        dead_time: from a command to the motor's first answer, s; 0 for motors without.
     """
 
     friction: Annotated[float, Field(ge=0, le=1000)]
     kp: Annotated[float, Field(gt=0, le=1e7)]
     max_force: Annotated[float, Field(gt=0, le=1e5)]
     time_constant: Annotated[float, Field(gt=0, le=10)]
+    dead_time: Annotated[float, Field(ge=0, le=LONGEST_DEAD_TIME)] = 0.0
 
 
 @dataclass(kw_only=True)
@@ -188,6 +191,9 @@ def _add_cable(spec: mujoco.MjSpec, index: int, tendons: Tendons, solver: Solver
     actuator = spec.add_actuator(name=f"{name}_position", target=name, trntype=mujoco.mjtTrn.mjTRN_TENDON)
     actuator.set_to_position(kp=tendons.kp, kv=tendons.kv, timeconst=tendons.time_constant)
     actuator.forcelimited, actuator.forcerange = True, [-tendons.max_force, 0]
+    if tendons.dead_time:
+        actuator.delay = tendons.dead_time
+        actuator.nsample = int(np.ceil(LONGEST_DEAD_TIME / solver.timestep)) + 1
     return cable
 
 

@@ -5,6 +5,7 @@ import mujoco
 import numpy as np
 from matplotlib.figure import Figure
 
+from trunkline.arm.joints import arm_hinges, cables
 from trunkline.figures.style import IDENTIFIED, INITIAL, TENDON, UNIT, UNIT_EDGE
 
 
@@ -19,13 +20,13 @@ def arm_figure(model: mujoco.MjModel) -> Figure:
         x, z = data.geom_xpos[geom][[0, 2]]
         corners = np.array([[-radius, -half], [radius, -half], [radius, half], [-radius, half]])
         side.fill(*(corners + [x, z]).T * 1000, facecolor=UNIT, edgecolor=UNIT_EDGE, linewidth=0.6)
-    for tendon in range(model.ntendon):
+    for tendon in cables(model):
         path = slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
         sites = data.site_xpos[model.wrap_objid[path]]
         side.plot(sites[:, 0] * 1000, sites[:, 2] * 1000, color=TENDON, linewidth=0.8)
     side.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Side view")
     side.grid(False)
-    jointed = np.flatnonzero(model.body_jntnum)
+    jointed = np.unique(model.jnt_bodyid[: arm_hinges(model)])
     numbers = np.arange(1, len(jointed) + 1)
     first_hinge = model.body_jntadr[jointed]
     units.semilogy(numbers, model.body_mass[jointed] * 1000, "o-", color=IDENTIFIED, label="mass (g)")

@@ -59,7 +59,8 @@ def _agreement(pulls: np.ndarray, shorter: np.ndarray) -> float:
 def _path_lengths(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
     """Of the model's tendons through the pose of a frame, m. Shape (nt,)."""
     data = mujoco.MjData(model)
-    data.qpos[:] = fit_pose(model, trial.segments, *measured_pose(trial, frame)).qpos
+    pose = fit_pose(model, trial.segments, *measured_pose(trial, frame)).qpos
+    data.qpos[: len(pose)] = pose
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
     mujoco.mj_tendon(model, data)

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from trunkline.arm.joints import arm_hinges, cables
 from trunkline.errors import InputError
 from trunkline.identification.pose_fit import PoseFit, fit_pose
-from trunkline.trials.experiments import is_static
+from trunkline.trials.experiments import EXPERIMENTS, is_static
 from trunkline.trials.trial import Trial
 
 SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend takes up
@@ -26,8 +27,9 @@ class Experiment:
     Attributes:
         name, kind, split: as in the trial; kind is its experiment.
         gravity: m/s², base frame. Shape (3,).
-        start: joint angles from which it starts. Shape (nq,).
-        velocity: with which it starts, rad/s; 0 unless the trial's arm moves then. Shape (nv,).
+        start: angles of the arm's hinges from which it starts. Shape (n,).
+        velocity: with which it starts, rad/s; 0 unless the trial's arm moves then. Shape (n,).
+        held: s for which the arm had been in the start pose, at least.
         lead: s from the start to the first frame.
         controls: commanded tendon lengths, m, held from one frame to the next: row 0 from the start to the first
             frame, row t from frame t - 1 to frame t. Shape (T, nu).
@@ -50,6 +52,7 @@ class Experiment:
     frame_step: float
     fit: PoseFit
     repaired: bool = False
+    held: float = np.inf
 
     @property
     def frames(self) -> int:
@@ -90,7 +93,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         split=trial.split,
         gravity=trial.gravity,
         start=fit.qpos,
-        velocity=_velocity(trial, model, seen) if trial.in_motion else np.zeros(model.nv),
+        velocity=_velocity(trial, model, seen) if trial.in_motion else np.zeros(arm_hinges(model)),
         lead=0.0 if static else _lead(trial, held),
         controls=lengths[:1] if static else 0.5 * (lengths[:-1] + lengths[1:])[held : held + len(positions)],
         positions=positions,
@@ -98,6 +101,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         frame_step=step,
         fit=fit,
         repaired=trial.repairs > 0,
+        held=trial.start if EXPERIMENTS[trial.experiment].hangs else np.inf,
     )
 
 
@@ -159,7 +163,7 @@ def check_names(trial: Trial, model: mujoco.MjModel) -> None:
     that it leaves out may have pulled."""
     sites = [model.site(i).name for i in range(model.nsite)]
     units = [name.removesuffix("_center") for name in sites if name.endswith("_center") and name != "base_center"]
-    tendons = [model.tendon(i).name for i in range(model.ntendon)]
+    tendons = [model.tendon(i).name for i in cables(model)]
     for key, found, names in (("segments", trial.segments, units), ("tendons", trial.tendons, tendons)):
         unknown = [name for name in found if name not in names]
         if unknown:

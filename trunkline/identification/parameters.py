@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from trunkline.arm.joints import BRANCH, SLIDER, all_elements, arm_hinges, cables, elements
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 
 Fields = dict[str, np.ndarray]  # name of an MjModel field → its values per candidate, (candidates, ...)
@@ -24,6 +25,8 @@ class Parameter:
         read: its value in a model.
         write: (fields, values (candidates,), model) sets it in every candidate.
         signed: whether it may be 0 or less. Only others are searched on a logarithmic scale.
+        part: what of an arm it belongs to, if not every arm has it: "tendons", their motors' "dead time", or a joint's
+            "branch 1", "slider 1", …
     """
 
     unit: str
@@ -31,6 +34,16 @@ class Parameter:
     read: Callable[[mujoco.MjModel], float]
     write: Callable[[Fields, np.ndarray, mujoco.MjModel], None]
     signed: bool = False
+    part: str = ""
+
+    def belongs_to(self, model: mujoco.MjModel) -> bool:
+        """Whether the arm has the part of which this is."""
+        if self.part == "dead time":
+            return bool(model.nhistory)
+        kind, _, number = self.part.partition(" ")
+        if number:
+            return len(elements(model, kind, int(number)).tendon) > 0
+        return not kind or model.nu > 0
 
     def coordinate(self, value):
         """Where a value lies on the axis that is searched: its natural logarithm, or itself if signed."""
@@ -45,12 +58,28 @@ def _column(values: np.ndarray, field: np.ndarray) -> np.ndarray:
     return values.reshape(-1, *[1] * (field.ndim - 1))
 
 
-def _scale(names: tuple[str, ...], reference: Callable[[mujoco.MjModel], float]) -> Callable:
-    """Scale whole fields, so that the parameter (their first joint's value) becomes the one asked for."""
+def _scale_stiffness(fields: Fields, factors: np.ndarray, model: mujoco.MjModel) -> None:
+    """Scale what joints bend against, springs and what is in proportion to them, by factors (candidates, n hinges)."""
+    arm = factors.shape[1]
+    fields["jnt_stiffness"][:, :arm] *= factors
+    fields["jnt_stiffnesspoly"][:, :arm] *= factors[..., None]
+    for one in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
+        fields["tendon_stiffness"][:, one.tendon] *= factors[:, one.hinge]
+        fields["dof_damping"][:, one.own] *= factors[:, one.hinge[: len(one.own)]]
+
+
+def _scale_damping(fields: Fields, factors: np.ndarray, model: mujoco.MjModel) -> None:
+    """Scale the dampers of joints, not those of their branches, by factors (candidates, n hinges)."""
+    arm = factors.shape[1]
+    fields["dof_damping"][:, :arm] *= factors
+    fields["dof_dampingpoly"][:, :arm] *= factors[..., None]
+
+
+def _whole_arm(scale: Callable, reference: Callable[[mujoco.MjModel], float]) -> Callable:
+    """Scale all joints alike, so that the parameter, the first joint's value, becomes the one asked for."""
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
-        for name in names:
-            fields[name] *= _column(values / reference(model), fields[name])
+        scale(fields, np.repeat((values / reference(model))[:, None], arm_hinges(model), axis=1), model)
 
     return write
 
@@ -71,7 +100,7 @@ def _write_kp(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None
 
 
 def _write_hardening(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
-    fields["jnt_stiffnesspoly"][:, :, 1] = values[:, None] * fields["jnt_stiffness"]
+    fields["jnt_stiffnesspoly"][:, :, 1] = values[:, None] * fields["jnt_stiffness"]  # 0 for branches' hinges
 
 
 def _write_joint_friction(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
@@ -98,14 +127,83 @@ def _mount(axis: int) -> Parameter:
     return Parameter("rad", ("body_quat",), partial(_read_mount, axis=axis), _write_mount(axis), signed=True)
 
 
-STIFFNESS_FIELDS = ("jnt_stiffness", "jnt_stiffnesspoly")
+def _write_tendons(name: str, index: tuple = ()) -> Callable:
+    """Set a number of every tendon along the arm."""
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        fields[name][(slice(None), cables(model), *index)] = values[:, None]
+
+    return write
+
+
+def _share(kind: str, number: int) -> Parameter:
+    """Stiffness of the joints' branches or sliders over that of their springs; a branch keeps its time."""
+
+    def read(model: mujoco.MjModel) -> float:
+        one = elements(model, kind, number)
+        shares = model.tendon_stiffness[one.tendon] / model.jnt_stiffness[one.hinge]
+        return float(shares[0]) if len(shares) else 0.0
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        one = elements(model, kind, number)
+        times = fields["dof_damping"][:, one.own] / fields["tendon_stiffness"][:, one.tendon[: len(one.own)]]
+        stiffness = values[:, None] * fields["jnt_stiffness"][:, one.hinge]
+        fields["tendon_stiffness"][:, one.tendon] = stiffness
+        fields["dof_damping"][:, one.own] = times * stiffness[:, : len(one.own)]
+
+    return Parameter("", ("tendon_stiffness", "dof_damping", "jnt_stiffness"), read, write, part=f"{kind} {number}")
+
+
+def _relaxation_time(number: int) -> Parameter:
+    def read(model: mujoco.MjModel) -> float:
+        one = elements(model, BRANCH, number)
+        return float(model.dof_damping[one.own[0]] / model.tendon_stiffness[one.tendon[0]]) if len(one.own) else 0.0
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        one = elements(model, BRANCH, number)
+        fields["dof_damping"][:, one.own] = values[:, None] * fields["tendon_stiffness"][:, one.tendon]
+
+    return Parameter("s", ("dof_damping", "tendon_stiffness"), read, write, part=f"{BRANCH} {number}")
+
+
+def _yield_bend(number: int) -> Parameter:
+    def read(model: mujoco.MjModel) -> float:
+        one = elements(model, SLIDER, number)
+        return float(model.tendon_springyield[one.tendon[0]]) if len(one.tendon) else 0.0
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        fields["tendon_springyield"][:, elements(model, SLIDER, number).tendon] = values[:, None]
+
+    return Parameter("rad", ("tendon_springyield",), read, write, part=f"{SLIDER} {number}")
+
+
+def _rest_bend(axis: int, power: int) -> Parameter:
+    """A coefficient of the shape in which the springs are slack: every joint bends by c_0 + c_1 s about an axis, s from
+    -1 at the first joint to 1 at the last."""
+
+    def basis(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
+        hinges = np.arange(arm_hinges(model)).reshape(-1, 2)[:, axis]
+        return hinges, np.linspace(-1, 1, len(hinges)) ** power
+
+    def read(model: mujoco.MjModel) -> float:
+        hinges, shape = basis(model)
+        return float(shape @ model.qpos_spring[hinges] / (shape @ shape))
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        hinges, shape = basis(model)
+        fields["qpos_spring"][:, hinges] += (values - read(model))[:, None] * shape
+
+    return Parameter("rad", ("qpos_spring",), read, write, signed=True)
+
+
+STIFFNESS_FIELDS = ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "dof_damping")
 DAMPING_FIELDS = ("dof_damping", "dof_dampingpoly")
 
 # Order matters: what scales with stiffness is written after it.
 PARAMETERS: dict[str, Parameter] = {
     "stiffness": Parameter(
         "N m/rad", STIFFNESS_FIELDS, lambda m: float(m.jnt_stiffness[0]),
-        _scale(STIFFNESS_FIELDS, lambda m: float(m.jnt_stiffness[0])),
+        _whole_arm(_scale_stiffness, lambda m: float(m.jnt_stiffness[0])),
     ),
     "hardening": Parameter(
         "1/rad²", STIFFNESS_FIELDS, lambda m: float(m.jnt_stiffnesspoly[0, 1] / m.jnt_stiffness[0]), _write_hardening,
@@ -116,43 +214,61 @@ PARAMETERS: dict[str, Parameter] = {
     ),
     "damping": Parameter(
         "N m s/rad", DAMPING_FIELDS, lambda m: float(m.dof_damping[0]),
-        _scale(DAMPING_FIELDS, lambda m: float(m.dof_damping[0])),
+        _whole_arm(_scale_damping, lambda m: float(m.dof_damping[0])),
     ),
+    "relaxation": _share(BRANCH, 1),
+    "relaxation_time": _relaxation_time(1),
+    "relaxation_2": _share(BRANCH, 2),
+    "relaxation_time_2": _relaxation_time(2),
+    "hysteresis": _share(SLIDER, 1),
+    "yield_bend": _yield_bend(1),
+    "rest_bend_x": _rest_bend(0, 0),
+    "rest_bend_y": _rest_bend(1, 0),
+    "rest_gradient_x": _rest_bend(0, 1),
+    "rest_gradient_y": _rest_bend(1, 1),
     "tendon_friction": Parameter(
-        "N", ("tendon_frictionloss",), lambda m: float(m.tendon_frictionloss[0]), _set("tendon_frictionloss", ()),
+        "N", ("tendon_frictionloss",), lambda m: float(m.tendon_frictionloss[0]), _write_tendons("tendon_frictionloss"),
+        part="tendons",
     ),
     # the smallest speed at which a regularised friction yields falls with it: a slow one lets a hook creep straight
     "friction_time": Parameter(
         "s", ("tendon_solref_fri",), lambda m: float(m.tendon_solref_fri[0, 0]),
-        _set("tendon_solref_fri", (slice(None), 0)),
+        _write_tendons("tendon_solref_fri", (0,)), part="tendons",
     ),
     "kp": Parameter(
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
+        part="tendons",
     ),
     "kv": Parameter(
         "N s/m", ("actuator_biasprm",), lambda m: float(-m.actuator_biasprm[0, 2]),
-        _set("actuator_biasprm", (slice(None), 2), -1.0),
+        _set("actuator_biasprm", (slice(None), 2), -1.0), part="tendons",
     ),
     "force_range": Parameter(
         "N", ("actuator_forcerange",), lambda m: float(-m.actuator_forcerange[0, 0]),
-        _set("actuator_forcerange", (slice(None), 0), -1.0),
+        _set("actuator_forcerange", (slice(None), 0), -1.0), part="tendons",
     ),
     "time_constant": Parameter(
         "s", ("actuator_dynprm",), lambda m: float(m.actuator_dynprm[0, 0]), _set("actuator_dynprm", (slice(None), 0)),
+        part="tendons",
+    ),
+    "dead_time": Parameter(
+        "s", ("actuator_delay",), lambda m: float(m.actuator_delay[0]), _set("actuator_delay", ()),
+        part="dead time",
     ),
     "mount_tilt_x": _mount(0),
     "mount_tilt_y": _mount(1),
     "mount_twist": _mount(2),
 }  # fmt: skip
 
-PER_JOINT_FIELDS = {"stiffness": STIFFNESS_FIELDS, "damping": DAMPING_FIELDS}
+# what a factor of each unit's own may scale: the fields, and how
+PER_JOINT = {"stiffness": (STIFFNESS_FIELDS, _scale_stiffness), "damping": (DAMPING_FIELDS, _scale_damping)}
 
 if TYPE_CHECKING:
     ParameterName = str
     PerJointName = str
 else:  # so that whoever names another is told which there are
     ParameterName = Literal[tuple(PARAMETERS)]
-    PerJointName = Literal[tuple(PER_JOINT_FIELDS)]
+    PerJointName = Literal[tuple(PER_JOINT)]
 
 
 def candidate_fields(
@@ -171,22 +287,20 @@ def candidate_fields(
     """
     factors = factors or {}
     count = len(next(iter((values | factors).values())))
-    names = {f for p in values for f in PARAMETERS[p].fields} | {f for p in factors for f in PER_JOINT_FIELDS[p]}
+    names = {f for p in values for f in PARAMETERS[p].fields} | {f for p in factors for f in PER_JOINT[p][0]}
+    names -= {"tendon_stiffness"} if not model.ntendon else set()
     fields = {name: np.repeat(np.array(getattr(model, name))[None], count, axis=0) for name in sorted(names)}
     for parameter in PARAMETERS:
         if parameter in values:
             PARAMETERS[parameter].write(fields, np.asarray(values[parameter], dtype=float), model)
         if parameter in factors:
-            per_hinge = factors[parameter][:, unit_of_hinge(model)]
-            for name in PER_JOINT_FIELDS[parameter]:
-                field = fields[name]
-                field *= per_hinge.reshape(per_hinge.shape + (1,) * (field.ndim - 2))
+            PER_JOINT[parameter][1](fields, factors[parameter][:, unit_of_hinge(model)], model)
     return fields
 
 
 def unit_of_hinge(model: mujoco.MjModel) -> np.ndarray:
-    """For each hinge the number, from 0, of the jointed body that it moves. Shape (njnt,)."""
-    return np.unique(model.jnt_bodyid, return_inverse=True)[1]
+    """For each hinge of the arm the number, from 0, of the unit that it moves. Shape (n,)."""
+    return np.unique(model.jnt_bodyid[: arm_hinges(model)], return_inverse=True)[1]
 
 
 def set_fields(model: mujoco.MjModel, fields: Fields, candidate: int = 0) -> None:

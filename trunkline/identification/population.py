@@ -7,9 +7,10 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from trunkline.arm.joints import BRANCH, SLIDER, all_elements
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
-from trunkline.simulation.motion import batch_of, move
+from trunkline.simulation.motion import batch_of, hold, move
 from trunkline.simulation.rest import come_to_rest, relax
 from trunkline.trials.experiments import is_static
 
@@ -79,14 +80,25 @@ class Population:
         for name, values in fields.items():
             batch.expand(name)[:] = np.tile(values, (len(experiments),) + (1,) * (values.ndim - 1))
         batch.expand("opt.gravity")[:] = np.repeat([e.gravity for e in experiments], count, axis=0)
-        batch.bind("qpos")[:] = np.repeat([e.start for e in experiments], count, axis=0)
-        batch.bind("qvel")[:] = np.repeat([e.velocity for e in experiments], count, axis=0)
+        arm = len(experiments[0].start)
+        batch.bind("qpos")[:, :arm] = np.repeat([e.start for e in experiments], count, axis=0)
+        batch.bind("qvel")[:, :arm] = np.repeat([e.velocity for e in experiments], count, axis=0)
+        self._remember(batch, np.repeat([e.held for e in experiments], count))
         if self._model.nu:
-            controls = np.repeat([e.controls[0] for e in experiments], count, axis=0)
-            batch.bind("ctrl")[:] = controls
-            if self._model.na:
-                batch.bind("act")[:] = controls
+            hold(batch, self._model, np.repeat([e.controls[0] for e in experiments], count, axis=0))
         return batch
+
+    def _remember(self, batch: Batch, held: np.ndarray) -> None:
+        """Joints' branches and sliders as after a straight arm was bent into the start pose `held` (n,) s ago."""
+        angles, stiffness = batch.bind("qpos"), batch.expand("tendon_stiffness") if self._model.ntendon else None
+        for one in all_elements(self._model, BRANCH):
+            time = batch.expand("dof_damping")[:, one.own] / stiffness[:, one.tendon]
+            angles[:, one.own] = angles[:, one.hinge] * -np.expm1(-held[:, None] / time)
+        for one in all_elements(self._model, SLIDER):
+            bend, give = angles[:, one.hinge], batch.expand("tendon_springyield")[:, one.tendon]
+            place = self._model.tendon_plasticadr[one.tendon]
+            for end in (0, 1):  # of the spring's length at rest
+                batch.bind("plastic")[:, place + end] = bend - np.clip(bend, -give, give)
 
     def _sites(self) -> list[int]:
         return [self._model.site(f"{name}_center").id for name in self._segments]

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from mujoco import minimize
 
+from trunkline.arm.joints import arm_hinges
 from trunkline.frames import rotation_from_wxyz
 
 POSITION_SIGMA = 0.5e-3  # m, what a tracked position is trusted to
@@ -21,7 +22,7 @@ GRADIENT_TOLERANCE = 1e-3  # of the cost in units of sigma², with columns of un
 class PoseFit:
     """Joint angles of one frame.
 
-    qpos: rad, shape (nq,). residuals: distance of each segment from its measurement, m, shape (S,).
+    qpos: of the arm's hinges, rad, shape (n,). residuals: distance of each segment from its measurement, m, shape (S,).
     iterations: of the last descent, on all segments. converged: whether it ended before they ran out.
     """
 
@@ -59,17 +60,18 @@ class PoseProblem:
         seen = np.flatnonzero(np.isfinite(positions).all(axis=1))
         self.seen = seen[np.argsort(model.site_bodyid[self.sites[seen]])]  # the chain numbers its bodies from the base
         self.hinges = int(np.bincount(model.jnt_bodyid).max())  # of each joint
-        rows = np.eye(model.nq, k=self.hinges)[: -self.hinges] - np.eye(model.nq)[: -self.hinges]
+        self.angles = arm_hinges(model)
+        rows = np.eye(self.angles, k=self.hinges)[: -self.hinges] - np.eye(self.angles)[: -self.hinges]
         self._smooth = rows / BEND_CHANGE_SIGMA
 
     def linearise(self, qpos: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Jacobian (R, nv) and residuals (R,) in units of sigma, against the segments `seen`.
+        """Jacobian (R, n) and residuals (R,) in units of sigma, against the segments `seen`, by the arm's n angles.
 
         First the changes of bend; then of every segment three rows for its position, and three for its orientation
         if it has one.
         """
         model, data = self.model, self.data
-        data.qpos[:] = qpos
+        data.qpos[: self.angles] = qpos
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         rows, residuals = [self._smooth], [self._smooth @ qpos]
@@ -77,11 +79,11 @@ class PoseProblem:
         for index in seen:
             site = self.sites[index]
             mujoco.mj_jacSite(model, data, jac_position, jac_rotation, site)
-            rows.append(jac_position / POSITION_SIGMA)
+            rows.append(jac_position[:, : self.angles] / POSITION_SIGMA)
             residuals.append((data.site_xpos[site] - self.positions[index]) / POSITION_SIGMA)
             if self._targets is not None:
                 error = _rotation_vector(data.site_xmat[site].reshape(3, 3) @ self._targets[index].T)
-                rows.append(jac_rotation / ROTATION_SIGMA)
+                rows.append(jac_rotation[:, : self.angles] / ROTATION_SIGMA)
                 residuals.append(error / ROTATION_SIGMA)
         return np.concatenate(rows), np.concatenate(residuals)
 
@@ -100,24 +102,24 @@ def fit_pose(
 ) -> PoseFit:
     """Least squares over the residuals of a `PoseProblem`, whose arguments these are, by `mujoco.minimize`."""
     problem = PoseProblem(model, segments, positions, quaternions)
-    seen, hinges = problem.seen, problem.hinges
-    qpos = np.zeros(model.nq)
+    seen, hinges, angles = problem.seen, problem.hinges, problem.angles
+    qpos = np.zeros(angles)
     # From the base on, a segment at a time, each new joint first bent as the one before it: a coil of more
     # than one turn has many wrong answers near the straight arm, and none on this way.
     for known in range(1, len(seen) + 1):
-        free = model.jnt_bodyid <= model.site_bodyid[problem.sites[seen[known - 1]]]
+        free = model.jnt_bodyid[:angles] <= model.site_bodyid[problem.sites[seen[known - 1]]]
         first = int(free.sum())
         fit = _descend(problem, qpos, seen[:known], free, max_iterations)
         qpos = fit.qpos
-        if 0 < first < model.nq:
-            qpos[first:] = np.resize(qpos[first - hinges : first], model.nq - first)
+        if 0 < first < angles:
+            qpos[first:] = np.resize(qpos[first - hinges : first], angles - first)
     return fit
 
 
 def _descend(
     problem: PoseProblem, qpos: np.ndarray, seen: np.ndarray, free: np.ndarray, max_iterations: int
 ) -> PoseFit:
-    """Least squares over the hinges `free` (nv,), against the segments `seen`, from `qpos`, within the limits' give."""
+    """Least squares over the hinges `free` (n,), against the segments `seen`, from `qpos`, within the limits' give."""
     model = problem.model
     known: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
 
@@ -132,7 +134,9 @@ def _descend(
             known[key] = problem.linearise(pose, seen)
         return known[key]
 
-    lower, upper = np.where(model.jnt_limited, model.jnt_range.T * LIMIT_GIVE, [[-UNLIMITED], [UNLIMITED]])
+    arm = len(free)
+    limits = model.jnt_range[:arm].T * LIMIT_GIVE
+    lower, upper = np.where(model.jnt_limited[:arm], limits, [[-UNLIMITED], [UNLIMITED]])
     angles, steps = minimize.least_squares(
         qpos[free],
         lambda columns: np.stack([linear(column)[1] for column in columns.T], axis=1),
@@ -146,7 +150,7 @@ def _descend(
     )
     qpos = qpos.copy()
     qpos[free] = angles
-    problem.data.qpos[:] = qpos
+    problem.data.qpos[: len(qpos)] = qpos
     mujoco.mj_kinematics(model, problem.data)
     offsets = np.linalg.norm(problem.data.site_xpos[problem.sites] - problem.positions, axis=1)
     return PoseFit(qpos, offsets, len(steps), len(steps) < max_iterations)

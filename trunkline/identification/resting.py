@@ -8,7 +8,7 @@ from scipy.optimize import newton
 
 from trunkline.errors import InputError
 from trunkline.identification.experiment import Experiment
-from trunkline.identification.parameters import STIFFNESS_FIELDS, Fields
+from trunkline.identification.parameters import Fields
 from trunkline.identification.pose_fit import fit_pose
 from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.splits import IDENTIFY
@@ -23,7 +23,8 @@ STILL = 2e-3  # m, of every coordinate's range in that time
 class RestShape:
     """A shape at rest under gravity.
 
-    pose: joint angles, rad. Shape (nq,). load: torque that gravity puts on each spring there, N m. Shape (nq,).
+    pose: angles of the arm's hinges, rad. Shape (n,). load: torque that gravity puts on each spring there, N m.
+    Shape (n,).
     """
 
     pose: np.ndarray
@@ -31,13 +32,13 @@ class RestShape:
 
 
 def rest_shape(model: mujoco.MjModel, pose: np.ndarray, gravity: np.ndarray) -> RestShape:
-    """The shape `pose` (nq,) of an arm without pull, and what its springs bear there under `gravity` (3,) m/s²."""
+    """The shape `pose` (n,) of an arm without pull, and what its springs bear there under `gravity` (3,) m/s²."""
     model = model.__copy__()
     model.opt.gravity[:] = gravity
     data = mujoco.MjData(model)
-    data.qpos[:] = pose
+    data.qpos[: len(pose)] = pose
     mujoco.mj_forward(model, data)
-    return RestShape(np.array(pose), -data.qfrc_bias.copy())
+    return RestShape(np.array(pose), -data.qfrc_bias[: len(pose)])
 
 
 def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) -> np.ndarray:
@@ -47,9 +48,10 @@ def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) ->
     the stiffer the arm, the less of its shape comes from gravity. Fields that `fields` lacks are the model's. NaN where
     no bend balances the load.
     """
-    springs = {name: getattr(model, name)[None] for name in STIFFNESS_FIELDS} | fields
-    poly = springs["jnt_stiffnesspoly"]
-    a, b, c, load = np.broadcast_arrays(springs["jnt_stiffness"], poly[..., 0], poly[..., 1], rest.load)
+    springs = {name: getattr(model, name)[None] for name in ("jnt_stiffness", "jnt_stiffnesspoly")} | fields
+    arm = len(rest.pose)  # hinges; those of Maxwell branches come after them and have no springs
+    poly = springs["jnt_stiffnesspoly"][:, :arm]
+    a, b, c, load = np.broadcast_arrays(springs["jnt_stiffness"][:, :arm], poly[..., 0], poly[..., 1], rest.load)
     bend, settled, _ = newton(
         lambda x: x * (a + x * (b + x * c)) - load,
         load / a,
@@ -57,7 +59,9 @@ def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) ->
         tol=BEND_TOLERANCE,
         full_output=True,
     )
-    return rest.pose - np.where(settled, bend, np.nan)
+    references = np.repeat(model.qpos_spring[None], len(bend), axis=0)
+    references[:, :arm] = rest.pose - np.where(settled, bend, np.nan)
+    return references
 
 
 def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...]) -> RestShape:

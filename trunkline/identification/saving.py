@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from trunkline.identification.parameters import PARAMETERS, PER_JOINT_FIELDS
+from trunkline.identification.parameters import PARAMETERS, PER_JOINT
 
 STRUCTURE = ("qpos_spring", "site_pos")  # shape at rest and markers, which are measured rather than searched for
 
@@ -47,7 +47,7 @@ def save_model(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
     """
     before = spec.compile()
     fields = {field for parameter in PARAMETERS.values() for field in parameter.fields}
-    fields |= {field for names in PER_JOINT_FIELDS.values() for field in names}
+    fields |= {field for names, _ in PER_JOINT.values() for field in names}
     for field in sorted(fields | set(STRUCTURE)):
         prefix, _, name = field.partition("_")
         if prefix not in ELEMENTS:

@@ -37,12 +37,19 @@ def fit_of(config: IdentificationSettings, segments: tuple[str, ...]) -> Fit:
 
 
 def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
-    """Refuse parameters of tendons and motors that the arm has not got."""
+    """Refuse parameters of tendons, motors and joints' elements that the arm has not got."""
     for name in config.parameters:
-        if not model.ntendon and PARAMETERS[name].fields[0].startswith(("tendon_", "actuator_")):
+        part = PARAMETERS[name].part
+        if PARAMETERS[name].belongs_to(model):
+            continue
+        if part == "tendons":
             found = "found it for an arm without tendons, expected parameters of joints alone"
             end = "; such an arm's pipeline ends with `dvc repro identify_damping`"
-            raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}{end}")
+        elif part == "dead time":
+            found, end = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0", ""
+        else:
+            found, end = f"found it for joints without {part}, expected build_mjcf.joints with one", ""
+        raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}{end}")
 
 
 def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:

@@ -45,7 +45,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     check_parameters(stage, config, model)
     reported = read_reported(config)
     # of an arm with tendons also the trials of later stages: a wrong name is told now, not after minutes
-    check_trials(read_trials(TRIALS, DECIDING) if model.ntendon else reported, model)
+    check_trials(read_trials(TRIALS, DECIDING) if model.nu else reported, model)
     model, experiments, fit = set_up(config, reported, model)
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)

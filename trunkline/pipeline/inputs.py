@@ -30,7 +30,7 @@ def read_model(path: str | Path) -> mujoco.MjModel:
         InputError: as `read_spec`, or the arm has no tendons.
     """
     model = read_spec(path).compile()
-    if not model.ntendon:
+    if not model.nu:
         raise InputError(f"{path}: found no tendons, expected at least one: an arm without ends with identify_damping")
     return model
 

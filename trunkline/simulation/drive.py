@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.simulation.motion import batch_of, move
+from trunkline.simulation.motion import batch_of, hold, move
 from trunkline.simulation.rest import base_frame, longest_step
 
 LOOK = 0.25  # s between looks at the tips
@@ -71,8 +71,7 @@ def drive(
     trajectories = commands if commands.ndim == 3 else commands[:, None]
     last = (trajectories.shape[1] - 1) * ROW
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
-    if model.na:
-        batch.bind("act")[:] = model.tendon_length0[model.actuator_trnid[:, 0]]
+    hold(batch, model, model.tendon_length0[model.actuator_trnid[:, 0]])
     site = model.site(tip_site).id
     tips = np.full((len(commands), looks, 3), np.nan)
     moving = np.arange(len(commands), dtype=np.int32)

@@ -14,17 +14,27 @@ CHUNK = 128  # steps a call: few calls, and records of some MB
 def batch_of(model: mujoco.MjModel, count: int) -> Batch:
     """`count` simulations of a copy of `model`, on as many threads as `thread_count` says; results do not depend on it.
 
-    What costs time and changes no bit is off: contacts where nothing can touch, and the search for islands where all
-    joints hang together in one tree. A simulation that diverges stays so: MuJoCo would start it anew by itself.
+    What costs time is off: contacts where nothing can touch, and the search for islands. A simulation that diverges
+    stays so: MuJoCo would start it anew by itself.
     """
     model = copy.copy(model)
     off = mujoco.mjtDisableBit
     model.opt.disableflags |= off.mjDSBL_AUTORESET
     if not model.geom_contype.any() and not model.geom_conaffinity.any() and not model.npair:
         model.opt.disableflags |= off.mjDSBL_CONTACT
-    if model.ntree <= 1:
-        model.opt.disableflags |= off.mjDSBL_ISLAND
+    model.opt.disableflags |= off.mjDSBL_ISLAND
     return Batch(model, count, nthread=thread_count())
+
+
+def hold(batch: Batch, model: mujoco.MjModel, controls: np.ndarray, ids=slice(None)) -> None:
+    """Put motors where they are once these controls (n, nu) were sent long ago, filters and dead times at rest."""
+    batch.bind("ctrl")[ids] = controls
+    if model.na:
+        batch.bind("act")[ids] = controls[..., model.actuator_actadr >= 0]
+    for motor in np.flatnonzero(model.actuator_history[:, 0]):
+        samples = model.actuator_history[motor, 0]  # after two numbers of its own come their times, then their values
+        first = model.actuator_historyadr[motor] + 2 + samples
+        batch.bind("history")[ids, first : first + samples] = controls[..., motor, None]
 
 
 def move(

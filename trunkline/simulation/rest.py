@@ -1,7 +1,7 @@
 """Settling: heavily damped and without friction, MuJoCo is stepped until every joint rests.
 
-Friction is off and damping is what settles soonest: neither moves the shape at rest, though which of several shapes
-an arm comes to may depend on its way there.
+Friction and the joints' branches and sliders are off, damping is what settles soonest: nothing of it moves the shape
+at rest, or it is the middle of a band of them; though which of several shapes an arm comes to may depend on its way.
 """
 
 import copy
@@ -12,8 +12,9 @@ import numpy as np
 from mujoco.batch import Batch
 from scipy.spatial.transform import Rotation
 
+from trunkline.arm.joints import BRANCH, SLIDER, all_elements
 from trunkline.frames import wxyz_from_rotation
-from trunkline.simulation.motion import batch_of
+from trunkline.simulation.motion import batch_of, hold
 
 LONGEST_STEP = 0.005  # s
 RELAXATION = 0.3  # s, damping over stiffness of each joint: about critical for the slowest swing of an arm
@@ -56,8 +57,7 @@ def settle(
     origin, to_world = base_frame(model)
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
     straight = model.tendon_length0[model.actuator_trnid[:, 0]]
-    if model.na:
-        batch.bind("act")[:] = straight
+    hold(batch, model, straight)
     timestep = relax(batch, model)
     control = batch.bind("ctrl")
     for share in np.arange(1, RAMP_STEPS + 1) / RAMP_STEPS:
@@ -83,17 +83,22 @@ def base_frame(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
 
 
 def relax(batch: Batch, model: mujoco.MjModel, step_factor: float = 1.0) -> float:
-    """Take friction from all simulations, damp them so that they settle soon; returns their time step, s.
+    """Take friction and what joints remember from all simulations, damp them so that they settle soon.
 
     Args:
         model: the one of the batch, whose fields each simulation may have changed before.
         step_factor: how much longer a step than `longest_step`.
+
+    Returns:
+        Their time step, s.
     """
     timestep = step_factor * longest_step(model)
     batch.expand("opt.timestep")[:] = timestep
     for name in ("dof_frictionloss", "tendon_frictionloss", "dof_dampingpoly"):
         batch.expand(name)[:] = 0
     batch.expand("dof_damping")[:] = RELAXATION * batch.expand("jnt_stiffness")[:, model.dof_jntid]
+    for one in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
+        batch.expand("tendon_stiffness")[:, one.tendon] = 0
     return timestep
 
 

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
+from trunkline.arm.joints import cables
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances
@@ -108,7 +109,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
     holes = tendon_holes(model, data, units)
     hole_in, hole_out, crosses, fixed_length = tendon_crossings(holes, data, base, to_base, anchors)
     gains, impedances = limit_gains(model, joints), limit_impedances(model, joints)
-    order = [int(np.flatnonzero(model.actuator_trnid[:, 0] == t)[0]) for t in range(model.ntendon)]
+    order = [int(np.flatnonzero(model.actuator_trnid[:, 0] == t)[0]) for t in cables(model)]
     tip, tip_quaternion = _tip(model, data, tip_site, units, base, to_base)
     return Chain(
         offset=np.diff(anchors, axis=0, prepend=0.0),
@@ -146,7 +147,7 @@ def _unit_inertials(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarra
 
 def _max_tensions(model: mujoco.MjModel, order: list[int]) -> np.ndarray:
     force = -model.actuator_forcerange[order, 0]
-    tendon_limit = np.where(model.tendon_actfrclimited, -model.tendon_actfrcrange[:, 0], np.inf)
+    tendon_limit = np.where(model.tendon_actfrclimited, -model.tendon_actfrcrange[:, 0], np.inf)[cables(model)]
     return np.minimum(force, tendon_limit)
 
 

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from trunkline.arm.joints import BRANCH, SLIDER, all_elements, cables
 from trunkline.errors import InputError
 
 _POSITION_DYNAMICS = (
@@ -68,8 +69,10 @@ def _require_unbranched_hinges(model: mujoco.MjModel) -> None:
 
 
 def unit_bodies(model: mujoco.MjModel) -> np.ndarray:
-    """Bodies that have joints, base first. Bodies without joints belong to the unit they are welded to."""
-    return np.flatnonzero(model.body_jntnum > 0)
+    """Bodies that have joints, base first, but those of Maxwell branches, which bear nothing at rest. Bodies without
+    joints belong to the unit they are welded to."""
+    branches = [model.jnt_bodyid[one.own] for one in all_elements(model, BRANCH)]
+    return np.setdiff1d(np.flatnonzero(model.body_jntnum > 0), np.concatenate([[], *branches]).astype(int))
 
 
 def _require_no_contacts(model: mujoco.MjModel) -> None:
@@ -94,7 +97,8 @@ def _geom_name(model: mujoco.MjModel, geom: int) -> str:
 
 
 def _require_site_tendons(model: mujoco.MjModel) -> None:
-    for tendon in range(model.ntendon):
+    parts = [one.tendon for kind in (BRANCH, SLIDER) for one in all_elements(model, kind)]
+    for tendon in np.setdiff1d(np.arange(model.ntendon), np.concatenate([[], *parts]).astype(int)):
         name = model.tendon(tendon).name
         path = slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
         for kind in model.wrap_type[path]:
@@ -129,7 +133,7 @@ def _require_pulling_actuators(model: mujoco.MjModel) -> None:
         if not model.actuator_forcelimited[actuator] or high > 0 or low >= 0:
             raise InputError(f"model: actuator {name!r}: found force range {low:g} {high:g}, expected -F 0: it pulls")
     pulled = model.actuator_trnid[:, 0] if model.nu else np.zeros(0, int)
-    for tendon in range(model.ntendon):
+    for tendon in cables(model):
         count = int(np.sum(pulled == tendon))
         if count != 1:
             raise InputError(f"model: tendon {model.tendon(tendon).name!r}: found {count} actuators, expected 1")

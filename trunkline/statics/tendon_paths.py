@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from trunkline.arm.joints import cables
 from trunkline.errors import InputError
 
 
@@ -10,7 +11,7 @@ def tendon_holes(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarray):
     """Per tendon its name and its sites as (unit index, -1 for the base; world position)."""
     index_of = {0: -1} | {int(body): index for index, body in enumerate(units)}
     holes = []
-    for tendon in range(model.ntendon):
+    for tendon in cables(model):
         start = model.tendon_adr[tendon]
         sites = model.wrap_objid[start : start + model.tendon_num[tendon]]
         bodies = model.body_weldid[model.site_bodyid[sites]]

@@ -10,7 +10,7 @@ from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with
 from trunkline.unity.manifest import Manifest
 from trunkline.unity.roundtrip import curl, deviation, simulate
-from trunkline.unity.twin import MANIFEST, MODEL, Trajectory
+from trunkline.unity.twin import MANIFEST, MODEL, Trajectory, without_dead_time
 
 
 @dataclass
@@ -33,15 +33,16 @@ class Curled:
 
 
 def read_models(calibrated: str, packed: dict[str, bytes]) -> dict[str, mujoco.MjModel]:
-    """Calibrated, packed and as Unity imports it; the latter two with the manifest's springs and dampers restored.
+    """Calibrated but for dead times, packed, and as Unity imports it; in the latter two springs and dampers restored.
 
     Args:
         calibrated: MJCF. packed: the package's files by path.
     """
-    mjcf = packed[MODEL].decode()
+    mjcf, spec = packed[MODEL].decode(), mujoco.MjSpec.from_string(calibrated)
+    without_dead_time(spec)
     described = Manifest.model_validate_json(packed[MANIFEST]).model
     return {
-        "calibrated": mujoco.MjModel.from_xml_string(calibrated),
+        "calibrated": spec.compile(),
         "packed": compile_with(mjcf, described.springs, described.dampers),
         "imported": compile_with(as_imported(mjcf), described.springs, described.dampers),
     }

@@ -6,6 +6,7 @@ from typing import Literal
 import mujoco
 from pydantic import BaseModel, ConfigDict, Field
 
+from trunkline.arm.joints import cables
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw
 
@@ -65,6 +66,9 @@ class Model(_Block):
         description="of hinges, polynomials that the importer cannot read: CalibratedSprings.cs restores them"
     )
     dampers: list[JointLaw] = Field(description="likewise")
+    dead_time: float = Field(
+        ge=0, description="s from a command to the motor's first answer, which the file has not: send commands so late"
+    )
     changes_max_deviation_mm: float = Field(
         ge=0, description="with the lines that stand in for them in the file, against the calibrated model"
     )
@@ -135,7 +139,7 @@ def names_of(model: mujoco.MjModel) -> Names:
     return Names(
         bodies=[model.body(i).name for i in range(1, model.nbody)],
         joints=[model.joint(i).name for i in range(model.njnt)],
-        tendons=[model.tendon(i).name for i in range(model.ntendon)],
+        tendons=[model.tendon(i).name for i in cables(model)],
         actuators=[model.actuator(i).name for i in range(model.nu)],
         sites=[model.site(i).name for i in range(model.nsite)],
     )
@@ -150,7 +154,7 @@ def describe_model(model: mujoco.MjModel, file: str, **measured) -> Model:
         gravity_unity=unity_position(model.opt.gravity).tolist(),
         integrator=mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_").lower(),
         names=names_of(model),
-        rest_lengths={model.tendon(i).name: float(model.tendon_length0[i]) for i in range(model.ntendon)},
+        rest_lengths={model.tendon(i).name: float(model.tendon_length0[i]) for i in cables(model)},
         **measured,
     )
 

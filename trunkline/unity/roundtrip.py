@@ -7,7 +7,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
-from trunkline.simulation.motion import batch_of, move
+from trunkline.simulation.motion import batch_of, hold, move
 
 
 @dataclass
@@ -48,8 +48,7 @@ def simulate(model: mujoco.MjModel, controls: np.ndarray, tilt: float) -> Motion
     """
     batch = batch_of(model, 1)
     batch.expand("opt.gravity")[:] = gravity_in_base(tilt)
-    if model.na:
-        batch.bind("act")[:] = controls[0, model.actuator_actadr >= 0]  # the motors' filters start at rest
+    hold(batch, model, controls[0])
     found = move(batch, controls[None], ("xpos", "qpos", "qvel"))
     return Motion(*(found[name][0] for name in ("xpos", "qpos", "qvel")), warnings=int(batch.warning.sum()))
 

@@ -73,8 +73,9 @@ def assemble(
     label: Label, sources: Sources, trajectory: Trajectory
 ) -> tuple[dict[str, bytes], list[Violation]]:
     """All files of the package by path, and the rules that it breaks."""
-    calibrated = mujoco.MjModel.from_xml_string(sources.mjcf)
     spec = mujoco.MjSpec.from_string(sources.mjcf)
+    dead_time = without_dead_time(spec)
+    calibrated = spec.compile()
     springs, dampers = linearize_joints(spec, *movement(calibrated, trajectory))
     spec.compile()
     mjcf = spec.to_xml()
@@ -116,6 +117,7 @@ def assemble(
             dampers=dampers,
             changes_max_deviation_mm=compare(calibrated, bundled, trajectory)[0] if springs or dampers else 0.0,
             import_max_deviation_mm=import_deviation_mm,
+            dead_time=dead_time,
         ),
         network=network_block,
         meshes=mesh_blocks,
@@ -126,6 +128,14 @@ def assemble(
     )
     files[MANIFEST] = (manifest.model_dump_json(indent=2) + "\n").encode()
     return files, violations + found
+
+
+def without_dead_time(spec: mujoco.MjSpec) -> float:
+    """Take the motors' dead time from a model in place, as no component of the importer has it; s, as it was."""
+    dead_time = max((float(actuator.delay) for actuator in spec.actuators), default=0.0)
+    for actuator in spec.actuators:
+        actuator.delay, actuator.nsample = 0, 0
+    return dead_time
 
 
 def movement(model: mujoco.MjModel, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,118 @@
+"""What a joint of an elastomer does beside bending like a spring: it creeps, and it remembers. In plain MJCF.
+
+A Maxwell branch, a spring and a damper in series, is a hinge of negligible inertia on the world, tied to the arm's
+hinge by a fixed tendon of stiffness k (coefficients 1 and -1), with damping k τ. A Jenkins element, a spring and a dry
+slider in series, is a fixed tendon on the arm's hinge alone, whose spring yields. Both are in proportion to the
+stiffness of their joint, so they fall along a spiral with α³ as that does. At rest a branch bears nothing; sliders open
+a band of shapes at rest, of which the model's statics are the middle.
+"""
+
+from dataclasses import dataclass, field
+from typing import Annotated
+
+import mujoco
+import numpy as np
+from pydantic import Field
+
+BRANCH, SLIDER = "branch", "slider"
+LIGHT = 1e-9  # kg and kg m², what MuJoCo wants of a body that moves; its damping makes it follow, not its inertia
+
+Share = Annotated[float, Field(gt=0, le=10)]
+
+
+@dataclass
+class Branch:
+    """share: stiffness k over that of the joint's spring. time: τ, s, in which the branch gives way."""
+
+    share: Share
+    time: Annotated[float, Field(gt=0, le=1000)]
+
+
+@dataclass
+class Slider:
+    """share: stiffness k over that of the joint's spring. yield_bend: rad, beyond which it slips."""
+
+    share: Share
+    yield_bend: Annotated[float, Field(gt=0, le=3)]
+
+
+@dataclass
+class Joints:
+    """What each joint has beside its spring and damper: `branch` 1, 2, … and `slider` 1, 2, … in this order."""
+
+    branches: Annotated[list[Branch], Field(max_length=3)] = field(default_factory=list)
+    sliders: Annotated[list[Slider], Field(max_length=5)] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Those of one kind and number in a model, one for each of n hinges of the arm.
+
+    tendon, hinge: numbers of their tendons and of the arm's hinges. own: of a branch's own hinges. Shape (n,).
+    """
+
+    tendon: np.ndarray
+    hinge: np.ndarray
+    own: np.ndarray
+
+
+def add_elements(spec: mujoco.MjSpec, joints: Joints, armature: float) -> None:
+    """Give every joint of an arm its branches and sliders, in place.
+
+    Args:
+        armature: kg m², of a branch's hinge.
+    """
+    hinges = [(joint, joint.parent.name) for joint in spec.joints]
+    for number, branch in enumerate(joints.branches, 1):
+        for joint, body in hinges:
+            name = f"{joint.name}_{BRANCH}_{number}"
+            own = spec.body(f"{body}_{BRANCH}_{number}") or _light_body(spec, f"{body}_{BRANCH}_{number}")
+            stiffness = branch.share * float(joint.stiffness[0])
+            own.add_joint(
+                name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis, limited=False, armature=armature,
+                damping=[stiffness * branch.time, 0, 0],
+            )  # fmt: skip
+            tie = spec.add_tendon(name=name, stiffness=[stiffness, 0, 0], springlength=[0, 0])
+            tie.wrap_joint(joint.name, 1)
+            tie.wrap_joint(name, -1)
+    for number, slider in enumerate(joints.sliders, 1):
+        for joint, _ in hinges:
+            spring = spec.add_tendon(
+                name=f"{joint.name}_{SLIDER}_{number}", stiffness=[slider.share * float(joint.stiffness[0]), 0, 0],
+                springlength=[0, 0], springyield=slider.yield_bend,
+            )  # fmt: skip
+            spring.wrap_joint(joint.name, 1)
+
+
+def _light_body(spec: mujoco.MjSpec, name: str):
+    body = spec.worldbody.add_body(name=name)
+    body.explicitinertial, body.mass, body.ipos, body.inertia = True, LIGHT, [0, 0, 0], [LIGHT] * 3
+    return body
+
+
+def elements(model: mujoco.MjModel, kind: str, number: int = 1) -> Elements:
+    """The model's elements `kind`, BRANCH or SLIDER, of this number; none where it was built without."""
+    ending = f"_{kind}_{number}"
+    tendons = [t for t in range(model.ntendon) if model.tendon(t).name.endswith(ending)]
+    names = [model.tendon(t).name for t in tendons]
+    hinges = [model.joint(name.removesuffix(ending)).id for name in names]
+    own = [model.joint(name).id for name in names] if kind == BRANCH else []
+    return Elements(*(np.array(found, dtype=int) for found in (tendons, hinges, own)))
+
+
+def all_elements(model: mujoco.MjModel, kind: str) -> list[Elements]:
+    """Those of every number that the model has, in order."""
+    found = []
+    while len((one := elements(model, kind, len(found) + 1)).tendon):
+        found.append(one)
+    return found
+
+
+def arm_hinges(model: mujoco.MjModel) -> int:
+    """How many hinges are the arm's; they come first, branches after them."""
+    return model.njnt - sum(len(branch.own) for branch in all_elements(model, BRANCH))
+
+
+def cables(model: mujoco.MjModel) -> list[int]:
+    """Numbers of the tendons that run along the arm; the others are parts of joints."""
+    return [t for t in range(model.ntendon) if model.wrap_type[model.tendon_adr[t]] != mujoco.mjtWrap.mjWRAP_JOINT]
