@@ -1,10 +1,14 @@
 """The start of a trial and its simulation, against plain MuJoCo."""
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
 
 from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
+from tests.support.small_arm import small_spec
+from trunkline.arm.joints import BRANCH, SLIDER, Branch, Joints, Slider, add_elements, elements
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay
 from trunkline.identification.experiment import prepare
@@ -201,3 +205,22 @@ def test_trials_of_another_arm_are_refused():
     trial.tendons = ("tendon_1", "tendon_2", "cable")
     with pytest.raises(InputError, match="tendons: trial curl.*'cable', expected.*tendon_1, tendon_2, tendon_3"):
         prepare(trial, model, 5)
+
+
+@pytest.mark.parametrize(("held", "share"), [(np.inf, 1.0), (0.35, 1 - np.exp(-0.7))])
+def test_what_joints_remember_begins_as_the_hand_left_it(held, share):
+    """A branch has given way for as long as the arm was held; a slider has slipped by what is beyond its yield."""
+    spec = small_spec()
+    add_elements(spec, Joints([Branch(0.3, 0.5)], [Slider(0.2, 0.02)]), 1e-5)
+    model = spec.compile()
+    start = np.tile([0.1, -0.01], 8)
+    experiment = SimpleNamespace(
+        kind="release", frames=1, gravity=np.zeros(3), start=start, velocity=0 * start, held=held, load=0.0,
+        controls=np.zeros((1, 3)),
+    )  # fmt: skip
+    population = Population(model, [experiment], ())
+    batch = population._batch("dynamic", [experiment], {"jnt_stiffness": model.jnt_stiffness[None]}, 1)
+    branch, slider = elements(model, BRANCH), elements(model, SLIDER)
+    np.testing.assert_allclose(batch.bind("qpos")[0, branch.own], share * start)
+    places = model.tendon_plasticadr[slider.tendon]
+    np.testing.assert_allclose(batch.bind("plastic")[0, places], np.tile([0.08, 0.0], 8), atol=1e-12)

@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import small_model
+from tests.support.small_arm import small_spec
 from trunkline.simulation import motion
-from trunkline.simulation.motion import batch_of, move
+from trunkline.simulation.motion import batch_of, hold, move
 
 STEPS = 24
 
@@ -62,3 +63,36 @@ def test_contacts_are_left_out_only_where_nothing_can_touch(model):
     assert batch_of(model, 1).get_model(0).opt.disableflags & contact
     model.geom_contype[1:] = model.geom_conaffinity[1:] = 1
     assert not batch_of(model, 1).get_model(0).opt.disableflags & contact
+
+
+DELAY = 12  # steps
+
+
+def delayed(model_of=small_spec):
+    spec = model_of()
+    for actuator in spec.actuators:
+        actuator.delay, actuator.nsample = DELAY * spec.option.timestep, 2 * DELAY
+    return spec.compile()
+
+
+def test_a_dead_time_moves_the_motion_and_changes_nothing_else():
+    """Held beforehand, the arm does the same, so many steps later."""
+    prompt, late = small_spec().compile(), delayed()
+    paths = []
+    for model in (prompt, late):
+        batch = batch_of(model, 1)
+        batch.expand("opt.gravity")[:] = 0  # straight and without pull, it is at rest
+        hold(batch, model, model.tendon_length0[None])
+        paths.append(move(batch, pulled(model, [0.03]), ("qpos",))["qpos"][0])
+    np.testing.assert_array_equal(paths[1][:DELAY], 0)
+    np.testing.assert_allclose(paths[1][DELAY:], paths[0][:-DELAY], atol=1e-12)
+
+
+def test_motors_that_are_held_pull_as_long_before():
+    """Neither filter nor dead time begins at a length of 0, which would pull with all force."""
+    model = delayed()
+    batch = batch_of(model, 2)
+    hold(batch, model, np.repeat(model.tendon_length0[None] - 0.01, 2, axis=0))
+    forces = move(batch, np.tile(model.tendon_length0 - 0.01, (2, 3, 1)), ("actuator_force",))["actuator_force"]
+    kp = model.actuator_gainprm[0, 0]
+    np.testing.assert_allclose(forces[:, 0], -0.01 * kp, rtol=1e-6)
