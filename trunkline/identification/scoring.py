@@ -1,18 +1,17 @@
 """The last step: identified models on trials that nothing has decided on."""
 
+import hashlib
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-import pandas as pd
 
-from trunkline.identification.evaluation import Replay, errors_of, replay, scores
-from trunkline.identification.experiment import Experiment, measured_pose, prepare, start_frames
-from trunkline.identification.null_model import hanging_still
-from trunkline.identification.pose_fit import fit_pose
+from trunkline.identification.evaluation import Prediction, replay
+from trunkline.identification.experiment import Experiment, prepare
+from trunkline.identification.null_model import references
+from trunkline.identification.repeatability import repeatability
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.trials.experiments import is_static
-from trunkline.trials.splits import TEST
+from trunkline.trials.splits import IDENTIFY, TEST
 from trunkline.trials.trial import Trial
 
 
@@ -31,58 +30,33 @@ class Compared:
 
 
 def score(
-    models: dict[str, mujoco.MjModel], trials: list[Trial], compared: Compared, floor_poses: int
-) -> tuple[dict, pd.DataFrame]:
-    """Errors of `models`, one of them "identified", and of the null model, on the trials of the split test.
+    models: dict[str, mujoco.MjModel], trials: list[Trial], compared: Compared
+) -> tuple[dict, dict[str, Prediction]]:
+    """Errors of `models`, one of them "identified", and of what they stand beside, on the trials of the split test.
 
     Args:
         trials: of the split test, and those to identify from, which the null model needs.
-        floor_poses: of each trial, at most, to take the noise floor from.
 
     Returns:
-        For metrics.json: by model the split `test` as `scores` gives it, and the noise floor; empty without such
-        trials. Of each trial, by model: columns experiment, trial, model, e_internal_mm, e_position_mm, e_tip_mm.
+        For metrics.json: by model, null model and for the noise floor the split `test` as `scores` gives it, and how
+        well the arm repeats itself. What each predicts of those trials, for tables and figures. Both are empty without
+        such trials.
     """
     trials = [trial for trial in trials if trial.experiment in compared.experiments]
     tested = [trial for trial in trials if trial.split == TEST]
     if not tested:
-        return {}, pd.DataFrame()
+        return {}, {}
     identified, segments = models["identified"], tested[0].segments
     experiments = [prepare(trial, identified, compared.frames, compared.command_delay) for trial in trials]
-    chosen = [i for i, e in enumerate(experiments) if e.split == TEST]
-    unseen = [experiments[i] for i in chosen]
-    replays = {name: replay(model, unseen, segments) for name, model in models.items()}
-    still = hanging_still(experiments, replays["identified"])
-    replays["null"] = Replay([still.positions[i] for i in chosen], still.length, still.tip)
-    floors = [noise_floor(trial, identified, compared.frames, floor_poses) * 1e3 for trial in tested]
-    kinds = sorted({trial.experiment for trial in tested})
-    metrics: dict = {name: scores(replayed, unseen) for name, replayed in replays.items()}
-    metrics |= {
-        "noise_floor_mm": float(np.mean(floors)),
-        "noise_floor_by_experiment_mm": {
-            kind: float(np.mean([f for f, trial in zip(floors, tested, strict=True) if trial.experiment == kind]))
-            for kind in kinds
-        },
-        "start_fit": start_fit(unseen),
-    }
-    return metrics, _table(unseen, replays)
-
-
-def noise_floor(trial: Trial, model: mujoco.MjModel, frames: int, poses: int) -> float:
-    """What noise and pose fit alone leave of a trial, m: to be compared with its position error.
-
-    In up to `poses` of the frames that are compared, evenly spread, joint angles are fitted to the measured segments,
-    as for the pose from which a simulation starts. The floor is the mean distance that remains between the model's
-    segments and the measured ones: measurement noise that the low-pass left, what the smoothing of the pose fit takes
-    from a sharp bend, and what no pose of this model can be. A simulation that is right in everything else is not
-    expected to come nearer, though it may: the fit also weighs orientations and smoothness.
-    """
-    first = 0 if is_static(trial.experiment) else start_frames(trial)[0] + 1
-    last = min(first + frames, len(trial.time)) - 1
-    seen = [f for f in range(first, last + 1) if trial.measured[f].any()]
-    places = np.linspace(0, len(seen) - 1, min(poses, len(seen))).round().astype(int)
-    fits = [fit_pose(model, trial.segments, *measured_pose(trial, seen[place])) for place in places]
-    return float(np.mean([np.nanmean(fit.residuals) for fit in fits]))
+    unseen = [e for e in experiments if e.split == TEST]
+    predictions = {name: Prediction(replay(model, unseen, segments), unseen) for name, model in models.items()}
+    like = predictions["identified"].replay
+    predictions |= references(tested, unseen, identified, like, ended=experiments)
+    metrics: dict = {name: prediction.scores() for name, prediction in predictions.items()}
+    metrics["noise_floor_mm"] = metrics["noise_floor"][TEST]["e_position_mm"]
+    metrics["start_fit"] = start_fit(unseen)
+    metrics["repeatability_mm"] = repeatability(trials, like.tip)
+    return metrics, predictions
 
 
 def start_fit(experiments: list[Experiment]) -> dict:
@@ -99,10 +73,12 @@ def start_fit(experiments: list[Experiment]) -> dict:
     }
 
 
-def _table(experiments: list[Experiment], replays: dict[str, Replay]) -> pd.DataFrame:
-    rows = []
-    for name, replayed in replays.items():
-        for positions, experiment in zip(replayed.positions, experiments, strict=True):
-            errors = errors_of(positions, experiment, replayed, None, None)
-            rows.append({"experiment": experiment.kind, "trial": experiment.name, "model": name} | errors)
-    return pd.DataFrame(rows)
+def fingerprints(trials: list[Trial]) -> dict[str, str]:
+    """Of the trials to identify from, by name, what tells them from another session's of the same name: a digest of
+    the filtered positions to the micrometre."""
+    return {t.name: fingerprint(t) for t in trials if t.split == IDENTIFY}
+
+
+def fingerprint(trial: Trial) -> str:
+    places = np.where(trial.measured[..., None], trial.positions, 0)
+    return hashlib.sha256((places.round(6) + 0.0).tobytes()).hexdigest()[:16]
