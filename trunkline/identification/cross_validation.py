@@ -29,8 +29,8 @@ def cross_validate(
         folds: into how many groups the trials go, in turn.
 
     Returns:
-        "coarse" and "identified", each with `e_internal_mm`, `e_position_mm`, `e_tip_mm` and `e_tip_pct`, means over all
-        left-out trials; without tip errors where a group never saw the tip.
+        "coarse" and "identified", each with `e_internal_mm`, `e_position_mm`, `e_tip_mm` and `e_tip_pct`, means over
+        all left-out trials; without tip errors where a group never saw the tip.
     """
     seen = [e for e in experiments if e.split == IDENTIFY]
     near = replace(fit.method, optimizer=LeastSquares(starts=0, descents=1, iterations=1, tolerance=1.0))

@@ -46,17 +46,43 @@ def score(
     tested = [trial for trial in trials if trial.split == TEST]
     if not tested:
         return {}, {}
-    identified, segments = models["identified"], tested[0].segments
+    identified = models["identified"]
     experiments = [prepare(trial, identified, compared.frames, compared.command_delay) for trial in trials]
     unseen = [e for e in experiments if e.split == TEST]
-    predictions = {name: Prediction(replay(model, unseen, segments), unseen) for name, model in models.items()}
-    like = predictions["identified"].replay
-    predictions |= references(tested, unseen, identified, like, ended=experiments)
+    predictions = _predictions(models, identified, tested, unseen, experiments)
     metrics: dict = {name: prediction.scores() for name, prediction in predictions.items()}
     metrics["noise_floor_mm"] = metrics["noise_floor"][TEST]["e_position_mm"]
     metrics["start_fit"] = start_fit(unseen)
-    metrics["repeatability_mm"] = repeatability(trials, like.tip)
+    metrics["repeatability_mm"] = repeatability(trials, predictions["identified"].replay.tip)
     return metrics, predictions
+
+
+def evaluate(
+    models: dict[str, mujoco.MjModel], trials: list[Trial], frames: int, command_delay: float
+) -> tuple[dict, dict[str, Prediction]]:
+    """Errors of `models`, one of them "model", on all `trials`, whatever their splits.
+
+    Args:
+        frames: compared of each trial, at most. command_delay: s, from a logged command to the motor.
+
+    Returns:
+        As `score`, over all splits at once.
+    """
+    model = models["model"]
+    experiments = [prepare(trial, model, frames, command_delay) for trial in trials]
+    predictions = _predictions(models, model, trials, experiments, experiments)
+    metrics: dict = {name: prediction.overall() for name, prediction in predictions.items()}
+    metrics["noise_floor_mm"] = metrics["noise_floor"]["e_position_mm"]
+    metrics["start_fit"] = start_fit(experiments)
+    metrics["repeatability_mm"] = repeatability(trials, predictions["model"].replay.tip)
+    return metrics, predictions
+
+
+def _predictions(models, model, trials: list[Trial], experiments: list[Experiment], ended) -> dict[str, Prediction]:
+    """Of all `models`, and what stands beside them; `model` is the one to whose segments poses are fitted."""
+    segments = trials[0].segments
+    found = {name: Prediction(replay(each, experiments, segments), experiments) for name, each in models.items()}
+    return found | references(trials, experiments, model, next(iter(found.values())).replay, ended)
 
 
 def start_fit(experiments: list[Experiment]) -> dict:
