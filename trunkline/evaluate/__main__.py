@@ -48,6 +48,8 @@ def _run(told: argparse.Namespace) -> int:
     if out.exists() and not (out / "metrics.json").is_file() and any(out.iterdir()):
         raise InputError(f"--out: {out}: found other files in it, expected a new folder or an earlier evaluation")
     reference = None if told.reference is None else read_reference(told.reference)
+    if told.reference is not None and out.resolve() in (told.reference.resolve(), told.reference.resolve().parent):
+        raise InputError(f"--out: {out}: found the reference there, expected another folder: it would be written over")
     models = {"model": read_arm(told.model)} | ({} if told.cad is None else {"cad": read_arm(told.cad)})
     written = written_beside(told.model, told.settings)
     trials = trials_of(told.session, told.settings)

@@ -1,7 +1,7 @@
 """How well the arm repeats itself: the part of every error that no model of it can take away.
 
-Trials that end alike, under the same gravity and the same pull, should end in the same shape. Friction and creep leave
-the arm elsewhere each time; how far is what a prediction of the mean shape, the best one, would be off.
+Trials that end alike, under the same gravity, load and pull, should end in the same shape. Friction and creep leave the
+arm elsewhere each time; how far is what a prediction of the mean shape, the best one, would be off.
 """
 
 import numpy as np
@@ -12,6 +12,7 @@ from trunkline.trials.trial import Trial
 
 SAME_GRAVITY = 0.035  # m/s², 0.2° of tilt: an arm held level sags by half a millimetre more or less then
 SAME_PULL = 1e-3  # m, of every tendon
+SAME_LOAD = 1e-3  # kg
 FEWEST = 3  # trials that end alike, below which they say nothing
 
 
@@ -72,10 +73,10 @@ def _alike(ends: list[tuple[Trial, np.ndarray]]) -> list[list[np.ndarray]]:
 
 
 def _same(one: Trial, other: Trial) -> bool:
-    if np.abs(one.gravity - other.gravity).max() > SAME_GRAVITY or one.tendons != other.tendons:
+    if np.abs(one.gravity - other.gravity).max() > SAME_GRAVITY or abs(one.load - other.load) > SAME_LOAD:
         return False
-    if not one.tendons:
-        return True
+    if one.tendons != other.tendons or not one.tendons:
+        return one.tendons == other.tendons
     pulls = [np.maximum(trial.commands[-1], 0) for trial in (one, other)]  # slack is slack, by however much
     return bool(np.abs(pulls[0] - pulls[1]).max() < SAME_PULL)
 
