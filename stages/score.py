@@ -2,13 +2,15 @@
 
 import json
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
+import pandas as pd
 from pydantic import Field
 
 from trunkline.errors import existing
-from trunkline.figures.scoring import score_figure
+from trunkline.figures.scoring import segment_figure, trial_figure
 from trunkline.figures.style import save_figure
+from trunkline.identification.evaluation import segment_table, trial_table
 from trunkline.identification.scoring import Compared, score
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
@@ -24,20 +26,20 @@ Stage = Literal["identify_stiffness", "identify_damping", "identify_control"]
 @settings
 class Config:
     stages: list[Stage] = Field(min_length=1)
-    floor_poses: Annotated[int, Field(ge=1, le=10_000)]
 
 
 def main(config: Config) -> None:
     trials = read_trials(TRIALS, (IDENTIFY, TEST))
     cad = initial = read_spec(ARTIFACTS / "build_mjcf/arm.xml").compile()
-    metrics, tables = {}, {}
+    metrics, of_trials, along = {}, {}, {}
     with progress(len(config.stages), "score", "stages") as bar:
         for stage in config.stages:
             folder = ARTIFACTS / stage
             identified = read_spec(folder / "arm.xml").compile()
             compared = Compared(**json.loads(existing(folder / "parameters.json").read_text())["compared"])
             models = {"cad": cad, "initial": initial, "identified": identified}
-            metrics[stage], tables[stage] = score(models, trials, compared, config.floor_poses)
+            metrics[stage], predictions = score(models, trials, compared)
+            of_trials[stage], along[stage] = trial_table(predictions), segment_table(predictions, trials[0].segments)
             if not metrics[stage]:
                 kinds = " or ".join(compared.experiments)
                 print(f"score: {stage}: found no {kinds} with split {TEST}, expected one: nothing to score")
@@ -45,7 +47,11 @@ def main(config: Config) -> None:
             bar.update(1, stage=stage)
     with output_folder(ARTIFACTS / "score") as folder:
         write_json(folder / "metrics.json", metrics)
-        save_figure(score_figure(tables, metrics), folder / "errors.png")
+        for name, tables in (("trials", of_trials), ("segments", along)):
+            table = pd.concat([table.assign(stage=stage) for stage, table in tables.items()])
+            table.to_csv(folder / f"{name}.csv", index=False, float_format="%.6g")
+        save_figure(trial_figure(of_trials), folder / "errors.png")
+        save_figure(segment_figure(along), folder / "segments.png")
 
 
 if __name__ == "__main__":

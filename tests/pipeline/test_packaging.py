@@ -18,7 +18,7 @@ OWN = {"trunkline", "stages", "demo", "benchmarks", "studies", "examples", "test
 # For an extra's sake or by name alone: no import shows them.
 UNSEEN = {"absl-py", "daqp", "plotly", "pyright", "pytest-xdist", "ruff", "setuptools"}
 NEEDS_PIPELINE = (
-    "trunkline/pipeline", "trunkline/figures", "trunkline/ik/learn.py", "trunkline/ik/network.py",
+    "trunkline/pipeline", "trunkline/evaluate", "trunkline/figures", "trunkline/ik/learn.py", "trunkline/ik/network.py",
     "trunkline/ik/onnx.py", "trunkline/ik/tip_loss.py", "trunkline/ik/training.py",
 )  # fmt: skip
 

@@ -32,6 +32,7 @@ MAY_NAME = {
     "demo/laboratory.py": {"TEST"},  # records it
     "stages/filter.py": {"SPLITS"},  # filters every trial for itself
     "stages/score.py": {"TEST"},  # reads it
+    "trunkline/evaluate/session.py": {"SPLITS"},  # the whole of any session, for a user who asks for it
     "trunkline/identification/evaluation.py": {"SPLITS"},  # sorts what it is given
     "trunkline/identification/scoring.py": {"TEST"},  # what the stage `score` calls
     "trunkline/pipeline/readme.py": {"TEST"},  # shows it
@@ -64,7 +65,7 @@ def test_the_splits_are_named_in_one_place():
             assert not typed, name
 
 
-def test_whoever_reads_trials_says_which_and_only_score_says_test():
+def test_whoever_reads_trials_says_which_and_of_the_stages_only_score_says_test():
     calls = [
         (name, ast.unparse(node.args[1]))
         for name, tree in files().items()
@@ -74,6 +75,7 @@ def test_whoever_reads_trials_says_which_and_only_score_says_test():
     assert {(name, told) for name, told in calls if told != "DECIDING"} == {
         ("stages/filter.py", "SPLITS"),
         ("stages/score.py", "(IDENTIFY, TEST)"),
+        ("trunkline/evaluate/session.py", "SPLITS"),
     }
     assert len(calls) >= 4
     assert TEST not in DECIDING
@@ -186,7 +188,7 @@ def scored(project):
         (folder / "arm.xml").write_text(save_model(spec, model))
         table = {"compared": {"experiments": compared[stage], "frames": 40, "command_delay": 0.0}}
         (folder / "parameters.json").write_text(json.dumps(table))
-    config = score_stage.Config(stages=list(compared), floor_poses=3)
+    config = score_stage.Config(stages=list(compared))
     score_stage.main(config)
     return root, config, json.loads((root / "artifacts/score/metrics.json").read_text())
 

@@ -5,14 +5,15 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from trunkline.figures.style import DOUBTFUL, IDENTIFIED, INITIAL, MEASURED
-from trunkline.identification.evaluation import Replay
-from trunkline.identification.experiment import Experiment
+from trunkline.figures.scoring import MODELS
+from trunkline.figures.style import DOUBTFUL, IDENTIFIED, MEASURED
+from trunkline.identification.evaluation import Prediction
 from trunkline.identification.identify import Identification
 from trunkline.identification.parameters import PARAMETERS
 
 NARROWEST = 60.0  # mm, of an axis: noise shall not look like motion
-COLORS = {"CAD": INITIAL, "initial": INITIAL, "identified": IDENTIFIED}
+LABELS = {name: label for name, (label, *_) in MODELS.items()}
+COLORS = {name: color for name, (_, color, *_) in MODELS.items()}
 
 
 def convergence_figure(identification: Identification) -> Figure:
@@ -29,15 +30,26 @@ def convergence_figure(identification: Identification) -> Figure:
     return figure
 
 
-def error_figure(curves: pd.DataFrame) -> Figure:
-    """Position and velocity error over time, initial and identified, as (d) and (e) of the paper's figure."""
-    figure, axes = plt.subplots(1, 2, figsize=(9, 3.4))
-    for model, rows in curves.groupby("model", sort=False):
-        axes[0].plot(rows.time_s, rows.position_error_mm, color=COLORS[model], label=model)
-        axes[1].plot(rows.time_s, rows.velocity_error_mm_s, color=COLORS[model], label=model)
-    axes[0].set(xlabel="time (s)", ylabel="error of distances (mm)", title="Position error, validate split", ylim=0)
-    axes[1].set(xlabel="time (s)", ylabel="error of their rate (mm/s)", title="Velocity error, validate split", ylim=0)
-    axes[0].legend()
+def error_figure(curves: pd.DataFrame, floor: dict[str, float]) -> Figure:
+    """Position and velocity error over time as (d) and (e) of the paper's figure, and the tip error.
+
+    Args:
+        floor: errors that noise alone leaves, as `scores` gives them for a split.
+    """
+    panels = {
+        "position_error_mm": ("error of distances (mm)", "Position error", floor["e_internal_mm"]),
+        "velocity_error_mm_s": ("error of their rate (mm/s)", "Velocity error", None),
+        "tip_error_mm": ("distance of the tip (mm)", "Tip error", floor.get("e_tip_mm")),
+    }
+    figure, axes = plt.subplots(1, len(panels), figsize=(4.5 * len(panels), 3.4))
+    for axis, (column, (label, title, least)) in zip(axes, panels.items(), strict=True):
+        for model, rows in curves.groupby("model", sort=False):
+            _, color, line, _ = MODELS[model]
+            axis.semilogy(rows.time_s, rows[column], line, color=color, label=LABELS[model])
+        if least is not None:
+            axis.axhline(least, color=MEASURED, linestyle=":", label=LABELS["noise_floor"])
+        axis.set(xlabel="time (s)", ylabel=label, title=f"{title}, validate split")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=5, fontsize=8)
     return figure
 
 
@@ -50,21 +62,25 @@ def distance_figure(table: pd.DataFrame, trial: str) -> Figure:
                               (model, {"color": COLORS[model], "linewidth": 1.2})):
             for number, (_, rows) in enumerate(table[table.source == source].groupby("segment", sort=False)):
                 axis.plot(rows.time_s, rows.distance_mm, label=source if number == 0 else None, **style)
-        axis.set(xlabel="time (s)", title=f"{trial}: {model} model", ylim=0)
+        axis.set(xlabel="time (s)", title=f"{trial}: {LABELS[model]} model", ylim=0)
         axis.legend(loc="lower right")
     axes[0].set_ylabel("distance from the base (mm)")
     return figure
 
 
-def path_figure(experiment: Experiment, index: int, replays: dict[str, Replay]) -> Figure:
-    """The tip's coordinates over time: where distances are blind, this shows the swing."""
+def path_figure(predictions: dict[str, Prediction]) -> Figure:
+    """The tip's coordinates over time: where distances are blind, this shows the swing. Of one trial."""
     figure, axes = plt.subplots(3, 1, figsize=(8, 6), sharex=True)
+    first = next(iter(predictions.values()))
+    (experiment,), tip = first.experiments, first.replay.tip
     time = np.arange(experiment.frames) * experiment.frame_step
     for axis, name in zip(axes, "xyz", strict=True):
         number = "xyz".index(name)
-        axis.plot(time, experiment.positions[:, -1, number] * 1e3, color=MEASURED, alpha=0.45, lw=2.5, label="measured")
-        for model, replayed in replays.items():
-            axis.plot(time, replayed.positions[index][:, -1, number] * 1e3, color=COLORS[model], lw=1.2, label=model)
+        measured = experiment.positions[:, tip, number]
+        axis.plot(time, measured * 1e3, color=MEASURED, alpha=0.45, lw=2.5, label="measured")
+        for model, prediction in predictions.items():
+            found = prediction.replay.positions[0][:, tip, number]
+            axis.plot(time, found * 1e3, color=COLORS[model], lw=1.2, label=LABELS[model])
         axis.set_ylabel(f"{name} (mm)")
         low, high = axis.get_ylim()
         spare = max(0.0, NARROWEST - (high - low)) / 2
@@ -76,7 +92,7 @@ def path_figure(experiment: Experiment, index: int, replays: dict[str, Replay]) 
 
 
 def shape_figure(table: pd.DataFrame) -> Figure:
-    """Measured, initial and identified shape of each trial, side view in the base frame."""
+    """Measured and simulated shape of each trial, side view in the base frame."""
     figure, axis = plt.subplots(figsize=(6.5, 6))
     for (_, source), rows in table.groupby(["trial", "source"], sort=False):
         x, z = np.append(0, rows.x_mm), np.append(0, rows.z_mm)
@@ -85,8 +101,9 @@ def shape_figure(table: pd.DataFrame) -> Figure:
             axis.annotate(f"{rows.tilt_deg.iloc[0]:.0f}°", (x[-1], z[-1]), xytext=(6, 0), textcoords="offset points")
         else:
             axis.plot(x, z, color=COLORS[source], linewidth=1.6 if source == "identified" else 1.1)
-    for source, style in (("measured", "o"), ("initial", "-"), ("identified", "-")):  # no CAD beside statics
-        axis.plot([], [], style, color=COLORS.get(source, MEASURED), label=source)
+    for source in table.source.unique():
+        style, label = ("o", source) if source == "measured" else ("-", LABELS[source])
+        axis.plot([], [], style, color=COLORS.get(source, MEASURED), label=label)
     axis.legend(loc="upper right")
     axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Shapes at rest, validate split")
     return figure

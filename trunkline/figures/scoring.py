@@ -1,4 +1,4 @@
-"""Figure of the last step: errors on the trials of the split test."""
+"""Errors beside what they stand beside: of every trial, and along the arm."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -7,24 +7,68 @@ from matplotlib.figure import Figure
 
 from trunkline.figures.style import DOUBTFUL, IDENTIFIED, INITIAL, MEASURED, VALIDATE
 
-MODELS = {"null": DOUBTFUL, "cad": INITIAL, "initial": VALIDATE, "identified": IDENTIFIED}
+# by name in metrics.json: label, colour, line, dot
+MODELS = {
+    "null": ("null: mean rest shape", DOUBTFUL, "--", "o"),
+    "null_straight": ("null: straight arm", DOUBTFUL, ":", "|"),
+    "null_held": ("null: start held", DOUBTFUL, "-.", "_"),
+    "cad": ("CAD", INITIAL, "-", "o"),
+    "initial": ("initial", VALIDATE, "-", "o"),
+    "coarse": ("coarse", VALIDATE, "--", "o"),
+    "identified": ("identified", IDENTIFIED, "-", "o"),
+    "model": ("model", IDENTIFIED, "-", "o"),
+    "noise_floor": ("noise floor", MEASURED, ":", "x"),
+}
+ERRORS = {"e_position_mm": "mean position error (mm)", "e_tip_mm": "tip error (mm)"}
 
 
-def score_figure(tables: dict[str, pd.DataFrame], metrics: dict[str, dict]) -> Figure:
-    """By stage the position error of every trial, a dot a model; the noise floor as a line."""
-    figure, axes = plt.subplots(1, len(tables), figsize=(4.2 * len(tables), 3.8), squeeze=False)
-    for axis, (stage, table) in zip(axes[0], tables.items(), strict=True):
-        axis.set_title(stage)
+def trial_figure(tables: dict[str, pd.DataFrame]) -> Figure:
+    """Position and tip error of every trial, a dot a model; a column of panels for each of the `tables`, by title."""
+    widths = [max(4.2, 1.2 + 0.22 * table.trial.nunique()) if len(table) else 4.2 for table in tables.values()]
+    figure, axes = plt.subplots(
+        2, len(tables), figsize=(sum(widths), 7), squeeze=False, sharex="col", width_ratios=widths
+    )
+    for column, (title, table) in zip(axes.T, tables.items(), strict=True):
+        column[0].set_title(title)
         if not len(table):
-            axis.text(0.5, 0.5, "no trial with split test", ha="center", transform=axis.transAxes)
+            column[0].text(0.5, 0.5, "no trial with split test", ha="center", transform=column[0].transAxes)
             continue
         names = list(dict.fromkeys(table.trial))
-        for model, color in MODELS.items():
-            rows = table[table.model == model].set_index("trial").loc[names]
-            axis.semilogy(np.arange(len(names)), rows.e_position_mm, "o", color=color, label=model)
-        axis.axhline(metrics[stage]["noise_floor_mm"], color=MEASURED, linestyle=":", label="noise floor")
-        axis.set_xticks(np.arange(len(names)), names, rotation=60, ha="right", fontsize=8)
-    axes[0, 0].set_ylabel("mean position error (mm)")
-    if any(map(len, tables.values())):
-        next(axis for axis in axes[0] if axis.lines).legend(fontsize=8)
+        for axis, error in zip(column, ERRORS, strict=True):
+            for model, (label, color, _, dot) in _shown(table).items():
+                rows = table[table.model == model].set_index("trial").reindex(names)
+                axis.semilogy(np.arange(len(names)), rows[error], dot, color=color, label=label)
+        column[1].set_xticks(np.arange(len(names)), names, rotation=60, ha="right", fontsize=8)
+    for axis, label in zip(axes[:, 0], ERRORS.values(), strict=True):
+        axis.set_ylabel(label)
+    _legend(figure, axes)
     return figure
+
+
+def segment_figure(tables: dict[str, pd.DataFrame]) -> Figure:
+    """The position error from the base to the tip, a line a model: a panel for each kind in each of the `tables`."""
+    panels = [(title, kind, rows) for title, table in tables.items() if len(table)
+              for kind, rows in table.groupby("experiment", sort=False)]  # fmt: skip
+    count = max(len(panels), 1)
+    figure, axes = plt.subplots(1, count, figsize=(4.2 * count, 4.4), squeeze=False, sharey=True)
+    for axis, (title, kind, rows) in zip(axes[0], panels, strict=False):
+        for model, (label, color, line, _) in _shown(rows).items():
+            own = rows[rows.model == model]
+            axis.semilogy(own.from_base_mm, own.e_position_mm, line, color=color, label=label)
+        axis.set(title=f"{kind}, {title}", xlabel="distance from the base, straight arm (mm)")
+    if not panels:
+        axes[0, 0].text(0.5, 0.5, "no trial", ha="center", transform=axes[0, 0].transAxes)
+    axes[0, 0].set_ylabel("mean position error (mm)")
+    _legend(figure, axes)
+    return figure
+
+
+def _shown(table: pd.DataFrame) -> dict[str, tuple[str, str, str, str]]:
+    found = set(table.model)
+    return {model: style for model, style in MODELS.items() if model in found}
+
+
+def _legend(figure: Figure, axes: np.ndarray) -> None:
+    entries = {label: line for axis in axes.flat for line, label in zip(*axis.get_legend_handles_labels(), strict=True)}
+    if entries:
+        figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=4, fontsize=8)

@@ -29,7 +29,8 @@ def cross_validate(
         folds: into how many groups the trials go, in turn.
 
     Returns:
-        "coarse" and "identified", each with `e_internal_mm` and `e_position_mm`, means over all left-out trials.
+        "coarse" and "identified", each with `e_internal_mm`, `e_position_mm`, `e_tip_mm` and `e_tip_pct`, means over
+        all left-out trials; without tip errors where a group never saw the tip.
     """
     seen = [e for e in experiments if e.split == IDENTIFY]
     near = replace(fit.method, optimizer=LeastSquares(starts=0, descents=1, iterations=1, tolerance=1.0))
@@ -41,12 +42,13 @@ def cross_validate(
         found = identify(title, result.models["coarse"], kept, replace(fit, method=near))
         for name, table in rows.items():
             model = found.models[name]
-            found_scores = scores(replay(model, left_out, fit.segments), left_out, fit.loss, fit.weights)[IDENTIFY]
+            found_scores = scores(replay(model, left_out, fit.segments), left_out)[IDENTIFY]
             table.append((len(left_out), found_scores))
     return {
         name: {
             key: float(np.average([row[key] for _, row in table], weights=[count for count, _ in table]))
-            for key in ("e_internal_mm", "e_position_mm")
+            for key in ("e_internal_mm", "e_position_mm", "e_tip_mm", "e_tip_pct")
+            if all(key in row for _, row in table)
         }
         for name, table in rows.items()
     }

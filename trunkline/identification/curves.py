@@ -5,8 +5,7 @@ import pandas as pd
 from scipy.signal import butter, sosfiltfilt
 
 from trunkline.frames import tilt_of_gravity
-from trunkline.identification.evaluation import Replay
-from trunkline.identification.experiment import Experiment
+from trunkline.identification.evaluation import Prediction
 from trunkline.identification.identify import Identification
 from trunkline.identification.loss import distances
 
@@ -25,33 +24,32 @@ def convergence_table(identification: Identification) -> pd.DataFrame:
     )
 
 
-def error_curves(experiments: list[Experiment], replays: dict[str, Replay]) -> pd.DataFrame:
-    """Over time, mean over trials and segments: columns time_s, model, position_error_mm, velocity_error_mm_s.
+def error_curves(predictions: dict[str, Prediction]) -> pd.DataFrame:
+    """Over time, mean over trials: columns time_s, model, position_error_mm, velocity_error_mm_s, tip_error_mm.
 
-    The errors of the paper's figure, of distances from the base and of their rate of change, low-pass filtered.
+    The first two are those of the paper's figure, of distances from the base and of their rate of change, mean over
+    segments; the third is how far the tip is from where it was measured. All are low-pass filtered.
     """
+    experiments = next(iter(predictions.values())).experiments
     frames = min(e.frames for e in experiments)
     step = experiments[0].frame_step
     low_pass = butter(2, ERROR_CUTOFF, fs=1 / step, output="sos")
-    tables = []
     unseen = np.stack([~e.measured[:frames] for e in experiments], axis=1)
-    for model, replayed in replays.items():
-        error = np.stack(
-            [
-                (distances(p) - distances(e.positions))[:frames]
-                for p, e in zip(replayed.positions, experiments, strict=True)
-            ],
-            axis=1,
-        )
+    tables = []
+    for model, prediction in predictions.items():
+        pairs = list(zip(prediction.replay.positions, experiments, strict=True))
+        tip = prediction.replay.tip
+        error = np.stack([(distances(p) - distances(e.positions))[:frames] for p, e in pairs], axis=1)
         rate = np.ma.array(np.gradient(error, step, axis=0), mask=unseen)
-        error = np.ma.array(error, mask=unseen)
+        away = np.stack([distances(p[:frames, [tip]] - e.positions[:frames, [tip]]) for p, e in pairs], axis=1)
         tables.append(
             pd.DataFrame(
                 {
                     "time_s": np.arange(frames) * step,
                     "model": model,
-                    "position_error_mm": _smooth(low_pass, error) * 1e3,
+                    "position_error_mm": _smooth(low_pass, np.ma.array(error, mask=unseen)) * 1e3,
                     "velocity_error_mm_s": _smooth(low_pass, rate) * 1e3,
+                    "tip_error_mm": _smooth(low_pass, np.ma.array(away, mask=unseen[..., [tip]])) * 1e3,
                 }
             )
         )
@@ -63,11 +61,16 @@ def _smooth(low_pass: np.ndarray, errors: np.ma.MaskedArray) -> np.ndarray:
     return sosfiltfilt(low_pass, np.abs(errors).mean(axis=(1, 2)).filled(0.0))
 
 
-def distance_table(experiment: Experiment, index: int, replays: dict[str, Replay], segments) -> pd.DataFrame:
-    """Distances from the base of a few segments: columns time_s, segment, source, distance_mm."""
+def distance_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -> pd.DataFrame:
+    """Distances from the base of a few segments in one trial: columns time_s, segment, source, distance_mm.
+
+    Args:
+        predictions: of that trial alone.
+    """
+    (experiment,) = next(iter(predictions.values())).experiments
     outer = len(segments) // 3  # nearer the base, distances hardly change
     chosen = np.unique(np.linspace(outer, len(segments) - 1, SHOWN_SEGMENTS).astype(int))
-    sources = {"measured": experiment.positions} | {m: r.positions[index] for m, r in replays.items()}
+    sources = {"measured": experiment.positions} | {m: p.replay.positions[0] for m, p in predictions.items()}
     time = np.arange(experiment.frames) * experiment.frame_step
     return pd.concat(
         pd.DataFrame(
@@ -78,11 +81,11 @@ def distance_table(experiment: Experiment, index: int, replays: dict[str, Replay
     )
 
 
-def shape_table(experiments: list[Experiment], replays: dict[str, Replay], segments) -> pd.DataFrame:
+def shape_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -> pd.DataFrame:
     """Last shapes in the plane of the tilt: columns trial, tilt_deg, source, segment, x_mm, z_mm."""
     rows = []
-    for index, experiment in enumerate(experiments):
-        sources = {"measured": experiment.positions} | {m: r.positions[index] for m, r in replays.items()}
+    for index, experiment in enumerate(next(iter(predictions.values())).experiments):
+        sources = {"measured": experiment.positions} | {m: p.replay.positions[index] for m, p in predictions.items()}
         for source, positions in sources.items():
             for segment, (x, _, z) in zip(segments, positions[-1] * 1e3, strict=True):
                 rows.append((experiment.name, np.degrees(tilt_of_gravity(experiment.gravity)), source, segment, x, z))

@@ -1,9 +1,11 @@
-"""How far a model is from the measurements, per split, and over time for the figures."""
+"""How far a model is from the measurements: per split, of every trial, and along the arm."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
+import pandas as pd
 
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import (
@@ -26,16 +28,40 @@ class Replay:
 
     positions: of the segments, m. Each (T, S, 3). length: of the model's straight arm, from the mount to the tip, m.
     tip: which segment is the farthest from the base along the chain.
+    straight: where that straight arm has its segments, m. Shape (S, 3).
     """
 
     positions: list[np.ndarray]
     length: float
     tip: int
+    straight: np.ndarray
 
     @property
     def diverged(self) -> int:
         """How many of the trials it does not survive; in every error they count as the arm's length away."""
         return sum(not np.isfinite(positions).all() for positions in self.positions)
+
+
+@dataclass
+class Prediction:
+    """What a model, or none, says of some experiments: `replay` has the positions of each, in their order."""
+
+    replay: Replay
+    experiments: list[Experiment]
+
+    def of(self, chosen: Callable[[Experiment], bool]) -> "Prediction":
+        """That of some of the experiments alone."""
+        kept = [i for i, experiment in enumerate(self.experiments) if chosen(experiment)]
+        positions = [self.replay.positions[i] for i in kept]
+        return Prediction(replace(self.replay, positions=positions), [self.experiments[i] for i in kept])
+
+    def scores(self, loss: str | None = None, weights: LossWeights | None = None) -> dict[str, dict]:
+        """As the function `scores`."""
+        return scores(self.replay, self.experiments, loss, weights)
+
+    def overall(self) -> dict:
+        """As `scores` for a split, over the trials of all of them."""
+        return _summary(_rows(self))
 
 
 def replay(
@@ -48,7 +74,16 @@ def replay(
     mujoco.mj_kinematics(model, data)
     length = float(np.linalg.norm(data.site("tip").xpos - data.site("base_center").xpos))
     tip = int(np.argmax([model.site_bodyid[model.site(f"{name}_center").id] for name in segments]))
-    return Replay([positions[0] for positions in simulated.positions], length, tip)
+    straight = segment_positions(model, segments, model.qpos0)
+    return Replay([positions[0] for positions in simulated.positions], length, tip, straight)
+
+
+def segment_positions(model: mujoco.MjModel, segments: tuple[str, ...], qpos: np.ndarray) -> np.ndarray:
+    """Where `model` has its segments at joint angles `qpos` (nq,), m. Shape (S, 3)."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    return np.array([data.site(f"{name}_center").xpos for name in segments])
 
 
 def scores(
@@ -59,23 +94,81 @@ def scores(
     `by_experiment` has the same for every kind; `without_repaired` where `ingest` repaired some of the split's trials,
     `repaired` of them. Where a simulation diverged, its segments count as the arm's length away along every axis.
     """
-    rows = [
-        (e, errors_of(positions, e, replayed, loss, weights))
-        for positions, e in zip(replayed.positions, experiments, strict=True)
-    ]
+    rows = _rows(Prediction(replayed, experiments), loss, weights)
     table: dict[str, dict] = {}
     for split in SPLITS:
         own = [(e, row) for e, row in rows if e.split == split]
-        if not own:
-            continue
-        kinds = sorted({e.kind for e, _ in own})
-        whole = [row for e, row in own if not e.repaired]
-        table[split] = _mean([row for _, row in own])
-        table[split]["by_experiment"] = {kind: _mean([row for e, row in own if e.kind == kind]) for kind in kinds}
-        table[split]["repaired"] = len(own) - len(whole)
-        if 0 < len(whole) < len(own):
-            table[split]["without_repaired"] = _mean(whole)
+        if own:
+            table[split] = _summary(own)
     return table
+
+
+def _summary(rows: list[tuple[Experiment, dict[str, float]]]) -> dict:
+    """What `scores` says of a split, from the errors of its trials."""
+    kinds = sorted({e.kind for e, _ in rows})
+    whole = [row for e, row in rows if not e.repaired]
+    table = _mean([row for _, row in rows])
+    table["by_experiment"] = {kind: _mean([row for e, row in rows if e.kind == kind]) for kind in kinds}
+    table["repaired"] = len(rows) - len(whole)
+    if 0 < len(whole) < len(rows):
+        table["without_repaired"] = _mean(whole)
+    return table
+
+
+def trial_table(predictions: dict[str, Prediction]) -> pd.DataFrame:
+    """A row a trial and model: columns trial, experiment, split, model, e_internal_mm, e_position_mm, e_tip_mm,
+    e_tip_pct, e_velocity_mm_s; nan where a trial has no such error."""
+    names = ("e_internal_mm", "e_position_mm", "e_tip_mm", "e_tip_pct", "e_velocity_mm_s")
+    return pd.DataFrame(
+        [
+            {"trial": e.name, "experiment": e.kind, "split": e.split, "model": model}
+            | {name: row.get(name, np.nan) for name in names}
+            for model, prediction in predictions.items()
+            for e, row in _rows(prediction)
+        ]
+    )
+
+
+def segment_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -> pd.DataFrame:
+    """The position error along the arm, mean over frames, then over the trials of a kind: columns experiment, model,
+    segment, from_base_mm (in the straight arm), e_position_mm."""
+    rows = []
+    for model, prediction in predictions.items():
+        replayed = prediction.replay
+        places = np.linalg.norm(replayed.straight, axis=1) * 1e3
+        for kind in sorted({e.kind for e in prediction.experiments}):
+            errors = [
+                _along(positions, e, replayed.length)
+                for positions, e in zip(replayed.positions, prediction.experiments, strict=True)
+                if e.kind == kind
+            ]
+            seen = np.isfinite(errors)
+            means = np.where(seen, errors, 0).sum(axis=0) / np.where(seen.any(axis=0), seen.sum(axis=0), np.nan)
+            for index in np.argsort(places):
+                rows.append((kind, model, segments[index], places[index], means[index] * 1e3))
+    return pd.DataFrame(rows, columns=["experiment", "model", "segment", "from_base_mm", "e_position_mm"])
+
+
+def _rows(
+    prediction: Prediction, loss: str | None = None, weights: LossWeights | None = None
+) -> list[tuple[Experiment, dict[str, float]]]:
+    replayed = prediction.replay
+    return [
+        (e, errors_of(positions, e, replayed, loss, weights))
+        for positions, e in zip(replayed.positions, prediction.experiments, strict=True)
+    ]
+
+
+def _survived(positions: np.ndarray, length: float) -> np.ndarray:
+    """Positions, m, with the arm's `length` along every axis in place of what is not finite."""
+    return np.nan_to_num(positions, nan=length, posinf=length, neginf=-length)
+
+
+def _along(positions: np.ndarray, experiment: Experiment, length: float) -> np.ndarray:
+    """Mean distance of each segment from its measurement, m; nan for one that was never measured. Shape (S,)."""
+    found = np.linalg.norm(_survived(positions, length) - experiment.positions, axis=-1)
+    count = experiment.measured.sum(axis=0)
+    return np.where(experiment.measured, found, 0).sum(axis=0) / np.where(count, count, np.nan)
 
 
 def errors_of(
@@ -83,7 +176,7 @@ def errors_of(
 ) -> dict[str, float]:
     """Loss and errors of one trial, simulated as `positions` (T, S, 3), m."""
     real, measured, length, tip = experiment.positions, experiment.measured, replayed.length, replayed.tip
-    positions = np.nan_to_num(positions, nan=length, posinf=length, neginf=-length)
+    positions = _survived(positions, length)
     found = {
         "e_internal": float(internal_error(positions, real, measured)),
         "e_position": float(position_error(positions, real, measured)),
@@ -95,7 +188,7 @@ def errors_of(
     row |= {f"{name}_pct": error / length * 100 for name, error in found.items()}
     if loss is not None and weights is not None:
         row["loss"] = float(loss_of(RESIDUALS[loss](positions[None], real, measured, weights))[0])
-    if experiment.frames > 1:
+    if experiment.frames > 1 and experiment.frame_step:
         row["e_velocity_mm_s"] = float(velocity_error(positions, real, measured, 1 / experiment.frame_step)) * 1e3
     return row
 

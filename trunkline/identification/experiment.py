@@ -27,6 +27,7 @@ class Experiment:
     Attributes:
         name, kind, split: as in the trial; kind is its experiment.
         gravity: m/s², base frame. Shape (3,).
+        load: kg at the tip, beside the model's own.
         start: angles of the arm's hinges from which it starts. Shape (n,).
         velocity: with which it starts, rad/s; 0 unless the trial's arm moves then. Shape (n,).
         held: s for which the arm had been in the start pose, at least.
@@ -53,6 +54,7 @@ class Experiment:
     fit: PoseFit
     repaired: bool = False
     held: float = np.inf
+    load: float = 0.0
 
     @property
     def frames(self) -> int:
@@ -102,6 +104,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         fit=fit,
         repaired=trial.repairs > 0,
         held=trial.start if EXPERIMENTS[trial.experiment].hangs else np.inf,
+        load=trial.load,
     )
 
 

@@ -1,18 +1,17 @@
 """The last step: identified models on trials that nothing has decided on."""
 
+import hashlib
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-import pandas as pd
 
-from trunkline.identification.evaluation import Replay, errors_of, replay, scores
-from trunkline.identification.experiment import Experiment, measured_pose, prepare, start_frames
-from trunkline.identification.null_model import hanging_still
-from trunkline.identification.pose_fit import fit_pose
+from trunkline.identification.evaluation import Prediction, replay
+from trunkline.identification.experiment import Experiment, prepare
+from trunkline.identification.null_model import references
+from trunkline.identification.repeatability import repeatability
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.trials.experiments import is_static
-from trunkline.trials.splits import TEST
+from trunkline.trials.splits import IDENTIFY, TEST
 from trunkline.trials.trial import Trial
 
 
@@ -31,58 +30,59 @@ class Compared:
 
 
 def score(
-    models: dict[str, mujoco.MjModel], trials: list[Trial], compared: Compared, floor_poses: int
-) -> tuple[dict, pd.DataFrame]:
-    """Errors of `models`, one of them "identified", and of the null model, on the trials of the split test.
+    models: dict[str, mujoco.MjModel], trials: list[Trial], compared: Compared
+) -> tuple[dict, dict[str, Prediction]]:
+    """Errors of `models`, one of them "identified", and of what they stand beside, on the trials of the split test.
 
     Args:
         trials: of the split test, and those to identify from, which the null model needs.
-        floor_poses: of each trial, at most, to take the noise floor from.
 
     Returns:
-        For metrics.json: by model the split `test` as `scores` gives it, and the noise floor; empty without such
-        trials. Of each trial, by model: columns experiment, trial, model, e_internal_mm, e_position_mm, e_tip_mm.
+        For metrics.json: by model, null model and for the noise floor the split `test` as `scores` gives it, and how
+        well the arm repeats itself. What each predicts of those trials, for tables and figures. Both are empty without
+        such trials.
     """
     trials = [trial for trial in trials if trial.experiment in compared.experiments]
     tested = [trial for trial in trials if trial.split == TEST]
     if not tested:
-        return {}, pd.DataFrame()
-    identified, segments = models["identified"], tested[0].segments
+        return {}, {}
+    identified = models["identified"]
     experiments = [prepare(trial, identified, compared.frames, compared.command_delay) for trial in trials]
-    chosen = [i for i, e in enumerate(experiments) if e.split == TEST]
-    unseen = [experiments[i] for i in chosen]
-    replays = {name: replay(model, unseen, segments) for name, model in models.items()}
-    still = hanging_still(experiments, replays["identified"])
-    replays["null"] = Replay([still.positions[i] for i in chosen], still.length, still.tip)
-    floors = [noise_floor(trial, identified, compared.frames, floor_poses) * 1e3 for trial in tested]
-    kinds = sorted({trial.experiment for trial in tested})
-    metrics: dict = {name: scores(replayed, unseen) for name, replayed in replays.items()}
-    metrics |= {
-        "noise_floor_mm": float(np.mean(floors)),
-        "noise_floor_by_experiment_mm": {
-            kind: float(np.mean([f for f, trial in zip(floors, tested, strict=True) if trial.experiment == kind]))
-            for kind in kinds
-        },
-        "start_fit": start_fit(unseen),
-    }
-    return metrics, _table(unseen, replays)
+    unseen = [e for e in experiments if e.split == TEST]
+    predictions = _predictions(models, identified, tested, unseen, experiments)
+    metrics: dict = {name: prediction.scores() for name, prediction in predictions.items()}
+    metrics["noise_floor_mm"] = metrics["noise_floor"][TEST]["e_position_mm"]
+    metrics["start_fit"] = start_fit(unseen)
+    metrics["repeatability_mm"] = repeatability(trials, predictions["identified"].replay.tip)
+    return metrics, predictions
 
 
-def noise_floor(trial: Trial, model: mujoco.MjModel, frames: int, poses: int) -> float:
-    """What noise and pose fit alone leave of a trial, m: to be compared with its position error.
+def evaluate(
+    models: dict[str, mujoco.MjModel], trials: list[Trial], frames: int, command_delay: float
+) -> tuple[dict, dict[str, Prediction]]:
+    """Errors of `models`, one of them "model", on all `trials`, whatever their splits.
 
-    In up to `poses` of the frames that are compared, evenly spread, joint angles are fitted to the measured segments,
-    as for the pose from which a simulation starts. The floor is the mean distance that remains between the model's
-    segments and the measured ones: measurement noise that the low-pass left, what the smoothing of the pose fit takes
-    from a sharp bend, and what no pose of this model can be. A simulation that is right in everything else is not
-    expected to come nearer, though it may: the fit also weighs orientations and smoothness.
+    Args:
+        frames: compared of each trial, at most. command_delay: s, from a logged command to the motor.
+
+    Returns:
+        As `score`, over all splits at once.
     """
-    first = 0 if is_static(trial.experiment) else start_frames(trial)[0] + 1
-    last = min(first + frames, len(trial.time)) - 1
-    seen = [f for f in range(first, last + 1) if trial.measured[f].any()]
-    places = np.linspace(0, len(seen) - 1, min(poses, len(seen))).round().astype(int)
-    fits = [fit_pose(model, trial.segments, *measured_pose(trial, seen[place])) for place in places]
-    return float(np.mean([np.nanmean(fit.residuals) for fit in fits]))
+    model = models["model"]
+    experiments = [prepare(trial, model, frames, command_delay) for trial in trials]
+    predictions = _predictions(models, model, trials, experiments, experiments)
+    metrics: dict = {name: prediction.overall() for name, prediction in predictions.items()}
+    metrics["noise_floor_mm"] = metrics["noise_floor"]["e_position_mm"]
+    metrics["start_fit"] = start_fit(experiments)
+    metrics["repeatability_mm"] = repeatability(trials, predictions["model"].replay.tip)
+    return metrics, predictions
+
+
+def _predictions(models, model, trials: list[Trial], experiments: list[Experiment], ended) -> dict[str, Prediction]:
+    """Of all `models`, and what stands beside them; `model` is the one to whose segments poses are fitted."""
+    segments = trials[0].segments
+    found = {name: Prediction(replay(each, experiments, segments), experiments) for name, each in models.items()}
+    return found | references(trials, experiments, model, next(iter(found.values())).replay, ended)
 
 
 def start_fit(experiments: list[Experiment]) -> dict:
@@ -99,10 +99,12 @@ def start_fit(experiments: list[Experiment]) -> dict:
     }
 
 
-def _table(experiments: list[Experiment], replays: dict[str, Replay]) -> pd.DataFrame:
-    rows = []
-    for name, replayed in replays.items():
-        for positions, experiment in zip(replayed.positions, experiments, strict=True):
-            errors = errors_of(positions, experiment, replayed, None, None)
-            rows.append({"experiment": experiment.kind, "trial": experiment.name, "model": name} | errors)
-    return pd.DataFrame(rows)
+def fingerprints(trials: list[Trial]) -> dict[str, str]:
+    """Of the trials to identify from, by name, what tells them from another session's of the same name: a digest of
+    the filtered positions to the micrometre."""
+    return {t.name: fingerprint(t) for t in trials if t.split == IDENTIFY}
+
+
+def fingerprint(trial: Trial) -> str:
+    places = np.where(trial.measured[..., None], trial.positions, 0)
+    return hashlib.sha256((places.round(6) + 0.0).tobytes()).hexdigest()[:16]

@@ -74,8 +74,14 @@ def check_settings(root: str | Path = ".") -> list[str]:
             raise InputError(f"{params}: {section}: no such stage in dvc.yaml{nearest(str(section), stages)}")
     files = [file for file in sorted(own_or_project(root, "stages").glob("*.py")) if file.stem in stages]
     for file in files:
-        load_config(runpy.run_path(str(file), run_name=file.stem)["Config"], file.stem, root)
+        settings_of(file.stem, root)
     return [file.stem for file in files]
+
+
+def settings_of(stage: str, root: str | Path = ".") -> Any:
+    """The settings of `stage`, as the class `Config` of its file in `stages/` has them; else as `load_config`."""
+    file = own_or_project(Path(root), "stages") / f"{stage}.py"
+    return load_config(runpy.run_path(str(file), run_name=stage)["Config"], stage, root)
 
 
 def compose_settings(folder: Path, section: dict[str, Any], where: str) -> dict[str, Any]:

@@ -1,7 +1,6 @@
 """The edge of the three identification stages: read model and trials, identify, write model, numbers, figures."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -10,15 +9,15 @@ import numpy as np
 from trunkline.errors import InputError, existing
 from trunkline.identification.checks import check_trials
 from trunkline.identification.cross_validation import cross_validate
-from trunkline.identification.evaluation import Replay, replay, scores
+from trunkline.identification.evaluation import Prediction, replay, segment_table, trial_table
 from trunkline.identification.identify import Identification, identify, with_parameters
-from trunkline.identification.loss import internal_error
-from trunkline.identification.null_model import hanging_still
+from trunkline.identification.null_model import references
 from trunkline.identification.parameter_table import parameter_table, undetermined
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Bounds
+from trunkline.identification.repeatability import repeatability
 from trunkline.identification.saving import save_model
-from trunkline.identification.scoring import Compared, start_fit
+from trunkline.identification.scoring import Compared, fingerprints, start_fit
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import check_folds, check_parameters, set_up
 from trunkline.pipeline.inputs import read_spec
@@ -29,6 +28,8 @@ from trunkline.trials.trial import Trial, read_trials
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 TRIALS = Path("data/processed/filter")
+TABLED = ("identified", "cad", "null", "noise_floor")  # in trials.csv; metrics.json has all
+CSV = {"index": False, "float_format": "%.6g"}
 
 
 def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tuple[str, ...] = ()) -> None:
@@ -36,8 +37,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
 
     Args:
         model_path: MJCF that the stage begins with.
-        whole: earlier stages whose scalars, with this stage's, make the whole arm: the CAD model and the one with all
-            scalars and no joint's own factor are then scored on the same trials too.
+        whole: earlier stages whose scalars, with this stage's, make the whole arm: the CAD model with all scalars and
+            no joint's own factor is then scored on the same trials too.
     """
     print(f"{stage}: reading the model and the trials", flush=True)
     spec = read_spec(model_path)
@@ -55,27 +56,29 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     identified = save_model(spec, result.models["identified"])
     # score what is written, not what was in memory: MJCF keeps six digits
     models = result.models | {"identified": mujoco.MjModel.from_xml_string(identified)}
+    models["cad"] = read_spec(CAD_MODEL).compile()
     if whole:
-        models["cad"] = read_spec(CAD_MODEL).compile()
         models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
         for field in ("qpos_spring", "site_pos", "site_sameframe"):  # rest shape and markers are no matter of scalars
             getattr(models["coarse"], field)[:] = getattr(model, field)
-    replays = {name: replay(m, experiments, segments) for name, m in models.items()}
-    compared = replays | {"null": hanging_still(experiments, replays["identified"])}
-    metrics = {name: scores(r, experiments, fit.loss, fit.weights) for name, r in compared.items()}
+    predictions = {name: Prediction(replay(m, experiments, segments), experiments) for name, m in models.items()}
+    metrics: dict = {"diverged_trials": {name: prediction.replay.diverged for name, prediction in predictions.items()}}
+    like = predictions["identified"].replay
+    predictions |= references(reported, experiments, models["identified"], like)
+    metrics |= {name: prediction.scores(fit.loss, fit.weights) for name, prediction in predictions.items()}
     metrics |= {
+        "noise_floor_mm": metrics["noise_floor"][VALIDATE]["e_position_mm"],
+        "repeatability_mm": repeatability(reported, like.tip),
         "evaluations": result.evaluations,
         "diverged": result.diverged,
-        "diverged_trials": {name: r.diverged for name, r in replays.items()},
         "at_bound": len(result.at_bound),
         "undetermined": len(undetermined(result, fit.parameters)),
         "converged": result.converged,
         "start_fit": start_fit(experiments),
     }
     if any(e.frames > 1 for e in experiments):
-        metrics["halved_step"] = _halved_step(
-            models["identified"], experiments, segments, replays["identified"], metrics
-        )
+        halved = Prediction(replay(models["identified"], experiments, segments, step_factor=0.5), experiments)
+        metrics["halved_step"] = _halved_step(predictions["identified"], halved)
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
@@ -86,9 +89,11 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     with output_folder(artifacts) as folder:
         (folder / "arm.xml").write_text(identified)
         table = parameter_table(result, fit.parameters) | {"compared": vars(Compared.of(config))}
+        table["fitted_to"] = fingerprints([t for t in reported if t.experiment in config.experiments])
         write_json(folder / "parameters.json", table)
         write_json(folder / "metrics.json", metrics)
-        write_plots(folder, result, fit.parameters, experiments, segments, replays)
+        write_tables(folder, predictions, segments)
+        write_plots(folder, result, fit.parameters, segments, predictions)
 
 
 def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
@@ -110,23 +115,25 @@ def doubts(result: Identification, bounds: dict[str, Bounds]) -> list[str]:
     )
 
 
-def _halved_step(model, experiments, segments, replayed: Replay, metrics: dict) -> dict[str, float]:
-    """By which share of itself half the time step moves E_internal, per split.
+def _halved_step(found: Prediction, halved: Prediction) -> dict:
+    """By which share of itself half the time step moves E_internal, per split, and the tip error (`tip`).
 
-    The measured E_internal hardly changes if errors of the step hide beside others, hence also the largest distance
-    between the two simulations of any segment, in mm.
+    Measured errors hardly change if those of the step hide beside others, hence also the largest distance between the
+    two simulations of any segment, and of the tip, in mm.
     """
-    halved = replay(model, experiments, segments, step_factor=0.5)
-    change = {}
-    for split in DECIDING:
-        before = metrics["identified"][split]["e_internal_mm"]
-        chosen = [(p, e) for p, e in zip(halved.positions, experiments, strict=True) if e.split == split]
-        after = np.mean([internal_error(p, e.positions, e.measured) for p, e in chosen]) * 1e3
-        change[split] = abs(float(after) - before) / before
-    furthest = np.max(
-        [np.linalg.norm(a - b, axis=-1).max() for a, b in zip(halved.positions, replayed.positions, strict=True)]
-    )
-    return change | {"max_mm": float(furthest) * 1e3}
+    before, after = found.scores(), halved.scores()
+
+    def change(error: str) -> dict[str, float]:
+        both = {split: (before[split].get(error), after[split].get(error)) for split in DECIDING}
+        return {split: abs(new - old) / old for split, (old, new) in both.items() if old and new is not None}
+
+    pairs = zip(halved.replay.positions, found.replay.positions, strict=True)
+    furthest = np.max([np.linalg.norm(a - b, axis=-1).max(axis=0) for a, b in pairs], axis=0) * 1e3
+    return change("e_internal_mm") | {
+        "tip": change("e_tip_mm"),
+        "max_mm": float(furthest.max()),
+        "tip_max_mm": float(furthest[found.replay.tip]),
+    }
 
 
 def _gain(metrics: dict) -> dict[str, float]:
@@ -137,39 +144,49 @@ def _gain(metrics: dict) -> dict[str, float]:
     }
 
 
-def write_plots(folder: Path, result: Identification, bounds, experiments, segments, replays) -> None:
+def write_tables(folder: Path, predictions: dict[str, Prediction], segments: tuple[str, ...]) -> None:
+    """Errors of every trial, and along the arm those of `validate`, beside null model, CAD and noise floor."""
+    trial_table({name: predictions[name] for name in TABLED}).to_csv(folder / "trials.csv", **CSV)
+    unseen = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
+    segment_table(unseen, segments).to_csv(folder / "segments.csv", **CSV)
+
+
+def write_plots(
+    folder: Path, result: Identification, bounds, segments, predictions: dict[str, Prediction]
+) -> None:
     """PNGs for people and CSV for `dvc plots`."""
     # pyplot and scipy.signal take long to import, so not before the first line
     from trunkline.figures import identification as plots
+    from trunkline.figures.scoring import segment_figure
     from trunkline.figures.style import save_figure
     from trunkline.identification import curves
 
-    first = {"CAD": replays["cad"]} if "cad" in replays else {"initial": replays["initial"]}
-    shown = first | {"identified": replays["identified"]}
-    curves.convergence_table(result).to_csv(folder / "convergence.csv", index=False, float_format="%.6g")
+    curves.convergence_table(result).to_csv(folder / "convergence.csv", **CSV)
     save_figure(plots.convergence_figure(result), folder / "convergence.png")
     units = {name: PARAMETERS[name].unit for name in result.values}
     save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
-    validate = [i for i, e in enumerate(experiments) if e.split == VALIDATE]
-    moving = [i for i in validate if experiments[i].frames > 1]
+    validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
+    save_figure(segment_figure({"validate split": segment_table(validate, segments)}), folder / "segments.png")
+    shown = {name: validate[name] for name in ("cad", "identified")}
     if "stiffness" in result.values:  # shapes at rest: static ones, or how releases end
-        table = curves.shape_table([experiments[i] for i in validate], _select(shown, validate), segments)
-        table.to_csv(folder / "shapes.csv", index=False, float_format="%.6g")
+        table = curves.shape_table(shown, segments)
+        table.to_csv(folder / "shapes.csv", **CSV)
         save_figure(plots.shape_figure(table), folder / "shapes.png")
-    elif moving:
-        errors = curves.error_curves([experiments[i] for i in moving], _select(shown, moving))
-        errors.to_csv(folder / "errors.csv", index=False, float_format="%.6g")
-        save_figure(plots.error_figure(errors), folder / "errors.png")
-        kinds = [i for i in moving if experiments[i].kind == experiments[moving[-1]].kind]
-        widest = max(kinds, key=lambda i: float(np.ptp(experiments[i].positions, axis=0).max()))
-        table = curves.distance_table(experiments[widest], widest, shown, segments)
-        table.to_csv(folder / "distances.csv", index=False, float_format="%.6g")
-        save_figure(plots.distance_figure(table, experiments[widest].name), folder / "distances.png")
-        save_figure(plots.path_figure(experiments[widest], widest, shown), folder / "paths.png")
-
-
-def _select(replays: dict[str, Replay], indices: list[int]) -> dict[str, Replay]:
-    return {name: replace(r, positions=[r.positions[i] for i in indices]) for name, r in replays.items()}
+        return
+    moving = {name: prediction.of(lambda e: e.frames > 1) for name, prediction in validate.items()}
+    experiments = moving["identified"].experiments
+    if experiments:
+        errors = curves.error_curves({name: moving[name] for name in ("null", "null_held", *shown)})
+        errors.to_csv(folder / "errors.csv", **CSV)
+        floor = moving["noise_floor"].scores()[VALIDATE]
+        save_figure(plots.error_figure(errors, floor), folder / "errors.png")
+        kinds = [e for e in experiments if e.kind == experiments[-1].kind]
+        widest = max(kinds, key=lambda e: float(np.ptp(e.positions, axis=0).max()))
+        one = {name: moving[name].of(lambda e: e is widest) for name in shown}
+        table = curves.distance_table(one, segments)
+        table.to_csv(folder / "distances.csv", **CSV)
+        save_figure(plots.distance_figure(table, widest.name), folder / "distances.png")
+        save_figure(plots.path_figure(one), folder / "paths.png")
 
 
 def read_reported(config: IdentificationSettings) -> list[Trial]:

@@ -30,7 +30,13 @@ EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README an
 
 # E_internal of the paper's arm before and after identification, over 437 frames: its section "Parameter Identification"
 PAPER = {"cad": "89.8 mm (17 %)", "identified": "15.8 mm (3 %)"}
-MODELS = {"cad": "CAD", "coarse": "coarse: one scalar each", "identified": "identified: with factors"}
+MODELS = {
+    "null": "null model: mean rest shape",
+    "cad": "CAD",
+    "coarse": "coarse: one scalar each",
+    "identified": "identified: with factors",
+    "noise_floor": "noise floor",
+}
 
 # stage: [(what it is, dotted key in metrics.json, unit)]
 RESULTS = {
@@ -38,10 +44,12 @@ RESULTS = {
         ("FK against MuJoCo settled to rest: median", "mujoco_deviation_mm.median", "mm"),
     ],
     "train_ik": [
-        ("The network's commands sent to MuJoCo, tip error at rest: median",
-         "as_controls.frictionless.position_error_mm.median", "mm"),
+        (
+            "The network's commands sent to MuJoCo, tip error at rest: median",
+            "as_controls.frictionless.position_error_mm.median",
+            "mm",
+        ),
         ("… 95th percentile", "as_controls.frictionless.position_error_mm.p95", "mm"),
-        ("… with friction, 95th percentile", "as_controls.friction.position_error_mm.p95", "mm"),
         ("… seconds until the arm rests, 95th percentile", "as_controls.friction.seconds_to_rest.p95", "s"),
         ("… sent to the lab's own arm: median", "on_plant.position_error_mm.median", "mm"),
     ],
@@ -56,25 +64,22 @@ RESULTS = {
 }
 
 
-# what it is, the stage whose model is scored, and where its row begins below `test`
+# what it is, the stage whose model is scored, and where its row begins below a split
 SCORES = [
     ("static tilts", "identify_stiffness", "by_experiment.static_tilt."),
     ("releases", "identify_damping", "by_experiment.release."),
     ("curls", "identify_control", "by_experiment.curl."),
+    ("static pulls", "identify_control", "by_experiment.static_pull."),
+    ("motions", "identify_control", "by_experiment.motion."),
     ("releases and curls", "identify_control", ""),
 ]
-
-EXAMPLE_RESULTS = {
-    "score": [
-        ("Releases of `test`: mean position error", "identify_damping.identified.test.e_position_mm", "mm"),
-        ("… of the null model", "identify_damping.null.test.e_position_mm", "mm"),
-        ("… tip error", "identify_damping.identified.test.e_tip_mm", "mm"),
-    ],
-    "identify_damping": [
-        ("Releases of `validate`: mean position error", "identified.validate.e_position_mm", "mm"),
-        ("… position error without repaired trials", "identified.validate.without_repaired.e_position_mm", "mm"),
-        ("Releases of `identify`: mean position error", "identified.identify.e_position_mm", "mm"),
-    ],
+# what stands beside an identified model
+BESIDE = {
+    "cad": "CAD",
+    "null": "null: mean rest shape",
+    "null_straight": "null: straight arm",
+    "null_held": "null: start held",
+    "noise_floor": "noise floor",
 }
 
 
@@ -112,43 +117,75 @@ def results_table(file: Path, results: dict[str, list[tuple[str, str, str]]]) ->
 
 
 def identification_table(root: Path) -> str:
-    """E_internal and mean position error over releases and curls, of the models CAD, coarse and identified."""
-    path = root / "artifacts" / "identify_control" / "metrics.json"
-    metrics = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+    """Errors over releases and curls, of the models CAD, coarse and identified, beside null model and noise floor."""
+    metrics = _metrics(root, "identify_control")
     lines = [
-        "| model | E_internal, identify | E_internal, validate | position error, identify "
-        "| position error, validate | E_internal, paper's arm |",
+        "| model | E_internal, identify | E_internal, validate | position / tip error, mm, identify "
+        "| position / tip error, mm, validate | E_internal, paper's arm |",
         "|---|---:|---:|---:|---:|---:|",
     ]
     for model, words in MODELS.items():
         cells = []
-        for error in ("e_internal", "e_position"):
-            for split in DECIDING:
-                millimetres, share = (lookup(metrics, f"{model}.{split}.{error}_{unit}") for unit in ("mm", "pct"))
-                cells.append(f"{_number(millimetres)} mm ({_number(share)} %)")
+        for split in DECIDING:
+            millimetres, share = (lookup(metrics, f"{model}.{split}.e_internal_{unit}") for unit in ("mm", "pct"))
+            cells.append(f"{_number(millimetres)} mm ({_number(share)} %)")
+        cells += [_pair(metrics, f"{model}.{split}.", share=True) for split in DECIDING]
         lines.append(f"| {words} | {' | '.join(cells)} | {PAPER.get(model, '')} |")
     return "\n".join(lines)
 
 
 def score_table(root: Path) -> str:
     """Errors on the trials of the split test, by kind of experiment, of the stage that identifies from it."""
-    path = root / "artifacts" / "score" / "metrics.json"
-    metrics = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
-    lines = [
-        "| trials of `test` | E_internal | position error | tip error | position: CAD | null model | noise floor |",
-        "|---|---:|---:|---:|---:|---:|---:|",
-    ]
+    metrics = _metrics(root, "score")
+    rows = []
     for what, stage, below in SCORES:
-        found = f"{stage}.identified.{TEST}.{below}"
-        cells = [f"{_number(lookup(metrics, f'{found}{error}_mm'))} mm" for error in ("e_internal", "e_position")]
-        tip, share = (_number(lookup(metrics, f"{found}e_tip_{unit}")) for unit in ("mm", "pct"))
-        cells.append(f"{tip} mm ({share} %)")
-        others = [f"{stage}.{model}.{TEST}.{below}e_position_mm" for model in ("cad", "null")]
-        kind = below.removeprefix("by_experiment.").rstrip(".")
-        others.append(f"{stage}.noise_floor_by_experiment_mm.{kind}" if kind else f"{stage}.noise_floor_mm")
-        cells += [f"{_number(lookup(metrics, key))} mm" for key in others]
-        lines.append(f"| {what} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+        at = f"{TEST}.{below}"
+        if lookup(metrics, f"{stage}.identified.{at}trials") is not None:
+            rows.append(f"| {what} | {' | '.join(_beside(lookup(metrics, stage), at))} |")
+    return "\n".join([*_head(f"trials of `{TEST}`"), *rows])
+
+
+def example_table(folder: Path) -> str:
+    """An example's releases by split, beside what an identified model stands beside, and the arm's repeatability."""
+    scored = lookup(_metrics(folder, "score"), "identify_damping")
+    fitted = _metrics(folder, "identify_damping")
+    head, line = _head("releases")
+    rows = [head + " repeatability |", line + "---:|"]
+    for split, metrics in ((TEST, scored), *((split, fitted) for split in reversed(DECIDING))):
+        scatter = [_number(lookup(metrics, f"repeatability_mm.release.{key}_mm")) for key in ("mean", "tip")]
+        for words, at in (("", f"{split}."), (", without repaired trials", f"{split}.without_repaired.")):
+            if not words or lookup(metrics, f"identified.{at}trials") is not None:
+                cells = [*_beside(metrics, at), " / ".join(scatter) if set(scatter) != {"–"} else "–"]
+                rows.append(f"| of `{split}`{words} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+def _metrics(root: Path, stage: str) -> dict | None:
+    path = root / "artifacts" / stage / "metrics.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+
+
+def _head(what: str) -> list[str]:
+    """The head of a table whose rows are of `_beside`."""
+    cells = [f"{what}: position / tip error, mm", "E_internal", "identified", *BESIDE.values()]
+    return [f"| {' | '.join(cells)} |", f"|---|{'---:|' * (len(cells) - 1)}"]
+
+
+def _beside(metrics: dict | None, at: str) -> list[str]:
+    """E_internal, then position / tip error of the identified model, of CAD, null models and the noise floor."""
+    found = [_number(lookup(metrics, f"identified.{at}e_internal_mm")), _pair(metrics, f"identified.{at}", share=True)]
+    return found + [_pair(metrics, f"{name}.{at}") for name in BESIDE]
+
+
+def _pair(metrics: dict | None, at: str, share: bool = False) -> str:
+    """Position / tip error in mm; with `share` in % of the arm's length too."""
+    if lookup(metrics, f"{at}e_position_mm") is None:
+        return "–"
+    pairs = [
+        " / ".join(_number(lookup(metrics, f"{at}{error}_{unit}")) for error in ("e_position", "e_tip"))
+        for unit in ("mm", "pct")
+    ]
+    return f"{pairs[0]} ({pairs[1]} %)" if share else pairs[0]
 
 
 def _goal(limit: Limit | None) -> str:
@@ -191,8 +228,7 @@ def generate(root: Path) -> dict[Path, str]:
     """README.md, the examples' own and the pages on results, with their generated blocks as they should be."""
     examples = {}
     for name in EXAMPLES:
-        folder = root / "examples" / name
-        examples[name] = results_table(folder / "limits.yaml", EXAMPLE_RESULTS)
+        examples[name] = example_table(root / "examples" / name)
     results = results_table(root / "tests" / "limits.yaml", RESULTS)
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
     own["score"] = score_table(root)

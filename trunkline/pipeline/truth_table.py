@@ -9,6 +9,8 @@ from trunkline.trials.splits import TEST, VALIDATE
 
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 TRUTH = Path("data/raw/demo.truth.json")
+# whose errors: of the identified model, and of what it stands beside
+BESIDE = {"identified": "", "cad": ": CAD", "null": ": null model", "noise_floor": ": noise floor"}
 # identified parameter: what the lab has, and the model has not, that acts in the same trials
 LACKING = {
     "stiffness": "scatter from unit to unit, masses off",
@@ -90,12 +92,10 @@ def error_table(root: Path) -> str:
     for stage, kind in zip(STAGES, ("static_tilt", "release", "curl"), strict=True):
         words = {"static_tilt": "static tilts", "release": "releases", "curl": "curls"}[kind]
         for split, table in ((VALIDATE, metrics[stage]), (TEST, metrics["score"].get(stage, {}))):
-            row = _at(table, "identified", split, "by_experiment", kind)
-            count = f"{row.get('trials', '–')} trials, `{stage}`"
-            lines.append(_row(f"position, {words} of `{split}`", row, "e_position", count))
-            lines.append(_row(f"tip, {words} of `{split}`", row, "e_tip", count))
-        floor = metrics["score"].get(stage, {}).get("noise_floor_by_experiment_mm", {}).get(kind)
-        lines.append(f"| noise floor, {words} of `test` | {_number(floor)} mm | | what noise and pose fit leave |")
+            for model, of in BESIDE.items():
+                row = _at(table, model, split, "by_experiment", kind)
+                count = f"{row.get('trials', '–')} trials, `{stage}`"
+                lines.append(_row(f"position / tip, {words} of `{split}`{of}", row, count))
         fit = _at(metrics[stage], "start_fit", "by_experiment", kind)
         mean, largest = (f"{_number(fit.get(key))} mm" for key in ("mean_mm", "max_mm"))
         lines.append(f"| pose from which {words} start | {mean} | {largest} | segments, `identify` and `validate` |")
@@ -119,8 +119,10 @@ def _start_rows(root: Path, filtered: dict) -> list[str]:
     return [*rows, f"| clock of the motors against the cameras' | | {_number(error)} ms | the session |"]
 
 
-def _row(what: str, row: dict, error: str, count: str) -> str:
-    mean, worst = (_number(row.get(f"{error}{end}_mm")) for end in ("", "_worst"))
+def _row(what: str, row: dict, count: str) -> str:
+    mean, worst = (
+        " / ".join(_number(row.get(f"{error}{end}_mm")) for error in ("e_position", "e_tip")) for end in ("", "_worst")
+    )
     return f"| {what} | {mean} mm | {worst} mm | {count} |"
 
 

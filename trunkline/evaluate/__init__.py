@@ -1,0 +1,1 @@
+"""A model against a session, without a fit: `python -m trunkline.evaluate`."""

@@ -1,0 +1,68 @@
+"""The model that is evaluated: what it must have, and what the stage that wrote it says of it."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.identification.scoring import fingerprint
+from trunkline.pipeline.config import settings_of
+from trunkline.pipeline.inputs import read_spec
+from trunkline.trials.trial import Trial
+
+
+@dataclass
+class Written:
+    """What is known of a model beside its MJCF. frames: compared of each trial, at most. command_delay: s.
+
+    fitted_to: digests of the trials that it was fitted to, by name; empty where nothing is known.
+    """
+
+    frames: int
+    command_delay: float
+    fitted_to: dict[str, str]
+
+    def saw(self, trial: Trial) -> bool:
+        """Whether it was fitted to this very recording, filtered as it is here."""
+        return self.fitted_to.get(trial.name) == fingerprint(trial)
+
+
+def written_beside(path: Path, root: Path) -> Written:
+    """From parameters.json beside the model; without one, frames and delay from the settings in `root`."""
+    file = path.parent / "parameters.json"
+    if not file.is_file():
+        settings = settings_of("identify_damping", root)
+        return Written(settings.frames, settings.command_delay, {})
+    try:
+        table = json.loads(file.read_text(encoding="utf-8"))
+        compared = table["compared"]
+        return Written(compared["frames"], compared["command_delay"], table.get("fitted_to", {}))
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(f"{file}: {error!r}, expected what a stage of identification writes") from error
+
+
+def read_arm(path: Path) -> mujoco.MjModel:
+    """The MJCF at `path`, compiled: a chain of hinges that hangs from the world's origin.
+
+    Raises:
+        InputError: one line that says what it lacks.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected the MJCF of an arm")
+    model = read_spec(path).compile()
+    sites = [model.site(index).name for index in range(model.nsite)]
+    for name, where in (("base_center", "in the mount"), ("tip", "on the last unit")):
+        if name not in sites:
+            raise InputError(f"{path}: found no site {name!r}, expected one {where}")
+    if not model.njnt or np.any(model.jnt_type != mujoco.mjtJoint.mjJNT_HINGE):
+        raise InputError(f"{path}: found {model.njnt} joints, not all hinges, expected a chain of hinges")
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mount = data.site("base_center")
+    if not (np.allclose(mount.xpos, 0, atol=1e-9) and np.allclose(mount.xmat, np.eye(3).ravel(), atol=1e-9)):
+        found = "found it moved or turned, expected it in the world's origin and along its axes"
+        raise InputError(f"{path}: site 'base_center': {found}")
+    return model

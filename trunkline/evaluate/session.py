@@ -1,0 +1,62 @@
+"""The trials of a session for one look at them: from its logs, or as the stage `filter` wrote them."""
+
+import sys
+from pathlib import Path
+
+from trunkline.errors import InputError
+from trunkline.filtering.filter import filter_take
+from trunkline.pipeline.config import settings_of
+from trunkline.progress import progress
+from trunkline.sessions.session import read_session
+from trunkline.takes.gathering import gather
+from trunkline.takes.intake import take_in
+from trunkline.takes.quality import by_sentence, judge
+from trunkline.trials.splits import SPLITS
+from trunkline.trials.trial import Trial, read_trials
+
+
+def trials_of(folder: Path, root: Path) -> list[Trial]:
+    """Every trial of a session, of all splits, filtered; what is refused or doubtful is said on stderr.
+
+    Args:
+        folder: logs and session.yaml, or what the stage `filter` writes.
+        root: holds the params.yaml that says how to take logs in and to filter them.
+
+    Raises:
+        InputError: it is no such folder, or no trial of it can be used.
+    """
+    if not (folder / "trials.parquet").is_file():
+        return _from_logs(folder, root)
+    try:
+        trials = read_trials(folder, SPLITS)
+    except KeyError as error:
+        raise InputError(f"{folder}: found trials without {error}, expected filtered ones, or a session") from error
+    if not trials:
+        raise InputError(f"{folder}: found no trial, expected at least one")
+    segments = trials[0].segments
+    other = next((trial for trial in trials if trial.segments != segments), None)
+    if other is not None:
+        found = f"found {len(other.segments)} segments, expected the {len(segments)} of {trials[0].name}"
+        raise InputError(f"{folder}: trial {other.name}: {found}")
+    return trials
+
+
+def _from_logs(folder: Path, root: Path) -> list[Trial]:
+    session = read_session(folder)
+    ingest, settings = settings_of("ingest", root), settings_of("filter", root)
+    taken = []
+    with progress(len(session.trials), "evaluate", "trials") as bar:
+        for entry in take_in(folder, session, ingest.limits):
+            taken.append(entry)
+            bar.update(1, trial=entry[0].name)
+    gathered = gather(taken, session, ingest.plausible, "leave_out", f"{folder}")
+    for name, reason in gathered.refused.items():
+        print(f"evaluate: left out {name}: {reason}", file=sys.stderr)
+    qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
+    for line in by_sentence(qualities, lambda found: found.warnings):
+        print(f"evaluate: warning: {line}", file=sys.stderr)
+    trials = []
+    for take, found in zip(gathered.takes, gathered.findings, strict=True):
+        take.repairs = len(found.repairs)
+        trials.append(filter_take(take, settings)[0])
+    return trials
