@@ -45,7 +45,8 @@ def test_a_hand_that_sways_when_it_lets_go_is_not_taken_for_the_release(sway, fr
         speed = sway * np.cos(phase)
         after = sway / way * np.sin(phase) * np.cos(omega * since) + speed / omega * np.sin(omega * since)
         moved = np.where(since < 0, sway / way * np.sin(way * since + phase), np.exp(-np.maximum(since, 0)) * after)
-        begin = release_time(time, positions + moved[:, None, None] * np.array([0.25, 0.6, 1.0])[:, None] * [0.6, 0.8, 0])
+        shape = np.array([0.25, 0.6, 1.0])[:, None] * [0.6, 0.8, 0]
+        begin = release_time(time, positions + moved[:, None, None] * shape)
         errors.append(begin.time - 0.8037)
         missed.append(abs(speed) > 0.06 and not begin.in_motion)
         assert abs(errors[-1]) < 4 * begin.sigma

@@ -36,11 +36,12 @@ class Start:
 
 @dataclass(frozen=True)
 class _Hold:
-    """One fit of a hold: its residual m, the degree, the release by it s, and the arm's speed m/s then."""
+    """One fit of a hold: its residual m, the degree, the release by it s with its variance, and the speed m/s then."""
 
     residual: float
     degree: int
     begin: float
+    variance: float
     speed: float
 
 
@@ -64,9 +65,10 @@ def release_time(time: np.ndarray, positions: np.ndarray) -> Start:
     fits = [_fit_hold(time, positions, end - span, end, degree) for span in spans for degree in DEGREES]
     alike = [fit for fit in fits if fit.residual <= ALIKE * min(fit.residual for fit in fits)]
     begins = [fit.begin for fit in alike]
+    variance = np.var(begins) + np.mean([fit.variance for fit in alike]) + step**2 / 12
     swayed = min(alike, key=lambda fit: fit.degree).speed  # a higher degree would find noise to be speed
     return Start(
-        float(np.median(begins)), float(np.hypot(np.std(begins), step / np.sqrt(12))), swayed,
+        float(np.median(begins)), float(np.sqrt(variance)), swayed,
         in_motion=swayed > MOVING * float(speed.max()),
     )  # fmt: skip
 
@@ -91,7 +93,7 @@ def departures(positions: np.ndarray, behind: int, ahead: int, shortest: int) ->
         positions: (T, S, 3) m. shortest: frames, fewer than `behind`, from which on something is foreseen.
 
     Returns:
-        From frame `shortest` on, to the last that has others `ahead`. Shape (T - shortest - ahead,), if that is positive.
+        From frame `shortest` on, as far as others are `ahead`. Shape (T - shortest - ahead,), if that is positive.
     """
     found = []
     for frame in range(shortest, len(positions) - ahead):
@@ -112,10 +114,16 @@ def _fit_hold(time: np.ndarray, positions: np.ndarray, first: int, end: int, deg
     fitted = np.linalg.lstsq(powers[held], positions[held].reshape(held.sum(), -1))[0]
     left = positions - (powers @ fitted).reshape(positions.shape)
     spare = max(held.sum() - 3 * (degree + 1), 1)  # of three frames, the low-pass leaves about one
-    begin = onset(time, robust_length(left), held, powers=POWERS, rise=LEAP)
-    begin = float(time[end]) if begin is None else begin
+    begins, frames, misfits = onsets(time, robust_length(left), held, 1e-5, POWERS, LEAP)
+    begin, variance = float(time[end]), 0.0
+    if len(begins):
+        misfits = np.maximum(misfits, 1e-30)
+        weights = (misfits / misfits.min()) ** (-frames / 2)  # the likelihoods of the powers
+        begin = float(np.average(begins, weights=weights))
+        variance = float(np.average((begins - begin) ** 2, weights=weights))
     velocity = polyval(begin - time[end], polyder(fitted)).reshape(1, -1, 3)
-    return _Hold(float(np.sqrt(np.square(left[held]).sum() / spare)), degree, begin, float(robust_length(velocity)[0]))
+    residual = float(np.sqrt(np.square(left[held]).sum() / spare))
+    return _Hold(residual, degree, begin, variance, float(robust_length(velocity)[0]))
 
 
 def _frames(seconds: float, step: float) -> int:
@@ -139,21 +147,32 @@ def free_time(time: np.ndarray, positions: np.ndarray, begin: float) -> float:
 
 
 def onset(
-    time: np.ndarray,
-    moved: np.ndarray,
-    resting: np.ndarray,
-    floor: float = 1e-5,
-    powers: tuple[float, ...] = (2,),
-    rise: tuple[float, float] = RISE,
+    time: np.ndarray, moved: np.ndarray, resting: np.ndarray, floor: float = 1e-5, powers: tuple[float, ...] = (2,)
 ) -> float | None:
     """When the displacement `moved` (T,) m begins to grow, s, after the frames `resting` (T,); None if it does not.
-
-    Under a force that sets in at t0, as under one that grows while damping prevails, the displacement grows as
-    (t - t0)². Its root is a straight line in time, and where that crosses zero is t0.
 
     Args:
         floor: m, what the noise is taken for at least.
         powers: of (t - t0) that come into question; the one that fits best counts.
+    """
+    begins, _, misfits = onsets(time, moved, resting, floor, powers)
+    return float(begins[np.argmin(misfits)]) if len(begins) else None
+
+
+def onsets(
+    time: np.ndarray,
+    moved: np.ndarray,
+    resting: np.ndarray,
+    floor: float,
+    powers: tuple[float, ...],
+    rise: tuple[float, float] = RISE,
+) -> tuple[np.ndarray, int, np.ndarray]:
+    """When `moved` (T,) m begins to grow as each of the powers of (t - t0), s, from how many frames, and the misfits.
+
+    Under a force that sets in at t0, as under one that grows while damping prevails, the displacement grows as
+    (t - t0)². Its root is a straight line in time, and where that crosses zero is t0.
+
+    Args: as for `onset`.
         rise: times the noise, from where to where it is looked at.
     """
     noise = max(float(np.median(moved[resting])), floor)
@@ -161,18 +180,19 @@ def onset(
     low, high = (share * noise for share in rise)
     risen = np.flatnonzero((moved > high) & (time > time[resting][-1]))
     if not len(risen):
-        return None
+        return np.empty(0), 0, np.empty(0)
     last = max(int(risen[0]), 3)
     still = np.flatnonzero(moved[:last] < low)
     first = min(int(still[-1]) + 1 if len(still) else 0, last - 2)
     t, y = time[first : last + 1], moved[first : last + 1]
-    best, begin = np.inf, None
+    found = []
     for power in powers:
         slope, offset = np.polyfit(t, y ** (1 / power), 1)
         misfit = np.square(np.maximum(slope * t + offset, 0) ** power - y).sum()
-        if slope > 0 and misfit < best:
-            best, begin = misfit, float(np.clip(-offset / slope, time[max(first - 6, 0)], t[-1]))
-    return begin
+        if slope > 0:
+            found.append((np.clip(-offset / slope, time[max(first - 6, 0)], t[-1]), misfit))
+    begins, misfits = np.array(found).reshape(-1, 2).T
+    return begins, len(t), misfits
 
 
 def robust_length(vectors: np.ndarray) -> np.ndarray:
