@@ -28,6 +28,7 @@ def trial(name, frames, segments, tendons, oriented):
         commands=RNG.normal(size=(frames, tendons)),
         tendon_positions=RNG.normal(size=(frames, tendons)),
         start=0.5,
+        start_sigma=0.003,
         repairs=2,
     )
 

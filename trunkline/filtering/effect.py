@@ -43,7 +43,12 @@ def summary(trials: list[Trial], effects: list[Effect]) -> dict:
                 "motion_mm": 1e3 * effect.motion,
             }
         else:
-            moving[trial.name] = {"start_s": trial.start, "duration_s": float(trial.time[-1])}
+            moving[trial.name] = {
+                "start_s": trial.start,
+                "start_sigma_s": trial.start_sigma,
+                "in_motion": trial.in_motion,
+                "duration_s": float(trial.time[-1]),
+            }
     angles = [effect.angle_noise for effect in effects if effect.angle_noise is not None]
     weights = [effect.samples for effect in effects]
     return {

@@ -90,9 +90,12 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
         motion = float(np.sqrt(np.mean(np.var(trial.positions, axis=0))))
         trial = average_static(trial)
     if kind.start is not None:
-        trial.start = kind.start(trial)
+        begun = kind.start(trial)
+        trial.start, trial.start_sigma, trial.in_motion = begun.time, begun.sigma, begun.in_motion
         if kind.free is not None and settings.release == "free":
-            trial.start, trial.in_motion = kind.free(trial, trial.start), True
+            trial.start, trial.in_motion = kind.free(trial, begun.time), True
+        elif begun.in_motion and begun.time > 0:
+            trial.start += 1 / settings.cutoff  # by then, the low-pass tells the velocity that the hand has left
     effect = Effect(
         samples=frames * count,
         gap_share=1 - float(measured.mean()),

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from trunkline.trials.recording import Recording
-from trunkline.trials.start import cycle_time, free_time, release_time
+from trunkline.trials.start import Start, cycle_time, free_time, release_time
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Kind:
     static: the arm rests throughout; a trial is averaged over time to one frame, and its model settles to rest.
     needs_motors: refused without commands or tendon positions.
     words: in the name of a log that is proposed to be one.
-    start: when a moving trial begins, s, by its filtered positions and commands; see the module `start`.
+    start: when a moving trial begins, by its filtered positions and commands; see the module `start`.
     free: when the last hand is off, s, where that may be later than `start` says.
     hangs: at its end, the arm hangs at rest with nothing that pulls it.
     """
@@ -43,7 +43,7 @@ class Kind:
     static: bool
     needs_motors: bool
     words: tuple[str, ...]
-    start: Callable[[Recording], float] | None = None
+    start: Callable[[Recording], Start] | None = None
     free: Callable[[Recording, float], float] | None = None
     hangs: bool = False
 

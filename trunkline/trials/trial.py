@@ -27,6 +27,7 @@ class Trial(Recording):
     measured: (T, S) False where a sample was bridged over a gap too long to trust.
     commands, tendon_positions: (T, K) m of pull from the straight arm's path length, on the same clock.
     start: s, when it begins: the detected release, or the beginning of the curl cycle; 0 for a static trial.
+    start_sigma: s, standard error of `start`; 0 for a static trial.
     in_motion: whether the arm moves at `start` already.
     repairs: how many `ingest` made in it.
     """
@@ -34,6 +35,7 @@ class Trial(Recording):
     gravity: np.ndarray
     measured: np.ndarray
     start: float = 0.0
+    start_sigma: float = 0.0
     in_motion: bool = False
     repairs: int = 0
 
@@ -50,6 +52,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "load": trial.load,
             "gravity": list(map(float, trial.gravity)),
             "start": float(trial.start),
+            "start_sigma": float(trial.start_sigma),
             "in_motion": trial.in_motion,
             "repairs": trial.repairs,
             "frames": len(trial.time),
@@ -68,6 +71,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "load": pa.float64(),
             "gravity": pa.list_(pa.float64()),
             "start": pa.float64(),
+            "start_sigma": pa.float64(),
             "in_motion": pa.bool_(),
             "repairs": pa.int64(),
             "frames": pa.int64(),
@@ -123,6 +127,7 @@ def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
                 commands=command["command"].reshape(command_shape),
                 tendon_positions=command["position"].reshape(command_shape),
                 start=row["start"],
+                start_sigma=row["start_sigma"],
                 in_motion=row["in_motion"],
                 repairs=row["repairs"],
             )
