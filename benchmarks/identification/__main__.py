@@ -1,6 +1,6 @@
 """Identification side by side with raw simulation, with the paper's recipe as first written, and with mujoco.sysid.
 
-    python -m benchmarks.identification [--quick] [--only rate recipe sysid growth]
+    python -m benchmarks.identification [--quick] [--only rate recipe sysid growth physics]
 
 Needs what `make demo` leaves behind. Uses TRUNKLINE_THREADS threads; runs of rivals alternate, and the best of each
 counts. CPU time is that of all threads: on a busy machine it says more than wall time.
@@ -10,13 +10,19 @@ import argparse
 import os
 import sys
 
-from benchmarks.identification import growth, rate, recipe, sysid
+from benchmarks.identification import growth, physics, rate, recipe, sysid
 from benchmarks.identification.case import QUICK, Size, read_case
 from trunkline.errors import in_one_line
 from trunkline.pipeline.results import recorded
 from trunkline.threads import thread_count
 
-PARTS = {"rate": rate.report, "recipe": recipe.report, "sysid": sysid.report, "growth": growth.report}
+PARTS = {
+    "rate": rate.report,
+    "recipe": recipe.report,
+    "sysid": sysid.report,
+    "growth": growth.report,
+    "physics": physics.report,
+}
 
 
 @in_one_line

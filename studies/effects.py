@@ -1,0 +1,201 @@
+"""Which physics an arm needs: a Markdown table, the simplest model first.
+
+    python -m studies.effects [--folds N] [--only NAME ...]
+
+Needs the filtered trials of a session. The simplest model has springs and dampers alone. Effects are tried one after
+the other, each in the stage that identifies it: the stage is fitted with and without it, trials of the split identify
+are left out in turn, and the effect is kept if it lowers the position error of the trials left out by more than the
+standard error of that difference over trials. `test` is never read. Then the simplest model and the chosen one are
+identified by all stages and scored on `validate`, beside the null models. Progress goes to stderr.
+"""
+
+import argparse
+import contextlib
+import sys
+import time
+from dataclasses import dataclass, field, replace
+from importlib import import_module
+
+import mujoco
+import numpy as np
+
+from benchmarks.identification.case import STAGES
+from stages.build_mjcf import Config as CadConfig
+from stages.build_mjcf import cad_arm
+from trunkline.arm.joints import Branch, Joints, Slider
+from trunkline.errors import in_one_line
+from trunkline.identification.cross_validation import errors_left_out
+from trunkline.identification.evaluation import Prediction, replay
+from trunkline.identification.experiment import Experiment
+from trunkline.identification.fit import Fit
+from trunkline.identification.identify import Identification, identify
+from trunkline.identification.null_model import hanging_still
+from trunkline.identification.problem import Bounds
+from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.setup import set_up
+from trunkline.pipeline.config import load_config
+from trunkline.pipeline.identify import read_reported
+from trunkline.pipeline.results import recorded
+from trunkline.trials.splits import VALIDATE
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A term of the model, the stage that identifies it, and its parameters with their ranges.
+
+    joints: what it adds to them. dead_time: guess of the motors', s.
+    """
+
+    title: str
+    stage: str
+    parameters: dict[str, Bounds]
+    joints: Joints = field(default_factory=Joints)
+    dead_time: float = 0.0
+
+
+def ranges(low: float, high: float, *names: str) -> dict[str, Bounds]:
+    return {name: Bounds(low, high) for name in names}
+
+
+SHARES, TIMES = (0.01, 3.0), (0.02, 20.0)  # of a spring's stiffness; s
+EFFECTS: dict[str, Effect] = {
+    "hardening": Effect("hardening", "identify_stiffness", ranges(0.02, 20.0, "hardening")),
+    "mount": Effect("mount tilt", "identify_stiffness", ranges(-0.1, 0.1, "mount_tilt_x", "mount_tilt_y")),
+    "bend": Effect("rest shape, even", "identify_stiffness", ranges(-0.05, 0.05, "rest_bend_x", "rest_bend_y")),
+    "gradient": Effect(
+        "rest shape, rising", "identify_stiffness", ranges(-0.05, 0.05, "rest_gradient_x", "rest_gradient_y")
+    ),
+    "branch": Effect(
+        "Maxwell branch", "identify_damping",
+        ranges(*SHARES, "relaxation") | ranges(*TIMES, "relaxation_time"), Joints([Branch(0.3, 0.5)]),
+    ),
+    "branch_2": Effect(
+        "second Maxwell branch", "identify_damping",
+        ranges(*SHARES, "relaxation_2") | ranges(*TIMES, "relaxation_time_2"), Joints([Branch(0.2, 2.0)]),
+    ),
+    "slider": Effect(
+        "Jenkins element", "identify_damping",
+        ranges(*SHARES, "hysteresis") | ranges(5e-4, 0.3, "yield_bend"), Joints(sliders=[Slider(0.2, 0.02)]),
+    ),
+    "friction": Effect(
+        "tendon friction", "identify_damping",
+        ranges(0.005, 3.0, "tendon_friction") | ranges(0.003, 0.3, "friction_time"),
+    ),
+    "dead_time": Effect("dead time", "identify_control", ranges(0.001, 0.2, "dead_time"), dead_time=0.02),
+}  # fmt: skip
+OPTIONAL = {name for effect in EFFECTS.values() for name in effect.parameters}
+
+
+def cad_model(effects: list[Effect]) -> mujoco.MjModel:
+    """The CAD model with what the effects add to it."""
+    config = load_config(CadConfig, "build_mjcf")
+    config.joints = Joints(
+        [branch for effect in effects for branch in effect.joints.branches],
+        [slider for effect in effects for slider in effect.joints.sliders],
+    )
+    config.actuation.dead_time = max((effect.dead_time for effect in effects), default=0.0)
+    model = cad_arm(config).spec.compile()
+    if not any("tendon_friction" in effect.parameters for effect in effects):
+        model.tendon_frictionloss[:] = 0
+    return model
+
+
+def settings_of(stage: str, effects: list[Effect]) -> IdentificationSettings:
+    """The committed settings of a stage, of the optional parameters those of `effects` alone; no factors of joints."""
+    config = load_config(import_module(f"stages.{stage}").Config, stage)
+    parameters = {name: span for name, span in config.parameters.items() if name not in OPTIONAL}
+    for effect in effects:
+        parameters |= effect.parameters if effect.stage == stage else {}
+    return replace(config, parameters=parameters, per_joint=[])
+
+
+@dataclass
+class Link:
+    """A stage's fit, and what it was made of."""
+
+    result: Identification
+    experiments: list[Experiment]
+    fit: Fit
+    kinds: list[str]
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        return self.result.models["identified"]
+
+    def left_out(self, stage: str, folds: int) -> np.ndarray:
+        """Position error of every trial to identify from, not having been seen, mm."""
+        fitted = [e for e in self.experiments if e.kind in self.kinds]
+        with contextlib.redirect_stdout(sys.stderr):
+            table = errors_left_out(stage, self.result, fitted, self.fit, folds)
+        return table[table["model"] == "identified"]["e_position_mm"].to_numpy()
+
+
+def chain(effects: list[Effect], last: str, known: dict[str, Link]) -> Link:
+    """The stages up to `last`, each on what the one before it found."""
+    model, key, link = cad_model(effects), "", None
+    for stage in STAGES:
+        config = settings_of(stage, effects)
+        key += f"{stage} {config} {model.nq} {model.nhistory}\n"
+        if key not in known:
+            with contextlib.redirect_stdout(sys.stderr):
+                begun, experiments, fit = set_up(config, read_reported(config), model)
+                fitted = [e for e in experiments if e.kind in config.experiments]
+                found = identify(stage, begun, fitted, fit)
+                print({name: float(f"{value:.4g}") for name, value in found.values.items()}, flush=True)
+                known[key] = Link(found, experiments, fit, config.experiments)
+        link = known[key]
+        model = link.model
+        if stage == last:
+            break
+    assert link is not None
+    return link
+
+
+def validated(title: str, link: Link) -> list[str]:
+    """Rows of the last table: errors on `validate` by kind."""
+    unseen = [e for e in link.experiments if e.split == VALIDATE]
+    replayed = replay(link.model, unseen, link.fit.segments)
+    still = Prediction(hanging_still(unseen, replayed, link.experiments), unseen).scores()[VALIDATE]["by_experiment"]
+    rows = []
+    for kind, row in Prediction(replayed, unseen).scores()[VALIDATE]["by_experiment"].items():
+        errors = [f"{row[f'{name}_mm']:.2f}" for name in ("e_internal", "e_position", "e_tip")]
+        errors += [f"{row['e_tip_pct']:.2f}", f"{still[kind]['e_tip_mm']:.1f}"]
+        rows.append(f"| {title} | {kind} | {' | '.join(errors)} |")
+    return rows
+
+
+@in_one_line
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="studies.effects", description=__doc__.splitlines()[0])
+    parser.add_argument("--folds", type=int, default=3, help="groups of trials that are left out in turn")
+    parser.add_argument("--only", nargs="+", choices=EFFECTS, default=list(EFFECTS), help="effects to try")
+    arguments = parser.parse_args()
+    known: dict[str, Link] = {}
+    kept: list[Effect] = []
+    with recorded("effects", keep=arguments.only == list(EFFECTS)):
+        print("| effect | position error left out (mm): without | with | lower by | kept | seconds |", flush=True)
+        print("|---|---:|---:|---:|---|---:|", flush=True)
+        for name in arguments.only:
+            effect, begun = EFFECTS[name], time.perf_counter()
+            errors = [
+                chain(effects, effect.stage, known).left_out(effect.stage, arguments.folds)
+                for effects in (kept, [*kept, effect])
+            ]
+            gain = errors[0] - errors[1]
+            standard_error = gain.std(ddof=1) / np.sqrt(len(gain))
+            pays = gain.mean() > standard_error
+            kept += [effect] if pays else []
+            means = f"{errors[0].mean():.3f} | {errors[1].mean():.3f} | {gain.mean():.3f} ± {standard_error:.3f}"
+            seconds = time.perf_counter() - begun
+            print(f"| {effect.title} | {means} | {'yes' if pays else 'no'} | {seconds:.0f} |", flush=True)
+        print("\nErrors on `validate`, the tip's also in % of length; null: the mean shape at rest.\n")
+        print("| model | experiment | E_internal (mm) | position (mm) | tip (mm) | tip (%) | null, tip (mm) |")
+        print("|---|---|---:|---:|---:|---:|---:|", flush=True)
+        for title, effects in (("simplest", []), ("chosen", kept)):
+            for stage in STAGES:
+                print("\n".join(validated(f"{title}, {stage}", chain(effects, stage, known))), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
