@@ -10,7 +10,7 @@ from pydantic import Field
 from trunkline.errors import existing
 from trunkline.figures.scoring import segment_figure, trial_figure
 from trunkline.figures.style import save_figure
-from trunkline.identification.evaluation import segment_table, trial_table
+from trunkline.identification.error_tables import segment_table, trial_table
 from trunkline.identification.scoring import Compared, score
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, run_stage, write_json

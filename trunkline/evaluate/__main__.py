@@ -17,7 +17,7 @@ from trunkline.evaluate.model import read_arm, written_beside
 from trunkline.evaluate.report import change_lines, kind_lines, read_reference, trial_lines
 from trunkline.evaluate.session import trials_of
 from trunkline.identification.checks import check_trials
-from trunkline.identification.evaluation import segment_table, trial_table
+from trunkline.identification.error_tables import segment_table, trial_table
 from trunkline.identification.scoring import evaluate
 from trunkline.pipeline.stage import output_folder, write_json
 

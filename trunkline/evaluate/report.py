@@ -6,26 +6,22 @@ from pathlib import Path
 import pandas as pd
 
 from trunkline.errors import InputError
+from trunkline.identification.error_tables import LABELS
 
-BESIDE = {
-    "cad": "CAD",
-    "null": "mean rest shape",
-    "null_straight": "straight arm",
-    "null_held": "start held",
-    "noise_floor": "noise floor",
-}
+BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")
 ERRORS = ("e_internal_mm", "e_position_mm", "e_tip_mm")
 
 
 def trial_lines(trials: pd.DataFrame, fitted: set[str]) -> list[str]:
     """A line a trial, `*` at those that the model was fitted to; position / tip error of what stands beside it."""
-    rows = [["trial", "experiment", "split", *_heads(set(trials.model))]]
-    for name in dict.fromkeys(trials.trial):
-        own = trials[trials.trial == name].set_index("model")
-        told = own.loc["model"]
-        errors = {model: row.to_dict() for model, row in own.iterrows()}
-        label = f"{name} *" if name in fitted else name
-        rows.append([label, told.experiment, told.split, *_cells(errors, set(trials.model))])
+    models = {name for name, label in LABELS.items() if label in set(trials.model)}
+    rows = [["trial", "experiment", "split", *_heads(models)]]
+    for trial in dict.fromkeys(trials.trial):
+        own = trials[trials.trial == trial].set_index("model")
+        errors = {name: own.loc[LABELS[name]].to_dict() for name in models if LABELS[name] in own.index}
+        told = errors["model"]
+        label = f"{trial} *" if trial in fitted else trial
+        rows.append([label, told["experiment"], told["split"], *_cells(errors, models)])
     return _aligned(rows, 3)
 
 
@@ -37,7 +33,7 @@ def kind_lines(metrics: dict) -> list[str]:
     for kind, table in metrics["model"]["by_experiment"].items():
         errors = {name: metrics[name]["by_experiment"].get(kind, {}) for name in models}
         found = repeats.get(kind, {})
-        scatter = f"{_number(found.get('mean_mm'))} / {_number(found.get('tip_mm'))}"
+        scatter = _pair(found.get("mean_mm"), found.get("tip_mm"))
         rows.append([kind, str(table["trials"]), *_cells(errors, models), scatter])
     return _aligned(rows, 1)
 
@@ -51,7 +47,7 @@ def read_reference(path: Path) -> dict:
     file = path / "metrics.json" if path.is_dir() else path
     try:
         metrics = json.loads(file.read_text(encoding="utf-8"))
-        metrics["model"]["by_experiment"], metrics["evaluated"]["model"]
+        _ = metrics["model"]["by_experiment"], metrics["evaluated"]["model"]
     except FileNotFoundError:
         raise InputError(f"--reference: {file}: no such file, expected metrics.json of another evaluation") from None
     except (ValueError, KeyError, TypeError) as error:
@@ -78,13 +74,13 @@ def change_lines(before: dict, now: dict) -> list[str]:
 
 
 def _heads(models: set[str]) -> list[str]:
-    return ["E_internal", "position", "tip", "tip %", *(label for name, label in BESIDE.items() if name in models)]
+    return ["E_internal", "position", "tip", "tip %", *(LABELS[name] for name in BESIDE if name in models)]
 
 
 def _cells(errors: dict[str, dict], models: set[str]) -> list[str]:
     found = errors["model"]
     pairs = [
-        f"{_number(row.get('e_position_mm'))} / {_number(row.get('e_tip_mm'))}"
+        _pair(row.get("e_position_mm"), row.get("e_tip_mm"))
         for row in (errors.get(name, {}) for name in BESIDE if name in models)
     ]
     return [*(_number(found.get(error)) for error in (*ERRORS, "e_tip_pct")), *pairs]
@@ -93,7 +89,11 @@ def _cells(errors: dict[str, dict], models: set[str]) -> list[str]:
 def _change(old: float | None, new: float | None) -> str:
     if old is None or new is None:
         return "–"
-    return f"{_number(old)} → {_number(new)} mm ({100 * (new / old - 1):+.0f} %)"
+    return f"{_number(old)} → {_number(new)} mm ({round(100 * (new / old - 1)):+d} %)"
+
+
+def _pair(position: float | None, tip: float | None) -> str:
+    return "–" if position is None else f"{_number(position)} / {_number(tip)}"
 
 
 def _number(value: float | None) -> str:

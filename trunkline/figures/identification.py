@@ -7,13 +7,13 @@ from matplotlib.figure import Figure
 
 from trunkline.figures.scoring import MODELS
 from trunkline.figures.style import DOUBTFUL, IDENTIFIED, MEASURED
+from trunkline.identification.error_tables import LABELS
 from trunkline.identification.evaluation import Prediction
 from trunkline.identification.identify import Identification
 from trunkline.identification.parameters import PARAMETERS
 
 NARROWEST = 60.0  # mm, of an axis: noise shall not look like motion
-LABELS = {name: label for name, (label, *_) in MODELS.items()}
-COLORS = {name: color for name, (_, color, *_) in MODELS.items()}
+COLORS = {label: color for label, (color, *_) in MODELS.items()}
 
 
 def convergence_figure(identification: Identification) -> Figure:
@@ -44,8 +44,8 @@ def error_figure(curves: pd.DataFrame, floor: dict[str, float]) -> Figure:
     figure, axes = plt.subplots(1, len(panels), figsize=(4.5 * len(panels), 3.4))
     for axis, (column, (label, title, least)) in zip(axes, panels.items(), strict=True):
         for model, rows in curves.groupby("model", sort=False):
-            _, color, line, _ = MODELS[model]
-            axis.semilogy(rows.time_s, rows[column], line, color=color, label=LABELS[model])
+            color, line, _ = MODELS[model]
+            axis.semilogy(rows.time_s, rows[column], line, color=color, label=model)
         if least is not None:
             axis.axhline(least, color=MEASURED, linestyle=":", label=LABELS["noise_floor"])
         axis.set(xlabel="time (s)", ylabel=label, title=f"{title}, validate split")
@@ -62,7 +62,7 @@ def distance_figure(table: pd.DataFrame, trial: str) -> Figure:
                               (model, {"color": COLORS[model], "linewidth": 1.2})):
             for number, (_, rows) in enumerate(table[table.source == source].groupby("segment", sort=False)):
                 axis.plot(rows.time_s, rows.distance_mm, label=source if number == 0 else None, **style)
-        axis.set(xlabel="time (s)", title=f"{trial}: {LABELS[model]} model", ylim=0)
+        axis.set(xlabel="time (s)", title=f"{trial}: {model} model", ylim=0)
         axis.legend(loc="lower right")
     axes[0].set_ylabel("distance from the base (mm)")
     return figure
@@ -80,7 +80,7 @@ def path_figure(predictions: dict[str, Prediction]) -> Figure:
         axis.plot(time, measured * 1e3, color=MEASURED, alpha=0.45, lw=2.5, label="measured")
         for model, prediction in predictions.items():
             found = prediction.replay.positions[0][:, tip, number]
-            axis.plot(time, found * 1e3, color=COLORS[model], lw=1.2, label=LABELS[model])
+            axis.plot(time, found * 1e3, color=COLORS[LABELS[model]], lw=1.2, label=LABELS[model])
         axis.set_ylabel(f"{name} (mm)")
         low, high = axis.get_ylim()
         spare = max(0.0, NARROWEST - (high - low)) / 2
@@ -102,8 +102,7 @@ def shape_figure(table: pd.DataFrame) -> Figure:
         else:
             axis.plot(x, z, color=COLORS[source], linewidth=1.6 if source == "identified" else 1.1)
     for source in table.source.unique():
-        style, label = ("o", source) if source == "measured" else ("-", LABELS[source])
-        axis.plot([], [], style, color=COLORS.get(source, MEASURED), label=label)
+        axis.plot([], [], "o" if source == "measured" else "-", color=COLORS.get(source, MEASURED), label=source)
     axis.legend(loc="upper right")
     axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Shapes at rest, validate split")
     return figure

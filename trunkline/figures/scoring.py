@@ -6,18 +6,19 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from trunkline.figures.style import DOUBTFUL, IDENTIFIED, INITIAL, MEASURED, VALIDATE
+from trunkline.identification.error_tables import LABELS
 
-# by name in metrics.json: label, colour, line, dot
+# by label: colour, line, dot
 MODELS = {
-    "null": ("null: mean rest shape", DOUBTFUL, "--", "o"),
-    "null_straight": ("null: straight arm", DOUBTFUL, ":", "|"),
-    "null_held": ("null: start held", DOUBTFUL, "-.", "_"),
-    "cad": ("CAD", INITIAL, "-", "o"),
-    "initial": ("initial", VALIDATE, "-", "o"),
-    "coarse": ("coarse", VALIDATE, "--", "o"),
-    "identified": ("identified", IDENTIFIED, "-", "o"),
-    "model": ("model", IDENTIFIED, "-", "o"),
-    "noise_floor": ("noise floor", MEASURED, ":", "x"),
+    LABELS["null"]: (DOUBTFUL, "--", "o"),
+    LABELS["null_straight"]: (DOUBTFUL, ":", "|"),
+    LABELS["null_held"]: (DOUBTFUL, "-.", "_"),
+    LABELS["cad"]: (INITIAL, "-", "o"),
+    LABELS["initial"]: (VALIDATE, "-", "o"),
+    LABELS["coarse"]: (VALIDATE, "--", "o"),
+    LABELS["identified"]: (IDENTIFIED, "-", "o"),
+    LABELS["model"]: (IDENTIFIED, "-", "o"),
+    LABELS["noise_floor"]: (MEASURED, ":", "x"),
 }
 ERRORS = {"e_position_mm": "mean position error (mm)", "e_tip_mm": "tip error (mm)"}
 
@@ -35,9 +36,9 @@ def trial_figure(tables: dict[str, pd.DataFrame]) -> Figure:
             continue
         names = list(dict.fromkeys(table.trial))
         for axis, error in zip(column, ERRORS, strict=True):
-            for model, (label, color, _, dot) in _shown(table).items():
+            for model, (color, _, dot) in _shown(table).items():
                 rows = table[table.model == model].set_index("trial").reindex(names)
-                axis.semilogy(np.arange(len(names)), rows[error], dot, color=color, label=label)
+                axis.semilogy(np.arange(len(names)), rows[error], dot, color=color, label=model)
         column[1].set_xticks(np.arange(len(names)), names, rotation=60, ha="right", fontsize=8)
     for axis, label in zip(axes[:, 0], ERRORS.values(), strict=True):
         axis.set_ylabel(label)
@@ -52,9 +53,9 @@ def segment_figure(tables: dict[str, pd.DataFrame]) -> Figure:
     count = max(len(panels), 1)
     figure, axes = plt.subplots(1, count, figsize=(4.2 * count, 4.4), squeeze=False, sharey=True)
     for axis, (title, kind, rows) in zip(axes[0], panels, strict=False):
-        for model, (label, color, line, _) in _shown(rows).items():
+        for model, (color, line, _) in _shown(rows).items():
             own = rows[rows.model == model]
-            axis.semilogy(own.from_base_mm, own.e_position_mm, line, color=color, label=label)
+            axis.semilogy(own.from_base_mm, own.e_position_mm, line, color=color, label=model)
         axis.set(title=f"{kind}, {title}", xlabel="distance from the base, straight arm (mm)")
     if not panels:
         axes[0, 0].text(0.5, 0.5, "no trial", ha="center", transform=axes[0, 0].transAxes)
@@ -63,7 +64,7 @@ def segment_figure(tables: dict[str, pd.DataFrame]) -> Figure:
     return figure
 
 
-def _shown(table: pd.DataFrame) -> dict[str, tuple[str, str, str, str]]:
+def _shown(table: pd.DataFrame) -> dict[str, tuple[str, str, str]]:
     found = set(table.model)
     return {model: style for model, style in MODELS.items() if model in found}
 

@@ -5,6 +5,7 @@ import pandas as pd
 from scipy.signal import butter, sosfiltfilt
 
 from trunkline.frames import tilt_of_gravity
+from trunkline.identification.error_tables import LABELS
 from trunkline.identification.evaluation import Prediction
 from trunkline.identification.identify import Identification
 from trunkline.identification.loss import distances
@@ -46,7 +47,7 @@ def error_curves(predictions: dict[str, Prediction]) -> pd.DataFrame:
             pd.DataFrame(
                 {
                     "time_s": np.arange(frames) * step,
-                    "model": model,
+                    "model": LABELS[model],
                     "position_error_mm": _smooth(low_pass, np.ma.array(error, mask=unseen)) * 1e3,
                     "velocity_error_mm_s": _smooth(low_pass, rate) * 1e3,
                     "tip_error_mm": _smooth(low_pass, np.ma.array(away, mask=unseen[..., [tip]])) * 1e3,
@@ -70,7 +71,7 @@ def distance_table(predictions: dict[str, Prediction], segments: tuple[str, ...]
     (experiment,) = next(iter(predictions.values())).experiments
     outer = len(segments) // 3  # nearer the base, distances hardly change
     chosen = np.unique(np.linspace(outer, len(segments) - 1, SHOWN_SEGMENTS).astype(int))
-    sources = {"measured": experiment.positions} | {m: p.replay.positions[0] for m, p in predictions.items()}
+    sources = {"measured": experiment.positions} | {LABELS[m]: p.replay.positions[0] for m, p in predictions.items()}
     time = np.arange(experiment.frames) * experiment.frame_step
     return pd.concat(
         pd.DataFrame(
@@ -85,7 +86,8 @@ def shape_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -
     """Last shapes in the plane of the tilt: columns trial, tilt_deg, source, segment, x_mm, z_mm."""
     rows = []
     for index, experiment in enumerate(next(iter(predictions.values())).experiments):
-        sources = {"measured": experiment.positions} | {m: p.replay.positions[index] for m, p in predictions.items()}
+        found = {LABELS[model]: p.replay.positions[index] for model, p in predictions.items()}
+        sources = {"measured": experiment.positions} | found
         for source, positions in sources.items():
             for segment, (x, _, z) in zip(segments, positions[-1] * 1e3, strict=True):
                 rows.append((experiment.name, np.degrees(tilt_of_gravity(experiment.gravity)), source, segment, x, z))

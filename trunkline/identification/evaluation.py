@@ -1,11 +1,10 @@
-"""How far a model is from the measurements: per split, of every trial, and along the arm."""
+"""How far a model is from the measurements, per split and of every trial."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-import pandas as pd
 
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import (
@@ -61,7 +60,7 @@ class Prediction:
 
     def overall(self) -> dict:
         """As `scores` for a split, over the trials of all of them."""
-        return _summary(_rows(self))
+        return _summary(trial_errors(self))
 
 
 def replay(
@@ -94,7 +93,7 @@ def scores(
     `by_experiment` has the same for every kind; `without_repaired` where `ingest` repaired some of the split's trials,
     `repaired` of them. Where a simulation diverged, its segments count as the arm's length away along every axis.
     """
-    rows = _rows(Prediction(replayed, experiments), loss, weights)
+    rows = trial_errors(Prediction(replayed, experiments), loss, weights)
     table: dict[str, dict] = {}
     for split in SPLITS:
         own = [(e, row) for e, row in rows if e.split == split]
@@ -107,7 +106,7 @@ def _summary(rows: list[tuple[Experiment, dict[str, float]]]) -> dict:
     """What `scores` says of a split, from the errors of its trials."""
     kinds = sorted({e.kind for e, _ in rows})
     whole = [row for e, row in rows if not e.repaired]
-    table = _mean([row for _, row in rows])
+    table: dict = _mean([row for _, row in rows])
     table["by_experiment"] = {kind: _mean([row for e, row in rows if e.kind == kind]) for kind in kinds}
     table["repaired"] = len(rows) - len(whole)
     if 0 < len(whole) < len(rows):
@@ -115,43 +114,32 @@ def _summary(rows: list[tuple[Experiment, dict[str, float]]]) -> dict:
     return table
 
 
-def trial_table(predictions: dict[str, Prediction]) -> pd.DataFrame:
-    """A row a trial and model: columns trial, experiment, split, model, e_internal_mm, e_position_mm, e_tip_mm,
-    e_tip_pct, e_velocity_mm_s; nan where a trial has no such error."""
-    names = ("e_internal_mm", "e_position_mm", "e_tip_mm", "e_tip_pct", "e_velocity_mm_s")
-    return pd.DataFrame(
-        [
-            {"trial": e.name, "experiment": e.kind, "split": e.split, "model": model}
-            | {name: row.get(name, np.nan) for name in names}
-            for model, prediction in predictions.items()
-            for e, row in _rows(prediction)
-        ]
-    )
+def halved_step(found: Prediction, halved: Prediction) -> dict:
+    """Of simulations at the model's own step and at half of it: by which share of itself that moves E_internal, per split,
+    and the tip error (`tip`).
+
+    Measured errors hardly change if those of the step hide beside others, hence also the largest distance between the
+    two simulations of any segment, and of the tip, in mm.
+    """
+    before, after = found.scores(), halved.scores()
+
+    def change(error: str) -> dict[str, float]:
+        both = {split: (before[split].get(error), after[split].get(error)) for split in before}
+        return {split: abs(new - old) / old for split, (old, new) in both.items() if old and new is not None}
+
+    pairs = zip(halved.replay.positions, found.replay.positions, strict=True)
+    furthest = np.max([np.linalg.norm(a - b, axis=-1).max(axis=0) for a, b in pairs], axis=0) * 1e3
+    return change("e_internal_mm") | {
+        "tip": change("e_tip_mm"),
+        "max_mm": float(furthest.max()),
+        "tip_max_mm": float(furthest[found.replay.tip]),
+    }
 
 
-def segment_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -> pd.DataFrame:
-    """The position error along the arm, mean over frames, then over the trials of a kind: columns experiment, model,
-    segment, from_base_mm (in the straight arm), e_position_mm."""
-    rows = []
-    for model, prediction in predictions.items():
-        replayed = prediction.replay
-        places = np.linalg.norm(replayed.straight, axis=1) * 1e3
-        for kind in sorted({e.kind for e in prediction.experiments}):
-            errors = [
-                _along(positions, e, replayed.length)
-                for positions, e in zip(replayed.positions, prediction.experiments, strict=True)
-                if e.kind == kind
-            ]
-            seen = np.isfinite(errors)
-            means = np.where(seen, errors, 0).sum(axis=0) / np.where(seen.any(axis=0), seen.sum(axis=0), np.nan)
-            for index in np.argsort(places):
-                rows.append((kind, model, segments[index], places[index], means[index] * 1e3))
-    return pd.DataFrame(rows, columns=["experiment", "model", "segment", "from_base_mm", "e_position_mm"])
-
-
-def _rows(
+def trial_errors(
     prediction: Prediction, loss: str | None = None, weights: LossWeights | None = None
 ) -> list[tuple[Experiment, dict[str, float]]]:
+    """Of every trial its errors, as `errors_of` gives them."""
     replayed = prediction.replay
     return [
         (e, errors_of(positions, e, replayed, loss, weights))
@@ -159,16 +147,9 @@ def _rows(
     ]
 
 
-def _survived(positions: np.ndarray, length: float) -> np.ndarray:
+def survived(positions: np.ndarray, length: float) -> np.ndarray:
     """Positions, m, with the arm's `length` along every axis in place of what is not finite."""
     return np.nan_to_num(positions, nan=length, posinf=length, neginf=-length)
-
-
-def _along(positions: np.ndarray, experiment: Experiment, length: float) -> np.ndarray:
-    """Mean distance of each segment from its measurement, m; nan for one that was never measured. Shape (S,)."""
-    found = np.linalg.norm(_survived(positions, length) - experiment.positions, axis=-1)
-    count = experiment.measured.sum(axis=0)
-    return np.where(experiment.measured, found, 0).sum(axis=0) / np.where(count, count, np.nan)
 
 
 def errors_of(
@@ -176,7 +157,7 @@ def errors_of(
 ) -> dict[str, float]:
     """Loss and errors of one trial, simulated as `positions` (T, S, 3), m."""
     real, measured, length, tip = experiment.positions, experiment.measured, replayed.length, replayed.tip
-    positions = _survived(positions, length)
+    positions = survived(positions, length)
     found = {
         "e_internal": float(internal_error(positions, real, measured)),
         "e_position": float(position_error(positions, real, measured)),
@@ -186,9 +167,10 @@ def errors_of(
         found["e_tip"] = float(position_error(positions[:, one], real[:, one], measured[:, one]))
     row = {f"{name}_mm": error * 1e3 for name, error in found.items()}
     row |= {f"{name}_pct": error / length * 100 for name, error in found.items()}
-    if loss is not None and weights is not None:
+    in_order = experiment.frames == 1 or experiment.frame_step > 0  # else frames taken from here and there
+    if loss is not None and weights is not None and in_order:
         row["loss"] = float(loss_of(RESIDUALS[loss](positions[None], real, measured, weights))[0])
-    if experiment.frames > 1 and experiment.frame_step:
+    if experiment.frames > 1 and in_order:
         row["e_velocity_mm_s"] = float(velocity_error(positions, real, measured, 1 / experiment.frame_step)) * 1e3
     return row
 

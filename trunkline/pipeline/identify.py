@@ -9,7 +9,8 @@ import numpy as np
 from trunkline.errors import InputError, existing
 from trunkline.identification.checks import check_trials
 from trunkline.identification.cross_validation import cross_validate
-from trunkline.identification.evaluation import Prediction, replay, segment_table, trial_table
+from trunkline.identification.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation import Prediction, halved_step, replay
 from trunkline.identification.identify import Identification, identify, with_parameters
 from trunkline.identification.null_model import references
 from trunkline.identification.parameter_table import parameter_table, undetermined
@@ -78,7 +79,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     }
     if any(e.frames > 1 for e in experiments):
         halved = Prediction(replay(models["identified"], experiments, segments, step_factor=0.5), experiments)
-        metrics["halved_step"] = _halved_step(predictions["identified"], halved)
+        metrics["halved_step"] = halved_step(predictions["identified"], halved)
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
@@ -113,27 +114,6 @@ def doubts(result: Identification, bounds: dict[str, Bounds]) -> list[str]:
         + [f"{name} ended on a bound of its range" for name in result.at_bound]
         + [f"{name} is not determined: its 95 % interval spans its range" for name in undetermined(result, bounds)]
     )
-
-
-def _halved_step(found: Prediction, halved: Prediction) -> dict:
-    """By which share of itself half the time step moves E_internal, per split, and the tip error (`tip`).
-
-    Measured errors hardly change if those of the step hide beside others, hence also the largest distance between the
-    two simulations of any segment, and of the tip, in mm.
-    """
-    before, after = found.scores(), halved.scores()
-
-    def change(error: str) -> dict[str, float]:
-        both = {split: (before[split].get(error), after[split].get(error)) for split in DECIDING}
-        return {split: abs(new - old) / old for split, (old, new) in both.items() if old and new is not None}
-
-    pairs = zip(halved.replay.positions, found.replay.positions, strict=True)
-    furthest = np.max([np.linalg.norm(a - b, axis=-1).max(axis=0) for a, b in pairs], axis=0) * 1e3
-    return change("e_internal_mm") | {
-        "tip": change("e_tip_mm"),
-        "max_mm": float(furthest.max()),
-        "tip_max_mm": float(furthest[found.replay.tip]),
-    }
 
 
 def _gain(metrics: dict) -> dict[str, float]:

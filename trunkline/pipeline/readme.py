@@ -13,6 +13,7 @@ import networkx
 from dvc.repo import Repo
 
 from trunkline.errors import in_one_line
+from trunkline.identification.error_tables import LABELS
 from trunkline.pipeline.baseline import baseline_file, read_baseline
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.limits import Limit, lookup, metrics_folder, read_limits
@@ -73,14 +74,7 @@ SCORES = [
     ("motions", "identify_control", "by_experiment.motion."),
     ("releases and curls", "identify_control", ""),
 ]
-# what stands beside an identified model
-BESIDE = {
-    "cad": "CAD",
-    "null": "null: mean rest shape",
-    "null_straight": "null: straight arm",
-    "null_held": "null: start held",
-    "noise_floor": "noise floor",
-}
+BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")  # an identified model
 
 
 def pipeline_graph(root: Path) -> str:
@@ -167,7 +161,7 @@ def _metrics(root: Path, stage: str) -> dict | None:
 
 def _head(what: str) -> list[str]:
     """The head of a table whose rows are of `_beside`."""
-    cells = [f"{what}: position / tip error, mm", "E_internal", "identified", *BESIDE.values()]
+    cells = [f"{what}: position / tip error, mm", "E_internal", *(LABELS[name] for name in ("identified", *BESIDE))]
     return [f"| {' | '.join(cells)} |", f"|---|{'---:|' * (len(cells) - 1)}"]
 
 
