@@ -118,6 +118,7 @@ def measure(
         experiment=truth.experiment,
         split=truth.split,
         level=truth.level,
+        load=truth.load,
         bodies=(BASE, *truth.segments),
         frames=frame_number + numbers,
         stamps=_nanoseconds(epoch, time + jitter),

@@ -56,7 +56,8 @@ def write_session(folder: Path, measurements: list[Measurement], settings: Instr
     ]
     for m in measurements:
         level = "" if m.level is None else f", level: {m.level:g}"
-        lines.append(f"  - {{file: {m.name}.mcap, experiment: {m.experiment}{level}, split: {m.split}}}")
+        load = f", load: {m.load:g}" if m.load else ""
+        lines.append(f"  - {{file: {m.name}.mcap, experiment: {m.experiment}{level}{load}, split: {m.split}}}")
     (Path(folder) / "session.yaml").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

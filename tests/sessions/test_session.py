@@ -40,6 +40,9 @@ def test_good_session(tmp_path):
     assert [trial.name for trial in read.trials] == ["tilt", "swing"]
     np.testing.assert_allclose(read.frame.up_direction(), [0, 1, 0])
     assert read.clock == "stamp"
+    assert [trial.load for trial in read.trials] == [0.0, 0.0]
+    loaded = read_session(session(tmp_path, changed("trials", 0, "load", value=0.05)))
+    assert [trial.load for trial in loaded.trials] == [0.05, 0.0]
     fixed = read_session(session(tmp_path, changed("base", value={"position": [0.1, 0, 0.1]})))
     assert isinstance(fixed.base, FixedBase)
 
@@ -75,6 +78,12 @@ def test_good_session(tmp_path):
             {"file": "tilt.mcap", "experiment": "curl", "level": 0.02, "split": "identify"},
             r"trials.0: level: found 0.02, expected 1 to 10000, the mm of pull of a curl",
         ),
+        (("trials", 1, "load"), 30, r"trials.1: load: found 30, expected 0 to 5, the kg at the tip of a release"),
+        (("trials", 1, "load"), -1, r"trials.1: load: found -1, expected 0 to 5, the kg at the tip"),
+        (("trials", 1, "load"), "30 g", r"trials.1.load: found '30 g', expected a valid number"),
+        (("trials", 1, "load"), True, r"trials.1.load: found true, expected a number"),
+        (("trials", 1, "load"), float("inf"), r"trials.1.load: found inf, expected a finite number"),
+        (("trials", 1, "laod"), 0.1, r"trials.1.laod: unknown key, did you mean 'load'\?"),
         (
             ("trials", 1, "window"),
             [2, 1],

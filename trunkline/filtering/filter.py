@@ -73,6 +73,7 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
         experiment=take.experiment,
         split=take.split,
         level=take.level,
+        load=take.load,
         gravity=gravity,
         time=grid,
         segments=take.segments,

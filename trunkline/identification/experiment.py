@@ -26,6 +26,7 @@ class Experiment:
     Attributes:
         name, kind, split: as in the trial; kind is its experiment.
         gravity: m/s², base frame. Shape (3,).
+        load: kg at the tip, beside the model's own.
         start: joint angles from which it starts. Shape (nq,).
         velocity: with which it starts, rad/s; 0 unless the trial's arm moves then. Shape (nv,).
         lead: s from the start to the first frame.
@@ -50,6 +51,7 @@ class Experiment:
     frame_step: float
     fit: PoseFit
     repaired: bool = False
+    load: float = 0.0
 
     @property
     def frames(self) -> int:
@@ -98,6 +100,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         frame_step=step,
         fit=fit,
         repaired=trial.repairs > 0,
+        load=trial.load,
     )
 
 

@@ -22,7 +22,7 @@ from pydantic import (
 from trunkline.errors import InputError, nearest
 from trunkline.sessions.splits import check_shared
 from trunkline.settings import read_yaml
-from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
+from trunkline.trials.experiments import EXPERIMENTS, LOAD, ExperimentName, Level
 from trunkline.trials.splits import SplitName
 
 
@@ -86,21 +86,22 @@ class Topics(Entry):
 
 
 class TrialEntry(Entry):
-    """window: s from the log's first pose. level: in the unit of the experiment."""
+    """window: s from the log's first pose. level: in the unit of the experiment. load: kg at the tip."""
 
     name: str = ""
     file: str
     window: tuple[FiniteFloat, FiniteFloat] | None = None
     experiment: ExperimentName
     level: FiniteFloat | None = None
+    load: FiniteFloat = 0.0
     split: SplitName
 
-    @field_validator("level", mode="before")
+    @field_validator("level", "load", mode="before")
     @classmethod
-    def _number(cls, level):
-        if isinstance(level, bool):
-            raise ValueError(f"found {str(level).lower()}, expected a number")
-        return level
+    def _number(cls, value):
+        if isinstance(value, bool):
+            raise ValueError(f"found {str(value).lower()}, expected a number")
+        return value
 
     @model_validator(mode="after")
     def _complete(self):
@@ -110,11 +111,15 @@ class TrialEntry(Entry):
         if level is not None:
             if self.level is None:
                 raise ValueError(f"level: missing, expected the nominal level of a {self.experiment}")
-            if not level.low <= self.level <= level.high:
-                expected = f"{level.low:g} to {level.high:g}, the {level.says} of a {self.experiment}"
-                raise ValueError(f"level: found {self.level:g}, expected {expected}")
+            self._check("level", self.level, level)
+        self._check("load", self.load, LOAD)
         self.name = self.name or Path(self.file).stem
         return self
+
+    def _check(self, key: str, value: float, level: Level) -> None:
+        if not level.low <= value <= level.high:
+            expected = f"{level.low:g} to {level.high:g}, the {level.says} of a {self.experiment}"
+            raise ValueError(f"{key}: found {value:g}, expected {expected}")
 
 
 class Session(Entry):

@@ -92,6 +92,7 @@ def _take(
         experiment=trial.experiment,
         split=trial.split,
         level=trial.level,
+        load=trial.load,
         up=session.frame.up_direction(),
         time=stretch.time,
         segments=tuple(reference.segments.values()),

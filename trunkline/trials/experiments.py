@@ -14,7 +14,7 @@ from trunkline.trials.start import cycle_time, free_time, release_time
 
 @dataclass(frozen=True)
 class Level:
-    """What the nominal level of a trial says. unit: "deg" or "mm". low, high: what session.yaml may name."""
+    """What a number of a trial says. unit: "deg", "mm" or "kg". low, high: what session.yaml may name."""
 
     says: str
     unit: str
@@ -24,6 +24,7 @@ class Level:
 
 TILT = Level("degrees of tilt", "deg", 0.0, 180.0)
 PULL = Level("mm of pull", "mm", 1.0, 10_000.0)  # below, metres were meant
+LOAD = Level("kg at the tip", "kg", 0.0, 5.0)  # above, grams were meant; of a trial of any kind
 
 
 @dataclass(frozen=True)
@@ -68,6 +69,19 @@ EXPERIMENTS: dict[str, Kind] = {
         static=False,
         needs_motors=True,
         words=("curl",),
+        start=lambda trial: cycle_time(trial.time, trial.commands),
+    ),
+    "static_pull": Kind(
+        level=None,
+        static=True,
+        needs_motors=True,
+        words=("pull",),
+    ),
+    "motion": Kind(
+        level=None,
+        static=False,
+        needs_motors=True,
+        words=("motion",),
         start=lambda trial: cycle_time(trial.time, trial.commands),
     ),
 }

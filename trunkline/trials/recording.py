@@ -10,13 +10,15 @@ class Planned:
     """What the experimenter says of a trial.
 
     name: unique within the session. experiment: one of `experiments.EXPERIMENTS`. split: what the trial may be used
-    for, one of `splits.SPLITS`. level: nominal, in the unit of its experiment; None where there is none.
+    for, one of `splits.SPLITS`. level: nominal, in the unit of its experiment; None where there is none. load: kg that
+    hang at the tip in this trial, beside what hangs there always.
     """
 
     name: str
     experiment: str
     split: str
     level: float | None
+    load: float = 0.0
 
 
 @dataclass(kw_only=True)

@@ -17,7 +17,8 @@ BASE = "base"  # the base body's name in poses.parquet
 class Take(Recording):
     """T frames, S segments, K tendons; the motors have Tc commands and Tm measured positions.
 
-    name, experiment, split, level: as planned, see `Planned`. segments: S names, tendons: K names, as in the model.
+    name, experiment, split, level, load: as planned, see `Planned`. segments: S names, tendons: K names, as in the
+    model.
     up: (3,) unit vector against gravity. time: (T,) s from the first frame.
     positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None, base_positions (T, 3), base_quaternions (T, 4):
     in the motion-capture frame, NaN where there is no good sample.
@@ -41,6 +42,7 @@ SCHEMA = pa.schema(
         "experiment": pa.string(),
         "split": pa.string(),
         "level": pa.float64(),
+        "load": pa.float64(),
         "up": pa.list_(pa.float64()),
         "clock_offset": pa.float64(),
         "repairs": pa.int64(),
@@ -65,6 +67,7 @@ def write_takes(folder: Path, takes: list[Take]) -> None:
                 "experiment": take.experiment,
                 "split": take.split,
                 "level": take.level,
+                "load": take.load,
                 "up": take.up.tolist(),
                 "clock_offset": float(take.clock_offset),
                 "repairs": take.repairs,
@@ -117,6 +120,7 @@ def read_takes(folder: Path, splits: tuple[str, ...]) -> list[Take]:
                 experiment=row["experiment"],
                 split=row["split"],
                 level=row["level"],
+                load=row.get("load", 0.0),
                 up=np.array(row["up"]),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
                 segments=tuple(row["segments"]),

@@ -19,7 +19,8 @@ from trunkline.trials.tables import long_table, pose_table, read_tables, stack
 class Trial(Recording):
     """One experiment of T frames, S segments and K tendons.
 
-    name, experiment, split, level: as planned, see `Planned`. segments: S names, tendons: K names, as in the model.
+    name, experiment, split, level, load: as planned, see `Planned`. segments: S names, tendons: K names, as in the
+    model.
     gravity: (3,) m/s² in the base frame, measured from the base body.
     time: (T,) s, uniform. A static trial is averaged over time and has T = 1.
     positions: (T, S, 3) m. quaternions: (T, S, 4) wxyz, hemisphere-continuous; None where the log has none.
@@ -46,6 +47,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "experiment": trial.experiment,
             "split": trial.split,
             "level": trial.level,
+            "load": trial.load,
             "gravity": list(map(float, trial.gravity)),
             "start": float(trial.start),
             "in_motion": trial.in_motion,
@@ -63,6 +65,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "experiment": pa.string(),
             "split": pa.string(),
             "level": pa.float64(),
+            "load": pa.float64(),
             "gravity": pa.list_(pa.float64()),
             "start": pa.float64(),
             "in_motion": pa.bool_(),
@@ -109,6 +112,7 @@ def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
                 experiment=row["experiment"],
                 split=row["split"],
                 level=row["level"],
+                load=row.get("load", 0.0),
                 gravity=np.array(row["gravity"]),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
                 segments=tuple(row["segments"]),
