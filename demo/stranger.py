@@ -158,9 +158,38 @@ class Stranger:
         return self.mount.apply(tips)
 
     def answers(self) -> dict:
-        s, unit = self.settings, 1 / self.settings.links_per_unit
-        flexibility = unit / self.links.stiffness.reshape(-1, s.links_per_unit).mean(axis=1)
-        raise NotImplementedError
+        """Stiffness is the relaxed one of a unit's links in series, at the base, with the mean scatter; damping is what
+        acts beside the Maxwell branches. What rubs on the tendons is no force of its own, so it has no counterpart."""
+        s, links = self.settings, self.links
+        properties = unit_properties(self.chain, s.modulus, s.density, s.core_ratio, damping_ratio=1.0)
+        scatter = 1 / (1 / links.stiffness.reshape(-1, s.links_per_unit)).sum(axis=1) / properties.stiffness
+        stiffness = scatter.mean() * properties.stiffness[0]
+        found = {
+            "stiffness": stiffness,
+            "hardening": s.hardening,
+            "damping": stiffness * s.viscous_time,
+            "tendon_friction": None,
+            "friction_time": None,
+            "kp": links.cable_stiffness.mean(),
+            "kv": s.cable_damping,
+            "force_range": s.motors.max_force,
+            "time_constant": s.motors.lag,
+        }
+        return {
+            "parameters": found,
+            "forces": ["stiffness", "damping", "kp", "kv", "force_range"],
+            "mass_factor": s.mass_factor,
+            "stiffness_factors": scatter / scatter.mean(),
+            "branches": [vars(branch) for branch in s.branches],
+            "sliders": [vars(slider) for slider in s.sliders],
+            "capstan_friction": s.friction,
+            "dead_time_s": s.motors.dead_time,
+            "rate_limit_m_s": s.motors.rate_limit,
+            "backlash_m": s.motors.backlash,
+            "zero_m": links.zero,
+            "mount_tilt_deg": np.degrees(self.mount.as_rotvec())[:2],
+            "rest_bend_rad": links.rest.reshape(-1, s.links_per_unit, 2).sum(axis=1),
+        }
 
     def _state(self, wound: np.ndarray) -> State:
         """Straight, nothing bears, the motors at `wound` (K,) m."""
