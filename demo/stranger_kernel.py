@@ -88,7 +88,7 @@ class Work(NamedTuple):
     turning: np.ndarray  # (M, 6), acceleration at q̈ = 0 beyond the parent's
     pushed: np.ndarray  # (M, 6), forces of tendons
     torque: np.ndarray  # (M, 2)
-    added: np.ndarray  # (M, 2), h D + h² K
+    added: np.ndarray  # (M, 3), h D + h² K: xx, xy, yy
     reach: np.ndarray  # (M, 2, 6), U of table 7.1
     inverse: np.ndarray  # (M, 3), of the 2 × 2 joint inertia: xx, xy, yy
     unbalanced: np.ndarray  # (M, 2), u of table 7.1
@@ -104,7 +104,7 @@ def work_for(links, tendons):
     m, u = len(links.lengths), len(links.hole_link)
     return Work(
         np.zeros((m, 3, 3)), np.zeros((m + 1, 3)), np.zeros((m, 2, 6)), np.zeros((m, 6)), np.zeros((m, 6)),
-        np.zeros((m, 6)), np.zeros((m, 2)), np.zeros((m, 2)), np.zeros((m, 2, 6)), np.zeros((m, 3)), np.zeros((m, 2)),
+        np.zeros((m, 6)), np.zeros((m, 2)), np.zeros((m, 3)), np.zeros((m, 2, 6)), np.zeros((m, 3)), np.zeros((m, 2)),
         np.zeros((u + 1, 3)), np.zeros((u + 1, 3)), np.zeros((u, 3)), np.zeros(u), np.zeros(tendons),
     )  # fmt: skip
 
@@ -172,6 +172,7 @@ def bend(links, state, work, h, damping, relaxed):
         square = qx * qx + qy * qy
         tx, ty = -(stiffness + hard * square) * qx, -(stiffness + hard * square) * qy
         kx, ky = stiffness + hard * (square + 2 * qx * qx), stiffness + hard * (square + 2 * qy * qy)
+        kxy, dxy = 2 * hard * qx * qy, 0.0
         d = damping * stiffness * links.viscous_time
         tx, ty = tx - d * vx, ty - d * vy
         dx = dy = d
@@ -196,10 +197,13 @@ def bend(links, state, work, h, damping, relaxed):
             push = k * (whole - links.limit + links.limit_time * closing)
             if push > 0:
                 tx, ty = tx - push * nx, ty - push * ny
-                kx, ky = kx + k * nx * nx, ky + k * ny * ny
-                dx, dy = dx + k * links.limit_time * nx * nx, dy + k * links.limit_time * ny * ny
-        work.torque[i, 0], work.torque[i, 1] = tx - h * kx * vx, ty - h * ky * vy
-        work.added[i, 0], work.added[i, 1] = h * dx + h * h * kx, h * dy + h * h * ky
+                kx, kxy, ky = kx + k * nx * nx, kxy + k * nx * ny, ky + k * ny * ny
+                d = k * links.limit_time
+                dx, dxy, dy = dx + d * nx * nx, dxy + d * nx * ny, dy + d * ny * ny
+        work.torque[i, 0] = tx - h * (kx * vx + kxy * vy)
+        work.torque[i, 1] = ty - h * (kxy * vx + ky * vy)
+        added = work.added[i]
+        added[0], added[1], added[2] = h * dx + h * h * kx, h * dxy + h * h * kxy, h * dy + h * h * ky
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -347,7 +351,7 @@ def accelerate(links, state, work, h, gravity, load):
                 r0 += inertia[a, b] * axis[0, b]
                 r1 += inertia[a, b] * axis[1, b]
             reach[0, a], reach[1, a] = r0, r1
-        d00, d01, d11 = work.added[i, 0], 0.0, work.added[i, 1]
+        d00, d01, d11 = work.added[i, 0], work.added[i, 1], work.added[i, 2]
         u0, u1 = work.torque[i, 0], work.torque[i, 1]
         for a in range(WHOLE):
             d00 += axis[0, a] * reach[0, a]
