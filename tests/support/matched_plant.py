@@ -25,7 +25,20 @@ def small_model(units: int = 6) -> mujoco.MjModel:
 
 
 def segments_of(model: mujoco.MjModel) -> tuple[str, ...]:
-    return tuple(model.body(i).name for i in range(2, model.nbody))
+    return tuple(name for name in (model.body(i).name for i in range(model.nbody)) if name.startswith("unit_"))
+
+
+def with_load(model: mujoco.MjModel, load: float) -> mujoco.MjModel:
+    """A model like `small_model` that was compiled with a point of `load` kg at its tip."""
+    spec = small_spec(model.nq // 2)
+    ball = spec.body(f"unit_{model.nq // 2:02d}").add_body(pos=list(spec.site("tip").pos))
+    ball.explicitinertial, ball.mass, ball.ipos, ball.inertia = True, load, [0, 0, 0], [1e-12] * 3
+    spec.option.timestep = model.opt.timestep
+    loaded = spec.compile()
+    for name in ("jnt_stiffness", "jnt_stiffnesspoly", "dof_damping", "dof_dampingpoly", "dof_frictionloss",
+                 "tendon_frictionloss", "actuator_gainprm", "actuator_biasprm"):  # fmt: skip
+        getattr(loaded, name)[:] = getattr(model, name)
+    return loaded
 
 
 def _trial(model, name, experiment, split, level, gravity, frames, start, pulls, noise, rng, substep=0.0) -> Trial:
@@ -59,35 +72,65 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
 
 def tilt(model, tilt_deg: float, split="identify", noise=0.0, seed=0) -> Trial:
     """At rest under tilted gravity, friction off."""
+    rng = np.random.default_rng(seed)
+    return _at_rest(model, f"tilt_{tilt_deg:.0f}_{split}", "static_tilt", split, tilt_deg, tilt_deg,
+                    np.full((1, 3), -SLACK), noise, rng)
+
+
+def static_pull(model, pulls_mm, tilt_deg=0.0, split="identify", noise=0.0, seed=0) -> Trial:
+    """At rest with each tendon held at its pull, friction off."""
+    pulls, rng = np.array([pulls_mm]) / 1000, np.random.default_rng(seed)
+    name = "_".join(f"{pull:.0f}" for pull in pulls_mm)
+    return _at_rest(model, f"pull_{name}_{tilt_deg:.0f}_{split}", "static_pull", split, None, tilt_deg, pulls,
+                    noise, rng)
+
+
+def _at_rest(model, name, experiment, split, level, tilt_deg, pulls, noise, rng) -> Trial:
+    start, gravity = _rest_pose(model, tilt_deg, pulls), gravity_in_base(np.radians(tilt_deg))
+    return _trial(model, name, experiment, split, level, gravity, 1, start, pulls, noise, rng)
+
+
+def _rest_pose(model, tilt_deg, pulls) -> np.ndarray:
+    """Joint angles at rest under the first of `pulls` (T, K), friction off."""
     settled = model.__copy__()
     settled.tendon_frictionloss[:] = 0
     settled.dof_damping[:] = 0.1 * settled.jnt_stiffness[settled.dof_jntid]
-    pulls = np.full((1, 3), -SLACK)
-    gravity = gravity_in_base(np.radians(tilt_deg))
-    settled.opt.gravity[:] = gravity
+    settled.opt.gravity[:] = gravity_in_base(np.radians(tilt_deg))
     data = mujoco.MjData(settled)
-    data.ctrl[:] = data.act[:] = settled.tendon_length0 + SLACK
+    data.ctrl[:] = data.act[:] = settled.tendon_length0 - pulls[0]
     mujoco.mj_step(settled, data, 4000)
     while np.abs(data.qvel).max() > 1e-6:  # rad/s; the hinges are then some 1e-6 rad from rest
         mujoco.mj_step(settled, data, 1000)
-    rng = np.random.default_rng(seed)
-    return _trial(model, f"tilt_{tilt_deg:.0f}_{split}", "static_tilt", split, tilt_deg, gravity, 1, data.qpos,
-                  pulls, noise, rng)
+    return data.qpos.copy()
 
 
-def release(model, bend: float, split="identify", frames=120, noise=0.0, seed=0, substep=0.0) -> Trial:
+def release(model, bend: float, split="identify", frames=120, noise=0.0, seed=0, substep=0.0, tilt_deg=0.0) -> Trial:
     """Let go from every y hinge at `bend` rad and every x hinge at half of it."""
     start = np.tile([0.5 * bend, bend], model.nq // 2)
     rng = np.random.default_rng(seed)
-    return _trial(model, f"release_{bend:.2f}_{split}", "release", split, None, gravity_in_base(0.0), frames, start,
+    return _trial(model, f"release_{bend:.2f}_{split}", "release", split, None,
+                  gravity_in_base(np.radians(tilt_deg)), frames, start,
                   np.full((frames, 3), -SLACK), noise, rng, substep)
 
 
-def curl(model, level_mm: float, split="identify", frames=150, noise=0.0, seed=0, tendon=0) -> Trial:
+def curl(
+    model, level_mm: float, split="identify", frames=150, noise=0.0, seed=0, tendon=0, tilt_deg=0.0
+) -> Trial:
     """One tendon pulled in and out again."""
     time = np.arange(frames) * FRAME
     pulls = np.full((frames, 3), -SLACK)
     pulls[:, tendon] = level_mm / 1000 * np.interp(time, [0.1, 0.3, 0.7, 0.9], [0, 1, 1, 0])
     rng = np.random.default_rng(seed)
-    return _trial(model, f"curl_{level_mm:.0f}_{tendon}_{split}", "curl", split, level_mm, gravity_in_base(0.0),
-                  frames, np.zeros(model.nq), pulls, noise, rng)
+    start = _rest_pose(model, tilt_deg, pulls[:1]) if tilt_deg else np.zeros(model.nq)
+    return _trial(model, f"curl_{level_mm:.0f}_{tendon}_{split}", "curl", split, level_mm,
+                  gravity_in_base(np.radians(tilt_deg)), frames, start, pulls, noise, rng)
+
+
+def motion(model, reach_mm=25.0, tilt_deg=0.0, split="identify", frames=240, noise=0.0, seed=0) -> Trial:
+    """From rest, each tendon follows sines of its own, up to `reach_mm` in all."""
+    rng, time = np.random.default_rng(seed), np.arange(frames) * FRAME
+    angle = 2 * np.pi * rng.uniform(0.3, 1.5, (3, 3)) * np.clip(time - 0.1, 0, None)[:, None, None]
+    pulls = reach_mm / 3000 * np.sin(angle).sum(axis=2)
+    start, name = _rest_pose(model, tilt_deg, pulls), f"motion_{seed}_{tilt_deg:.0f}_{split}"
+    return _trial(model, name, "motion", split, None, gravity_in_base(np.radians(tilt_deg)), frames, start, pulls,
+                  noise, rng)

@@ -9,12 +9,15 @@ from mujoco.batch import Batch
 
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
+from trunkline.simulation.load import hang, slowing
 from trunkline.simulation.motion import batch_of, move
-from trunkline.simulation.rest import come_to_rest, relax
-from trunkline.trials.experiments import is_static
+from trunkline.simulation.rest import come_to_rest, creep_to_rest, relax
+from trunkline.trials.experiments import EXPERIMENTS, is_static
 
 SETTLE_TIME = 10.0  # s, the most; a shape that does not rest by then counts as diverged
+CREEP_TIME = 30.0  # s more for trials with pulls or a load, which may press on the arm
 REST_SPEED = 2e-5  # rad/s of the fastest hinge: some 1e-5 rad are left then
+CREEP_SPEED = 1e-3  # rad/s, with which a pressed arm may still creep after that: less than any trial at rest shows
 
 
 @dataclass
@@ -79,6 +82,9 @@ class Population:
         for name, values in fields.items():
             batch.expand(name)[:] = np.tile(values, (len(experiments),) + (1,) * (values.ndim - 1))
         batch.expand("opt.gravity")[:] = np.repeat([e.gravity for e in experiments], count, axis=0)
+        loads = np.repeat([e.load for e in experiments], count)
+        if loads.any():
+            hang(batch, self._model, loads, tuple(fields))
         batch.bind("qpos")[:] = np.repeat([e.start for e in experiments], count, axis=0)
         batch.bind("qvel")[:] = np.repeat([e.velocity for e in experiments], count, axis=0)
         if self._model.nu:
@@ -92,18 +98,28 @@ class Population:
         return [self._model.site(f"{name}_center").id for name in self._segments]
 
     def _settle(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
-        """Static shapes: friction off, heavily damped, until each is at rest."""
+        """Static shapes: from the measured pose, friction off, heavily damped, until each is at rest."""
         batch = self._batch("static", experiments, fields, count)
         timestep = relax(batch, self._model, self._step_factor)
-        seen = batch.bind("site_xpos")
+        loads = np.array([e.load for e in experiments])
+        if loads.any():
+            batch.expand("dof_damping")[:] *= np.repeat(slowing(self._model, loads), count)[:, None]
+        seen, speed = batch.bind("site_xpos"), batch.bind("qvel")
         moving, steps = come_to_rest(batch, timestep, SETTLE_TIME, REST_SPEED)
+        pressed = [EXPERIMENTS[e.kind].needs_motors or e.load > 0 for e in experiments]
+        creeping = moving[np.repeat(pressed, count)[moving]]
+        if len(creeping):
+            left, more = creep_to_rest(batch, timestep, creeping, CREEP_TIME, REST_SPEED)
+            steps += more
+            fast = left[~(np.abs(speed[left]).max(axis=1) < CREEP_SPEED)]
+            moving = np.union1d(np.setdiff1d(moving, creeping), fast)
         shapes = seen[:, None, self._sites()]
         shapes[moving] = np.nan
         shapes[batch.warning.any(axis=(1, 2))] = np.nan
         return list(shapes.reshape(len(experiments), count, *shapes.shape[1:])), steps
 
     def _run(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
-        """Releases and curls: from the start to the first frame, then frame by frame."""
+        """Trials in motion: from the start to the first frame, then frame by frame."""
         batch = self._batch("dynamic", experiments, fields, count)
         frame_step, sites = experiments[0].frame_step, self._sites()
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))

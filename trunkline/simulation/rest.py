@@ -19,6 +19,8 @@ LONGEST_STEP = 0.005  # s
 RELAXATION = 0.3  # s, damping over stiffness of each joint: about critical for the slowest swing of an arm
 CHUNK = 0.1  # s between looks at which simulations rest
 FINE_SPEED = 5e-9  # rad/s of the fastest joint, where MuJoCo is the reference: tips are some 1e-9 m from rest
+SPAN = 0.5  # s between the places from which the end of a slow motion is extrapolated
+STRIDE = 0.95  # of a motion that shrinks by this share in SPAN or more slowly: no longer leaps than this gives
 RAMP, RAMP_STEPS = 1.0, 50  # s in which tendons are drawn in, and in how many steps
 
 
@@ -112,6 +114,35 @@ def come_to_rest(batch: Batch, timestep: float, seconds: float, rest_speed: floa
             break
         batch.step(ids=moving, nstep=chunk, stage=mujoco.mjtStage.mjSTAGE_POS)
         steps += chunk * len(moving)
+        moving = moving[~(np.abs(speed[moving]).max(axis=1) < rest_speed)]
+    return moving, steps
+
+
+def creep_to_rest(
+    batch: Batch, timestep: float, moving: np.ndarray, seconds: float, rest_speed: float
+) -> tuple[np.ndarray, int]:
+    """Bring to rest what `come_to_rest` left `moving`, up to `seconds` later; arguments and returns as there.
+
+    Pulls and loads that press on an arm take most of its stiffness against some bend, and in that it creeps long after
+    all else rests. What is left of such a motion d shrinks by a factor λ in each SPAN, and its end is d λ / (1 - λ)
+    ahead (Aitken). Simulations go there, and creep on from there.
+    """
+    steps, span, moving = 0, round(SPAN / timestep), np.array(moving, dtype=np.int32)
+    place, speed = batch.bind("qpos"), batch.bind("qvel")
+    for _ in range(round(seconds / (3 * SPAN))):
+        if not len(moving):
+            break
+        places = [place[moving].copy()]
+        for _ in range(2):
+            batch.step(ids=moving, nstep=span)
+            places.append(place[moving].copy())
+        before, last = places[1] - places[0], places[2] - places[1]
+        shrinks = np.sum(before * last, axis=1) / np.maximum(np.sum(before * before, axis=1), 1e-300)
+        shrinks = np.clip(shrinks, 0.0, STRIDE)[:, None]
+        place[moving] = places[2] + last * shrinks / (1 - shrinks)
+        speed[moving] = 0.0
+        batch.step(ids=moving, nstep=span, stage=mujoco.mjtStage.mjSTAGE_POS)
+        steps += 3 * span * len(moving)
         moving = moving[~(np.abs(speed[moving]).max(axis=1) < rest_speed)]
     return moving, steps
 

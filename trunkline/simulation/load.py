@@ -1,0 +1,66 @@
+"""A load at the tip of some simulations of a batch, of a model that need not have a body for it."""
+
+import mujoco
+import numpy as np
+from mujoco.batch import Batch
+from scipy.linalg import eigvalsh
+from scipy.spatial.transform import Rotation
+
+from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+
+INERTIAL = ("body_mass", "body_ipos", "body_iquat", "body_inertia")
+
+
+def hang(batch: Batch, model: mujoco.MjModel, loads: np.ndarray, given: tuple[str, ...] = ()) -> None:
+    """Hang a point mass at the site `tip` of each simulation, on top of what the model carries there.
+
+    The body that holds the site becomes the rigid composite of itself and the mass. What MuJoCo derives from masses
+    when it compiles follows: stepping reads `dof_invweight0` and `tendon_invweight0`, by which friction and joint
+    limits are softened, and `body_subtreemass`, for the point about which it sums inertia.
+
+    Args:
+        model: the one of the batch. loads: kg, one a simulation. Shape (B,).
+        given: which of `INERTIAL` each simulation has values of its own for; the others are set to the model's first.
+    """
+    for name in INERTIAL:
+        if name not in given:
+            batch.expand(name)[:] = getattr(model, name)
+    site = model.site("tip").id
+    body, chosen = model.site_bodyid[site], np.flatnonzero(loads)
+    masses, centres, turns, inertias = (batch.expand(name)[chosen, body] for name in INERTIAL)
+    together = masses + loads[chosen]
+    arm = model.site_pos[site] - centres
+    axes = rotation_from_wxyz(turns).as_matrix()
+    reduced = masses * loads[chosen] / together  # kg; about the common centre, two masses turn as this one at `arm`
+    parallel = np.sum(arm**2, axis=1)[:, None, None] * np.eye(3) - arm[:, :, None] * arm[:, None, :]
+    tensor = np.einsum("nij,nj,nkj->nik", axes, inertias, axes) + reduced[:, None, None] * parallel
+    principal, axes = np.linalg.eigh(tensor)
+    axes[:, :, 0] *= np.linalg.det(axes)[:, None]
+    composite = (
+        together,
+        centres + (loads[chosen] / together)[:, None] * arm,
+        wxyz_from_rotation(Rotation.from_matrix(axes)),
+        principal,
+    )
+    for name, values in zip(INERTIAL, composite, strict=True):
+        batch.expand(name)[chosen, body] = values
+    # else MuJoCo takes the centre and the axes of mass for where they were compiled to be
+    batch.expand("body_sameframe")[chosen, body] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+    batch.set_const()
+
+
+def slowing(model: mujoco.MjModel, loads: np.ndarray) -> np.ndarray:
+    """By how many times each load (B,), kg at the site `tip`, slows the straight model's slowest swing. Shape (B,).
+
+    What is critical damping without the load is by so much too little with it. Hinges without a spring are left out.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    mass, jacobian = np.empty((model.nv, model.nv)), np.empty((3, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    mujoco.mj_jacSite(model, data, jacobian, None, model.site("tip").id)
+    springs = np.flatnonzero(model.jnt_stiffness[model.dof_jntid])
+    stiffness = np.diag(model.jnt_stiffness[model.dof_jntid[springs]])
+    mass, added = mass[np.ix_(springs, springs)], (jacobian.T @ jacobian)[np.ix_(springs, springs)]
+    periods = {load: eigvalsh(mass + load * added, stiffness)[-1] ** 0.5 for load in {0.0, *loads.tolist()}}
+    return np.array([periods[load] / periods[0.0] for load in loads.tolist()])
