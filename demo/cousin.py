@@ -21,6 +21,7 @@ from trunkline.arm.mjcf import Solref, unit_name
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.progress import progress
 from trunkline.simulation.drive import drive
+from trunkline.simulation.load import hang
 from trunkline.simulation.motion import batch_of, move
 
 CALM = 8.0  # times the arm's damping: it comes to rest sooner, and in the same place
@@ -134,9 +135,8 @@ class Cousin:
         batch.expand("opt.gravity")[:] = bench.gravity
         damping = batch.expand("dof_damping")
         damping *= bench.steady_factor
-        tip = self.model.site("tip").bodyid[0]
         if bench.loads.any():
-            raise NotImplementedError
+            hang(batch, self.model, bench.loads)
         stride = bench.stride
         instants = controls.shape[1] // stride
         parts = [batch.bind("qpos")[:, None].copy()]
