@@ -1,21 +1,17 @@
 """Record the demo session: simulate the experiments, look at them through the lab's instruments, write the logs,
 and beside them the truth."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
-from demo.answers import parameters, start_in_log
-from demo.experiments import PLANS, Experiments
+from demo.answers import start_in_log
+from demo.bench import Plant
+from demo.experiments import PLANS, Experiments, loaded_trials
 from demo.instruments import InstrumentSettings, measure
-from demo.laboratory import SAMPLE_RATE, Motors, record
-from demo.plant import PlantSettings, build_plant
+from demo.laboratory import record
+from demo.plants import Arm, PlantSettings, build_plant
 from demo.recorder import write_log, write_session
-from trunkline.arm.mjcf import unit_name
-from trunkline.arm.spiral import spiral_chain
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.settings import Seed, settings
@@ -26,22 +22,11 @@ SESSION = Path("data/raw/demo")
 ANSWERS = SESSION.with_name("demo.truth.json")  # beside the session, not in it: no stage depends on it
 
 
-@dataclass
-class Arm:
-    length: Annotated[float, Field(ge=0.01, le=10)]
-    base_width: Annotated[float, Field(gt=0, le=2)]
-    tip_width: Annotated[float, Field(gt=0, le=2)]
-    units: Annotated[int, Field(ge=1, le=500)]
-    tendons: Annotated[int, Field(ge=3, le=12)]  # fewer cannot bend the arm to every side
-    tracked: Annotated[list[Annotated[int, Field(ge=1, le=500)]], Field(min_length=1)]
-
-
 @settings
 class Config:
     seed: Seed
     arm: Arm
     plant: PlantSettings
-    motors: Motors
     experiments: Experiments
     instruments: InstrumentSettings
 
@@ -53,14 +38,17 @@ class Config:
         for group in [*tests.curl_tendons, *tests.test.curl_tendons]:
             known = max(group) <= arm.tendons and _distinct(group)
             _expect(known, "experiments.curl_tendons", group, f"distinct tendons from 1 to {arm.tendons}")
-        steps = 1 / (SAMPLE_RATE * self.plant.timestep)
-        whole = round(steps) >= 1 and abs(steps - round(steps)) < 1e-6
-        _expect(whole, "plant.timestep", self.plant.timestep, f"{1 / SAMPLE_RATE:g} s or a whole fraction of it")
+        for key, pulls in (("experiments.pulls", tests.pulls), ("experiments.test.pulls", tests.test.pulls)):
+            for pull in pulls:
+                _expect(len(pull.levels) == arm.tendons, key, pull.levels, f"a level for each of {arm.tendons} tendons")
         shortest, longest = self.instruments.occlusion_ms
         _expect(shortest <= longest, "instruments.occlusion_ms", [shortest, longest], "the shortest first")
         _expect(any(self.instruments.up), "instruments.up", list(self.instruments.up), "a direction")
         for key, plan in PLANS.values():
-            _check_trials(f"experiments.{key}", plan(tests), plan(tests.tested()), tests)
+            if trials := plan(tests):
+                _check_trials(f"experiments.{key}", trials, plan(tests.tested()), tests)
+        loaded = [trial.name for trial in [*loaded_trials(tests), *loaded_trials(tests.tested())]]
+        _expect(_distinct(loaded), "experiments.loads", _repeated(loaded), "a log of its own for each trial")
 
 
 def _check_trials(key: str, trials: list[Planned], tested: list[Planned], experiments: Experiments) -> None:
@@ -85,13 +73,16 @@ def _repeated(values: list) -> str:
     return next((f"{value!r} twice" for value in values if values.count(value) > 1), "no repetition")
 
 
+def plant_of(config: Config) -> Plant:
+    """The arm on the bench: the same one for whoever asks."""
+    return build_plant(config.arm, config.plant, np.random.default_rng(config.seed).spawn(1)[0])
+
+
 def main(config: Config) -> None:
-    arm = config.arm
-    plant_rng, lab_rng, instrument_rng, test_rng = np.random.default_rng(config.seed).spawn(4)
-    chain = spiral_chain(arm.length, arm.base_width, arm.tip_width, arm.units)
-    plant = build_plant(chain, config.plant, arm.tendons, plant_rng)
-    tracked = [unit_name(number - 1) for number in arm.tracked]
-    truths = record(plant, config.motors, config.experiments, arm.tendons, tracked, lab_rng, test_rng)
+    _, lab_rng, instrument_rng, test_rng = np.random.default_rng(config.seed).spawn(4)
+    plant = plant_of(config)
+    tracked = [number - 1 for number in config.arm.tracked]
+    truths = record(plant, config.experiments, tracked, lab_rng, test_rng)
     measurements, starts, start = [], {}, 0.0
     with output_folder(SESSION) as folder, progress(len(truths), "record", "logs") as bar:
         for truth, rng in zip(truths, instrument_rng.spawn(len(truths)), strict=True):
@@ -102,10 +93,7 @@ def main(config: Config) -> None:
             write_log(folder / f"{truth.name}.mcap", measurements[-1])
             bar.update(1, log=truth.name)
         write_session(folder, measurements, config.instruments)
-    answers = parameters(chain, config.plant, plant) | {
-        "clock_offset_s": config.instruments.clock_offset_s,
-        "starts_s": starts,
-    }
+    answers = plant.answers() | {"clock_offset_s": config.instruments.clock_offset_s, "starts_s": starts}
     write_json(ANSWERS, answers)
 
 

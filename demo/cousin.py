@@ -1,26 +1,48 @@
-"""The stand-in arm: what the lab has on its bench. It is not the model that gets identified.
+"""The cousin: an arm that shares the model's structure, and is not the model. Tests of recovery go on with it.
 
 Every unit of the spiral hangs on a short elastic link with a joint at each end (twice the joints), the joints
 harden, scatter and have dry friction, the masses are off, and the cables are stiff springs wound by motors.
 """
 
+import copy
 from dataclasses import dataclass
-from typing import Annotated
+from itertools import pairwise
+from typing import Annotated, Literal
 
 import mujoco
 import numpy as np
 from pydantic import Field
 
+from demo.bench import COMMAND_RATE, SAMPLE_RATE, Bench, Seen
+
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import unit_properties
 from trunkline.arm.mjcf import Solref, unit_name
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.progress import progress
+from trunkline.simulation.drive import drive
+from trunkline.simulation.load import hang
+from trunkline.simulation.motion import batch_of, move
+
+CALM = 8.0  # times the arm's damping: it comes to rest sooner, and in the same place
+LONGEST_REST = 8.0  # s
 
 Share = Annotated[float, Field(gt=0, lt=1)]
 
 
 @dataclass
-class PlantSettings:
+class Motors:
+    """What winds the cables: it follows commands late and no faster than it can.
+
+    rate_limit: m/s of cable. command_delay: s.
+    """
+
+    rate_limit: Annotated[float, Field(gt=0, le=100)]
+    command_delay: Annotated[float, Field(ge=0, le=10)]
+
+
+@dataclass
+class CousinSettings:
     """The truth about the arm on the bench.
 
     modulus: Pa. density: kg/m³. core_ratio: core diameter over width.
@@ -30,9 +52,10 @@ class PlantSettings:
     tendon_friction: N. cable_stiffness: N/m. cable_damping: N s/m. max_force: N.
     hole_ratio: distance of the cables from the axis over the unit's radius.
     link_ratio: length of the elastic link over that of its unit. link_mass_ratio: likewise for the mass.
-    armature: kg m². timestep: s. limit_solref: s and ratio, of the units closing on each other.
+    armature: kg m². limit_solref: s and ratio, of the units closing on each other.
     """
 
+    kind: Literal["cousin"]
     modulus: Annotated[float, Field(ge=1e3, le=1e12)]
     density: Annotated[float, Field(ge=1, le=30000)]
     core_ratio: Share
@@ -49,14 +72,99 @@ class PlantSettings:
     link_ratio: Share
     link_mass_ratio: Share
     armature: Annotated[float, Field(ge=0, le=1)]
-    timestep: Annotated[float, Field(ge=1e-5, le=0.01)]
     limit_solref: Solref
+    motors: Motors
 
 
-def build_plant(
-    chain: ChainGeometry, settings: PlantSettings, tendons: int, rng: np.random.Generator
+class Cousin:
+    """The plant, hanging straight down. Draws the stiffness scatter from `rng`."""
+
+    def __init__(self, chain: ChainGeometry, settings: CousinSettings, tendons: int, rng: np.random.Generator) -> None:
+        self.chain, self.settings, self.tendons = chain, settings, tendons
+        self.model = build_model(chain, settings, tendons, rng)
+
+    def run(self, label: str, bench: Bench, tracked: list[int]) -> Seen:
+        wound = wind(bench.commands, self.settings.motors)
+        controls = np.concatenate([self.model.tendon_length0 - wound, bench.pulls], axis=2)
+        angles = self._simulate(label, bench, controls)[:, bench.skipped :]
+        sites = [self.model.site(f"{unit_name(index)}_center").id for index in tracked]
+        positions = np.empty((*angles.shape[:2], len(sites), 3))
+        rotations = np.empty((*positions.shape, 3))
+        data = mujoco.MjData(self.model)
+        for trial, path in enumerate(angles):
+            for frame, qpos in enumerate(path):
+                data.qpos[:] = qpos
+                mujoco.mj_kinematics(self.model, data)
+                positions[trial, frame] = data.site_xpos[sites]
+                rotations[trial, frame] = data.site_xmat[sites].reshape(-1, 3, 3)
+        return Seen(positions, rotations, wound[:, :: bench.stride][:, bench.skipped :][:, : angles.shape[1]])
+
+    def reach(self, commands: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+        model = copy.copy(self.model)
+        model.dof_damping[:] *= CALM
+        no_hand = np.zeros_like(commands)
+        return drive(model, np.concatenate([commands, no_hand], axis=1), gravity, LONGEST_REST).end
+
+    def answers(self) -> dict:
+        """Stiffness and damping are those of a unit's two joints in series, at the base; stiffness with the mean scatter."""
+        s, model = self.settings, self.model
+        properties = unit_properties(self.chain, s.modulus, s.density, s.core_ratio, s.damping_ratio)
+        hinges = model.nv // self.chain.units  # two joints of two hinges a unit, each joint twice as stiff as the unit
+        scatter = model.jnt_stiffness[::hinges] / 2 / properties.stiffness
+        found = {
+            "stiffness": scatter.mean() * properties.stiffness[0],
+            "hardening": s.hardening,
+            "damping": model.dof_damping[0] / 2,
+            "tendon_friction": model.tendon_frictionloss[0] if model.ntendon else None,
+            "friction_time": model.tendon_solref_fri[0, 0] if model.ntendon else None,
+            "kp": s.cable_stiffness,
+            "kv": s.cable_damping,
+            "force_range": s.max_force,
+            "time_constant": None,
+        }
+        return {
+            "parameters": found,
+            "forces": ["stiffness", "damping", "tendon_friction", "kp", "kv", "force_range"],
+            "mass_factor": s.mass_factor,
+            "stiffness_factors": scatter / scatter.mean(),
+        }
+
+    def _simulate(self, label: str, bench: Bench, controls: np.ndarray) -> np.ndarray:
+        """Joint angles (n, T, nq) at SAMPLE_RATE of n trials that start straight and at rest."""
+        batch = batch_of(self.model, len(controls))
+        batch.expand("opt.gravity")[:] = bench.gravity
+        damping = batch.expand("dof_damping")
+        damping *= bench.steady_factor
+        if bench.loads.any():
+            hang(batch, self.model, bench.loads)
+        stride = bench.stride
+        instants = controls.shape[1] // stride
+        parts = [batch.bind("qpos")[:, None].copy()]
+        with progress(instants, f"record {label}", "instants") as bar:
+            for start, end in pairwise((0, round(bench.steady * SAMPLE_RATE), instants)):
+                if start or not bench.steady:
+                    damping[:] = self.model.dof_damping
+                rows = controls[:, start * stride : end * stride]
+                if len(rows[0]):
+                    parts.append(move(batch, rows, ("qpos",), stride, at=stride - 1, moved=bar.update)["qpos"])
+        return np.concatenate(parts, axis=1)[:, :instants]
+
+
+def wind(commands: np.ndarray, motors: Motors) -> np.ndarray:
+    """Cable wound by motors that follow `commands` (n, T, K) at COMMAND_RATE late and at a limited rate, in m."""
+    delay, furthest = round(motors.command_delay * COMMAND_RATE), motors.rate_limit / COMMAND_RATE
+    wound = np.empty_like(commands)
+    position = commands[:, 0]
+    for row in range(commands.shape[1]):
+        position = position + np.clip(commands[:, max(row - delay, 0)] - position, -furthest, furthest)
+        wound[:, row] = position
+    return wound
+
+
+def build_model(
+    chain: ChainGeometry, settings: CousinSettings, tendons: int, rng: np.random.Generator
 ) -> mujoco.MjModel:
-    """The plant, hanging straight down; gravity is set per trial. Draws the stiffness scatter from `rng`.
+    """The cousin, hanging straight down; gravity is set per trial. Draws the stiffness scatter from `rng`.
 
     Actuators: first a cable spring for each tendon (ctrl: wound length, m), then a pull for each (ctrl: N), by
     which a hand bends the arm before it lets go.
@@ -65,7 +173,7 @@ def build_plant(
     scatter = 1 + settings.stiffness_scatter * rng.uniform(-1, 1, chain.units)
     spec = mujoco.MjSpec()
     spec.compiler.degree = spec.compiler.autolimits = False
-    spec.option.timestep = settings.timestep
+    spec.option.timestep = 1 / COMMAND_RATE
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     spec.option.gravity = [0, 0, -STANDARD_GRAVITY]
     cables = [_add_cable(spec, index, settings) for index in range(tendons)]
@@ -116,7 +224,7 @@ def _set_inertia(body, mass: float, inertia: np.ndarray, center: float) -> None:
     body.explicitinertial, body.mass, body.inertia, body.ipos = True, mass, inertia, [0, 0, center]
 
 
-def _add_cable(spec: mujoco.MjSpec, index: int, settings: PlantSettings):
+def _add_cable(spec: mujoco.MjSpec, index: int, settings: CousinSettings):
     cable = spec.add_tendon(name=f"tendon_{index + 1}", frictionloss=settings.tendon_friction)
     spring = spec.add_actuator(name=f"{cable.name}_spring", target=cable.name, trntype=mujoco.mjtTrn.mjTRN_TENDON)
     spring.set_to_position(kp=settings.cable_stiffness, kv=settings.cable_damping)

@@ -1,0 +1,77 @@
+"""What a plant on the bench does: commands and pulls of a hand go in, what cameras and motors could see comes out."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+COMMAND_RATE = 2000.0  # Hz, of commands as sent and of a hand's pull
+SAMPLE_RATE = 500.0  # Hz, of what is seen
+LOOSE = 0.3  # m of cable paid out, far more than any bend takes up
+
+
+@dataclass
+class Bench:
+    """n trials of one length, all at once, each from rest under an upright mount.
+
+    gravity: in the frame of the base marker, m/s². Shape (n, 3).
+    commands: m of pull, as sent at COMMAND_RATE. Shape (n, T, K).
+    pulls: of a hand at each cable, N. Shape (n, T, K).
+    loads: at the tip, kg. Shape (n,).
+    steady, steady_factor: a hand steadies the arm for so many s, all damping is so many times as large.
+    since: s, from when on the trials are seen.
+    """
+
+    gravity: np.ndarray
+    commands: np.ndarray
+    pulls: np.ndarray
+    loads: np.ndarray
+    steady: float = 0.0
+    steady_factor: float = 1.0
+    since: float = 0.0
+
+    @property
+    def stride(self) -> int:
+        """Commands a sample."""
+        return round(COMMAND_RATE / SAMPLE_RATE)
+
+    @property
+    def skipped(self) -> int:
+        """Samples before `since`."""
+        return round(self.since * SAMPLE_RATE)
+
+
+@dataclass
+class Seen:
+    """F samples at SAMPLE_RATE, from `since` on; the base marker's frame.
+
+    positions (n, F, S, 3): m, of the tracked units' centres. rotations (n, F, S, 3, 3): of their axes.
+    wound (n, F, K): m of pull, by the motors' encoders.
+    """
+
+    positions: np.ndarray
+    rotations: np.ndarray
+    wound: np.ndarray
+
+
+class Plant(Protocol):
+    """An arm with its motors and cables."""
+
+    tendons: int
+
+    def run(self, label: str, bench: Bench, tracked: list[int]) -> Seen:
+        """Do the trials and look at the units of these indices. `label` says what is done, for a bar of progress."""
+        ...
+
+    def reach(self, commands: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+        """Where the tip comes to rest, from straight, with its friction, in the base frame, m. Shape (N, 3).
+
+        Args:
+            commands: of the motors, m, sent at once. Shape (N, K).
+            gravity: m/s². Shape (N, 3).
+        """
+        ...
+
+    def answers(self) -> dict:
+        """What is true of it, see `demo.answers`."""
+        ...

@@ -1,0 +1,264 @@
+"""The stranger: an arm of the same drawing that nobody designed the model for.
+
+It has three links where the drawing has a unit, springs that harden, relax and keep a memory, tendons that rub on
+their holes, a rest shape and a mount that are a little off, and motors of their own. Its forces are computed in
+`stranger_kernel`, without MuJoCo.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+from scipy.spatial.transform import Rotation
+
+from demo.bench import COMMAND_RATE, LOOSE, Bench, Seen
+from demo.stranger_kernel import Links, State, come_to_rest, path_lengths, simulate, tip
+from trunkline.arm.geometry import ChainGeometry
+from trunkline.arm.material import unit_properties
+from trunkline.frames import STANDARD_GRAVITY
+from trunkline.progress import progress
+from trunkline.threads import thread_count
+
+UPRIGHT = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+CALM = 40.0  # times the joints' own damping, about what brings the arm to rest soonest
+STILL = 2e-6  # rad/s: with all joints turning alike the tip then moves by 0.05 mm/s
+LONGEST_REST = 12.0  # s
+
+Share = Annotated[float, Field(gt=0, lt=1)]
+Ratio = Annotated[float, Field(gt=0, le=100)]
+Duration = Annotated[float, Field(gt=0, le=1000)]
+Bend = Annotated[float, Field(gt=0, le=10)]
+
+
+@dataclass
+class Branch:
+    """A Maxwell branch beside every joint's spring. ratio: modulus over the relaxed one. time: constant, s."""
+
+    ratio: Ratio
+    time: Duration
+
+
+@dataclass
+class Slider:
+    """A Jenkins element beside every joint's spring. ratio: stiffness over the joint's relaxed one. bend: of a unit at
+    which it slides, rad."""
+
+    ratio: Ratio
+    bend: Bend
+
+
+@dataclass
+class StrangerMotors:
+    """dead_time: s. rate_limit: m/s of cable. lag: s, of first order. max_force: N. backlash: m, of a winch.
+    zero_scatter: m, standard deviation of what a winch reads where its cable is just straight."""
+
+    dead_time: Annotated[float, Field(ge=0, le=10)]
+    rate_limit: Annotated[float, Field(gt=0, le=100)]
+    lag: Duration
+    max_force: Annotated[float, Field(gt=0, le=1e5)]
+    backlash: Annotated[float, Field(ge=0, le=1)]
+    zero_scatter: Annotated[float, Field(ge=0, le=1)]
+
+
+@dataclass
+class StrangerSettings:
+    """The truth about the arm on the bench. Sources stand in the file.
+
+    links_per_unit: of the drawing. modulus: Pa, relaxed. density: kg/m³. core_ratio: core diameter over width.
+    stiffness_scatter, mass_scatter: relative, uniform, per link. mass_factor: of every link's mass.
+    hardening: growth of the stiffness per rad² of bend of a unit. viscous_time: s, of the joints' damping, D / K.
+    rest_bend: rad, bend of the whole arm about x and y where nothing pulls, evenly; rest_growth: more of it towards
+    the tip, less at the base, rad likewise. rest_scatter: rad, standard deviation of a unit's.
+    mount_tilt_deg: of the arm against the base marker, to a side that is drawn.
+    limit_ratio: stiffness of two links that touch over that of their joint. limit_time: s, its damping over it.
+    hole_ratio: distance of the cables from the axis over the unit's radius. friction: μ in a hole. slip_length: m of
+    travel within which it builds up. cable_stiffness: N/m, between winch and mount; cable_scatter: relative, uniform.
+    cable_damping: N s/m. substeps: of 1 / COMMAND_RATE s.
+    """
+
+    kind: Literal["stranger"]
+    links_per_unit: Annotated[int, Field(ge=1, le=9)]
+    modulus: Annotated[float, Field(ge=1e3, le=1e12)]
+    density: Annotated[float, Field(ge=1, le=30000)]
+    core_ratio: Share
+    mass_factor: Annotated[float, Field(gt=0, le=100)]
+    mass_scatter: Annotated[float, Field(ge=0, lt=1)]
+    stiffness_scatter: Annotated[float, Field(ge=0, lt=1)]
+    hardening: Annotated[float, Field(ge=0, le=1e6)]
+    viscous_time: Duration
+    branches: Annotated[list[Branch], Field(max_length=9)]
+    sliders: Annotated[list[Slider], Field(max_length=9)]
+    rest_bend: tuple[Annotated[float, Field(ge=-3, le=3)], Annotated[float, Field(ge=-3, le=3)]]
+    rest_growth: tuple[Annotated[float, Field(ge=-3, le=3)], Annotated[float, Field(ge=-3, le=3)]]
+    rest_scatter: Annotated[float, Field(ge=0, le=1)]
+    mount_tilt_deg: Annotated[float, Field(ge=0, le=90)]
+    limit_ratio: Annotated[float, Field(gt=0, le=1e6)]
+    limit_time: Duration
+    hole_ratio: Annotated[float, Field(gt=0, le=1)]
+    friction: Annotated[float, Field(ge=0, le=10)]
+    slip_length: Annotated[float, Field(gt=0, le=1)]
+    cable_stiffness: Annotated[float, Field(gt=0, le=1e7)]
+    cable_scatter: Annotated[float, Field(ge=0, lt=1)]
+    cable_damping: Annotated[float, Field(ge=0, le=1e6)]
+    motors: StrangerMotors
+    substeps: Annotated[int, Field(ge=1, le=100)]
+
+
+class Stranger:
+    """The plant; `rng` draws its scatter, and to which side its mount leans."""
+
+    def __init__(
+        self, chain: ChainGeometry, settings: StrangerSettings, tendons: int, rng: np.random.Generator
+    ) -> None:
+        self.settings, self.tendons, self.chain = settings, tendons, chain
+        side = rng.uniform(0, 2 * np.pi)
+        lean = np.radians(settings.mount_tilt_deg) * np.array([np.cos(side), np.sin(side), 0])
+        self.mount = Rotation.from_rotvec(lean)  # base marker ← arm
+        self.links = make_links(chain, settings, tendons, rng)
+        self.straight = path_lengths(self.links, self._state(np.zeros(tendons)))
+
+    def run(self, label: str, bench: Bench, tracked: list[int]) -> Seen:
+        count, rows, _ = bench.commands.shape
+        samples = rows // bench.stride - bench.skipped
+        positions = np.empty((count, samples, len(tracked), 3))
+        rotations, wound = np.empty((*positions.shape, 3)), np.empty((count, samples, self.tendons))
+        watched, heights = _centres(self.chain, self.links.lengths)
+        upright, gravity = self.mount.inv().apply(UPRIGHT), self.mount.inv().apply(bench.gravity)
+        starts: dict[tuple, State] = {}  # of trials that begin alike
+        for load, sent in zip(bench.loads, bench.commands[:, 0], strict=True):
+            if (load, *sent) not in starts:
+                starts[load, *sent] = self._rest(upright, load, sent)
+
+        def one(index: int) -> None:
+            load, sent = bench.loads[index], bench.commands[index]
+            state = State(*(part.copy() for part in starts[load, *sent[0]]))
+            simulate(
+                self.links, state, gravity[index], load, sent, bench.pulls[index], self.straight, COMMAND_RATE,
+                self.settings.substeps, round(bench.steady * COMMAND_RATE), bench.steady_factor, bench.stride,
+                bench.skipped, watched[tracked], heights[tracked], positions[index], rotations[index], wound[index],
+            )  # fmt: skip
+
+        self._all(f"record {label}", one, count, "trials")
+        assert np.isfinite(positions).all(), "the stranger's engine diverged: its steps are too long"
+        turn = self.mount.as_matrix()
+        return Seen(positions @ turn.T, turn @ rotations, wound)
+
+    def reach(self, commands: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+        tips, pull = np.empty((len(commands), 3)), self.mount.inv().apply(gravity)
+        start = self._rest(self.mount.inv().apply(UPRIGHT), 0.0, np.full(self.tendons, -LOOSE))
+        start.motors[:] = start.winches[:] = 0.0
+
+        def one(index: int) -> None:
+            tips[index] = tip(self.links, self._rest(pull[index], 0.0, commands[index], start))
+
+        self._all("drive the stranger", one, len(commands), "drives")
+        return self.mount.apply(tips)
+
+    def answers(self) -> dict:
+        """Stiffness is the relaxed one of a unit's links in series, at the base, with the mean scatter; damping is what
+        acts beside the Maxwell branches. What rubs on the tendons is no force of its own, so it has no counterpart."""
+        s, links = self.settings, self.links
+        properties = unit_properties(self.chain, s.modulus, s.density, s.core_ratio, damping_ratio=1.0)
+        scatter = 1 / (1 / links.stiffness.reshape(-1, s.links_per_unit)).sum(axis=1) / properties.stiffness
+        stiffness = scatter.mean() * properties.stiffness[0]
+        found = {
+            "stiffness": stiffness,
+            "hardening": s.hardening,
+            "damping": stiffness * s.viscous_time,
+            "tendon_friction": None,
+            "friction_time": None,
+            "kp": links.cable_stiffness.mean(),
+            "kv": s.cable_damping,
+            "force_range": s.motors.max_force,
+            "time_constant": s.motors.lag,
+        }
+        return {
+            "parameters": found,
+            "forces": ["stiffness", "damping", "kp", "kv", "force_range"],
+            "mass_factor": s.mass_factor,
+            "stiffness_factors": scatter / scatter.mean(),
+            "branches": [vars(branch) for branch in s.branches],
+            "sliders": [vars(slider) for slider in s.sliders],
+            "capstan_friction": s.friction,
+            "dead_time_s": s.motors.dead_time,
+            "rate_limit_m_s": s.motors.rate_limit,
+            "backlash_m": s.motors.backlash,
+            "zero_m": links.zero,
+            "mount_tilt_deg": np.degrees(self.mount.as_rotvec())[:2],
+            "rest_bend_rad": links.rest.reshape(-1, s.links_per_unit, 2).sum(axis=1),
+        }
+
+    def _state(self, wound: np.ndarray) -> State:
+        """Straight, nothing bears, the motors at `wound` (K,) m."""
+        links, units = len(self.links.lengths), len(self.links.hole_link)
+        s = self.settings
+        return State(
+            q=np.zeros((links, 2)), v=np.zeros((links, 2)), branches=np.zeros((len(s.branches), links, 2)),
+            sliders=np.zeros((len(s.sliders), links, 2)), slips=np.zeros((self.tendons, units + 1)),
+            motors=np.array(wound, float), winches=np.array(wound, float),
+        )  # fmt: skip
+
+    def _rest(self, gravity: np.ndarray, load: float, sent: np.ndarray, start: State | None = None) -> State:
+        """The arm long after it was left alone with the motors at `sent` (K,) m, from `start` or from straight."""
+        state = self._state(sent) if start is None else State(*(part.copy() for part in start))
+        step = 1 / (COMMAND_RATE * self.settings.substeps)
+        steps = round(LONGEST_REST / step)
+        come_to_rest(self.links, state, gravity, load, sent, self.straight, step, steps, CALM, STILL)
+        state.v[:] = 0.0
+        return state
+
+    def _all(self, label: str, one: Callable[[int], None], count: int, unit: str) -> None:
+        with ThreadPoolExecutor(thread_count()) as pool, progress(count, label, unit) as bar:
+            for done in as_completed([pool.submit(one, index) for index in range(count)]):
+                done.result()
+                bar.update(1)
+
+
+def make_links(chain: ChainGeometry, settings: StrangerSettings, tendons: int, rng: np.random.Generator) -> Links:
+    """The stranger's links: the drawing's spiral cut `links_per_unit` times as fine, with the scatter of `rng`."""
+    s, per = settings, settings.links_per_unit
+    fine = finer(chain, per)
+    properties = unit_properties(fine, s.modulus, s.density, s.core_ratio, damping_ratio=1.0)
+    count, place = fine.units, (np.arange(fine.units) + 0.5) / fine.units
+    masses = s.mass_factor * (1 + s.mass_scatter * rng.uniform(-1, 1, count))
+    stiffness = properties.stiffness * (1 + s.stiffness_scatter * rng.uniform(-1, 1, count))
+    rest = np.outer(np.ones(count), s.rest_bend) + np.outer(2 * place - 1, s.rest_growth)
+    rest = rest / count + s.rest_scatter / np.sqrt(per) * rng.normal(size=(count, 2))
+    cables = s.cable_stiffness * (1 + s.cable_scatter * rng.uniform(-1, 1, tendons))
+    zero = s.motors.zero_scatter * rng.normal(size=tendons)
+    hole_link, hole_height = _centres(chain, fine.lengths)
+    return Links(
+        lengths=fine.lengths, masses=masses * properties.masses, transverse=masses * properties.transverse_inertia,
+        axial=masses * properties.axial_inertia, stiffness=stiffness, hardening=s.hardening * per**2, rest=rest,
+        viscous_time=s.viscous_time, branch_ratio=np.array([b.ratio for b in s.branches]),
+        branch_time=np.array([b.time for b in s.branches]), slider_ratio=np.array([e.ratio for e in s.sliders]),
+        slider_yield=np.array([e.bend / per for e in s.sliders]), limit=float(fine.joint_range[0]),
+        limit_ratio=s.limit_ratio, limit_time=s.limit_time, hole_link=hole_link, hole_height=hole_height,
+        hole_radius=s.hole_ratio * chain.widths / 2, base_radius=s.hole_ratio * float(chain.widths[0]) / 2,
+        azimuth=2 * np.pi * np.arange(tendons) / tendons, friction=s.friction, slip_length=s.slip_length,
+        cable_stiffness=cables, cable_damping=s.cable_damping, zero=zero, dead_time=s.motors.dead_time,
+        rate_limit=s.motors.rate_limit, lag=s.motors.lag, max_force=s.motors.max_force, backlash=s.motors.backlash,
+    )  # fmt: skip
+
+
+def finer(chain: ChainGeometry, per: int) -> ChainGeometry:
+    """The same arm with each unit cut into `per` similar ones."""
+    ratio = chain.ratio ** (1 / per)
+    within = ratio ** np.arange(per)
+    return ChainGeometry(
+        lengths=np.outer(chain.lengths, within / within.sum()).ravel(),
+        widths=np.outer(chain.widths, within).ravel(),
+        joint_range=np.repeat(chain.joint_range / per, per),
+        ratio=ratio,
+    )
+
+
+def _centres(chain: ChainGeometry, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The link in which each unit's centre lies, and its height above that link's joint (negative), m."""
+    ends = np.cumsum(lengths)
+    centres = np.cumsum(chain.lengths) - chain.lengths / 2
+    links = np.searchsorted(ends, centres)
+    return links, ends[links] - lengths[links] - centres
