@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pandas as pd
 
-from trunkline.identification.evaluation import Prediction, replay, trial_table
+from trunkline.identification.error_tables import trial_table
+from trunkline.identification.evaluation import Prediction, replay
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.fit import Fit
 from trunkline.identification.identify import Identification, identify
@@ -17,7 +18,7 @@ ERRORS = ("e_internal_mm", "e_position_mm", "e_tip_mm", "e_tip_pct")
 def errors_left_out(
     label: str, result: Identification, experiments: list[Experiment], fit: Fit, folds: int
 ) -> pd.DataFrame:
-    """Errors on trials of the `identify` split that the fit did not see, as `evaluation.trial_table` gives them.
+    """Errors on trials of the `identify` split that the fit did not see, as `error_tables.trial_table` gives them.
 
     Every trial is left out once. A fit on the others starts from the one on all: least squares ends in the same place
     from there, and sooner. Models are "coarse" and "identified", before and after per-joint tuning: what only fits
