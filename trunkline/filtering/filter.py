@@ -12,7 +12,7 @@ from trunkline.filtering.effect import Effect
 from trunkline.frames import make_continuous, tilt_of_gravity
 from trunkline.signals.base_frame import average_base, gravity_from_up, to_base_frame
 from trunkline.signals.smoothing import bridged, fill_gaps, low_pass, outliers, resample
-from trunkline.trials.experiments import EXPERIMENTS
+from trunkline.trials.experiments import EXPERIMENTS, Kind
 from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
 
@@ -89,13 +89,7 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
     if kind.static:
         motion = float(np.sqrt(np.mean(np.var(trial.positions, axis=0))))
         trial = average_static(trial)
-    if kind.start is not None:
-        begun = kind.start(trial)
-        trial.start, trial.start_sigma, trial.in_motion = begun.time, begun.sigma, begun.in_motion
-        if kind.free is not None and settings.release == "free":
-            trial.start, trial.in_motion = kind.free(trial, begun.time), True
-        elif begun.in_motion and begun.time > 0:
-            trial.start += 1 / settings.cutoff  # by then, the low-pass tells the velocity that the hand has left
+    trial = replace(trial, **start_of(trial, kind, settings.cutoff, settings.release))
     effect = Effect(
         samples=frames * count,
         gap_share=1 - float(measured.mean()),
@@ -110,6 +104,23 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
         base_turn=base.turn,
     )
     return trial, effect
+
+
+def start_of(trial: Trial, kind: Kind, cutoff: float, release: str) -> dict:
+    """When a trial begins: its start and start_sigma, s, and in_motion.
+
+    Args:
+        cutoff: Hz of the low-pass that it went through. release: as in `Filter`.
+    """
+    if kind.start is None:
+        return {}
+    begun = kind.start(trial)
+    start, in_motion = begun.time, begun.in_motion
+    if kind.free is not None and release == "free":
+        start, in_motion = kind.free(trial, begun.time), True
+    elif begun.in_motion and begun.time > 0:
+        start += 1 / cutoff  # from then on the low-pass tells the velocity that the hand has given it
+    return {"start": start, "start_sigma": begun.sigma, "in_motion": in_motion}
 
 
 class _Segment(NamedTuple):

@@ -8,17 +8,20 @@ import numpy as np
 from trunkline.identification.certainty import Certainty, bootstrap, certainty
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.fit import Fit, Polish
+from trunkline.identification.influence import Influence, influence
 from trunkline.identification.linearisation import linearise
 from trunkline.identification.optimizers import Optimizer
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import Problem
 from trunkline.identification.resting import RestShape, spring_references
+from trunkline.identification.robust import reweighted
 from trunkline.identification.search import Convergence, Found, descend, search
-from trunkline.identification.surrogate import surrogate
+from trunkline.identification.surrogate import Surrogate, surrogate
 from trunkline.progress import progress
 from trunkline.trials.splits import IDENTIFY
 
 COARSER_TOLERANCE = 1e-2  # relative decrease of the loss at a coarser step, whose minimum lies elsewhere anyway
+REWEIGHINGS, SAME_WEIGHT = 4, 0.05  # at most; weights that change by less leave the minimum where it is
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
 
 
@@ -31,7 +34,10 @@ class Identification:
     certainty: of the scalars, on the axes of the search, before joints got factors. bootstrap: their 95 % intervals
         by resampling trials, lowest and highest z, shape (2, P).
     factor_certainty: of all factors, given the scalars; None without factors.
-    at_bound: names of what ended on a bound. converged: which searches stopped for that reason.
+    influence: of every trial on every scalar.
+    at_bound: names of what ended on a bound.
+    converged: which searches stopped for that reason; the rough one, if its starts agree too.
+    agreeing, starts: of so many distinct starts of the rough search, how many end at its least loss.
     """
 
     models: dict[str, mujoco.MjModel]
@@ -40,8 +46,11 @@ class Identification:
     certainty: Certainty
     bootstrap: np.ndarray
     factor_certainty: Certainty | None
+    influence: Influence
     at_bound: list[str]
     converged: dict[str, bool]
+    agreeing: int
+    starts: int
     convergence: dict[str, Convergence]
     evaluations: int
     diverged: int
@@ -67,12 +76,14 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
         loose = replace(method.polish, tolerance=max(method.polish.tolerance, COARSER_TOLERANCE))
         searches["whole"] = found = _polish(whole, found, loose, f"{label} on whole trials")
     searches["polish"] = found = _polish(exact, found, method.polish, f"{label} polish")
+    around = surrogate(exact, found.vector, found.linear.residuals if found.linear else None)
+    found, around = _reweigh(exact, found, around, fit, f"{label} reweighed")
+    searches["polish"] = found
     values = values_of(parameters, found.vector)
     coarse = with_parameters(model, values, rest=rest)
     at_bound = _at_bound(parameters, found.vector, *exact.bounds())
     linear = found.linear
     assert linear is not None, "least squares ends on its own linearisation"
-    moves = surrogate(exact, found.vector, linear.residuals).moves
 
     factors: dict[str, np.ndarray] = {}
     factor_certainty = None
@@ -82,6 +93,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
         joints = replace(
             replace(fit, parameters={}).problem(coarse, seen),
             per_joint=per_joint, per_joint_range=method.per_joint_range, prior_weight=prior_weight,
+            trial_weights=exact.trial_weights,
         )  # fmt: skip
         searches["per_joint"] = found = _search(joints, method.fine, method.seed, f"{label} per joint")
         factor_certainty = certainty(found.linear or linearise(joints, found.vector), method.per_joint_deviation)
@@ -93,11 +105,14 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
         models={"initial": model, "coarse": coarse, "identified": with_parameters(coarse, {}, factors, rest)},
         values=values,
         factors=factors,
-        certainty=certainty(linear, moves=moves),
-        bootstrap=bootstrap(linear, method.seed, moves),
+        certainty=certainty(linear, moves=around.moves),
+        bootstrap=bootstrap(linear, method.seed, around.moves),
         factor_certainty=factor_certainty,
+        influence=influence(around, [e.name for e in seen], list(parameters)),
         at_bound=at_bound,
         converged={name: search.converged for name, search in searches.items()},
+        agreeing=searches["coarse"].agreeing,
+        starts=searches["coarse"].starts,
         convergence={name: search.convergence for name, search in searches.items()},
         evaluations=sum(p.evaluations for p in problems),
         diverged=sum(p.diverged for p in problems),
@@ -133,6 +148,28 @@ def _polish(problem: Problem, rough: Found, polish: Polish, label: str) -> Found
             problem, start, polish.iterations, polish.tolerance,
             lambda best: bar.update(1, best_loss=best, **problem.effort()),
         )  # fmt: skip
+
+
+def _reweigh(exact: Problem, found: Found, around: Surrogate, fit: Fit, label: str) -> tuple[Found, Surrogate]:
+    """The minimum in which outlying trials count less, and the surrogate around it; what it was if there are none.
+
+    The surrogate says which, and about where the minimum then is; least squares goes there, until the weights stay.
+    """
+    kinds, polish = [e.kind for e in exact.experiments], fit.method.polish
+    for _ in range(REWEIGHINGS):
+        weights, place = reweighted(around, kinds, fit.weights.outlying)
+        if np.abs(weights - exact.trial_weights).max() < SAME_WEIGHT:
+            break
+        exact.trial_weights = weights
+        tried = np.stack([found.vector, np.clip(found.vector + place, *exact.bounds())])
+        start = tried[np.argmin(exact.losses(tried))]
+        with progress(polish.iterations, label, "iterations") as bar:
+            found = descend(
+                exact, start, polish.iterations, polish.tolerance,
+                lambda best, bar=bar: bar.update(1, best_loss=best, **exact.effort()),
+            )  # fmt: skip
+        around = surrogate(exact, found.vector, found.linear.residuals if found.linear else None)
+    return found, around
 
 
 def with_parameters(

@@ -18,6 +18,7 @@ class LossWeights:
     delta_position, delta_velocity: Huber thresholds δ of the relative residuals.
     epsilon: m, keeps relative residuals finite near the base. epsilon_velocity: m a frame, likewise.
     weight_position, weight_velocity: w_pos and w_vel.
+    outlying: a trial counts less from that many times the median loss of its kind on, see `robust`.
     """
 
     delta_position: Annotated[float, Field(gt=0, le=1000)]
@@ -26,6 +27,7 @@ class LossWeights:
     epsilon_velocity: Annotated[float, Field(gt=0, le=10)]
     weight_position: Annotated[float, Field(ge=0, le=1000)]
     weight_velocity: Annotated[float, Field(ge=0, le=1000)]
+    outlying: Annotated[float, Field(gt=1, le=1e9)] = 4.0
 
 
 def huber(residual: np.ndarray, delta: float) -> np.ndarray:

@@ -42,6 +42,8 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
         "weakest_direction": weakest_in_words(names, certainty.weakest),
         "per_joint": _factor_table(result),
         "at_bound": result.at_bound,
+        "influence": result.influence.table(),
+        "trial_weights": dict(zip(result.influence.trials, result.influence.weights.tolist(), strict=True)),
     }
 
 

@@ -36,7 +36,9 @@ class Problem:
     A candidate is a vector z: first the scalars of `parameters` (natural logarithms, but for signed ones), then, if
     `per_joint` names them, the factors of every unit, within `per_joint_range` of 1 and pulled towards it by `prior`.
     `step_factor` is how much coarser than the model's own time step to simulate. With `rest`, every candidate hangs
-    in that shape. Counts evaluations (one candidate on all trials), divergences and steps.
+    in that shape.
+    `trial_weights` (T,), ones if not given, are those of trials in the loss. Counts evaluations (one candidate on all
+    trials), divergences and steps.
     """
 
     model: mujoco.MjModel
@@ -50,12 +52,15 @@ class Problem:
     per_joint_range: float = 0.0
     prior_weight: float = 0.0
     rest: RestShape | None = None
+    trial_weights: np.ndarray = None  # type: ignore[assignment]
     evaluations: int = 0
     diverged: int = 0
     steps: int = 0
     seconds: float = 0.0
 
     def __post_init__(self):
+        if self.trial_weights is None:
+            self.trial_weights = np.ones(len(self.experiments))
         self._population = Population(self.model, self.experiments, self.segments, self.step_factor)
         self.units = int(unit_of_hinge(self.model).max()) + 1
 
@@ -79,9 +84,9 @@ class Problem:
         self.evaluations += len(vectors)
         self.diverged += int(simulated.diverged.sum())
         self.steps += simulated.steps
-        share = 1 / np.sqrt(len(self.experiments))
+        shares = np.sqrt(self.trial_weights / len(self.experiments))
         blocks = []
-        for positions, experiment in zip(simulated.positions, self.experiments, strict=True):
+        for positions, experiment, share in zip(simulated.positions, self.experiments, shares, strict=True):
             with np.errstate(invalid="ignore", over="ignore"):
                 block = share * RESIDUALS[self.loss](
                     positions, experiment.positions, experiment.measured, self.weights

@@ -15,6 +15,10 @@ PLATEAU_STARTS = 2  # from how many of the nearest that do matter to search agai
 PLATEAU_ITERATIONS, PLATEAU_TOLERANCE = 4, 1e-3  # of each
 PLATEAU_LEVEL = 1e-6  # relative change of the loss that matters
 STEP_TOLERANCE = 1e-5  # of a candidate z, relative: a smaller step of least squares is no step
+ELSEWHERE_STARTS = 2  # besides what was found,
+ELSEWHERE_CANDIDATES, ELSEWHERE_APART = 12, 0.15  # the best of so many, so far apart, as a share of a range
+ELSEWHERE_ITERATIONS, ELSEWHERE_TOLERANCE = 6, 1e-3  # of least squares from each
+AGREEING = 1.05  # times the least loss
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
 
 
@@ -31,6 +35,7 @@ class Found:
     """Result of a search.
 
     vector: the best candidate z. loss: its. converged: stopped for that reason, not because its time was up.
+    agreeing, starts: of so many distinct starts, how many ended at a loss as small; 0 of 0 if there was only one.
     linear: the residuals around it, if least squares ended there. others: worse minima that were found on the way,
     which whole trials may rank otherwise than the few that a search is made on.
     """
@@ -41,6 +46,8 @@ class Found:
     converged: bool
     linear: Linearisation | None = None
     others: tuple[np.ndarray, ...] = ()
+    agreeing: int = 0
+    starts: int = 0
 
 
 def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) -> Found:
@@ -54,7 +61,36 @@ def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) ->
             starts = np.concatenate([starts, _latin_hypercube(rng, optimizer.starts, *problem.bounds())])
             starts = starts[np.argsort(problem.losses(starts), kind="stable")]
         found = _best_descent(problem, starts[: optimizer.descents], optimizer.iterations, optimizer.tolerance, report)
-    return _leave_plateaus(problem, found, report) if problem.parameters else found
+    if not problem.parameters:
+        return found
+    if isinstance(optimizer, DifferentialEvolution) or optimizer.starts:  # else it goes on from what is known
+        found = _from_elsewhere(problem, found, rng, report)
+    return _leave_plateaus(problem, found, report)
+
+
+def _from_elsewhere(problem: Problem, found: Found, rng: np.random.Generator, report: Report) -> Found:
+    """Least squares from a few starts far from what was found and from one another, and how many of them end there.
+
+    A search that ends for its own reasons may still have ended beside the minimum. It has converged if distinct starts
+    agree with it: at least two ends, its own included, as good as the best.
+    """
+    low, high = problem.bounds()
+    drawn = _latin_hypercube(rng, ELSEWHERE_CANDIDATES, low, high)
+    drawn = drawn[np.argsort(problem.losses(drawn), kind="stable")]
+    chosen = [found.vector]
+    for start in drawn:
+        apart = min(np.abs((start - other) / (high - low)).max() for other in chosen)
+        if apart > ELSEWHERE_APART and len(chosen) <= ELSEWHERE_STARTS:
+            chosen.append(start)
+    polished = descend(problem, found.vector, ELSEWHERE_ITERATIONS, ELSEWHERE_TOLERANCE, report)
+    ends = [polished, *(descend(problem, s, ELSEWHERE_ITERATIONS, ELSEWHERE_TOLERANCE, report) for s in chosen[1:])]
+    best = min(ends, key=lambda end: end.loss)
+    agreeing = sum(end.loss <= AGREEING * best.loss for end in ends)
+    others = (*found.others, *(end.vector for end in ends if end is not best))
+    return replace(
+        found, vector=best.vector, loss=best.loss, linear=best.linear, others=others, agreeing=agreeing,
+        starts=len(ends), converged=found.converged and agreeing > 1,
+    )  # fmt: skip
 
 
 def _leave_plateaus(problem: Problem, found: Found, report: Report) -> Found:

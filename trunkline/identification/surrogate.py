@@ -17,6 +17,7 @@ ITERATIONS = 40
 DAMPING, DAMPING_CHANGE = 1e-3, 5.0  # of steps, with columns of unit length
 LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e6
 LONGEST = 3.0  # of a move, along each axis: nothing is known out there, nor of what no trial depends on
+ALONE = 1e-9  # share of a parameter's information: with less, trials do not tell it
 LEAST_COLUMN = 1e-12  # of the largest: what is shorter is taken for rounding
 SETTLED = 1e-12  # relative decrease of the loss
 
@@ -26,9 +27,15 @@ class Surrogate:
     """Losses of T trials as ½ φᵀ G_t φ, with φ = (1, d_1 … d_P, d_i d_j for i ≤ j) at d from the estimate.
 
     grams: G, the residuals' coefficients times themselves: no loss is ever negative. Shape (T, F, F).
+    weights: of the trials in the fit that it is around; ones if not given. Not in the grams. Shape (T,).
     """
 
     grams: np.ndarray
+    weights: np.ndarray = None  # type: ignore[assignment]
+
+    def __post_init__(self):
+        if self.weights is None:
+            self.weights = np.ones(len(self.grams))
 
     @property
     def count(self) -> int:
@@ -36,11 +43,20 @@ class Surrogate:
         return round(np.sqrt(2 * self.grams.shape[1] + 0.25) - 1.5)
 
     def moves(self, weights: np.ndarray) -> np.ndarray:
-        """By how much the minimum moves when trials weigh `weights` (B, T) in place of 1. Shape (B, P)."""
-        return self._minimum(weights) - self._minimum(np.ones((1, weights.shape[1])))
+        """By how much the minimum moves when trials weigh `weights` (B, T) times what they do. Shape (B, P)."""
+        return self.minima(weights * self.weights) - self.minima(self.weights[None])
 
-    def _minimum(self, weights: np.ndarray) -> np.ndarray:
-        """Damped Newton steps from d = 0, for all weights (B, T) at once. Shape (B, P).
+    def losses(self, places: np.ndarray) -> np.ndarray:
+        """Of every trial, unweighted, at places d (B, P). Shape (B, T)."""
+        return np.stack([_losses(gram[None], places) for gram in self.grams], axis=1)
+
+    def tells(self, weights: np.ndarray) -> np.ndarray:
+        """Which parameters trials that weigh `weights` (T,) say anything about. Shape (P,)."""
+        lengths = [np.diag(np.einsum("t,tfg->fg", w, self.grams))[1 : self.count + 1] for w in (weights, self.weights)]
+        return lengths[0] > ALONE * lengths[1]
+
+    def minima(self, weights: np.ndarray) -> np.ndarray:
+        """Where the loss is least. Damped Newton steps from d = 0, for all weights (B, T) at once. Shape (B, P).
 
         A bootstrap asks for thousands of these small fits: scipy's trust-exact, one by one, takes far longer to the
         same answers (`python -m benchmarks.surrogate`).
@@ -82,7 +98,8 @@ def surrogate(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] 
         residuals = [block[0] for block in problem.residuals(vector[None])]
     others = problem.residuals(vector + places[1:])
     blocks = [np.concatenate([base[None], block]) for base, block in zip(residuals, others, strict=True)]
-    return Surrogate(np.stack([coefficients @ (block @ block.T) @ coefficients.T for block in blocks]))
+    grams = np.stack([coefficients @ (block @ block.T) @ coefficients.T for block in blocks])
+    return Surrogate(grams / problem.trial_weights[:, None, None], problem.trial_weights)
 
 
 def _losses(grams: np.ndarray, places: np.ndarray) -> np.ndarray:

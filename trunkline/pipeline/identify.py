@@ -21,6 +21,7 @@ from trunkline.identification.saving import save_model
 from trunkline.identification.scoring import Compared, fingerprints, start_fit
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import check_folds, check_parameters, set_up
+from trunkline.identification.suspicion import suspicions
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json
 from trunkline.trials.experiments import is_static
@@ -75,6 +76,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         "at_bound": len(result.at_bound),
         "undetermined": len(undetermined(result, fit.parameters)),
         "converged": result.converged,
+        "starts_agreeing": {"agreeing": result.agreeing, "of": result.starts},
+        "deciding_trials": len(result.influence.deciding()),
         "start_fit": start_fit(experiments),
     }
     if any(e.frames > 1 for e in experiments):
@@ -84,7 +87,12 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
         metrics["cross_validation"] = cross_validate(stage, result, fitted, fit, config.cross_validation_folds)
-    for doubt in doubts(result, fit.parameters):
+    looks = {
+        trial.name: suspicions(trial, experiment, fitted, models["identified"], fit)
+        for trial, experiment in zip(reported, experiments, strict=True)
+        if trial.name in result.influence.deciding()
+    }
+    for doubt in doubts(result, fit.parameters, looks):
         print(f"{stage}: {doubt}")
     artifacts = Path("artifacts") / stage
     with output_folder(artifacts) as folder:
@@ -106,11 +114,23 @@ def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
     return values
 
 
-def doubts(result: Identification, bounds: dict[str, Bounds]) -> list[str]:
-    """What a user should know before trusting the result, a line each."""
+def doubts(
+    result: Identification, bounds: dict[str, Bounds], looks: dict[str, list[str]] | None = None
+) -> list[str]:
+    """What a user should know before trusting the result, a line each.
+
+    Args:
+        looks: what looks wrong about trials that decide too much.
+    """
+    lone = f"{result.agreeing} of {result.starts} distinct starts ended at the least loss that the coarse search found"
     unfinished = [search.replace("_", " ") for search, converged in result.converged.items() if not converged]
     return (
         [f"the {search} search ended before it had converged" for search in unfinished]
+        + [lone] * (result.starts > 0 and result.agreeing < 2)
+        + [
+            f"{trial} {'; '.join([*told, *(looks or {}).get(trial, [])])}"
+            for trial, told in result.influence.deciding().items()
+        ]
         + [f"{name} ended on a bound of its range" for name in result.at_bound]
         + [f"{name} is not determined: its 95 % interval spans its range" for name in undetermined(result, bounds)]
     )

@@ -1,0 +1,84 @@
+"""Whether a search finds the minimum wherever it begins: `python -m studies.starts`
+
+Twenty times, the values of the model that a stage begins with are off by up to 3 times either way, each parameter by
+its own factor, and the trials have other noise. The plant is a small arm that is not the model: heavier, with dry
+friction in its joints (`studies.coverage`); ranges are a tenth to ten times the truth. The rough search is the
+committed one (conf/shared/optimizer/), then least squares. The best known loss of a session is the least of these, and
+of least squares from the truth and from more starts. `converged` is what the stage would say. Takes a few minutes.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from studies.choices import variant
+from studies.coverage import FRAMES, RANGE, STEPS, UNITS, mismatched
+from tests.support.matched_plant import FRAME, segments_of, small_model
+from tests.support.noisy_trials import STAGES, WEIGHTS, measured, with_values
+from trunkline.errors import in_one_line
+from trunkline.identification.experiment import prepare
+from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
+from trunkline.identification.problem import Bounds, Problem
+from trunkline.identification.search import descend, search
+from trunkline.pipeline.results import recorded
+from trunkline.progress import progress
+
+SESSIONS = 20
+OFF = 3.0  # times, at most, either way
+POLISH = 12, 1e-6  # iterations and tolerance
+KNOWN = LeastSquares(starts=15, descents=4, iterations=12, tolerance=1e-6)  # of the best known loss
+WITHIN = 1.05  # times the best known loss
+EVOLUTION = variant(DifferentialEvolution, Path("conf/shared/optimizer/differential_evolution.yaml"))
+
+
+def quiet(best: float) -> None:
+    """No progress of a single search."""
+
+
+def session(name: str, seed: int) -> tuple[float, bool, int, int]:
+    """One session of a stage: loss over the best known, whether it says converged, and how many starts agree of how
+    many."""
+    stage, model = STAGES[name], small_model(UNITS)
+    model.opt.timestep = FRAME / STEPS
+    rng = np.random.default_rng([seed, list(STAGES).index(name)])
+    factors = OFF ** rng.uniform(-1, 1, len(stage.true))
+    begin = with_values(model, {key: f * v for (key, v), f in zip(stage.true.items(), factors, strict=True)})
+    trials = [measured(t, rng) for t in stage.trials(mismatched(with_values(model, stage.true)), FRAMES[name])]
+    experiments = [prepare(trial, begin, FRAMES[name]) for trial in trials]
+    bounds = {key: Bounds(value / RANGE, value * RANGE) for key, value in stage.true.items()}
+    problem = Problem(begin, experiments, segments_of(begin), bounds, "positions", WEIGHTS)
+    rough = search(problem, EVOLUTION, seed, quiet)
+    found = descend(problem, rough.vector, *POLISH, quiet)
+    truth = np.log(list(stage.true.values()))
+    known = [descend(problem, truth, *POLISH, quiet).loss, search(problem, KNOWN, seed + 1000, quiet).loss, found.loss]
+    return found.loss / min(known), rough.converged and found.converged, rough.agreeing, rough.starts
+
+
+@in_one_line
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="studies.starts", description=__doc__.splitlines()[0])
+    parser.add_argument("--sessions", type=int, default=SESSIONS)
+    arguments = parser.parse_args()
+    with recorded("starts", keep=arguments.sessions == SESSIONS), threadpool_limits(1):
+        print("| stage | within 5 % of the best known loss | worst | says converged | all starts agree | misled |")
+        print("|---|---:|---:|---:|---:|---:|", flush=True)
+        for name in STAGES:
+            rows = []
+            with progress(arguments.sessions, f"starts of {name}", "sessions") as bar:
+                for seed in range(arguments.sessions):
+                    rows.append(session(name, seed))
+                    bar.update(1)
+            ratios = np.array([row[0] for row in rows])
+            misled = sum(ratio > WITHIN and converged for ratio, converged, *_ in rows)
+            cells = [f"{np.sum(ratios <= WITHIN)} of {len(rows)}", f"{ratios.max():.3f}"]
+            cells += [str(sum(row[1] for row in rows)), str(sum(row[2] == row[3] for row in rows)), str(misled)]
+            print(f"| {name} | " + " | ".join(cells) + " |", flush=True)
+        print("misled: it says converged, and is not within 5 %")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
