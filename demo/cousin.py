@@ -14,7 +14,6 @@ import numpy as np
 from pydantic import Field
 
 from demo.bench import COMMAND_RATE, SAMPLE_RATE, Bench, Seen
-
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import unit_properties
 from trunkline.arm.mjcf import Solref, unit_name

@@ -46,5 +46,5 @@ def test_starts_are_found_in_the_signal_that_tells_them():
         segments=("unit_01",), positions=swing[:, None, None] * np.ones(3), quaternions=None,
         measured=np.ones((240, 1), bool), tendons=("tendon_1",), commands=pull[:, None], tendon_positions=pull[:, None],
     )  # fmt: skip
-    assert EXPERIMENTS["release"].start(trial).time == pytest.approx(0.8, abs=0.02)
-    assert EXPERIMENTS["curl"].start(trial).time == pytest.approx(0.3, abs=0.02)
+    assert EXPERIMENTS["release"].start(trial, lambda columns: columns).time == pytest.approx(0.8, abs=0.02)
+    assert EXPERIMENTS["curl"].start(trial, lambda columns: columns).time == pytest.approx(0.3, abs=0.02)

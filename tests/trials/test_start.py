@@ -9,6 +9,11 @@ from trunkline.trials.start import cycle_time, free_time, release_time
 RATE = 120.0
 
 
+def smooth(columns):
+    """The low-pass that `ring_down` went through."""
+    return low_pass(columns, RATE, 20.0, 4)
+
+
 def ring_down(release: float, noise: float, seed: int, hand: float = 0.0, duration: float = 3.0):
     """Three segments held at up to 0.2 m aside until `release`, while a hand drifts by `hand` m/s."""
     time = np.arange(int(duration * RATE)) / RATE
@@ -20,17 +25,18 @@ def ring_down(release: float, noise: float, seed: int, hand: float = 0.0, durati
     positions = np.zeros((len(time), 3, 3))
     positions[..., 0] = (swing + held[:, None].T[0] / 0.2)[:, None] * along
     positions += np.random.default_rng(seed).normal(scale=noise, size=positions.shape)
-    return time, low_pass(positions.reshape(len(time), -1), RATE, 20.0, 4).reshape(positions.shape)
+    return time, smooth(positions.reshape(len(time), -1)).reshape(positions.shape)
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize(("release", "hand"), [(0.3, 0.0), (0.5037, 0.0), (1.0, 0.01)])
 def test_release_is_found_to_a_frame(release, hand, seed):
     time, positions = ring_down(release, 3e-4, seed, hand)
-    begin = release_time(time, positions)
+    begin = release_time(time, positions, smooth)
     assert begin.time == pytest.approx(release, abs=1.5 / RATE if hand else 0.7 / RATE)
     assert abs(begin.time - release) < 4 * begin.sigma < 0.03
     assert not begin.in_motion
+    assert not begin.swaying
 
 
 @pytest.mark.parametrize("frequency", [0.3, 1.0, 2.0])
@@ -46,9 +52,9 @@ def test_a_hand_that_sways_when_it_lets_go_is_not_taken_for_the_release(sway, fr
         after = sway / way * np.sin(phase) * np.cos(omega * since) + speed / omega * np.sin(omega * since)
         moved = np.where(since < 0, sway / way * np.sin(way * since + phase), np.exp(-np.maximum(since, 0)) * after)
         shape = np.array([0.25, 0.6, 1.0])[:, None] * [0.6, 0.8, 0]
-        begin = release_time(time, positions + moved[:, None, None] * shape)
+        begin = release_time(time, positions + moved[:, None, None] * shape, smooth)
         errors.append(begin.time - 0.8037)
-        missed.append(abs(speed) > 0.06 and not begin.in_motion)
+        missed.append(abs(speed) > 0.06 and not begin.swaying)
         assert abs(errors[-1]) < 4 * begin.sigma
     assert np.sqrt(np.mean(np.square(errors))) < 1 / RATE
     assert not any(missed)
@@ -58,7 +64,7 @@ def test_a_hold_that_creeps_is_not_taken_for_the_release():
     time, positions = ring_down(1.0, 3e-4, 0)
     crept = 0.02 * np.exp(-np.minimum(time, 1.0) / 0.3)
     positions = positions + crept[:, None, None] * np.array([0.25, 0.6, 1.0])[:, None] * [0, 1.0, 0]
-    begin = release_time(time, positions)
+    begin = release_time(time, positions, smooth)
     assert begin.time == pytest.approx(1.0, abs=1.5 / RATE)
     assert begin.speed < 0.01
 
@@ -78,14 +84,14 @@ def test_the_arm_is_free_when_the_hand_has_gone(gentle):
     positions = np.interp(time, fine, path)[:, None, None] * np.array([0.2, 0.6, 1.0])[:, None] * [1.0, 0, 0]
     positions += np.random.default_rng(0).normal(scale=1e-5, size=positions.shape)
     positions = low_pass(positions.reshape(len(time), -1), RATE, 20.0, 4).reshape(positions.shape)
-    begin = release_time(time, positions).time
+    begin = release_time(time, positions, smooth).time
     assert free_time(time, positions, begin) == pytest.approx(0.5 + gentle, abs=0.035)
 
 
 def test_an_arm_that_swings_from_the_first_frame_was_released_before():
     time, positions = ring_down(0.0, 3e-4, 0)
     swinging = time > 0.15
-    begin = release_time(time[swinging] - time[swinging][0], positions[swinging])
+    begin = release_time(time[swinging] - time[swinging][0], positions[swinging], smooth)
     assert (begin.time, begin.in_motion) == (0.0, True)
 
 

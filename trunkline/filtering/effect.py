@@ -47,6 +47,7 @@ def summary(trials: list[Trial], effects: list[Effect]) -> dict:
                 "start_s": trial.start,
                 "start_sigma_s": trial.start_sigma,
                 "in_motion": trial.in_motion,
+                "swaying": trial.swaying,
                 "duration_s": float(trial.time[-1]),
             }
     angles = [effect.angle_noise for effect in effects if effect.angle_noise is not None]

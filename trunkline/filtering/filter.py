@@ -1,6 +1,7 @@
 """A take becomes a trial: outliers out, gaps bridged, one uniform clock, filtered, in the base frame."""
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
@@ -89,7 +90,7 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
     if kind.static:
         motion = float(np.sqrt(np.mean(np.var(trial.positions, axis=0))))
         trial = average_static(trial)
-    trial = replace(trial, **start_of(trial, kind, settings.cutoff, settings.release))
+    trial = replace(trial, **start_of(trial, kind, settings))
     effect = Effect(
         samples=frames * count,
         gap_share=1 - float(measured.mean()),
@@ -106,21 +107,16 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
     return trial, effect
 
 
-def start_of(trial: Trial, kind: Kind, cutoff: float, release: str) -> dict:
-    """When a trial begins: its start and start_sigma, s, and in_motion.
-
-    Args:
-        cutoff: Hz of the low-pass that it went through. release: as in `Filter`.
-    """
+def start_of(trial: Trial, kind: Kind, settings: Filter) -> dict:
+    """When a trial that went through the low-pass begins: its start and start_sigma, s, in_motion and swaying."""
     if kind.start is None:
         return {}
-    begun = kind.start(trial)
-    start, in_motion = begun.time, begun.in_motion
-    if kind.free is not None and release == "free":
-        start, in_motion = kind.free(trial, begun.time), True
-    elif begun.in_motion and begun.time > 0:
-        start += 1 / cutoff  # from then on the low-pass tells the velocity that the hand has given it
-    return {"start": start, "start_sigma": begun.sigma, "in_motion": in_motion}
+    smooth = partial(low_pass, rate=1 / (trial.time[1] - trial.time[0]), cutoff=settings.cutoff, order=settings.order)
+    begun = kind.start(trial, smooth)
+    found = {"start": begun.time, "start_sigma": begun.sigma, "in_motion": begun.in_motion, "swaying": begun.swaying}
+    if kind.free is not None and settings.release == "free":
+        found |= {"start": kind.free(trial, begun.time), "in_motion": True, "swaying": False}
+    return found
 
 
 class _Segment(NamedTuple):

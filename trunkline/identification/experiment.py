@@ -16,6 +16,7 @@ SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend take
 
 QUIET_FRAMES = 3  # before the start: there the low-pass has not yet smeared the motion into the hold
 REACH = 2  # frames to either side for the velocity at the start; the low-pass leaves nothing finer
+SWAY_FRAMES = 8  # between the poses that tell how a hand moves the arm that it is about to let go
 LOOK_BACK = 30  # frames in which to look for a start pose that enough cameras saw
 SEEN_SHARE = 0.6  # of the segments that must be measured in the frame of the start pose
 
@@ -84,6 +85,11 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
     fit = _fit_frame(trial, model, seen)
+    start, velocity = fit.qpos, np.zeros(arm_hinges(model))
+    if trial.in_motion:
+        velocity = _velocity(trial, model, seen)
+    elif trial.swaying:
+        start, velocity = _foreseen(trial, model, seen)
     lengths = commanded_lengths(trial, model)
     if command_delay and model.nu:
         lengths = np.stack(
@@ -94,8 +100,8 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         kind=trial.experiment,
         split=trial.split,
         gravity=trial.gravity,
-        start=fit.qpos,
-        velocity=_velocity(trial, model, seen) if trial.in_motion else np.zeros(arm_hinges(model)),
+        start=start,
+        velocity=velocity,
         lead=0.0 if static else _lead(trial, held),
         controls=lengths[:1] if static else 0.5 * (lengths[:-1] + lengths[1:])[held : held + len(positions)],
         positions=positions,
@@ -137,6 +143,18 @@ def _velocity(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
     before, after = max(frame - REACH, 0), min(frame + REACH, len(trial.time) - 1)
     turned = _fit_frame(trial, model, after).qpos - _fit_frame(trial, model, before).qpos
     return turned / (trial.time[after] - trial.time[before])
+
+
+def _foreseen(trial: Trial, model: mujoco.MjModel, seen: int) -> tuple[np.ndarray, np.ndarray]:
+    """Joint angles, rad, and velocities, rad/s, at the start of an arm that a hand still moves then: a parabola through
+    its poses up to frame `seen`, before the low-pass smears in what comes after. Each of shape (n,)."""
+    apart = min(SWAY_FRAMES, seen // 2)
+    if not apart:
+        return _fit_frame(trial, model, seen).qpos, _velocity(trial, model, seen)
+    frames = seen - apart * np.arange(3)
+    poses = np.stack([_fit_frame(trial, model, frame).qpos for frame in frames])
+    parabola = np.polyfit(trial.time[frames] - trial.start, poses, 2)
+    return parabola[2], parabola[1]
 
 
 def _seen_frame(trial: Trial, latest: int) -> int:

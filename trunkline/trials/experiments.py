@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from trunkline.trials.recording import Recording
-from trunkline.trials.start import Start, cycle_time, free_time, release_time
+from trunkline.trials.start import Smooth, Start, cycle_time, free_time, release_time
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,8 @@ class Kind:
     static: the arm rests throughout; a trial is averaged over time to one frame, and its model settles to rest.
     needs_motors: refused without commands or tendon positions.
     words: in the name of a log that is proposed to be one.
-    start: when a moving trial begins, by its filtered positions and commands; see the module `start`.
+    start: when a moving trial begins, by its filtered positions and commands, and the low-pass of the former; see
+        the module `start`.
     free: when the last hand is off, s, where that may be later than `start` says.
     hangs: at its end, the arm hangs at rest with nothing that pulls it.
     """
@@ -43,7 +44,7 @@ class Kind:
     static: bool
     needs_motors: bool
     words: tuple[str, ...]
-    start: Callable[[Recording], Start] | None = None
+    start: Callable[[Recording, Smooth], Start] | None = None
     free: Callable[[Recording, float], float] | None = None
     hangs: bool = False
 
@@ -60,7 +61,7 @@ EXPERIMENTS: dict[str, Kind] = {
         static=False,
         needs_motors=False,
         words=("release",),
-        start=lambda trial: release_time(trial.time, trial.positions),
+        start=lambda trial, smooth: release_time(trial.time, trial.positions, smooth),
         free=lambda trial, begin: free_time(trial.time, trial.positions, begin),
         hangs=True,
     ),
@@ -69,7 +70,7 @@ EXPERIMENTS: dict[str, Kind] = {
         static=False,
         needs_motors=True,
         words=("curl",),
-        start=lambda trial: cycle_time(trial.time, trial.commands),
+        start=lambda trial, smooth: cycle_time(trial.time, trial.commands),
     ),
     "static_pull": Kind(
         level=None,
@@ -82,7 +83,7 @@ EXPERIMENTS: dict[str, Kind] = {
         static=False,
         needs_motors=True,
         words=("motion",),
-        start=lambda trial: cycle_time(trial.time, trial.commands),
+        start=lambda trial, smooth: cycle_time(trial.time, trial.commands),
     ),
 }
 

@@ -1,9 +1,9 @@
 """When a trial begins: the moment a held arm is let go, or a tendon begins to be pulled."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial.polynomial import polyder, polyval
 
 AHEAD, BEHIND = 0.033, 0.1  # s: how far a hand's motion is foreseen, and from how much of it
 SHORTEST = 0.08  # s of a hold, before which nothing is foreseen
@@ -11,13 +11,15 @@ LIFTOFF = 0.5  # share of the largest departure from what was foreseen that only
 QUIET = 0.05  # share of it below which a hand may still move the arm,
 USUAL = 2.0  # and times its median before, if that is more
 FORESEEN_FRAMES = 3  # at least, or there was no hold
-HOLDS = (0.15, 0.25, 0.4)  # s before the release, over which the hand's motion is fitted
-DEGREES = (0, 1, 2, 3)  # of the polynomials
-ALIKE = 1.3  # times the least residual: up to there, fits of the hold count alike
+HOLD, FREE = 0.15, 0.07  # s before and after the release that are fitted
+SEARCHED = 0.05  # s to either side of the first guess
+DEGREE = 2  # of the hand's motion
+LEAVING = (2, 3)  # powers of time in which a released arm leaves: its far end is light, and soon at full speed
+TRIES = 4  # a frame
 RISE = (2.0, 16.0)  # times the noise: where the displacement stands out, yet grows as the square of time
-LEAP = (8.0, 64.0)  # the same for a release: beyond what the low-pass carries ahead of it
-POWERS = (1.5, 2.0)  # of time, with which a released arm leaves: its far end is light, and soon at full speed
-MOVING = 0.03  # share of the top speed from which on a swaying hand gives the arm a start of its own
+SWAYING = 0.03  # share of the top speed from which on a hand gives the arm a start of its own
+
+Smooth = Callable[[np.ndarray], np.ndarray]  # the low-pass that positions went through, on columns (T, C)
 
 
 @dataclass(frozen=True)
@@ -25,33 +27,25 @@ class Start:
     """When a trial begins.
 
     time, sigma: s, and its standard error. speed: m/s, with which the arm is on its way by then.
-    in_motion: whether that matters, so that the trial must start with it.
+    in_motion: whether it moves from the first frame on, let go before.
+    swaying: whether the hand's own speed as it lets go matters, so that the trial must start with it.
     """
 
     time: float
     sigma: float
     speed: float = 0.0
     in_motion: bool = False
+    swaying: bool = False
 
 
-@dataclass(frozen=True)
-class _Hold:
-    """One fit of a hold: its residual m, the degree, the release by it s with its variance, and the speed m/s then."""
-
-    residual: float
-    degree: int
-    begin: float
-    variance: float
-    speed: float
-
-
-def release_time(time: np.ndarray, positions: np.ndarray) -> Start:
+def release_time(time: np.ndarray, positions: np.ndarray, smooth: Smooth) -> Start:
     """When the arm was let go; at 0 s and in motion if it is on its way from the first frame.
 
     A hand sways and creeps, but smoothly: where the arm will be a moment later can be foreseen. An arm that is let go
-    accelerates most at once, and departs from that (`departures`). The hand's motion before is fitted and continued;
-    the arm was let go when its displacement from there began to grow (`onset`). Several fits explain a hold about as
-    well: their median counts, and their spread, beside the length of a frame, is its uncertainty.
+    accelerates most at once, and departs from that (`departures`): a first guess. Around it, positions are fitted by
+    the hand's motion, a polynomial, and from an instant on powers of the time since, which went through the same
+    low-pass; the instant with the least residual counts. Its uncertainty is that of the fit, how far it is from the
+    first guess, which was made in another way, and a frame.
 
     Args:
         time (T,) s, uniform. positions (T, S, 3) m, filtered, of an arm that is held, then swings.
@@ -61,16 +55,41 @@ def release_time(time: np.ndarray, positions: np.ndarray) -> Start:
     end = _end_of_hold(positions[: np.argmax(speed) + 1 + _frames(AHEAD, step)], step)
     if end is None:
         return Start(0.0, step / np.sqrt(12), float(speed[0]), in_motion=True)
-    spans = dict.fromkeys(min(_frames(hold, step), end) for hold in HOLDS)
-    fits = [_fit_hold(time, positions, end - span, end, degree) for span in spans for degree in DEGREES]
-    alike = [fit for fit in fits if fit.residual <= ALIKE * min(fit.residual for fit in fits)]
-    begins = [fit.begin for fit in alike]
-    variance = np.var(begins) + np.mean([fit.variance for fit in alike]) + step**2 / 12
-    swayed = min(alike, key=lambda fit: fit.degree).speed  # a higher degree would find noise to be speed
-    return Start(
-        float(np.median(begins)), float(np.sqrt(variance)), swayed,
-        in_motion=swayed > MOVING * float(speed.max()),
-    )  # fmt: skip
+    begin, variance, swayed = _let_go(time, positions, smooth, float(time[end]))
+    sigma = float(np.sqrt(variance + (begin - time[end]) ** 2 / 3 + step**2 / 12))
+    return Start(begin, sigma, swayed, swaying=swayed > SWAYING * float(speed.max()))
+
+
+def _let_go(
+    time: np.ndarray, positions: np.ndarray, smooth: Smooth, guess: float
+) -> tuple[float, float, float]:
+    """The instant near `guess`, s, from which powers of the time since explain the motion best, its variance, and the
+    speed, m/s, that the hand had given the arm by then."""
+    step = float(time[1] - time[0])
+    window = (time >= guess - HOLD) & (time <= guess + FREE)
+    seen = positions[window].reshape(window.sum(), -1)
+    held = np.vander((time[window] - guess) / HOLD, DEGREE + 1)
+    instants = np.arange(max(guess - SEARCHED, time[window][0]), guess + min(SEARCHED, FREE / 2), step / TRIES)
+    residuals, fits = [], []
+    for instant in instants:
+        since = np.maximum(time - instant, 0)[:, None] / FREE
+        left = smooth(since ** np.array(LEAVING))[window]
+        design = np.hstack([held, left])
+        fit = np.linalg.lstsq(design, seen)[0]
+        residuals.append(float(np.square(seen - design @ fit).sum()))
+        fits.append(fit)
+    best = int(np.argmin(residuals))
+    spare = max(seen.size / 3 - fits[best].size, 1)  # of three frames, the low-pass leaves about one
+    inner = int(np.clip(best, 1, len(instants) - 2))
+    curvature = (residuals[inner - 1] - 2 * residuals[inner] + residuals[inner + 1]) / (step / TRIES) ** 2
+    variance = 2 * residuals[best] / spare / curvature if curvature > 0 else SEARCHED**2
+    return float(instants[best]), float(variance), _speed(fits[best][: DEGREE + 1], (instants[best] - guess) / HOLD)
+
+
+def _speed(polynomials: np.ndarray, at: float) -> float:
+    """Speed, m/s, of segments that move as polynomials (DEGREE + 1, 3 S) of time over HOLD, highest power first."""
+    velocity = np.stack([np.polyval(np.polyder(column), at) for column in polynomials.T]) / HOLD
+    return float(robust_length(velocity.reshape(1, -1, 3))[0])
 
 
 def _end_of_hold(positions: np.ndarray, step: float) -> int | None:
@@ -105,27 +124,6 @@ def departures(positions: np.ndarray, behind: int, ahead: int, shortest: int) ->
     return np.array(found)
 
 
-def _fit_hold(time: np.ndarray, positions: np.ndarray, first: int, end: int, degree: int) -> _Hold:
-    """The frames from `first` to `end` as polynomials of a degree, and when the arm leaves them."""
-    since = time - time[end]
-    held = np.zeros(len(time), bool)
-    held[first : end + 1] = True
-    powers = np.vander(since, degree + 1, increasing=True)
-    fitted = np.linalg.lstsq(powers[held], positions[held].reshape(held.sum(), -1))[0]
-    left = positions - (powers @ fitted).reshape(positions.shape)
-    spare = max(held.sum() - 3 * (degree + 1), 1)  # of three frames, the low-pass leaves about one
-    begins, frames, misfits = onsets(time, robust_length(left), held, 1e-5, POWERS, LEAP)
-    begin, variance = float(time[end]), 0.0
-    if len(begins):
-        misfits = np.maximum(misfits, 1e-30)
-        weights = (misfits / misfits.min()) ** (-frames / 2)  # the likelihoods of the powers
-        begin = float(np.average(begins, weights=weights))
-        variance = float(np.average((begins - begin) ** 2, weights=weights))
-    velocity = polyval(begin - time[end], polyder(fitted)).reshape(1, -1, 3)
-    residual = float(np.sqrt(np.square(left[held]).sum() / spare))
-    return _Hold(residual, degree, begin, variance, float(robust_length(velocity)[0]))
-
-
 def _frames(seconds: float, step: float) -> int:
     return max(round(seconds / step), 2)
 
@@ -147,52 +145,38 @@ def free_time(time: np.ndarray, positions: np.ndarray, begin: float) -> float:
 
 
 def onset(
-    time: np.ndarray, moved: np.ndarray, resting: np.ndarray, floor: float = 1e-5, powers: tuple[float, ...] = (2,)
+    time: np.ndarray,
+    moved: np.ndarray,
+    resting: np.ndarray,
+    floor: float = 1e-5,
+    powers: tuple[int, ...] = (2,),
 ) -> float | None:
     """When the displacement `moved` (T,) m begins to grow, s, after the frames `resting` (T,); None if it does not.
+
+    Under a force that sets in at t0, as under one that grows while damping prevails, the displacement grows as
+    (t - t0)². Its root is a straight line in time, and where that crosses zero is t0.
 
     Args:
         floor: m, what the noise is taken for at least.
         powers: of (t - t0) that come into question; the one that fits best counts.
     """
-    begins, _, misfits = onsets(time, moved, resting, floor, powers)
-    return float(begins[np.argmin(misfits)]) if len(begins) else None
-
-
-def onsets(
-    time: np.ndarray,
-    moved: np.ndarray,
-    resting: np.ndarray,
-    floor: float,
-    powers: tuple[float, ...],
-    rise: tuple[float, float] = RISE,
-) -> tuple[np.ndarray, int, np.ndarray]:
-    """When `moved` (T,) m begins to grow as each of the powers of (t - t0), s, from how many frames, and the misfits.
-
-    Under a force that sets in at t0, as under one that grows while damping prevails, the displacement grows as
-    (t - t0)². Its root is a straight line in time, and where that crosses zero is t0.
-
-    Args: as for `onset`.
-        rise: times the noise, from where to where it is looked at.
-    """
     noise = max(float(np.median(moved[resting])), floor)
     moved = np.sqrt(np.maximum(moved**2 - noise**2, 0))
-    low, high = (share * noise for share in rise)
+    low, high = (share * noise for share in RISE)
     risen = np.flatnonzero((moved > high) & (time > time[resting][-1]))
     if not len(risen):
-        return np.empty(0), 0, np.empty(0)
+        return None
     last = max(int(risen[0]), 3)
     still = np.flatnonzero(moved[:last] < low)
     first = min(int(still[-1]) + 1 if len(still) else 0, last - 2)
     t, y = time[first : last + 1], moved[first : last + 1]
-    found = []
+    best, begin = np.inf, None
     for power in powers:
         slope, offset = np.polyfit(t, y ** (1 / power), 1)
         misfit = np.square(np.maximum(slope * t + offset, 0) ** power - y).sum()
-        if slope > 0:
-            found.append((np.clip(-offset / slope, time[max(first - 6, 0)], t[-1]), misfit))
-    begins, misfits = np.array(found).reshape(-1, 2).T
-    return begins, len(t), misfits
+        if slope > 0 and misfit < best:
+            best, begin = misfit, float(np.clip(-offset / slope, time[max(first - 6, 0)], t[-1]))
+    return begin
 
 
 def robust_length(vectors: np.ndarray) -> np.ndarray:

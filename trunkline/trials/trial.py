@@ -29,6 +29,7 @@ class Trial(Recording):
     start: s, when it begins: the detected release, or the beginning of the curl cycle; 0 for a static trial.
     start_sigma: s, standard error of `start`; 0 for a static trial.
     in_motion: whether the arm moves at `start` already.
+    swaying: whether a hand still moved it when it let go, so that it starts with the velocity that it had before.
     repairs: how many `ingest` made in it.
     """
 
@@ -37,6 +38,7 @@ class Trial(Recording):
     start: float = 0.0
     start_sigma: float = 0.0
     in_motion: bool = False
+    swaying: bool = False
     repairs: int = 0
 
 
@@ -54,6 +56,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "start": float(trial.start),
             "start_sigma": float(trial.start_sigma),
             "in_motion": trial.in_motion,
+            "swaying": trial.swaying,
             "repairs": trial.repairs,
             "frames": len(trial.time),
             "segments": list(trial.segments),
@@ -73,6 +76,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "start": pa.float64(),
             "start_sigma": pa.float64(),
             "in_motion": pa.bool_(),
+            "swaying": pa.bool_(),
             "repairs": pa.int64(),
             "frames": pa.int64(),
             "segments": pa.list_(pa.string()),
@@ -129,6 +133,7 @@ def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
                 start=row["start"],
                 start_sigma=row["start_sigma"],
                 in_motion=row["in_motion"],
+                swaying=row["swaying"],
                 repairs=row["repairs"],
             )
         )
