@@ -12,9 +12,7 @@ from scipy.spatial.transform import Rotation
 from demo.bench import COMMAND_RATE, LOOSE, Bench
 from demo.record import Config
 from demo.stranger import Stranger, StrangerSettings
-from demo.stranger_kernel import (
-    State, accelerate, advance, bend, path_lengths, place, pull, remember, simulate, wind, work_for,
-)  # fmt: skip
+from demo.stranger_kernel import State, advance, bend, path_lengths, place, pull, remember, simulate, wind, work_for
 from trunkline.arm.spiral import spiral_chain
 from trunkline.pipeline.config import load_config
 
@@ -107,7 +105,8 @@ def test_accelerations_are_those_of_mujoco_s_twin(settings, load, wound):
     mujoco.mj_forward(model, data)
     before = state.v.copy()
     step(plant, state, work_for(plant.links, 3), h, load=load)
-    np.testing.assert_allclose((state.v - before).ravel() / h, data.qacc, rtol=1e-4, atol=1e-4 * np.abs(data.qacc).max())
+    found = (state.v - before).ravel() / h
+    np.testing.assert_allclose(found, data.qacc, rtol=1e-4, atol=1e-4 * np.abs(data.qacc).max())
 
 
 def energy(plant: Stranger, state: State) -> float:
@@ -290,9 +289,10 @@ def test_motors_are_late_lag_and_stall(settings):
     sent = np.zeros((400, 3))
     sent[100:, 0] = 0.01
     places, turns, wound = np.empty((100, 1, 3)), np.empty((100, 1, 3, 3)), np.empty((100, 3))
+    state, hand, watched, heights = plant._state(np.zeros(3)), np.zeros((400, 3)), np.array([3]), np.array([-0.01])
     simulate(
-        plant.links, plant._state(np.zeros(3)), GRAVITY, 0.0, sent, np.zeros((400, 3)), plant.straight, COMMAND_RATE, 3, 0,
-        1.0, 4, 0, np.array([3]), np.array([-0.01]), places, turns, wound,
+        plant.links, state, GRAVITY, 0.0, sent, hand, plant.straight, COMMAND_RATE, 3, 0, 1.0, 4, 0, watched, heights,
+        places, turns, wound,
     )  # fmt: skip
     started = np.flatnonzero(wound[:, 0] > 0)[0] / 500
     assert started == pytest.approx(100 / COMMAND_RATE + 0.02, abs=0.003)
