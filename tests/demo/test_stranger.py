@@ -335,3 +335,17 @@ def test_the_tip_comes_to_rest_where_the_rig_says(settings):
     seen = plant.run("test", bench, [5])
     end = seen.positions[0, -1, 0] - plant.chain.lengths[5] / 2 * seen.rotations[0, -1, 0, :, 2]
     assert np.linalg.norm(tip[0] - end) < 2e-3
+
+
+def test_its_answers_are_those_of_the_arm_that_it_is(settings):
+    """A unit pressed by a torque bends by that over the stiffness told; the mean factor is 1; the lean is as large."""
+    plant = arm(settings)
+    told = plant.answers()
+    first = plant.links.stiffness[:PER]
+    factor = told["stiffness_factors"][0] * told["parameters"]["stiffness"]
+    assert 0.3 / factor == pytest.approx((0.3 / first).sum())
+    assert told["stiffness_factors"].mean() == pytest.approx(1)
+    lean = np.hypot(told["parameters"]["mount_tilt_x"], told["parameters"]["mount_tilt_y"])
+    assert np.degrees(lean) == pytest.approx(settings.mount_tilt_deg)
+    whole = told["rest_bend_rad"].sum(axis=0)
+    np.testing.assert_allclose(whole, settings.rest_bend, atol=5 * settings.rest_scatter * np.sqrt(UNITS))
