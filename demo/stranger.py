@@ -25,6 +25,7 @@ from trunkline.threads import thread_count
 UPRIGHT = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 CALM = 40.0  # times the joints' own damping, about what brings the arm to rest soonest
 STILL = 2e-6  # rad/s: with all joints turning alike the tip then moves by 0.05 mm/s
+REST_STEP = 2.5e-4  # s: so damped, the arm bears longer steps than in a trial, and comes to rest in the same place
 LONGEST_REST = 12.0  # s
 
 Share = Annotated[float, Field(gt=0, lt=1)]
@@ -215,9 +216,8 @@ class Stranger:
     def _rest(self, gravity: np.ndarray, load: float, sent: np.ndarray, start: State | None = None) -> State:
         """The arm long after it was left alone with the motors at `sent` (K,) m, from `start` or from straight."""
         state = self._state(sent) if start is None else State(*(part.copy() for part in start))
-        step = 1 / (COMMAND_RATE * self.settings.substeps)
-        steps = round(LONGEST_REST / step)
-        come_to_rest(self.links, state, gravity, load, sent, self.straight, step, steps, CALM, STILL)
+        steps = round(LONGEST_REST / REST_STEP)
+        come_to_rest(self.links, state, gravity, load, sent, self.straight, REST_STEP, steps, CALM, STILL)
         state.v[:] = 0.0
         return state
 
