@@ -105,7 +105,7 @@ class Cousin:
         return drive(model, np.concatenate([commands, no_hand], axis=1), gravity, LONGEST_REST).end
 
     def answers(self) -> dict:
-        """Stiffness and damping are those of a unit's two joints in series, at the base; stiffness with the mean scatter."""
+        """Stiffness, with its mean scatter, and damping are those of a unit's two joints in series, at the base."""
         s, model = self.settings, self.model
         properties = unit_properties(self.chain, s.modulus, s.density, s.core_ratio, s.damping_ratio)
         hinges = model.nv // self.chain.units  # two joints of two hinges a unit, each joint twice as stiff as the unit

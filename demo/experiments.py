@@ -30,7 +30,7 @@ class Loaded:
 
 @dataclass
 class Pull:
-    """levels: mm of pull of each tendon, null where it is loose. from_beyond: whether the motors go too far at first."""
+    """levels: mm of pull of each tendon, null where it is loose. from_beyond: whether motors go too far at first."""
 
     levels: list[Pulled | None]
     from_beyond: bool

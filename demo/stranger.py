@@ -25,6 +25,7 @@ from trunkline.threads import thread_count
 UPRIGHT = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 CALM = 40.0  # times the joints' own damping, about what brings the arm to rest soonest
 STILL = 2e-6  # rad/s: with all joints turning alike the tip then moves by 0.05 mm/s
+REST_STEP = 2.5e-4  # s: so damped, the arm bears longer steps than in a trial, and comes to rest in the same place
 LONGEST_REST = 12.0  # s
 
 Share = Annotated[float, Field(gt=0, lt=1)]
@@ -159,8 +160,13 @@ class Stranger:
 
     def answers(self) -> dict:
         """Stiffness is the relaxed one of a unit's links in series, at the base, with the mean scatter; damping is what
-        acts beside the Maxwell branches. What rubs on the tendons is no force of its own, so it has no counterpart."""
+        acts beside the Maxwell branches. Nothing answers to a tendon's constant friction, as it grows with tension, and
+        to a single branch or slider of the model, as there are several. Rest shapes are by unit, c_0 + c_1 s with s
+        from -1 to 1."""
         s, links = self.settings, self.links
+        rest = links.rest.reshape(-1, s.links_per_unit, 2).sum(axis=1)
+        place = np.linspace(-1, 1, len(rest))
+        lean = self.mount.as_rotvec()
         properties = unit_properties(self.chain, s.modulus, s.density, s.core_ratio, damping_ratio=1.0)
         scatter = 1 / (1 / links.stiffness.reshape(-1, s.links_per_unit)).sum(axis=1) / properties.stiffness
         stiffness = scatter.mean() * properties.stiffness[0]
@@ -174,21 +180,27 @@ class Stranger:
             "kv": s.cable_damping,
             "force_range": s.motors.max_force,
             "time_constant": s.motors.lag,
+            "dead_time": s.motors.dead_time,
+            "rest_bend_x": rest[:, 0].mean(),
+            "rest_bend_y": rest[:, 1].mean(),
+            "rest_gradient_x": place @ rest[:, 0] / (place @ place),
+            "rest_gradient_y": place @ rest[:, 1] / (place @ place),
+            "mount_tilt_x": lean[0],
+            "mount_tilt_y": lean[1],
+            "mount_twist": lean[2],
         }
         return {
             "parameters": found,
             "forces": ["stiffness", "damping", "kp", "kv", "force_range"],
             "mass_factor": s.mass_factor,
             "stiffness_factors": scatter / scatter.mean(),
-            "branches": [vars(branch) for branch in s.branches],
-            "sliders": [vars(slider) for slider in s.sliders],
+            "branches": [{"ratio": branch.ratio, "time_s": branch.time} for branch in s.branches],
+            "sliders": [{"ratio": slider.ratio, "bend_rad": slider.bend} for slider in s.sliders],
             "capstan_friction": s.friction,
-            "dead_time_s": s.motors.dead_time,
             "rate_limit_m_s": s.motors.rate_limit,
             "backlash_m": s.motors.backlash,
             "zero_m": links.zero,
-            "mount_tilt_deg": np.degrees(self.mount.as_rotvec())[:2],
-            "rest_bend_rad": links.rest.reshape(-1, s.links_per_unit, 2).sum(axis=1),
+            "rest_bend_rad": rest,
         }
 
     def _state(self, wound: np.ndarray) -> State:
@@ -204,9 +216,8 @@ class Stranger:
     def _rest(self, gravity: np.ndarray, load: float, sent: np.ndarray, start: State | None = None) -> State:
         """The arm long after it was left alone with the motors at `sent` (K,) m, from `start` or from straight."""
         state = self._state(sent) if start is None else State(*(part.copy() for part in start))
-        step = 1 / (COMMAND_RATE * self.settings.substeps)
-        steps = round(LONGEST_REST / step)
-        come_to_rest(self.links, state, gravity, load, sent, self.straight, step, steps, CALM, STILL)
+        steps = round(LONGEST_REST / REST_STEP)
+        come_to_rest(self.links, state, gravity, load, sent, self.straight, REST_STEP, steps, CALM, STILL)
         state.v[:] = 0.0
         return state
 

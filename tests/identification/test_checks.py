@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support import matched_plant
-from tests.support.matched_plant import curl, release, small_model, tilt
+from tests.support.matched_plant import curl, motion, release, small_model, static_pull, tilt
 from trunkline.errors import InputError
 from trunkline.identification.checks import check_trials
 
@@ -59,6 +59,36 @@ def test_every_exchange_of_tendons_shows_in_the_curls_that_it_changes(model, cur
     for trial, pulled in zip(curls, ({0}, {1}, {2}, {1, 2}), strict=True):
         named = {columns.index(tendon) for tendon in pulled}
         assert refused(with_columns(trial, list(columns)), model) == (named != pulled), trial.name
+
+
+@pytest.mark.parametrize("columns", [(1, 0, 2), (0, 2, 1), (2, 1, 0), (1, 2, 0), (2, 0, 1)])
+def test_exchanged_tendons_show_in_static_pulls(model, columns):
+    pulls = ([30, -300, -300], [5, 30, -300], [30, -15, -15])
+    for trial in (static_pull(model, some, angle) for some in pulls for angle in (0, 25)):
+        check_trials([trial], model)
+        largest = int(np.argmax(trial.commands[0]))
+        assert refused(with_columns(trial, list(columns)), model) or columns[largest] == largest, trial.name
+
+
+def test_static_pulls_that_other_things_bend_too_pass(model):
+    """What gravity bends further than tendons do, and what all tendons press."""
+    trials = [static_pull(model, [10, -300, -300], 90), static_pull(model, [-300, 10, 5], 120)]
+    check_trials([*trials, static_pull(model, [20, 30, 30])], model)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_motions_pass_and_show_exchanged_tendons(model, seed):
+    check_trials([motion(model, seed=seed, reach_mm=40, noise=3e-4, pressed=True)], model)
+    trial = motion(model, seed=seed, reach_mm=80, noise=3e-4)
+    check_trials([trial], model)
+    late = {key: getattr(trial, key)[10:] for key in ("time", "positions", "quaternions", "measured")}
+    late |= {"commands": trial.commands[:-10], "tendon_positions": trial.commands[:-10]}  # motors 80 ms ahead
+    check_trials([replace(trial, **late)], model)
+    said = f"tendons: trial motion_{seed}_0_identify: found the path of 'tendon_.' .* mm longer than commanded"
+    for columns in ([1, 2, 0], [1, 0, 2], [2, 1, 0]):
+        with pytest.raises(InputError, match=said) as caught:
+            check_trials([with_columns(trial, columns)], model)
+        assert "\n" not in str(caught.value)
 
 
 def test_what_is_said_names_key_trial_and_both_tendons(model, curls):

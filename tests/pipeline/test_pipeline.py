@@ -64,13 +64,29 @@ def test_a_stage_lists_its_settings(stages, address):
     folder, name = _folder_and_name(address)
     params = {_relative(dep): dep.params for dep in stages[address].deps if hasattr(dep, "params")}
     section = OmegaConf.to_container(OmegaConf.load(ROOT / folder / "params.yaml"))[name] or {}
-    groups = group_options(ROOT / "conf" / name)
-    expected = {f"{folder}params.yaml": [name], f"conf/{name}/config.yaml": []}
-    expected |= {options[section[group]].relative_to(ROOT).as_posix(): [] for group, options in groups.items()}
+    expected = {f"{folder}params.yaml": [name], **_settings("conf", name, section)}
     if section.get("rig") == "demo.rig":  # which reads the lab's settings
-        expected |= {"demo/params.yaml": ["record"], "demo/conf/record/config.yaml": []}
+        expected |= LAB_S_SETTINGS
     params.pop("versions.yaml")  # the next test's
     assert params == expected
+
+
+def _settings(conf: str, name: str, section: dict) -> dict[str, list]:
+    """The files of a stage's settings, with those of the groups' options that its section of params.yaml names."""
+    chosen = [options[section[group]] for group, options in group_options(ROOT / conf / name).items()]
+    return {f"{conf}/{name}/config.yaml": []} | {file.relative_to(ROOT).as_posix(): [] for file in chosen}
+
+
+LAB_S_SETTINGS = {
+    "demo/params.yaml": ["record"],
+    **_settings("demo/conf", "record", OmegaConf.to_container(OmegaConf.load(ROOT / "demo/params.yaml"))["record"]),
+}
+
+
+def test_the_lab_lists_its_settings(stages):
+    params = {_relative(dep): dep.params for dep in stages["demo/dvc.yaml:record"].deps if hasattr(dep, "params")}
+    params.pop("versions.yaml")
+    assert params == LAB_S_SETTINGS
 
 
 @pytest.mark.parametrize("address", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record"])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.logs.test_schemas import CASES, write_foxglove, write_ros
-from tests.support.sessions import SEGMENTS, all_truths, instruments, record
+from tests.support.sessions import SEGMENTS, all_truths, instruments, motion_truth, pull_truth, record
 from tests.support.workbench import ROOT
 from trunkline.preparation.inspect import main
 from trunkline.sessions.session import read_session
@@ -25,7 +25,7 @@ def inspect(capsys, *paths) -> tuple[str, str]:
 
 
 def test_a_lab_session_is_described_and_its_proposal_is_the_session(tmp_path, capsys):
-    record(tmp_path, all_truths(), instruments())
+    record(tmp_path, [*all_truths(), pull_truth(), motion_truth()], instruments())
     right = read_session(tmp_path)
     said, proposed = inspect(capsys, tmp_path)
     assert "mocap4r2_msgs/msg/RigidBodies (cdr), poses: " in said
@@ -42,7 +42,8 @@ def test_a_lab_session_is_described_and_its_proposal_is_the_session(tmp_path, ca
 
 
 def test_experiments_are_told_apart_without_names(tmp_path, capsys):
-    record(tmp_path, all_truths(), instruments())
+    """But for a motion, which could be a curl."""
+    record(tmp_path, [*all_truths(), pull_truth()], instruments())
     right = {trial.file: trial for trial in read_session(tmp_path).trials}
     names = {}
     for index, path in enumerate(sorted(tmp_path.glob("*.mcap"))):

@@ -126,11 +126,15 @@ def curl(
                   gravity_in_base(np.radians(tilt_deg)), frames, start, pulls, noise, rng)
 
 
-def motion(model, reach_mm=25.0, tilt_deg=0.0, split="identify", frames=240, noise=0.0, seed=0) -> Trial:
-    """From rest, each tendon follows sines of its own, up to `reach_mm` in all."""
+def motion(
+    model, reach_mm=25.0, tilt_deg=0.0, split="identify", frames=240, noise=0.0, seed=0, pressed=False
+) -> Trial:
+    """From rest, each tendon follows sines of its own, up to `reach_mm` in all; what they all have in common presses
+    the arm together, and is left out but if `pressed`."""
     rng, time = np.random.default_rng(seed), np.arange(frames) * FRAME
     angle = 2 * np.pi * rng.uniform(0.3, 1.5, (3, 3)) * np.clip(time - 0.1, 0, None)[:, None, None]
     pulls = reach_mm / 3000 * np.sin(angle).sum(axis=2)
+    pulls -= 0.0 if pressed else pulls.mean(axis=1, keepdims=True)
     start, name = _rest_pose(model, tilt_deg, pulls), f"motion_{seed}_{tilt_deg:.0f}_{split}"
     return _trial(model, name, "motion", split, None, gravity_in_base(np.radians(tilt_deg)), frames, start, pulls,
                   noise, rng)

@@ -1,5 +1,6 @@
 """A small made-up session: a flexible pendulum of four segments, tilted, released and curled, in a few seconds."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -105,6 +106,23 @@ def curl_truth(level_mm: float = 40.0, split: str = "validate") -> Truth:
     pull = 1e-3 * level_mm * 0.5 * (1 - np.cos(2 * np.pi * phase))
     pulls = np.stack([pull, -pull / 2, -pull / 2], axis=1)
     return bent_truth(f"curl_{level_mm:.0f}", "curl", level_mm, split, 0.0, pull / 0.03, pulls)
+
+
+def pull_truth(pulls_mm=(40.0, -20.0, -20.0), split: str = "identify", load: float = 0.0) -> Truth:
+    """At rest for 1.5 s with tendons held, bent as far as tendon 1 says."""
+    held = 1e-3 * np.tile(pulls_mm, (int(1.5 * RATE), 1))
+    name = "pull_" + "_".join(f"{pull:.0f}" for pull in pulls_mm)
+    truth = bent_truth(name, "static_pull", None, split, 0.0, held[:, 0] / 0.03, held)
+    return replace(truth, load=load)
+
+
+def motion_truth(split: str = "identify", tilt_deg: float = 0.0) -> Truth:
+    """Sines of 0.7 and 1.3 Hz from `CURL_BEGIN` on, of a mount that is tilted."""
+    time = np.arange(int(4.0 * RATE)) / RATE
+    since = 2 * np.pi * np.clip(time - CURL_BEGIN, 0, None)
+    pull = 0.015 * (np.sin(0.7 * since) + np.sin(1.3 * since))
+    pulls = np.stack([pull, -pull / 2, -pull / 2], axis=1)
+    return bent_truth(f"motion_{split}", "motion", None, split, tilt_deg, pull / 0.03, pulls)
 
 
 def all_truths() -> list[Truth]:

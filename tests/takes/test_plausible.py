@@ -9,7 +9,17 @@ import pytest
 
 from demo.instruments import measure
 from demo.recorder import write_log, write_session
-from tests.support.sessions import SEGMENTS, TENDONS, curl_truth, instruments, record, release_truth, static_truth
+from tests.support.sessions import (
+    SEGMENTS,
+    TENDONS,
+    curl_truth,
+    instruments,
+    motion_truth,
+    pull_truth,
+    record,
+    release_truth,
+    static_truth,
+)
 from trunkline.errors import InputError
 from trunkline.sessions.session import read_session
 from trunkline.takes.checks import Findings, Limits
@@ -32,6 +42,10 @@ def truths():
         replace(release_truth("validate"), name="release_b"),
         curl_truth(40.0, "identify"),
         curl_truth(60.0),
+        pull_truth((40.0, -20.0, -20.0)),
+        pull_truth((20.0, -10.0, -10.0), "validate", load=0.05),
+        motion_truth(),
+        motion_truth("validate", 30.0),
     ]
 
 
@@ -163,6 +177,10 @@ def test_a_base_that_moves_while_a_segment_rests_is_named(sound):
         ("tilt_00", "release", None, "expected more than 2 % in a release: is it another experiment"),
         ("curl_40", "release", None, "commands: 'tendon_1' is wound by 40 mm, expected a release without actuation"),
         ("tilt_00", "curl", 40.0, "expected more than 2 % in a curl"),
+        ("curl_40", "static_pull", None, "expected at most 2 % in a static_pull: is it another experiment"),
+        ("motion_identify", "static_pull", None, "commands: 'tendon_1' is wound by .* expected a static_pull to hold"),
+        ("pull_40_-20_-20", "motion", None, "expected more than 2 % in a motion"),
+        ("motion_identify", "release", None, "commands: 'tendon_1' is wound by"),
     ],
 )
 def test_a_trial_labelled_as_another_experiment_is_named(sound, name, experiment, level, message):
@@ -221,6 +239,42 @@ def test_pulls_from_an_encoder_that_starts_anywhere_are_left(sound):
     later = {"command_time": take.command_time[half:], "commands": take.commands[half:]}
     later |= {"tendon_time": take.tendon_time[wound], "tendon_positions": take.tendon_positions[wound]}
     assert judged(sound, curl_40=replace(take, **later)) == ({}, []), "a window that begins with the arm curled"
+
+
+@pytest.mark.parametrize("name", ["pull_40_-20_-20", "motion_identify"])
+def test_pulls_without_a_level_that_are_in_mm_are_named(sound, name):
+    take = take_of(sound, name)
+    trials, _ = judged(sound, **{name: replace(take, commands=1e3 * take.commands)})
+    assert list(trials) == [name]
+    (said,) = trials[name]
+    found = r"commands: found pulls up to \d+.* m, expected less than the arm's length of 0\.\d+ m: are they in mm"
+    assert re.match(found, said)
+    both = pulls(take, lambda c: 1e3 * c, lambda p: 1e3 * p)
+    if name.startswith("motion"):
+        assert any("tendon positions: found pulls up to" in said for said in judged(sound, **{name: both})[0][name])
+
+
+def test_a_static_pull_whose_window_touches_the_way_to_the_next_is_left(sound):
+    take = take_of(sound, "pull_40_-20_-20")
+    next_time = take.command_time[-1] + np.arange(1, 80) / 100
+    ramp = take.commands[-1] + np.linspace(0, 0.02, 79)[:, None]
+    commanded = np.concatenate([take.command_time, next_time]), np.concatenate([take.commands, ramp])
+    seen = np.concatenate([take.tendon_time, next_time]), np.concatenate([take.tendon_positions, ramp])
+    for ahead in (0.0, 0.5):  # s, of the motors' clock
+        later = {"command_time": commanded[0] - ahead, "tendon_time": seen[0] - ahead}
+        later = replace(take, commands=commanded[1], tendon_positions=seen[1], **later)
+        assert judged(sound, **{take.name: later}) == ({}, [])
+
+
+def test_static_pulls_have_no_say_in_the_clocks(tmp_path):
+    """A ramp beside the window would fit any offset at which it is not seen."""
+    truth = pull_truth()
+    held = truth.commands.copy()
+    truth.commands = held * np.clip(np.arange(len(held)) / 40, 0, 1)[:, None]
+    truth.tendon_positions = truth.tendon_positions * np.clip(np.arange(len(truth.time)) / 200, 0, 1)[:, None]
+    record(tmp_path, [truth], instruments())
+    ((_, _, found),) = take_in(tmp_path, read_session(tmp_path), LIMITS)
+    assert found.offset is None
 
 
 def test_exchanged_topics_are_named(sound):

@@ -2,13 +2,18 @@
 
 import mujoco
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from trunkline.errors import InputError
 from trunkline.identification.experiment import SEEN_SHARE, check_names, measured_pose, start_frames
 from trunkline.identification.pose_fit import fit_pose
+from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.trial import Trial
 
 WOUND = 5e-3  # m, from which on a tendon counts as wound, and the arm as bent by it
+PLACES = 12  # frames of a trial in which several tendons pull in turn
+SHORTER = 0.75  # of the cables' stretch that other names may leave at least, where those given are right
+STRETCH = 2.5e-3  # m, all tendons together, in the mean over frames, from which on more stretch than need be counts
 ALIKE = 0.5  # of how well pulls and path lengths agree at best; two of three tendons exchanged: -0.5, out of six: 0.5
 
 
@@ -22,7 +27,8 @@ def check_trials(trials: list[Trial], model: mujoco.MjModel) -> None:
         check_names(trial, model)
     for trial in trials:
         if trial.tendons:
-            check_sides(trial, model)
+            kind = EXPERIMENTS[trial.experiment]
+            (check_lengths if kind.needs_motors and kind.level is None else check_sides)(trial, model)
 
 
 def check_sides(trial: Trial, model: mujoco.MjModel) -> None:
@@ -49,6 +55,30 @@ def check_sides(trial: Trial, model: mujoco.MjModel) -> None:
     raise InputError(
         f"session.yaml: tendons: trial {trial.name}: {found}, expected it to bend to the side of what is wound: "
         "are names exchanged, signs reversed, or is the base body turned about the arm?"
+    )
+
+
+def check_lengths(trial: Trial, model: mujoco.MjModel) -> None:
+    """Refuse a trial in which tendons are longer than commanded by far, and other tendons are not.
+
+    A tendon may be slack, but is hardly longer than its motor lets it be, whatever else bends the arm: gravity, other
+    tendons, its own momentum. The model's tendons are threaded through poses that were measured. By how much each
+    would be stretched in all is compared with what is left if names are exchanged in the best way; tendons that all
+    pull against each other leave the same with any names.
+    """
+    seen = np.flatnonzero(trial.measured.mean(axis=1) >= SEEN_SHARE)
+    frames = seen[:: max(len(seen) // PLACES, 1)]
+    tendons = [model.tendon(name).id for name in trial.tendons]
+    shorter = np.array([model.tendon_length0 - _path_lengths(trial, model, frame) for frame in frames])[:, tendons]
+    stretch = np.maximum(trial.commands[frames, :, None] - shorter[:, None, :], 0).mean(axis=0)  # (K names, K paths)
+    named, best = np.trace(stretch), stretch[linear_sum_assignment(stretch)].sum()
+    if named - best < STRETCH or best >= SHORTER * named:
+        return
+    worst = int(np.argmax(np.diag(stretch)))
+    found = f"found the path of {trial.tendons[worst]!r} {1e3 * stretch[worst, worst]:.0f} mm longer than commanded"
+    raise InputError(
+        f"session.yaml: tendons: trial {trial.name}: {found}, which fits with names exchanged, expected a tendon to be "
+        "slack or about as long as its command: are names exchanged, or is the base body turned about the arm?"
     )
 
 

@@ -107,13 +107,13 @@ def _experiment(
     if word:
         experiment = names[word[1]]
     else:
-        pulled = pull > MIN_TRAVEL
-        seen = (pulled, not pulled and travel < RESTING)
+        rests = pull <= MIN_TRAVEL and travel < RESTING
+        asked = survey.commands or survey.tendon_positions  # encoders may start anywhere
+        held = asked is not None and np.nan_to_num(asked.positions).max(initial=0.0) > MIN_TRAVEL
+        seen = (pull > MIN_TRAVEL or (rests and held), rests)
         experiment = next(name for name, kind in EXPERIMENTS.items() if (kind.needs_motors, kind.static) == seen)
     level = EXPERIMENTS[experiment].level
     if level is PULL:
-        if EXPERIMENTS[experiment].static and wound is not None and np.isfinite(wound.positions).any():
-            pull = float(np.nanmax(wound.positions))  # what is held throughout; only a change shows elsewhere
         return experiment, round(1e3 * pull)
     return experiment, _tilt(poses, base, up) if level is TILT else None
 

@@ -107,7 +107,9 @@ def _take(
 
 
 def _offset(take: Take, limits: Limits) -> OffsetFit | None:
-    """By how much the motors' clock is off, by what was wound, or else by what was commanded."""
+    """By how much the motors' clock is off, by what was wound, or else by what was commanded, while the arm moves."""
+    if EXPERIMENTS[take.experiment].static:
+        return None
     wound = (take.tendon_time, take.tendon_positions)
     motion = wound if len(take.tendon_time) else (take.command_time, take.commands)
     fit = estimate_offset(take.time, take.positions, *motion, limits.clock_offset)

@@ -59,7 +59,7 @@ def check_plausible(takes: list[Take], findings: list[Findings], base: str | Non
     for take, found in zip(takes, findings, strict=True):
         found.faults += _misplaced(take, usual, names, settings.distance * length)
         found.faults += _motion(take, length, settings.still)
-        found.faults += check_pulls(take, settings.still * length, settings.pull)
+        found.faults += check_pulls(take, length, settings.still * length, settings.pull)
     said = _order(takes[0].segments, usual) + _loose(chosen, usual, settings, length)
     return said if base is None else said + _base_at_rest(chosen, base)
 

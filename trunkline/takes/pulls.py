@@ -12,12 +12,14 @@ FITS = 1.25  # factor within which a pull is as its level says, whatever is let 
 LATEST = 0.3  # s, of a lag that is looked for
 EARLY = 0.01  # s by which what is measured may come before its command
 NOISIER = 5.0  # times the measurements' noise, that no command has
+HELD = MIN_TRAVEL  # m, to either side, by which a tendon that is held may be wound
 
 
-def check_pulls(take: Take, idle: float, factor: float) -> list[str]:
+def check_pulls(take: Take, length: float, idle: float, factor: float) -> list[str]:
     """What cannot be true of a take's tendons, a sentence each.
 
     Args:
+        length: m, of the arm, from which no tendon can be drawn in by more than that.
         idle: m, by which tendons may move in an experiment that does not pull them.
         factor: by which pulls may differ from the level, and measured from commanded ones.
     """
@@ -28,6 +30,12 @@ def check_pulls(take: Take, idle: float, factor: float) -> list[str]:
             said = [_against_level(key, pulls - zero, 1e-3 * take.level, factor) for zero in (0.0, pulls[:1])]
             if pulls.size and all(said):
                 return said[1]
+    elif kind.needs_motors:
+        said = _held(take) if kind.static else []
+        said += _beyond("commands", take.commands, length)
+        said += _beyond("tendon positions", take.tendon_positions - take.tendon_positions[:1], length)
+        if said:
+            return said
     elif not kind.needs_motors and not kind.static and take.commands.size:  # a loose tendon may well move by itself
         wound = np.ptp(take.commands, axis=0)
         most = int(np.argmax(wound))
@@ -37,6 +45,29 @@ def check_pulls(take: Take, idle: float, factor: float) -> list[str]:
     if take.commands.size and take.tendon_positions.size:
         return _against_commands(take, factor)
     return []
+
+
+def _held(take: Take) -> list[str]:
+    """In an experiment at rest, most of the time every command is about where it is in the middle: windows may touch
+    the way to the next pull, the more so as the motors' clock is not set yet."""
+    inside = (take.command_time >= 0) & (take.command_time <= take.time[-1])
+    if not inside.any():
+        return []
+    off = np.abs(take.commands[inside] - np.median(take.commands[inside], axis=0))
+    most = int(np.argmax(np.mean(off > HELD, axis=0)))
+    if np.mean(off[:, most] > HELD) <= 0.5:
+        return []
+    found = f"{take.tendons[most]!r} is wound by {1e3 * np.ptp(take.commands[inside, most]):.4g} mm"
+    return [f"experiment: commands: {found}, expected a {take.experiment} to hold them to within {1e3 * HELD:g} mm"]
+
+
+def _beyond(key: str, pulls: np.ndarray, length: float) -> list[str]:
+    """No tendon is drawn in by more than the arm is long."""
+    pulled = float(pulls.max(initial=0.0))
+    if pulled <= length:
+        return []
+    hint = ": are they in mm?" if 1e-3 * pulled <= length else ""
+    return [f"{key}: found pulls up to {pulled:.4g} m, expected less than the arm's length of {length:.4g} m{hint}"]
 
 
 def _against_level(key: str, wound: np.ndarray, level: float, factor: float) -> list[str]:
