@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import pandas as pd
 from pydantic import Field
@@ -26,6 +26,7 @@ Stage = Literal["identify_stiffness", "identify_damping", "identify_control"]
 @settings
 class Config:
     stages: list[Stage] = Field(min_length=1)
+    floor_poses: Annotated[int, Field(ge=1, le=10_000)]
 
 
 def main(config: Config) -> None:
@@ -38,7 +39,7 @@ def main(config: Config) -> None:
             identified = read_spec(folder / "arm.xml").compile()
             compared = Compared(**json.loads(existing(folder / "parameters.json").read_text())["compared"])
             models = {"cad": cad, "initial": initial, "identified": identified}
-            metrics[stage], predictions = score(models, trials, compared)
+            metrics[stage], predictions = score(models, trials, compared, config.floor_poses)
             of_trials[stage], along[stage] = trial_table(predictions), segment_table(predictions, trials[0].segments)
             if not metrics[stage]:
                 kinds = " or ".join(compared.experiments)

@@ -203,7 +203,7 @@ def row(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> str:
     unseen = [e for e in found.experiments if e.split == VALIDATE]
     replayed = replay(found.model, unseen, found.fit.segments)
     table = scores(replayed, unseen, found.fit.loss, found.fit.weights)[VALIDATE]["by_experiment"]
-    errors = [f"{table[kind][key]:.3f}" for key in ("e_internal_mm", "e_position_mm") for kind in KINDS]
+    errors = [f"{table[kind][key]:.3f}" for key in ("e_internal_mm", "e_position_mm", "e_tip_mm") for kind in KINDS]
     return "| " + " | ".join([choice.title, *errors, *(f"{seconds:.0f}" for seconds in found.spent)]) + " |"
 
 
@@ -213,7 +213,7 @@ def main() -> int:
     parser.add_argument("--quick", action="store_true", help="few trials, frames and iterations: only whether it runs")
     parser.add_argument("--only", nargs="+", choices=CHOICES, default=list(CHOICES), help="some of the rows")
     arguments = parser.parse_args()
-    heads = [f"{error}, {kind}s (mm)" for error in ("E_internal", "position") for kind in KINDS]
+    heads = [f"{error}, {kind}s (mm)" for error in ("E_internal", "position", "tip") for kind in KINDS]
     heads += [f"CPU {stage.removeprefix('identify_')} (s)" for stage in STAGES]
     require_demo(CAD_MODEL)
     known: dict[str, Chain] = {}

@@ -64,8 +64,9 @@ def cases() -> dict[str, Case]:
     }
 
 
-def error(case: Case, takes: list[Take]) -> tuple[float, float, float]:
-    """Mean position error on the identify and on the validate releases, mm, and the latter over the arm's length."""
+def error(case: Case, takes: list[Take]) -> tuple[float, float, float, float]:
+    """Mean position error on the identify and on the validate releases, mm, and of the latter also the tip error, mm
+    and % of the arm's length."""
     chosen = replace(load_config(filter.Config, "filter", EXAMPLE), **case.filtered)
     trials = [filter_take(as_stamped(take) if case.as_stamped else take, chosen)[0] for take in takes]
     config = load_config(identify_stiffness.Config, "identify_stiffness", EXAMPLE)
@@ -75,7 +76,7 @@ def error(case: Case, takes: list[Take]) -> tuple[float, float, float]:
         found = identify("", model, experiments, fit)
     table = scores(replay(found.models["identified"], experiments, fit.segments), experiments, fit.loss, fit.weights)
     unseen = table[VALIDATE]
-    return table[IDENTIFY]["e_position_mm"], unseen["e_position_mm"], unseen["e_position_pct"]
+    return table[IDENTIFY]["e_position_mm"], unseen["e_position_mm"], unseen["e_tip_mm"], unseen["e_tip_pct"]
 
 
 def arm(case: Case) -> mujoco.MjModel:
@@ -95,10 +96,10 @@ def as_stamped(take: Take) -> Take:
 @recorded("real_arm")
 def main() -> int:
     takes = read_takes(EXAMPLE / "data/processed/ingest", DECIDING)
-    print(f"{'':45}  identify  validate: mean position error, and of the length")
+    print(f"{'':45}  identify  validate: mean position error, tip error, and that of the length")
     for name, case in cases().items():
-        identify_mm, validate_mm, share = error(case, takes)
-        print(f"{name:45}  {identify_mm:5.2f} mm  {validate_mm:5.2f} mm  {share:.2f} %", flush=True)
+        identify_mm, validate_mm, tip_mm, share = error(case, takes)
+        print(f"{name:45}  {identify_mm:5.2f} mm  {validate_mm:5.2f} mm  {tip_mm:5.2f} mm  {share:.2f} %", flush=True)
     return 0
 
 

@@ -77,12 +77,13 @@ class Case:
         return ", ".join(f"{name} {value:.4g} {PARAMETERS[name].unit}" for name, value in pairs)
 
     def unseen_errors(self, vector: np.ndarray) -> str:
-        """E_internal and position error of a candidate on the unseen trials, in words."""
+        """E_internal, position and tip error of a candidate on the unseen trials, in words."""
         replayed = replay(
             with_parameters(self.model, values_of(self.fit.parameters, vector)), self.unseen, self.fit.segments
         )
         table = scores(replayed, self.unseen, self.fit.loss, self.fit.weights)[VALIDATE]
-        return f"validate: E_internal {table['e_internal_mm']:.3f} mm, position {table['e_position_mm']:.2f} mm"
+        errors = f"E_internal {table['e_internal_mm']:.3f} mm, position {table['e_position_mm']:.2f} mm"
+        return f"validate: {errors}, tip {table['e_tip_mm']:.2f} mm"
 
 
 ReadCase = Callable[[str, Size], Case]

@@ -188,7 +188,7 @@ def scored(project):
         (folder / "arm.xml").write_text(save_model(spec, model))
         table = {"compared": {"experiments": compared[stage], "frames": 40, "command_delay": 0.0}}
         (folder / "parameters.json").write_text(json.dumps(table))
-    config = score_stage.Config(stages=list(compared))
+    config = score_stage.Config(stages=list(compared), floor_poses=3)
     score_stage.main(config)
     return root, config, json.loads((root / "artifacts/score/metrics.json").read_text())
 

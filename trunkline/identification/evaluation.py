@@ -115,8 +115,7 @@ def _summary(rows: list[tuple[Experiment, dict[str, float]]]) -> dict:
 
 
 def halved_step(found: Prediction, halved: Prediction) -> dict:
-    """Of simulations at the model's own step and at half of it: by which share of itself that moves E_internal, per split,
-    and the tip error (`tip`).
+    """By which share of itself half the time step moves E_internal, per split, and the tip error (`tip`).
 
     Measured errors hardly change if those of the step hide beside others, hence also the largest distance between the
     two simulations of any segment, and of the tip, in mm.

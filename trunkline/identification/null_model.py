@@ -16,7 +16,7 @@ from trunkline.trials.experiments import is_static
 from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.trial import Trial
 
-FLOOR_POSES = 12  # frames of each trial, at most, in which the noise floor is taken
+FLOOR_POSES = 12  # frames of each trial, at most, in which the noise floor is taken where no setting says
 
 
 def references(
@@ -25,6 +25,7 @@ def references(
     model: mujoco.MjModel,
     like: Replay,
     ended: list[Experiment] | None = None,
+    floor_poses: int = FLOOR_POSES,
 ) -> dict[str, Prediction]:
     """The null models and the noise floor, by their names in metrics.json.
 
@@ -32,12 +33,13 @@ def references(
         trials, experiments: the same ones, in the same order.
         model: whose joint angles are fitted to measured poses. like: its replay, for the arm's length and tip.
         ended: from whose ends the mean shape at rest is; None for `experiments` themselves.
+        floor_poses: of each trial, at most, in which the noise floor is taken.
     """
     found = {
         "null": Prediction(hanging_still(experiments, like, ended or experiments), experiments),
         "null_straight": Prediction(straight(experiments, like), experiments),
         "null_held": held(trials, experiments, model, like),
-        "noise_floor": noise_floor(trials, experiments, model, like),
+        "noise_floor": noise_floor(trials, experiments, model, like, floor_poses),
     }
     return {name: prediction for name, prediction in found.items() if prediction.experiments}
 
@@ -77,22 +79,24 @@ def held(trials: list[Trial], experiments: list[Experiment], model: mujoco.MjMod
     return Prediction(replace(like, positions=positions), [e for _, e in pairs])
 
 
-def noise_floor(trials: list[Trial], experiments: list[Experiment], model: mujoco.MjModel, like: Replay) -> Prediction:
-    """What noise and pose fit alone leave of every trial, in `FLOOR_POSES` of its frames at most, evenly spread.
+def noise_floor(
+    trials: list[Trial], experiments: list[Experiment], model: mujoco.MjModel, like: Replay, poses: int = FLOOR_POSES
+) -> Prediction:
+    """What noise and pose fit alone leave of every trial, in `poses` of its frames at most, evenly spread.
 
     Joint angles are fitted to the measured segments of each, as for the pose from which a simulation starts. What
     remains is measurement noise that the low-pass left, what the smoothing of the pose fit takes from a sharp bend,
     and what no pose of this model can be. A simulation that is right in everything else is not expected to come
     nearer, though it may: the fit also weighs orientations and smoothness. These frames have no rate of change.
     """
-    floors = [_floor(trial, e, model) for trial, e in zip(trials, experiments, strict=True)]
+    floors = [_floor(trial, e, model, poses) for trial, e in zip(trials, experiments, strict=True)]
     return Prediction(replace(like, positions=[positions for _, positions in floors]), [e for e, _ in floors])
 
 
-def _floor(trial: Trial, experiment: Experiment, model: mujoco.MjModel) -> tuple[Experiment, np.ndarray]:
+def _floor(trial: Trial, experiment: Experiment, model: mujoco.MjModel, count: int) -> tuple[Experiment, np.ndarray]:
     first = 0 if is_static(trial.experiment) else start_frames(trial)[0] + 1
     seen = np.flatnonzero(experiment.measured.any(axis=1))
-    frames = seen[np.linspace(0, len(seen) - 1, min(FLOOR_POSES, len(seen))).round().astype(int)]
+    frames = seen[np.linspace(0, len(seen) - 1, min(count, len(seen))).round().astype(int)]
     poses = [fit_pose(model, trial.segments, *measured_pose(trial, first + frame)).qpos for frame in frames]
     parts = {name: getattr(experiment, name)[frames] for name in ("controls", "positions", "measured")}
     shapes = np.array([segment_positions(model, trial.segments, qpos) for qpos in poses])

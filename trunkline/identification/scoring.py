@@ -8,7 +8,7 @@ import numpy as np
 
 from trunkline.identification.evaluation import Prediction, replay
 from trunkline.identification.experiment import Experiment, prepare
-from trunkline.identification.null_model import references
+from trunkline.identification.null_model import FLOOR_POSES, references
 from trunkline.identification.repeatability import repeatability
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.trials.splits import IDENTIFY, TEST
@@ -30,12 +30,13 @@ class Compared:
 
 
 def score(
-    models: dict[str, mujoco.MjModel], trials: list[Trial], compared: Compared
+    models: dict[str, mujoco.MjModel], trials: list[Trial], compared: Compared, floor_poses: int
 ) -> tuple[dict, dict[str, Prediction]]:
     """Errors of `models`, one of them "identified", and of what they stand beside, on the trials of the split test.
 
     Args:
         trials: of the split test, and those to identify from, which the null model needs.
+        floor_poses: of each trial, at most, to take the noise floor from.
 
     Returns:
         For metrics.json: by model, null model and for the noise floor the split `test` as `scores` gives it, and how
@@ -49,7 +50,7 @@ def score(
     identified = models["identified"]
     experiments = [prepare(trial, identified, compared.frames, compared.command_delay) for trial in trials]
     unseen = [e for e in experiments if e.split == TEST]
-    predictions = _predictions(models, identified, tested, unseen, experiments)
+    predictions = _predictions(models, identified, tested, unseen, experiments, floor_poses)
     metrics: dict = {name: prediction.scores() for name, prediction in predictions.items()}
     metrics["noise_floor_mm"] = metrics["noise_floor"][TEST]["e_position_mm"]
     metrics["start_fit"] = start_fit(unseen)
@@ -78,11 +79,13 @@ def evaluate(
     return metrics, predictions
 
 
-def _predictions(models, model, trials: list[Trial], experiments: list[Experiment], ended) -> dict[str, Prediction]:
+def _predictions(
+    models, model, trials: list[Trial], experiments: list[Experiment], ended, floor_poses: int = FLOOR_POSES
+) -> dict[str, Prediction]:
     """Of all `models`, and what stands beside them; `model` is the one to whose segments poses are fitted."""
     segments = trials[0].segments
     found = {name: Prediction(replay(each, experiments, segments), experiments) for name, each in models.items()}
-    return found | references(trials, experiments, model, next(iter(found.values())).replay, ended)
+    return found | references(trials, experiments, model, next(iter(found.values())).replay, ended, floor_poses)
 
 
 def start_fit(experiments: list[Experiment]) -> dict:
