@@ -20,6 +20,7 @@ class BentResiduals:
     slopes: np.ndarray
     bends: np.ndarray
     parameters = ("stiffness", "damping")
+    trial_weights = np.ones(TRIALS)
 
     def residuals(self, vectors):
         lines = np.einsum("trp,cp->tcr", self.slopes, vectors)
