@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
+from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.identification.experiment import prepare
 from trunkline.identification.fit import Fit, Method, Polish, Rough
 from trunkline.identification.identify import identify
@@ -50,6 +51,29 @@ def test_per_joint_factors_come_back():
     found = identified(trials, model, {"stiffness": (0.99 * span, 1.01 * span)}, ("stiffness",))
     stiffness = found.models["identified"].jnt_stiffness / model.jnt_stiffness
     np.testing.assert_allclose(stiffness[::2][:3], factors[:3], atol=0.02)  # beyond, gravity bends too little
+
+
+def test_a_maxwell_branch_comes_back():
+    """From an arm that was bent at once and let go at once: its branches had no time to give way."""
+    model = small_model(joints=Joints([Branch(0.3, 0.5)]))
+    true = {"damping": 1.5 * PARAMETERS["damping"].read(model), "relaxation": 0.6, "relaxation_time": 0.2}
+    truth = changed(model, **true)
+    trials = [release(truth, bend, frames=100) for bend in (0.3, -0.25, 0.15)]
+    ranges = {"damping": (0.005, 1.0), "relaxation": (0.05, 3.0), "relaxation_time": (0.02, 3.0)}
+    found = identified(trials, model, ranges)
+    for name, value in true.items():
+        assert found.values[name] == pytest.approx(value, rel=0.05), name
+    assert not found.at_bound
+
+
+def test_a_slider_comes_back():
+    model = small_model(joints=Joints(sliders=[Slider(0.2, 0.05)]))
+    true = {"hysteresis": 0.5, "yield_bend": 0.03}
+    truth = changed(model, **true)
+    trials = [release(truth, bend, frames=100) for bend in (0.3, -0.25, 0.15)]
+    found = identified(trials, model, {"hysteresis": (0.05, 3.0), "yield_bend": (0.005, 0.2)})
+    for name, value in true.items():
+        assert found.values[name] == pytest.approx(value, rel=0.05), name
 
 
 def test_damping_and_tendon_friction_and_its_creep_come_back():

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.support.small_arm import small_spec
+from trunkline.arm.joints import BRANCH, SLIDER, Joints, add_elements, all_elements, arm_hinges, cables
 from trunkline.frames import gravity_in_base, wxyz_from_rotation
 from trunkline.identification.experiment import SLACK
 from trunkline.trials.trial import Trial
@@ -15,17 +16,19 @@ from trunkline.trials.trial import Trial
 FRAME = 1 / 120
 
 
-def small_model(units: int = 6) -> mujoco.MjModel:
+def small_model(units: int = 6, joints: Joints | None = None) -> mujoco.MjModel:
     spec = small_spec(units)
+    add_elements(spec, joints or Joints(), 1e-5)
     spec.option.timestep = FRAME / 8
     model = spec.compile()
-    model.dof_damping[:] *= 4
-    model.tendon_frictionloss[:] = 0.3
+    model.dof_damping[: arm_hinges(model)] *= 4
+    model.tendon_frictionloss[cables(model)] = 0.3
     return model
 
 
 def segments_of(model: mujoco.MjModel) -> tuple[str, ...]:
-    return tuple(name for name in (model.body(i).name for i in range(model.nbody)) if name.startswith("unit_"))
+    names = [model.body(i).name for i in range(model.nbody)]
+    return tuple(name for name in names if name.startswith("unit_") and BRANCH not in name)
 
 
 def with_load(model: mujoco.MjModel, load: float) -> mujoco.MjModel:
@@ -46,8 +49,12 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
     model = model.__copy__()
     model.opt.gravity[:] = gravity
     data = mujoco.MjData(model)
-    lengths = model.tendon_length0 - pulls
-    data.qpos[:], data.act[:] = start, lengths[0]
+    lengths = model.tendon_length0[cables(model)] - pulls
+    data.qpos[: len(start)], data.act[:] = start, lengths[0]
+    for slider in all_elements(model, SLIDER):  # slipped on the way from the straight arm
+        bend, give = data.qpos[slider.hinge], model.tendon_springyield[slider.tendon]
+        for end in (0, 1):
+            data.plastic[model.tendon_plasticadr[slider.tendon] + end] = bend - np.clip(bend, -give, give)
     segments = segments_of(model)
     sites = [model.site(f"{s}_center").id for s in segments]
     positions, quaternions = np.empty((frames, len(sites), 3)), np.empty((frames, len(sites), 4))
@@ -106,7 +113,7 @@ def _rest_pose(model, tilt_deg, pulls) -> np.ndarray:
 
 def release(model, bend: float, split="identify", frames=120, noise=0.0, seed=0, substep=0.0, tilt_deg=0.0) -> Trial:
     """Let go from every y hinge at `bend` rad and every x hinge at half of it."""
-    start = np.tile([0.5 * bend, bend], model.nq // 2)
+    start = np.tile([0.5 * bend, bend], arm_hinges(model) // 2)
     rng = np.random.default_rng(seed)
     return _trial(model, f"release_{bend:.2f}_{split}", "release", split, None,
                   gravity_in_base(np.radians(tilt_deg)), frames, start,

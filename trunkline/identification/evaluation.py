@@ -78,9 +78,9 @@ def replay(
 
 
 def segment_positions(model: mujoco.MjModel, segments: tuple[str, ...], qpos: np.ndarray) -> np.ndarray:
-    """Where `model` has its segments at joint angles `qpos` (nq,), m. Shape (S, 3)."""
+    """Where `model` has its segments at angles `qpos` (n,) of its first hinges, the arm's, m. Shape (S, 3)."""
     data = mujoco.MjData(model)
-    data.qpos[:] = qpos
+    data.qpos[: len(qpos)] = qpos
     mujoco.mj_kinematics(model, data)
     return np.array([data.site(f"{name}_center").xpos for name in segments])
 

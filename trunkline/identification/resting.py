@@ -72,7 +72,7 @@ def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], segments
     """
     shapes, gravities = [], []
     for experiment in experiments:
-        if not EXPERIMENTS[experiment.kind].hangs or experiment.split != IDENTIFY:
+        if not EXPERIMENTS[experiment.kind].hangs or experiment.split != IDENTIFY or experiment.load:
             continue
         last = slice(-max(round(LAST / experiment.frame_step), 1), None)
         positions = np.where(experiment.measured[last, :, None], experiment.positions[last], np.nan)
