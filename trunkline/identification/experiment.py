@@ -152,7 +152,7 @@ def _foreseen(trial: Trial, model: mujoco.MjModel, seen: int) -> tuple[np.ndarra
     if not apart:
         return _fit_frame(trial, model, seen).qpos, _velocity(trial, model, seen)
     frames = seen - apart * np.arange(3)
-    poses = np.stack([_fit_frame(trial, model, frame).qpos for frame in frames])
+    poses = np.stack([_fit_frame(trial, model, frame).qpos for frame in frames.tolist()])
     parabola = np.polyfit(trial.time[frames] - trial.start, poses, 2)
     return parabola[2], parabola[1]
 

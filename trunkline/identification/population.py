@@ -96,9 +96,9 @@ class Population:
 
     def _remember(self, batch: Batch, held: np.ndarray) -> None:
         """Joints' branches and sliders as after a straight arm was bent into the start pose `held` (n,) s ago."""
-        angles, stiffness = batch.bind("qpos"), batch.expand("tendon_stiffness") if self._model.ntendon else None
+        angles = batch.bind("qpos")
         for one in all_elements(self._model, BRANCH):
-            time = batch.expand("dof_damping")[:, one.own] / stiffness[:, one.tendon]
+            time = batch.expand("dof_damping")[:, one.own] / batch.expand("tendon_stiffness")[:, one.tendon]
             angles[:, one.own] = angles[:, one.hinge] * -np.expm1(-held[:, None] / time)
         for one in all_elements(self._model, SLIDER):
             bend, give = angles[:, one.hinge], batch.expand("tendon_springyield")[:, one.tendon]
