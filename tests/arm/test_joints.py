@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_spec
-from trunkline.arm.joints import BRANCH, SLIDER, Branch, Joints, Slider, add_elements, all_elements, arm_hinges, cables
+from trunkline.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import read_chain
 

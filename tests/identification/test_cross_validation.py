@@ -1,10 +1,11 @@
 """Tuning every joint on a few trials: a gain that is real shows on trials left out, one that fits noise does not."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from tests.support.matched_plant import segments_of, small_model, tilt
-from trunkline.identification.cross_validation import cross_validate
+from trunkline.identification.cross_validation import ERRORS, cross_validate
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import prepare
 from trunkline.identification.fit import Fit, Method, Polish, Rough
@@ -59,6 +60,13 @@ def test_factors_of_the_plant_are_better_on_trials_left_out():
     assert left_out["identified"] < 0.5 * left_out["coarse"]
 
 
+def error_table(found: dict) -> pd.DataFrame:
+    """As `trial_table`, with the number of trials left out with it for the E_internal of each."""
+    rows = [{"model": name, "e_internal_mm": float(len(prediction.experiments))} | dict.fromkeys(ERRORS[1:], 1.0)
+            for name, prediction in found.items() for _ in prediction.experiments]  # fmt: skip
+    return pd.DataFrame(rows)
+
+
 def test_every_trial_is_left_out_once(monkeypatch):
     """Errors are means over all trials, so folds of unequal size do not weigh more than their trials."""
     model = small_model(4)
@@ -67,10 +75,7 @@ def test_every_trial_is_left_out_once(monkeypatch):
     module = "trunkline.identification.cross_validation"
     monkeypatch.setattr(f"{module}.identify", lambda *args: type("Found", (), {"models": result.models})())
     monkeypatch.setattr(f"{module}.replay", lambda model, left, segments: seen.append([e.name for e in left]) or left)
-    monkeypatch.setattr(
-        f"{module}.scores",
-        lambda replayed, *rest: {"identify": {"e_internal_mm": float(len(replayed)), "e_position_mm": 1.0}},
-    )
+    monkeypatch.setattr(f"{module}.trial_table", lambda found: error_table(found))
     result = type("Result", (), {"models": {"coarse": model, "identified": model}})()
     table = cross_validate("test", result, trials, Fit((), {}, (), "positions", WEIGHTS, METHOD), folds=2)
     assert seen[::2] == [[trials[0].name, trials[2].name], [trials[1].name]]

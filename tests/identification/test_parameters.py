@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_spec
-from trunkline.arm.joints import BRANCH, Branch, Joints, Slider, add_elements, all_elements, arm_hinges
+from trunkline.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.elements import BRANCH, all_elements, arm_hinges
 from trunkline.identification.parameters import PARAMETERS, Parameter, candidate_fields, set_fields, unit_of_hinge
 from trunkline.identification.saving import save_model
 

@@ -8,7 +8,8 @@ import pytest
 
 from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
 from tests.support.small_arm import small_spec
-from trunkline.arm.joints import BRANCH, SLIDER, Branch, Joints, Slider, add_elements, elements
+from trunkline.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.elements import BRANCH, SLIDER, elements
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay
 from trunkline.identification.experiment import prepare

@@ -248,6 +248,8 @@ def test_the_stand_in_lab_refuses_unknown_keys_too(tmp_path):
     (tmp_path / "conf").symlink_to(ROOT / "demo" / "conf")
     for path in [(), *_nested(schema)]:
         params = OmegaConf.load(ROOT / "demo" / "params.yaml")
+        if path and isinstance(params.record.get(path[0]), str):  # chosen from conf/ by its name
+            continue
         OmegaConf.update(params, ".".join(["record", *path, "tpyo"]), 1, force_add=True)
         OmegaConf.save(params, tmp_path / "params.yaml")
         with pytest.raises(InputError, match=".".join(["record", *path, "tpyo: unknown key"])):

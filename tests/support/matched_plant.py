@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.support.small_arm import small_spec
-from trunkline.arm.joints import BRANCH, SLIDER, Joints, add_elements, all_elements, arm_hinges, cables
+from trunkline.arm.joints import Joints, add_elements
+from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables
 from trunkline.frames import gravity_in_base, wxyz_from_rotation
 from trunkline.identification.experiment import SLACK
 from trunkline.trials.trial import Trial

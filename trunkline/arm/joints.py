@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from typing import Annotated
 
 import mujoco
-import numpy as np
 from pydantic import Field
 
-BRANCH, SLIDER = "branch", "slider"
+from trunkline.elements import BRANCH, SLIDER
+
 LIGHT = 1e-9  # kg and kg m², what MuJoCo wants of a body that moves; its damping makes it follow, not its inertia
 
 Share = Annotated[float, Field(gt=0, le=10)]
@@ -42,18 +42,6 @@ class Joints:
 
     branches: Annotated[list[Branch], Field(max_length=3)] = field(default_factory=list)
     sliders: Annotated[list[Slider], Field(max_length=5)] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Elements:
-    """Those of one kind and number in a model, one for each of n hinges of the arm.
-
-    tendon, hinge: numbers of their tendons and of the arm's hinges. own: of a branch's own hinges. Shape (n,).
-    """
-
-    tendon: np.ndarray
-    hinge: np.ndarray
-    own: np.ndarray
 
 
 def add_elements(spec: mujoco.MjSpec, joints: Joints, armature: float) -> None:
@@ -88,31 +76,3 @@ def _light_body(spec: mujoco.MjSpec, name: str):
     body = spec.worldbody.add_body(name=name)
     body.explicitinertial, body.mass, body.ipos, body.inertia = True, LIGHT, [0, 0, 0], [LIGHT] * 3
     return body
-
-
-def elements(model: mujoco.MjModel, kind: str, number: int = 1) -> Elements:
-    """The model's elements `kind`, BRANCH or SLIDER, of this number; none where it was built without."""
-    ending = f"_{kind}_{number}"
-    tendons = [t for t in range(model.ntendon) if model.tendon(t).name.endswith(ending)]
-    names = [model.tendon(t).name for t in tendons]
-    hinges = [model.joint(name.removesuffix(ending)).id for name in names]
-    own = [model.joint(name).id for name in names] if kind == BRANCH else []
-    return Elements(*(np.array(found, dtype=int) for found in (tendons, hinges, own)))
-
-
-def all_elements(model: mujoco.MjModel, kind: str) -> list[Elements]:
-    """Those of every number that the model has, in order."""
-    found = []
-    while len((one := elements(model, kind, len(found) + 1)).tendon):
-        found.append(one)
-    return found
-
-
-def arm_hinges(model: mujoco.MjModel) -> int:
-    """How many hinges are the arm's; they come first, branches after them."""
-    return model.njnt - sum(len(branch.own) for branch in all_elements(model, BRANCH))
-
-
-def cables(model: mujoco.MjModel) -> list[int]:
-    """Numbers of the tendons that run along the arm; the others are parts of joints."""
-    return [t for t in range(model.ntendon) if model.wrap_type[model.tendon_adr[t]] != mujoco.mjtWrap.mjWRAP_JOINT]

@@ -5,7 +5,7 @@ import mujoco
 import numpy as np
 from matplotlib.figure import Figure
 
-from trunkline.arm.joints import arm_hinges, cables
+from trunkline.elements import arm_hinges, cables
 from trunkline.figures.style import IDENTIFIED, INITIAL, TENDON, UNIT, UNIT_EDGE
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from trunkline.arm.joints import arm_hinges, cables
+from trunkline.elements import arm_hinges, cables
 from trunkline.errors import InputError
 from trunkline.identification.pose_fit import PoseFit, fit_pose
 from trunkline.trials.experiments import EXPERIMENTS, is_static

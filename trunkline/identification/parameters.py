@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from trunkline.arm.joints import BRANCH, SLIDER, all_elements, arm_hinges, cables, elements
+from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, elements
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 
 Fields = dict[str, np.ndarray]  # name of an MjModel field → its values per candidate, (candidates, ...)

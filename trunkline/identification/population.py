@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.arm.joints import BRANCH, SLIDER, all_elements
+from trunkline.elements import BRANCH, SLIDER, all_elements
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
 from trunkline.simulation.load import hang, slowing

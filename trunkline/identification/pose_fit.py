@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from mujoco import minimize
 
-from trunkline.arm.joints import arm_hinges
+from trunkline.elements import arm_hinges
 from trunkline.frames import rotation_from_wxyz
 
 POSITION_SIGMA = 0.5e-3  # m, what a tracked position is trusted to

@@ -12,7 +12,7 @@ import numpy as np
 from mujoco.batch import Batch
 from scipy.spatial.transform import Rotation
 
-from trunkline.arm.joints import BRANCH, SLIDER, all_elements
+from trunkline.elements import BRANCH, SLIDER, all_elements
 from trunkline.frames import wxyz_from_rotation
 from trunkline.simulation.motion import batch_of, hold
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from trunkline.arm.joints import cables
+from trunkline.elements import cables
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from trunkline.arm.joints import BRANCH, SLIDER, all_elements, cables
+from trunkline.elements import BRANCH, SLIDER, all_elements, cables
 from trunkline.errors import InputError
 
 _POSITION_DYNAMICS = (

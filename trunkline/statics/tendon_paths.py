@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from trunkline.arm.joints import cables
+from trunkline.elements import cables
 from trunkline.errors import InputError
 
 

@@ -6,7 +6,7 @@ from typing import Literal
 import mujoco
 from pydantic import BaseModel, ConfigDict, Field
 
-from trunkline.arm.joints import cables
+from trunkline.elements import cables
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw
 
