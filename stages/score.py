@@ -32,7 +32,7 @@ class Config:
 def main(config: Config) -> None:
     trials = read_trials(TRIALS, (IDENTIFY, TEST))
     cad = initial = read_spec(ARTIFACTS / "build_mjcf/arm.xml").compile()
-    metrics, of_trials, along = {}, {}, {}
+    metrics, of_trials, along, unscored = {}, {}, {}, {trial.experiment for trial in trials if trial.split == TEST}
     with progress(len(config.stages), "score", "stages") as bar:
         for stage in config.stages:
             folder = ARTIFACTS / stage
@@ -42,15 +42,16 @@ def main(config: Config) -> None:
             metrics[stage], predictions = score(models, trials, compared, config.floor_poses)
             of_trials[stage], along[stage] = trial_table(predictions), segment_table(predictions, trials[0].segments)
             if not metrics[stage]:
-                kinds = " or ".join(compared.experiments)
-                print(f"score: {stage}: found no {kinds} with split {TEST}, expected one: nothing to score")
-            initial = identified
+                print(f"score: {stage}: found no {' or '.join(compared.experiments)} with split {TEST}, expected one")
+            initial, unscored = identified, unscored - set(compared.experiments)
             bar.update(1, stage=stage)
+    if unscored:
+        print(f"score: {', '.join(sorted(unscored))}: no stage's `reported` has it, so nothing of it is scored")
     with output_folder(ARTIFACTS / "score") as folder:
         write_json(folder / "metrics.json", metrics)
         for name, tables in (("trials", of_trials), ("segments", along)):
-            table = pd.concat([table.assign(stage=stage) for stage, table in tables.items()])
-            table.to_csv(folder / f"{name}.csv", index=False, float_format="%.6g")
+            whole = pd.concat([table.assign(stage=stage) for stage, table in tables.items()])
+            whole.to_csv(folder / f"{name}.csv", index=False, float_format="%.6g")
         save_figure(trial_figure(of_trials), folder / "errors.png")
         save_figure(segment_figure(along), folder / "segments.png")
 
