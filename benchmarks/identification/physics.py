@@ -6,12 +6,13 @@ from functools import partial
 import mujoco
 import numpy as np
 
-from benchmarks.identification.case import CAD_MODEL, ReadCase, Size
+from benchmarks.identification.case import ReadCase, Size
 from benchmarks.identification.timing import alternate
-from trunkline.arm.joints import Branch, Joints, Slider, add_elements
+from stages.build_mjcf import Config, cad_arm
+from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.population import Population
-from trunkline.pipeline.inputs import read_spec
+from trunkline.pipeline.config import load_config
 
 CANDIDATES = 4
 BRANCHES, SLIDERS = [Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)]
@@ -40,14 +41,10 @@ def report(read_case: ReadCase, size: Size) -> None:
 
 
 def model_with(joints: Joints, dead_time: float = 0.0) -> mujoco.MjModel:
-    """The CAD model of the pipeline with these joints."""
-    spec = read_spec(CAD_MODEL)
-    armature = float(spec.joints[0].armature)
-    add_elements(spec, joints, armature)
-    for actuator in spec.actuators:
-        actuator.delay = dead_time
-        actuator.nsample = int(np.ceil(dead_time / spec.option.timestep)) + 1 if dead_time else 0
-    return spec.compile()
+    """The CAD model of the pipeline's settings, with these joints."""
+    config = load_config(Config, "build_mjcf")
+    config.joints, config.actuation.dead_time = joints, dead_time
+    return cad_arm(config).spec.compile()
 
 
 def steps(model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...]) -> int:

@@ -81,7 +81,7 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "tendon_friction": False,
         "friction_time": False,
         "kp": False,
-        "kv": False,
+        "kv": True,
         "force_range": None,  # undetermined
         "time_constant": None,  # the lab's motor has none
     }
