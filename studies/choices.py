@@ -26,7 +26,7 @@ from trunkline.errors import in_one_line
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.fit import Fit
-from trunkline.identification.identify import identify
+from trunkline.identification.identify import Identification, identify
 from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.problem import Bounds
 from trunkline.identification.settings import IdentificationSettings
@@ -150,12 +150,13 @@ def quick(stage: str, config: IdentificationSettings) -> IdentificationSettings:
 
 @dataclass
 class Chain:
-    """What stages end with: the last model, the last stage's trials and fit, CPU seconds by stage."""
+    """What stages end with: the last model, the last stage's trials, fit and result, CPU seconds by stage."""
 
     model: mujoco.MjModel
     experiments: list[Experiment]
     fit: Fit | None
     spent: list[float]
+    result: Identification | None = None
 
 
 def chain(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> Chain:
@@ -186,7 +187,7 @@ def next_link(before: Chain, stage: str, config: IdentificationSettings, trials:
     spent = [*before.spent, clock.read().cpu]
     for line in [*doubts(result, fit.parameters), result.values]:
         print(f"{stage}: {line}")
-    return Chain(result.models["identified"], experiments, fit, spent)
+    return Chain(result.models["identified"], experiments, fit, spent, result)
 
 
 def fewer(experiments: list[Experiment], trials: int) -> list[Experiment]:

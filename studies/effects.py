@@ -22,17 +22,14 @@ import numpy as np
 from benchmarks.identification.case import STAGES
 from stages.build_mjcf import Config as CadConfig
 from stages.build_mjcf import cad_arm
+from studies.choices import Chain, next_link
 from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.errors import in_one_line
 from trunkline.identification.cross_validation import errors_left_out
 from trunkline.identification.evaluation import Prediction, replay
-from trunkline.identification.experiment import Experiment
-from trunkline.identification.fit import Fit
-from trunkline.identification.identify import Identification, identify
 from trunkline.identification.null_model import hanging_still
 from trunkline.identification.problem import Bounds
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import read_reported
 from trunkline.pipeline.results import recorded
@@ -109,49 +106,31 @@ def settings_of(stage: str, effects: list[Effect]) -> IdentificationSettings:
     return replace(config, parameters=parameters, per_joint=[])
 
 
-@dataclass
-class Link:
-    """A stage's fit, and what it was made of."""
-
-    result: Identification
-    experiments: list[Experiment]
-    fit: Fit
-    kinds: list[str]
-
-    @property
-    def model(self) -> mujoco.MjModel:
-        return self.result.models["identified"]
-
-    def left_out(self, stage: str, folds: int) -> np.ndarray:
-        """Position error of every trial to identify from, not having been seen, mm."""
-        fitted = [e for e in self.experiments if e.kind in self.kinds]
-        with contextlib.redirect_stdout(sys.stderr):
-            table = errors_left_out(stage, self.result, fitted, self.fit, folds)
-        return table[table["model"] == "identified"]["e_position_mm"].to_numpy()
+def left_out(link: Chain, stage: str, folds: int) -> np.ndarray:
+    """Position error of every trial to identify from, not having been seen by the last stage's fit, mm."""
+    kinds = settings_of(stage, []).experiments
+    fitted = [e for e in link.experiments if e.kind in kinds]
+    with contextlib.redirect_stdout(sys.stderr):
+        table = errors_left_out(stage, link.result, fitted, link.fit, folds)
+    return table[table["model"] == "identified"]["e_position_mm"].to_numpy()
 
 
-def chain(effects: list[Effect], last: str, known: dict[str, Link]) -> Link:
+def chain(effects: list[Effect], last: str, known: dict[str, Chain]) -> Chain:
     """The stages up to `last`, each on what the one before it found."""
-    model, key, link = cad_model(effects), "", None
+    found, key = Chain(cad_model(effects), [], None, []), ""
     for stage in STAGES:
         config = settings_of(stage, effects)
-        key += f"{stage} {config} {model.nq} {model.nhistory}\n"
+        key += f"{stage} {config} {found.model.nq} {found.model.nhistory}\n"
         if key not in known:
             with contextlib.redirect_stdout(sys.stderr):
-                begun, experiments, fit = set_up(config, read_reported(config), model)
-                fitted = [e for e in experiments if e.kind in config.experiments]
-                found = identify(stage, begun, fitted, fit)
-                print({name: float(f"{value:.4g}") for name, value in found.values.items()}, flush=True)
-                known[key] = Link(found, experiments, fit, config.experiments)
-        link = known[key]
-        model = link.model
+                known[key] = next_link(found, stage, config, read_reported(config), is_quick=False)
+        found = known[key]
         if stage == last:
             break
-    assert link is not None
-    return link
+    return found
 
 
-def validated(title: str, link: Link) -> list[str]:
+def validated(title: str, link: Chain) -> list[str]:
     """Rows of the last table: errors on `validate` by kind."""
     unseen = [e for e in link.experiments if e.split == VALIDATE]
     replayed = replay(link.model, unseen, link.fit.segments)
@@ -170,7 +149,7 @@ def main() -> int:
     parser.add_argument("--folds", type=int, default=3, help="groups of trials that are left out in turn")
     parser.add_argument("--only", nargs="+", choices=EFFECTS, default=list(EFFECTS), help="effects to try")
     arguments = parser.parse_args()
-    known: dict[str, Link] = {}
+    known: dict[str, Chain] = {}
     kept: list[Effect] = []
     with recorded("effects", keep=arguments.only == list(EFFECTS)):
         print("| effect | position error left out (mm): without | with | lower by | kept | seconds |", flush=True)
@@ -178,7 +157,7 @@ def main() -> int:
         for name in arguments.only:
             effect, begun = EFFECTS[name], time.perf_counter()
             errors = [
-                chain(effects, effect.stage, known).left_out(effect.stage, arguments.folds)
+                left_out(chain(effects, effect.stage, known), effect.stage, arguments.folds)
                 for effects in (kept, [*kept, effect])
             ]
             gain = errors[0] - errors[1]

@@ -113,7 +113,7 @@ def noisy(
 def fitted_start(experiment: Experiment, model: mujoco.MjModel, segments, shifts, turns) -> PoseFit:
     """The fit to an experiment's start, of which every segment is seen off by `shifts`, m, and `turns`, rad (S, 3)."""
     data = mujoco.MjData(model)
-    data.qpos[:] = experiment.start
+    data.qpos[: len(experiment.start)] = experiment.start
     mujoco.mj_kinematics(model, data)
     sites = [model.site(f"{name}_center").id for name in segments]
     rotation = Rotation.from_rotvec(turns) * Rotation.from_matrix(data.site_xmat[sites].reshape(-1, 3, 3))

@@ -65,7 +65,7 @@ def as_first_written(case: Case) -> Callable[[np.ndarray], float]:
             substeps = round(experiment.frame_step / case.model.opt.timestep)
             model.opt.gravity[:] = experiment.gravity
             data = mujoco.MjData(model)
-            data.qpos[:], data.act[:] = experiment.start, experiment.controls[0]
+            data.qpos[: len(experiment.start)], data.act[:] = experiment.start, experiment.controls[0]
             seen = np.empty(experiment.positions.shape)
             for frame in range(experiment.frames):
                 model.opt.timestep = (experiment.frame_step if frame else experiment.lead) / substeps
