@@ -1,9 +1,10 @@
 """Errors of a session whose trials are at rest and in motion."""
 
 import numpy as np
+import pytest
 
 from tests.support.matched_plant import release, segments_of, small_model, tilt
-from trunkline.identification.evaluation import replay, scores
+from trunkline.identification.evaluation import period_error, replay, scores
 from trunkline.identification.experiment import prepare
 from trunkline.identification.loss import LossWeights
 
@@ -28,3 +29,27 @@ def test_trials_that_a_model_does_not_survive_are_counted():
     found.positions[1][-1, 0] = np.nan
     assert found.diverged == 1
     assert scores(found, experiments, "positions", WEIGHTS)["identify"]["e_position_mm"] > 1
+
+
+@pytest.mark.parametrize("longer", [1.0, 1.01, 0.98, 1.05])
+def test_the_period_of_a_swing_that_dies_away(longer):
+    """As a release: four to five swings, of which the cameras miss a part."""
+    time = np.arange(437) / 120
+
+    def swing(period: float) -> np.ndarray:
+        wave = np.exp(-0.6 * time) * np.cos(2 * np.pi * time / period)
+        return 0.1 * wave[:, None] * [0.6, 0.0, 0.8] + [0.0, 0.3, -0.4]
+
+    measured = np.ones(437, dtype=bool)
+    measured[100:110] = False
+    real = np.where(measured[:, None], swing(0.8), np.nan)
+    assert period_error(swing(0.8 * longer), real, measured) == pytest.approx(abs(longer - 1), abs=2e-3)
+
+
+def test_an_arm_that_hangs_still_has_no_period():
+    model = small_model(4)
+    experiments = [prepare(release(model, 0.2, frames=60), model, 60)]
+    found = replay(model, experiments, segments_of(model))
+    assert "e_swing_period_pct" in scores(found, experiments)["identify"]
+    found.positions[0][:] = found.positions[0][:1]
+    assert "e_swing_period_pct" not in scores(found, experiments)["identify"]

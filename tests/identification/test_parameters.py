@@ -11,6 +11,7 @@ from trunkline.identification.parameters import PARAMETERS, Parameter, candidate
 from trunkline.identification.saving import save_model
 
 VALUES = {
+    "joint_place": 0.3,
     "stiffness": 2.5, "hardening": 0.7, "joint_friction": 0.01, "damping": 0.02, "tendon_friction": 0.8,
     "friction_time": 0.03, "kp": 1500.0, "kv": 60.0, "force_range": 45.0, "time_constant": 0.08,
     "relaxation": 0.5, "relaxation_time": 0.7, "relaxation_2": 0.1, "relaxation_time_2": 3.0, "hysteresis": 0.4,
@@ -28,6 +29,20 @@ def full_spec() -> mujoco.MjSpec:
     add_elements(spec, ELEMENTS, 1e-5)
     for actuator in spec.actuators:
         actuator.delay, actuator.nsample = 0.02, 100
+    return spec
+
+
+def cantilever_spec(units: int, stiffness: float, length: float) -> mujoco.MjSpec:
+    """A chain of equal units, two hinges each at its upper end."""
+    spec = mujoco.MjSpec()
+    body = spec.worldbody.add_body(name="base")
+    for unit in range(units):
+        body = body.add_body(name=f"unit_{unit:02d}", pos=[0, 0, -length if unit else 0.0])
+        body.explicitinertial, body.mass, body.inertia = True, 1e-3, [1e-6] * 3
+        for axis, direction in (("x", (1, 0, 0)), ("y", (0, 1, 0))):
+            hinge = mujoco.mjtJoint.mjJNT_HINGE
+            body.add_joint(name=f"{body.name}_{axis}", type=hinge, axis=direction, stiffness=[stiffness, 0, 0])
+    body.add_site(name="tip", pos=[0, 0, -length])
     return spec
 
 
@@ -69,6 +84,22 @@ def test_scaling_keeps_the_arm_s_proportions():
     for one in all_elements(start, BRANCH):  # branches are as stiff beside their springs as before, and as slow
         np.testing.assert_allclose(model.tendon_stiffness[one.tendon] / start.tendon_stiffness[one.tendon], stiffer)
         np.testing.assert_allclose(model.dof_damping[one.own] / start.dof_damping[one.own], stiffer)
+
+
+@pytest.mark.parametrize(("place", "error"), [(0.0, 3 / 2 / 20 + 1 / 2 / 20**2), (0.5, -1 / 4 / 20**2)])
+def test_an_arm_that_bends_in_the_middle_of_its_units_is_nearer_to_a_rod(place, error):
+    """Sag of a cantilever under a small force F at its end, against F L³ / (3 E I) of a rod; K = E I n / L."""
+    units, stiffness, length, force = 20, 5.0, 0.4, 0.01
+    spec = cantilever_spec(units, stiffness, length / units)
+    model = model_with({"joint_place": place}, model=spec.compile())
+    data = mujoco.MjData(model)
+    model.opt.gravity[:] = 0
+    tip = model.site("tip")
+    mujoco.mj_forward(model, data)
+    jacobian = np.empty((3, model.nv))
+    mujoco.mj_jacSite(model, data, jacobian, None, tip.id)
+    sag = force * np.sum(jacobian[0] ** 2 / model.jnt_stiffness)
+    assert sag / (force * length**3 / (3 * stiffness * length / units)) == pytest.approx(1 + error, rel=1e-9)
 
 
 def test_candidates_do_not_mix():

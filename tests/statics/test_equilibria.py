@@ -54,6 +54,16 @@ def test_an_arm_on_a_turned_mount_rests_there_in_its_own_frame(arm, chain):
     np.testing.assert_allclose(settled.position, found.position, rtol=0, atol=2e-5)
 
 
+def test_units_that_bend_further_down_rest_where_mujoco_does(arm, chain):
+    lower = arm.__copy__()
+    set_fields(lower, candidate_fields(arm, {"joint_place": np.array([0.4])}))
+    tensions, gravity = random_pulls(chain, 6)
+    found = equilibrium(read_chain(lower), tensions, gravity)
+    settled = settle(lower, found.lengths - tensions / chain.gain, gravity)
+    np.testing.assert_allclose(settled.position, found.position, rtol=0, atol=2e-5)
+    assert np.linalg.norm(found.position - equilibrium(chain, tensions, gravity).position, axis=1).max() > 1e-3
+
+
 def test_actuators_saturate_as_mujocos_do(arm, chain):
     commands = chain.straight_lengths - np.array([[0.5, -0.1, -0.1], [0.03, 0.02, -0.1]])
     found = actuated(chain, commands, gravity_in_base(0.5))

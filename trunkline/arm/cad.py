@@ -33,6 +33,7 @@ class Chain(ABC):
         tendons: how many. hole_ratio: distance of their holes from the axis over the unit's outer radius.
         tip_load: kg that hangs at the tip.
         segments: name of a tracked point to its distance from the mount along the straight arm, m.
+        joint_place: where a unit bends, as a share of its length: 0 at its upper end, as in the paper's chain.
     """
 
     length: Annotated[float, Field(ge=0.01, le=10)]
@@ -42,6 +43,7 @@ class Chain(ABC):
     hole_ratio: Annotated[float, Field(gt=0, le=1)]
     tip_load: Annotated[float, Field(ge=0, le=100)]
     segments: dict[str, Annotated[float, Field(gt=0, le=10)]]
+    joint_place: Annotated[float, Field(ge=0, le=1)]
 
     def __post_init__(self):
         for name, distance in self.segments.items():
@@ -81,4 +83,5 @@ class Chain(ABC):
             "stiffness_base": properties.stiffness[0],
             "damping_base": properties.damping[0],
         }
-        return CadArm(build_spec(chain, properties, tendons, solver, self.tip_load, self.segments), metrics)
+        spec = build_spec(chain, properties, tendons, solver, self.tip_load, self.segments, self.joint_place)
+        return CadArm(spec, metrics)

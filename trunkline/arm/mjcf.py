@@ -92,12 +92,14 @@ def build_spec(
     solver: Solver,
     tip_load: float = 0.0,
     segments: dict[str, float] | None = None,
+    joint_place: float = 0.0,
 ) -> mujoco.MjSpec:
     """The arm hanging straight down from its mount, in SI units. Compile it with `.compile()`.
 
     Args:
         tip_load: kg that hangs at the tip.
         segments: name of a tracked point to its distance from the mount along the straight arm, m.
+        joint_place: where a unit bends, as a share of its length from its upper end.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "arm"
@@ -116,7 +118,7 @@ def build_spec(
     _add_holes(body, "base", hole_radii[0], 0.0, cables)
     units = []
     for index in range(chain.units):
-        body = _add_unit(body, index, chain, properties, solver)
+        body = _add_unit(body, index, chain, properties, solver, joint_place)
         _add_holes(body, unit_name(index), hole_radii[index], -chain.lengths[index] / 2, cables)
         units.append(body)
     for name, distance in (segments or {}).items():
@@ -139,7 +141,9 @@ def _add_load(parent, mass: float, chain: ChainGeometry) -> None:
     )  # fmt: skip
 
 
-def _add_unit(parent, index: int, chain: ChainGeometry, properties: UnitProperties, solver: Solver):
+def _add_unit(
+    parent, index: int, chain: ChainGeometry, properties: UnitProperties, solver: Solver, joint_place: float
+):
     name, length = unit_name(index), chain.lengths[index]
     body = parent.add_body(name=name, pos=[0, 0, -chain.lengths[index - 1] if index else 0.0])
     body.explicitinertial = True
@@ -150,6 +154,7 @@ def _add_unit(parent, index: int, chain: ChainGeometry, properties: UnitProperti
         body.add_joint(
             name=f"{name}_{axis}",
             type=mujoco.mjtJoint.mjJNT_HINGE,
+            pos=[0, 0, -joint_place * length],
             axis=direction,
             limited=True,
             range=[-chain.joint_range[index], chain.joint_range[index]],

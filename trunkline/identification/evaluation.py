@@ -16,8 +16,10 @@ from trunkline.identification.loss import (
     velocity_error,
 )
 from trunkline.identification.population import Population
+from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.splits import SPLITS
 
+SPECTRUM = 16  # times as many points as samples, so that a parabola through three of them finds a peak
 STRUCTURE = "jnt_stiffness"  # any field: a population of one is the model itself
 
 
@@ -171,7 +173,33 @@ def errors_of(
         row["loss"] = float(loss_of(RESIDUALS[loss](positions[None], real, measured, weights))[0])
     if experiment.frames > 1 and in_order:
         row["e_velocity_mm_s"] = float(velocity_error(positions, real, measured, 1 / experiment.frame_step)) * 1e3
+        swings = EXPERIMENTS[experiment.kind].hangs and np.ptp(positions[:, tip], axis=0).any()
+        if swings and measured[:, tip].any():
+            row["e_swing_period_pct"] = 100 * period_error(positions[:, tip], real[:, tip], measured[:, tip])
     return row
+
+
+def period_error(simulated: np.ndarray, real: np.ndarray, measured: np.ndarray) -> float:
+    """By which share of itself the period of a swing differs, along the line on which it is widest.
+
+    Args:
+        simulated, real: positions of one point over a swing that dies away, m. Each (T, 3).
+        measured: which of the real ones count. Shape (T,).
+    """
+    times = np.arange(len(real))
+    filled = np.stack([np.interp(times, times[measured], axis[measured]) for axis in real.T], axis=1)
+    line = np.linalg.svd(filled - filled.mean(axis=0), full_matrices=False)[2][0]
+    found, true = (_frequency(points @ line) for points in (simulated, filled))
+    return abs(true / found - 1)
+
+
+def _frequency(swing: np.ndarray) -> float:
+    """Of the largest peak of the spectrum, the mean taken off, in cycles a sample."""
+    spectrum = np.abs(np.fft.rfft(swing - swing.mean(), SPECTRUM * len(swing)))
+    peak = int(np.clip(np.argmax(spectrum), 1, len(spectrum) - 2))
+    before, at, after = spectrum[peak - 1 : peak + 2]
+    offset = 0.5 * (after - before) / max(2 * at - before - after, 1e-300)  # of a parabola's top
+    return (peak + offset) / (SPECTRUM * len(swing))
 
 
 def _mean(rows: list[dict[str, float]]) -> dict[str, float]:

@@ -8,7 +8,7 @@ import numpy as np
 from trunkline.elements import arm_hinges, cables
 from trunkline.errors import InputError
 from trunkline.identification.pose_fit import PoseFit, fit_pose
-from trunkline.trials.experiments import EXPERIMENTS, is_static
+from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial
 
 SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend takes up
@@ -31,7 +31,6 @@ class Experiment:
         load: kg at the tip, beside the model's own.
         start: angles of the arm's hinges from which it starts. Shape (n,).
         velocity: with which it starts, rad/s; 0 unless the trial's arm moves then. Shape (n,).
-        held: s for which the arm had been in the start pose, at least.
         lead: s from the start to the first frame.
         controls: commanded tendon lengths, m, held from one frame to the next: row 0 from the start to the first
             frame, row t from frame t - 1 to frame t. Shape (T, nu).
@@ -54,7 +53,6 @@ class Experiment:
     frame_step: float
     fit: PoseFit
     repaired: bool = False
-    held: float = np.inf
     load: float = 0.0
 
     @property
@@ -109,7 +107,6 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         frame_step=step,
         fit=fit,
         repaired=trial.repairs > 0,
-        held=trial.start if EXPERIMENTS[trial.experiment].hangs else np.inf,
         load=trial.load,
     )
 

@@ -84,6 +84,24 @@ def _whole_arm(scale: Callable, reference: Callable[[mujoco.MjModel], float]) ->
     return write
 
 
+def _unit_ends(model: mujoco.MjModel) -> np.ndarray:
+    """Where each hinge's unit ends, m, in the unit's frame: the next unit's origin, or the tip. Shape (n, 3)."""
+    units = unit_of_hinge(model)
+    bodies = np.unique(model.jnt_bodyid[: len(units)])
+    ends = np.concatenate([model.body_pos[bodies[1:]], [model.site("tip").pos]])
+    return ends[units]
+
+
+def _read_place(model: mujoco.MjModel) -> float:
+    end = _unit_ends(model)[0]
+    return float(model.jnt_pos[0] @ end / (end @ end))
+
+
+def _write_place(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    ends = _unit_ends(model)
+    fields["jnt_pos"][:, : len(ends)] = values[:, None, None] * ends
+
+
 def _set(name: str, index: tuple, sign: float = 1.0) -> Callable:
     """Set one column of a field for every element."""
 
@@ -205,6 +223,9 @@ PARAMETERS: dict[str, Parameter] = {
         "N m/rad", STIFFNESS_FIELDS, lambda m: float(m.jnt_stiffness[0]),
         _whole_arm(_scale_stiffness, lambda m: float(m.jnt_stiffness[0])),
     ),
+    # where a unit bends, as a share of its length: 0 at its upper end, 0.5 if all along; 1 - γ, γ the characteristic
+    # radius factor of pseudo-rigid-body models (L. L. Howell, Compliant Mechanisms, 2001)
+    "joint_place": Parameter("", ("jnt_pos",), _read_place, _write_place, signed=True),
     "hardening": Parameter(
         "1/rad²", STIFFNESS_FIELDS, lambda m: float(m.jnt_stiffnesspoly[0, 1] / m.jnt_stiffness[0]), _write_hardening,
     ),

@@ -89,17 +89,16 @@ class Population:
         arm = len(experiments[0].start)
         batch.bind("qpos")[:, :arm] = np.repeat([e.start for e in experiments], count, axis=0)
         batch.bind("qvel")[:, :arm] = np.repeat([e.velocity for e in experiments], count, axis=0)
-        self._remember(batch, np.repeat([e.held for e in experiments], count))
+        self._remember(batch)
         if self._model.nu:
             hold(batch, self._model, np.repeat([e.controls[0] for e in experiments], count, axis=0))
         return batch
 
-    def _remember(self, batch: Batch, held: np.ndarray) -> None:
-        """Joints' branches and sliders as after a straight arm was bent into the start pose `held` (n,) s ago."""
+    def _remember(self, batch: Batch) -> None:
+        """Joints' branches and sliders as long after a straight arm was bent into the start pose."""
         angles = batch.bind("qpos")
         for one in all_elements(self._model, BRANCH):
-            time = batch.expand("dof_damping")[:, one.own] / batch.expand("tendon_stiffness")[:, one.tendon]
-            angles[:, one.own] = angles[:, one.hinge] * -np.expm1(-held[:, None] / time)
+            angles[:, one.own] = angles[:, one.hinge]
         for one in all_elements(self._model, SLIDER):
             bend, give = angles[:, one.hinge], batch.expand("tendon_springyield")[:, one.tendon]
             place = self._model.tendon_plasticadr[one.tendon]
