@@ -1,13 +1,37 @@
 """What a plant on the bench does: commands and pulls of a hand go in, what cameras and motors could see comes out."""
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Annotated, Protocol
 
 import numpy as np
+from pydantic import Field
 
 COMMAND_RATE = 2000.0  # Hz, of commands as sent and of a hand's pull
 SAMPLE_RATE = 500.0  # Hz, of what is seen
 LOOSE = 0.3  # m of cable paid out, far more than any bend takes up
+
+Share = Annotated[float, Field(gt=0, lt=1)]
+
+
+@dataclass
+class PrintedArm:
+    """The truth that every arm on the bench has settings of.
+
+    modulus: Pa, of what lasts. density: kg/m³. core_ratio: core diameter over width. mass_factor: of every body's mass.
+    stiffness_scatter: relative, uniform, from joint to joint along the arm. hardening: relative growth of the stiffness
+    per rad² of bend of a unit. hole_ratio: distance of the cables from the axis over the unit's radius.
+    cable_stiffness: N/m. cable_damping: N s/m.
+    """
+
+    modulus: Annotated[float, Field(ge=1e3, le=1e12)]
+    density: Annotated[float, Field(ge=1, le=30000)]
+    core_ratio: Share
+    mass_factor: Annotated[float, Field(gt=0, le=100)]
+    stiffness_scatter: Annotated[float, Field(ge=0, lt=1)]
+    hardening: Annotated[float, Field(ge=0, le=1e6)]
+    hole_ratio: Annotated[float, Field(gt=0, le=1)]
+    cable_stiffness: Annotated[float, Field(gt=0, le=1e7)]
+    cable_damping: Annotated[float, Field(ge=0, le=1e6)]
 
 
 @dataclass

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from demo.bench import COMMAND_RATE, SAMPLE_RATE, Bench, Seen
+from demo.bench import COMMAND_RATE, SAMPLE_RATE, Bench, PrintedArm, Seen, Share
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import unit_properties
 from trunkline.arm.mjcf import Solref, unit_name
@@ -25,8 +25,6 @@ from trunkline.simulation.motion import batch_of, move
 
 CALM = 8.0  # times the arm's damping: it comes to rest sooner, and in the same place
 LONGEST_REST = 8.0  # s
-
-Share = Annotated[float, Field(gt=0, lt=1)]
 
 
 @dataclass
@@ -41,33 +39,19 @@ class Motors:
 
 
 @dataclass
-class CousinSettings:
-    """The truth about the arm on the bench.
+class CousinSettings(PrintedArm):
+    """The truth about the arm on the bench, which scatters by joint pair.
 
-    modulus: Pa. density: kg/m³. core_ratio: core diameter over width.
-    mass_factor: of every unit's mass. stiffness_scatter: relative, uniform, per joint pair.
-    hardening: relative growth of a joint's stiffness per rad² of bend between two units.
-    damping_ratio: ζ of D = 2ζ √(K m) ℓ. dry_friction: torque over stiffness, rad.
-    tendon_friction: N. cable_stiffness: N/m. cable_damping: N s/m. max_force: N.
-    hole_ratio: distance of the cables from the axis over the unit's radius.
+    damping_ratio: ζ of D = 2ζ √(K m) ℓ. dry_friction: torque over stiffness, rad. tendon_friction, max_force: N.
     link_ratio: length of the elastic link over that of its unit. link_mass_ratio: likewise for the mass.
     armature: kg m². limit_solref: s and ratio, of the units closing on each other.
     """
 
     kind: Literal["cousin"]
-    modulus: Annotated[float, Field(ge=1e3, le=1e12)]
-    density: Annotated[float, Field(ge=1, le=30000)]
-    core_ratio: Share
-    mass_factor: Annotated[float, Field(gt=0, le=100)]
-    stiffness_scatter: Annotated[float, Field(ge=0, lt=1)]
-    hardening: Annotated[float, Field(ge=0, le=1e6)]
     damping_ratio: Annotated[float, Field(gt=0, le=100)]
     dry_friction: Annotated[float, Field(ge=0, le=10)]
     tendon_friction: Annotated[float, Field(ge=0, le=1000)]
-    cable_stiffness: Annotated[float, Field(gt=0, le=1e7)]
-    cable_damping: Annotated[float, Field(ge=0, le=1e6)]
     max_force: Annotated[float, Field(gt=0, le=1e5)]
-    hole_ratio: Annotated[float, Field(gt=0, le=1)]
     link_ratio: Share
     link_mass_ratio: Share
     armature: Annotated[float, Field(ge=0, le=1)]

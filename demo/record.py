@@ -93,8 +93,8 @@ def main(config: Config) -> None:
             write_log(folder / f"{truth.name}.mcap", measurements[-1])
             bar.update(1, log=truth.name)
         write_session(folder, measurements, config.instruments)
-    answers = plant.answers() | {"clock_offset_s": config.instruments.clock_offset_s, "starts_s": starts}
-    write_json(ANSWERS, answers)
+    lab = {"plant": config.plant.kind, "clock_offset_s": config.instruments.clock_offset_s, "starts_s": starts}
+    write_json(ANSWERS, plant.answers() | lab)
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from demo.bench import COMMAND_RATE, LOOSE, Bench, Seen
+from demo.bench import COMMAND_RATE, LOOSE, Bench, PrintedArm, Seen
 from demo.stranger_kernel import Links, State, come_to_rest, path_lengths, simulate, tip
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import unit_properties
@@ -28,7 +28,6 @@ STILL = 2e-6  # rad/s: with all joints turning alike the tip then moves by 0.05 
 REST_STEP = 2.5e-4  # s: so damped, the arm bears longer steps than in a trial, and comes to rest in the same place
 LONGEST_REST = 12.0  # s
 
-Share = Annotated[float, Field(gt=0, lt=1)]
 Ratio = Annotated[float, Field(gt=0, le=100)]
 Duration = Annotated[float, Field(gt=0, le=1000)]
 Bend = Annotated[float, Field(gt=0, le=10)]
@@ -65,30 +64,21 @@ class StrangerMotors:
 
 
 @dataclass
-class StrangerSettings:
-    """The truth about the arm on the bench. Sources stand in the file.
+class StrangerSettings(PrintedArm):
+    """The truth about the arm on the bench, which scatters by link. Sources stand in the file.
 
-    links_per_unit: of the drawing. modulus: Pa, relaxed. density: kg/m³. core_ratio: core diameter over width.
-    stiffness_scatter, mass_scatter: relative, uniform, per link. mass_factor: of every link's mass.
-    hardening: growth of the stiffness per rad² of bend of a unit. viscous_time: s, of the joints' damping, D / K.
-    rest_bend: rad, bend of the whole arm about x and y where nothing pulls, evenly; rest_growth: more of it towards
-    the tip, less at the base, rad likewise. rest_scatter: rad, standard deviation of a unit's.
+    links_per_unit: of the drawing. mass_scatter: relative, uniform, per link. viscous_time: s, of the joints' damping,
+    D / K. rest_bend: rad, bend of the whole arm about x and y where nothing pulls, evenly; rest_growth: more of it
+    towards the tip, less at the base, rad likewise. rest_scatter: rad, standard deviation of a unit's.
     mount_tilt_deg: of the arm against the base marker, to a side that is drawn.
     limit_ratio: stiffness of two links that touch over that of their joint. limit_time: s, its damping over it.
-    hole_ratio: distance of the cables from the axis over the unit's radius. friction: μ in a hole. slip_length: m of
-    travel within which it builds up. cable_stiffness: N/m, between winch and mount; cable_scatter: relative, uniform.
-    cable_damping: N s/m. substeps: of 1 / COMMAND_RATE s.
+    friction: μ in a hole. slip_length: m of travel within which it builds up. cable_scatter: relative, uniform, of the
+    cables' stiffness between winch and mount. substeps: of 1 / COMMAND_RATE s.
     """
 
     kind: Literal["stranger"]
     links_per_unit: Annotated[int, Field(ge=1, le=9)]
-    modulus: Annotated[float, Field(ge=1e3, le=1e12)]
-    density: Annotated[float, Field(ge=1, le=30000)]
-    core_ratio: Share
-    mass_factor: Annotated[float, Field(gt=0, le=100)]
     mass_scatter: Annotated[float, Field(ge=0, lt=1)]
-    stiffness_scatter: Annotated[float, Field(ge=0, lt=1)]
-    hardening: Annotated[float, Field(ge=0, le=1e6)]
     viscous_time: Duration
     branches: Annotated[list[Branch], Field(max_length=9)]
     sliders: Annotated[list[Slider], Field(max_length=9)]
@@ -98,12 +88,9 @@ class StrangerSettings:
     mount_tilt_deg: Annotated[float, Field(ge=0, le=90)]
     limit_ratio: Annotated[float, Field(gt=0, le=1e6)]
     limit_time: Duration
-    hole_ratio: Annotated[float, Field(gt=0, le=1)]
     friction: Annotated[float, Field(ge=0, le=10)]
     slip_length: Annotated[float, Field(gt=0, le=1)]
-    cable_stiffness: Annotated[float, Field(gt=0, le=1e7)]
     cable_scatter: Annotated[float, Field(ge=0, lt=1)]
-    cable_damping: Annotated[float, Field(ge=0, le=1e6)]
     motors: StrangerMotors
     substeps: Annotated[int, Field(ge=1, le=100)]
 

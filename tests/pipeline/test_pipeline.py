@@ -72,8 +72,12 @@ def test_a_stage_lists_its_settings(stages, address):
 
 
 def _settings(conf: str, name: str, section: dict) -> dict[str, list]:
-    """The files of a stage's settings, with those of the groups' options that its section of params.yaml names."""
-    chosen = [options[section[group]] for group, options in group_options(ROOT / conf / name).items()]
+    """The files of a stage's settings, with those of the groups' options that its section of params.yaml names, and of
+    the options on which these build."""
+    chosen = []
+    for group, options in group_options(ROOT / conf / name).items():
+        bases = OmegaConf.load(options[section[group]]).get("defaults", [])
+        chosen += [options[option] for option in (section[group], *bases) if option != "_self_"]
     return {f"{conf}/{name}/config.yaml": []} | {file.relative_to(ROOT).as_posix(): [] for file in chosen}
 
 
@@ -226,6 +230,19 @@ def test_an_edit_of_code_reruns_the_stages_that_use_it(pipeline, stages, file, f
 def test_a_conf_file_reruns_its_stage_and_no_other(pipeline):
     pipeline.edit("conf/package_unity/config.yaml", lambda text: f"{text}\nadded: 1\n")
     assert pipeline.ran("dvc", "repro", "-q") == ["stages.package_unity"]
+    pipeline.restore()
+
+
+def test_a_plant_that_is_not_chosen_reruns_nothing_and_another_choice_does(pipeline, stages):
+    """The lab's settings are listed by their choice; its rig drives the same plant."""
+    chosen = OmegaConf.load(pipeline.folder / "demo/params.yaml").record.plant
+    (other,) = {"cousin", "stranger"} - {chosen}
+    pipeline.edit(f"demo/conf/record/plant/{other}.yaml", lambda text: f"{text}\nadded: 1\n")
+    assert pipeline.ran("dvc", "repro", "-q") == []
+    pipeline.edit(f"demo/conf/record/plant/{chosen}.yaml", lambda text: f"{text}\nadded: 1\n")
+    ran = pipeline.ran("dvc", "repro", "-q")
+    assert ran[0] == "demo.record"
+    assert "stages.train_ik" in ran
     pipeline.restore()
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from trunkline.pipeline.readme import generate, with_blocks
-from trunkline.pipeline.truth_table import TRUTH, error_table, expectation, holds, identified, truth_table
+from trunkline.identification.parameters import PARAMETERS
+from trunkline.pipeline.readme import generate, score_table, with_blocks
+from trunkline.pipeline.truth_table import LACKING, TRUTH, error_table, expectation, holds, identified, truth_table
 
 ROOT = Path(__file__).parents[2]
 
@@ -31,7 +32,9 @@ def judged(tmp_path):
     truth = {"hardening": 1.5, "tendon_friction": 0.6, "kp": 1500.0, "force_range": 16.0, "time_constant": None}
     truth = {"parameters": truth, "forces": ["tendon_friction", "kp", "force_range"], "mass_factor": 1.2}
     truth |= {"clock_offset_s": 0.1, "starts_s": {"release_a": 0.7, "release_b": 0.7}}
-    (tmp_path / TRUTH).write_text(json.dumps(truth | {"stiffness_factors": [1.1, 0.9, 1.0]}))
+    truth |= {"stiffness_factors": [1.1, 0.9, 1.0], "plant": "stranger", "sliders": [], "capstan_friction": 0.15}
+    truth |= {"branches": [{"ratio": 0.12, "time_s": 0.05}] * 3, "rate_limit_m_s": 0.25, "backlash_m": 3e-4}
+    (tmp_path / TRUTH).write_text(json.dumps(truth))
     rows = {
         "hardening": {"value": 1.6, "interval_95_given_model": [1.4, 1.8]},
         "tendon_friction": {"value": 0.6, "interval_95_given_model": [0.55, 0.65]},
@@ -61,6 +64,39 @@ def test_the_truth_is_held_against_the_intervals(judged):
     assert lines["`force_range`, N"].startswith("16 | 13.33 | 9 | undetermined |  |")
     assert lines["`time_constant`, N"].startswith("– | – | 0.03 | 0.02 … 0.04 |  |")
     assert "own scatter 1.00; 2 of 3\n" in truth_table(judged)
+
+
+def test_the_truth_table_says_what_the_model_lacks(judged):
+    """What a parameter that is identified stands for is lacking no more, or is so many of the lab's."""
+
+    def lacking(**more) -> str:
+        path = judged / "artifacts/identify_control/parameters.json"
+        rows = {name: {"value": 1.0, "unit": "1", "undetermined": False} for name in ("kp", *more)}
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(json.dumps({"parameters": rows}))
+        (line,) = (line for line in truth_table(judged).splitlines() if line.startswith("| `kp`"))
+        return line
+
+    assert "dead time of the motors, friction that grows" in lacking()
+    assert "Maxwell branches (it has 0 of 3)" in lacking()
+    assert "dead time" not in lacking(dead_time=1)
+    assert "Maxwell branches (it has 2 of 3)" in lacking(relaxation=1, relaxation_2=1)
+    assert "sliders" not in lacking(), "this lab has none"
+    assert "0.12 for 0.05 s, 0.12 for 0.05 s" in truth_table(judged)
+    plants = {yaml.safe_load(file.read_text())["kind"] for file in ROOT.glob("demo/conf/record/plant/*.yaml")}
+    assert set(LACKING) == plants
+    named = {name for effects in LACKING.values() for effect in effects for name in (*effect.on, effect.unless) if name}
+    assert named <= set(PARAMETERS)
+
+
+def test_scores_are_told_by_kind_and_together(tmp_path):
+    """The last row's words are those of the kinds on which the last stage is scored."""
+    row = {"trials": 1, "e_position_mm": 1.0, "e_tip_mm": 2.0, "e_internal_mm": 0.5}
+    table = {"test": row | {"by_experiment": {"curl": row, "release": row, "motion": row}}}
+    (tmp_path / "artifacts/score").mkdir(parents=True)
+    (tmp_path / "artifacts/score/metrics.json").write_text(json.dumps({"identify_control": {"identified": table}}))
+    rows = [line.split(" | ")[0] for line in score_table(tmp_path).splitlines()[2:]]
+    assert rows == ["| curls", "| motions", "| releases, curls and motions, `identify_control`"]
 
 
 def test_errors_of_starts_and_of_the_clock_are_against_the_truth(judged):

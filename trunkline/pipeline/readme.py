@@ -18,7 +18,7 @@ from trunkline.pipeline.baseline import baseline_file, read_baseline
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.limits import Limit, lookup, metrics_folder, read_limits
 from trunkline.pipeline.results import block
-from trunkline.pipeline.truth_table import error_table, truth_table
+from trunkline.pipeline.truth_table import KINDS, error_table, truth_table
 from trunkline.trials.splits import DECIDING, TEST
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
@@ -65,15 +65,6 @@ RESULTS = {
 }
 
 
-# what it is, the stage whose model is scored, and where its row begins below a split
-SCORES = [
-    ("static tilts", "identify_stiffness", "by_experiment.static_tilt."),
-    ("releases", "identify_damping", "by_experiment.release."),
-    ("curls", "identify_control", "by_experiment.curl."),
-    ("static pulls", "identify_control", "by_experiment.static_pull."),
-    ("motions", "identify_control", "by_experiment.motion."),
-    ("releases and curls", "identify_control", ""),
-]
 BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")  # an identified model
 
 
@@ -111,7 +102,8 @@ def results_table(file: Path, results: dict[str, list[tuple[str, str, str]]]) ->
 
 
 def identification_table(root: Path) -> str:
-    """Errors over releases and curls, of the models CAD, coarse and identified, beside null model and noise floor."""
+    """Errors over all kinds on which `identify_control` is scored, of the models CAD, coarse and identified, beside
+    null model and noise floor."""
     metrics = _metrics(root, "identify_control")
     lines = [
         "| model | E_internal, identify | E_internal, validate | position / tip error, mm, identify "
@@ -129,13 +121,19 @@ def identification_table(root: Path) -> str:
 
 
 def score_table(root: Path) -> str:
-    """Errors on the trials of the split test, by kind of experiment, of the stage that identifies from it."""
+    """Errors on the trials of the split test, by kind of experiment, of the stage that identifies from it; last of all
+    kinds on which the last stage is scored."""
     metrics = _metrics(root, "score")
-    rows = []
-    for what, stage, below in SCORES:
-        at = f"{TEST}.{below}"
+    rows, together = [], "identify_control"
+    for kind, (what, stage) in KINDS.items():
+        at = f"{TEST}.by_experiment.{kind}."
         if lookup(metrics, f"{stage}.identified.{at}trials") is not None:
             rows.append(f"| {what} | {' | '.join(_beside(lookup(metrics, stage), at))} |")
+    scored = lookup(metrics, f"{together}.identified.{TEST}.by_experiment") or {}
+    if scored:
+        *words, last = (KINDS[kind][0] for kind in KINDS if kind in scored)
+        what = f"{', '.join(words)} and {last}" if words else last
+        rows.append(f"| {what}, `{together}` | {' | '.join(_beside(lookup(metrics, together), f'{TEST}.'))} |")
     return "\n".join([*_head(f"trials of `{TEST}`"), *rows])
 
 

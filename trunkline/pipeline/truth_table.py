@@ -1,6 +1,8 @@
 """What was identified in the demo session, and how far off it is, beside the stand-in lab's truth: Markdown tables."""
 
 import json
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,19 +11,69 @@ from trunkline.trials.splits import TEST, VALIDATE
 
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 TRUTH = Path("data/raw/demo.truth.json")
+# kind of experiment: what its trials are called, and the stage whose model is scored on them
+KINDS = {
+    "static_tilt": ("static tilts", "identify_stiffness"),
+    "release": ("releases", "identify_damping"),
+    "curl": ("curls", "identify_control"),
+    "static_pull": ("static pulls", "identify_control"),
+    "motion": ("motions", "identify_control"),
+}
 # whose errors: of the identified model, and of what it stands beside
 BESIDE = {"identified": "", "cad": ": CAD", "null": ": null model", "noise_floor": ": noise floor"}
-# identified parameter: what the lab has, and the model has not, that acts in the same trials
+
+
+@dataclass(frozen=True)
+class Effect:
+    """What a plant of the lab has that acts in the trials from which the parameters `on` come.
+
+    unless: the model has it too if this parameter is identified, or one that differs by a number at its end.
+    count: key of the list in the truth that says how many of these the plant has.
+    """
+
+    words: str
+    on: tuple[str, ...]
+    unless: str = ""
+    count: str = ""
+
+    def lacking(self, truth: dict, identified: Collection[str]) -> str:
+        """What of it a model lacks of which these parameters are identified; empty if nothing."""
+        modelled = len({self.unless, f"{self.unless}_2"} & set(identified))
+        if not self.count:
+            return "" if modelled else self.words
+        present = len(truth[self.count])
+        return f"{self.words} (it has {modelled} of {present})" if modelled < present else ""
+
+
+SPRINGS = ("stiffness", "hardening")
+LEAN = ("mount_tilt_x", "mount_tilt_y")
+REST = ("rest_bend_x", "rest_bend_y", "rest_gradient_x", "rest_gradient_y")
+RELAXING = ("relaxation", "relaxation_time", "relaxation_2", "relaxation_time_2")
+MEMORY = ("hysteresis", "yield_bend")
+RUBBING = ("tendon_friction", "friction_time")
+MOTORS = ("kp", "kv", "time_constant", "dead_time")
 LACKING = {
-    "stiffness": "scatter from unit to unit, masses off",
-    "hardening": "two joints in every unit, dry friction in them, scatter from unit to unit",
-    "damping": "two joints in every unit, dry friction in them, masses off, another integrator",
-    "tendon_friction": "dry friction in the joints, masses off",
-    "friction_time": "dry friction in the joints",
-    "kp": "a motor with a limited rate and a delay, two joints in every unit, masses off",
-    "kv": "a motor with a limited rate and a delay, dry friction in the joints, masses off",
-    "force_range": "masses off",
-    "time_constant": "a motor with a limited rate and a delay, which has no time constant",
+    "cousin": (
+        Effect("a motor with a limited rate and a delay", ("kp", "kv")),
+        Effect("a motor with a limited rate and a delay, which has no time constant", ("time_constant",)),
+        Effect("two joints in every unit", ("hardening", "damping", "kp")),
+        Effect("dry friction in the joints", ("hardening", "damping", *RUBBING, "kv"), unless="joint_friction"),
+        Effect("scatter from unit to unit", SPRINGS),
+        Effect("masses off", ("stiffness", "damping", "tendon_friction", "kp", "kv", "force_range")),
+        Effect("another integrator", ("damping",)),
+    ),
+    "stranger": (
+        Effect("a limited rate and backlash of the motors, cables that differ", MOTORS),
+        Effect("dead time of the motors", MOTORS, unless="dead_time"),
+        Effect("friction that grows with a tendon's tension", (*RUBBING, "kp", "kv", "force_range")),
+        Effect("Maxwell branches", ("damping", *RELAXING, *MEMORY, *RUBBING, "kp", "kv"), "relaxation", "branches"),
+        Effect("sliders", (*SPRINGS, "damping", *RELAXING, *MEMORY, *RUBBING, "kp"), "hysteresis", "sliders"),
+        Effect("a rest shape", (*SPRINGS, *LEAN), unless="rest_bend_x"),
+        Effect("a mount that leans", (*SPRINGS, *REST), unless="mount_tilt_x"),
+        Effect("several links in every unit", (*SPRINGS, "damping", "kp")),
+        Effect("scatter from link to link", (*SPRINGS, *REST)),
+        Effect("masses off", ("stiffness", "damping", "tendon_friction", "kp", "kv", "force_range")),
+    ),
 }
 
 
@@ -29,22 +81,25 @@ def truth_table(root: Path) -> str:
     """A row for each identified parameter: truth, what is expected, what was found, and whether the interval holds it.
 
     Motion tells forces only up to a common factor, which the masses set. So what is to be expected of a force is the
-    truth over the factor by which the lab's masses exceed those of the CAD model.
+    truth over the factor by which the lab's masses exceed those of the CAD model. Of a parameter that several stages
+    identify the last one counts.
     """
-    truth = _json(root / TRUTH)
+    truth, rows = _json(root / TRUTH), identified(root)
     lines = [
         "| parameter | truth | expected | found | 95 % interval, given the model | holds it | the model lacks |",
         "|---|---:|---:|---:|---:|---|---|",
     ]
-    for name, row in identified(root).items():
+    for name, row in rows.items():
         expected = expectation(truth, name)
         cells = [f"`{name}`, {row['unit']}", _number(truth.get("parameters", {}).get(name)), _number(expected)]
         low, high = row.get("interval_95_given_model", (None, None))
         interval = "undetermined" if row["undetermined"] else f"{_number(low)} … {_number(high)}"
         held = {True: "yes", False: "**no**", None: ""}[holds(row, expected)]
-        cells += [_number(row["value"]), interval, held, LACKING.get(name, "")]
+        effects = [effect for effect in LACKING.get(truth.get("plant", ""), ()) if name in effect.on]
+        lacking = [words for effect in effects if (words := effect.lacking(truth, rows))]
+        cells += [_number(row["value"]), interval, held, ", ".join(lacking)]
         lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join([*lines, "", _factors(root, truth)])
+    return "\n".join([*lines, "", _factors(root, truth), *_unanswered(truth)])
 
 
 def identified(root: Path) -> dict[str, dict]:
@@ -85,12 +140,26 @@ def _factors(root: Path, truth: dict) -> str:
     )
 
 
+def _unanswered(truth: dict) -> list[str]:
+    """What the lab has that no single parameter answers to, in a sentence."""
+    if "branches" not in truth:
+        return []
+    branches = ", ".join(f"{_number(one['ratio'])} for {_number(one['time_s'])} s" for one in truth["branches"])
+    sliders = ", ".join(f"{_number(one['ratio'])} up to {_number(one['bend_rad'])} rad" for one in truth["sliders"])
+    return [
+        f"The lab's Maxwell branches, over its springs: {branches}; its sliders: {sliders}. Friction in its holes: "
+        f"{_number(truth['capstan_friction'])}.\nIts motors wind at most {_number(truth['rate_limit_m_s'])} m/s, with "
+        f"{_number(1e3 * truth['backlash_m'])} mm of backlash."
+    ]
+
+
 def error_table(root: Path) -> str:
     """Every known source of error for itself: of trials by kind, of starts, clocks, poses and the time step."""
     metrics = {stage: _json(root / "artifacts" / stage / "metrics.json") for stage in (*STAGES, "score", "filter")}
     lines = ["| error | mean | largest | of |", "|---|---:|---:|---|"]
-    for stage, kind in zip(STAGES, ("static_tilt", "release", "curl"), strict=True):
-        words = {"static_tilt": "static tilts", "release": "releases", "curl": "curls"}[kind]
+    for kind, (words, stage) in KINDS.items():
+        if not _at(metrics[stage], "identified", VALIDATE, "by_experiment", kind):
+            continue
         for split, table in ((VALIDATE, metrics[stage]), (TEST, metrics["score"].get(stage, {}))):
             for model, of in BESIDE.items():
                 row = _at(table, model, split, "by_experiment", kind)
@@ -109,7 +178,7 @@ def _start_rows(root: Path, filtered: dict) -> list[str]:
     """Detected starts and the clock's offset against the truth."""
     truth, moving, rows = _json(root / TRUTH), filtered.get("moving", {}), []
     starts = truth.get("starts_s", {})
-    for kind in ("release", "curl"):
+    for kind in ("release", "curl", "motion"):
         late = [1e3 * (moving[name]["start_s"] - start) for name, start in starts.items()
                 if name.startswith(kind) and name in moving]  # fmt: skip
         cells = [f"{np.mean(late):+.2f} ms", f"{max(late, key=abs):+.2f} ms"] if late else ["–", "–"]

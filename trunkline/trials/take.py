@@ -120,7 +120,7 @@ def read_takes(folder: Path, splits: tuple[str, ...]) -> list[Take]:
                 experiment=row["experiment"],
                 split=row["split"],
                 level=row["level"],
-                load=row.get("load", 0.0),
+                load=row["load"],
                 up=np.array(row["up"]),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
                 segments=tuple(row["segments"]),

@@ -120,7 +120,7 @@ def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
                 experiment=row["experiment"],
                 split=row["split"],
                 level=row["level"],
-                load=row.get("load", 0.0),
+                load=row["load"],
                 gravity=np.array(row["gravity"]),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
                 segments=tuple(row["segments"]),
