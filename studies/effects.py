@@ -57,6 +57,7 @@ def ranges(low: float, high: float, *names: str) -> dict[str, Bounds]:
 SHARES, TIMES = (0.01, 3.0), (0.02, 20.0)  # of a spring's stiffness; s
 EFFECTS: dict[str, Effect] = {
     "hardening": Effect("hardening", "identify_stiffness", ranges(0.02, 20.0, "hardening")),
+    "place": Effect("place of the joints", "identify_stiffness", ranges(-0.2, 1.0, "joint_place")),
     "mount": Effect("mount tilt", "identify_stiffness", ranges(-0.1, 0.1, "mount_tilt_x", "mount_tilt_y")),
     "bend": Effect("rest shape, even", "identify_stiffness", ranges(-0.05, 0.05, "rest_bend_x", "rest_bend_y")),
     "gradient": Effect(
