@@ -96,6 +96,7 @@ class Cousin:
         scatter = model.jnt_stiffness[::hinges] / 2 / properties.stiffness
         found = {
             "stiffness": scatter.mean() * properties.stiffness[0],
+            "joint_place": 0.0,  # two joints, evenly on both sides of it
             "hardening": s.hardening,
             "damping": model.dof_damping[0] / 2,
             "tendon_friction": model.tendon_frictionloss[0] if model.ntendon else None,

@@ -70,7 +70,7 @@ LACKING = {
         Effect("sliders", (*SPRINGS, "damping", *RELAXING, *MEMORY, *RUBBING, "kp"), "hysteresis", "sliders"),
         Effect("a rest shape", (*SPRINGS, *LEAN), unless="rest_bend_x"),
         Effect("a mount that leans", (*SPRINGS, *REST), unless="mount_tilt_x"),
-        Effect("several links in every unit", (*SPRINGS, "damping", "kp")),
+        Effect("several links in every unit", (*SPRINGS, "damping", "kp"), unless="joint_place"),
         Effect("scatter from link to link", (*SPRINGS, *REST)),
         Effect("masses off", ("stiffness", "damping", "tendon_friction", "kp", "kv", "force_range")),
     ),
