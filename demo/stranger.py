@@ -148,7 +148,7 @@ class Stranger:
     def answers(self) -> dict:
         """Stiffness is the relaxed one of a unit's links in series, at the base, with the mean scatter; damping is what
         acts beside the Maxwell branches. Nothing answers to a tendon's constant friction, as it grows with tension, and
-        to a single branch or slider of the model, as there are several. The joints' place is the mean of a unit's links.
+        to a single branch or slider of the model, as there are several. joint_place is the mean of a unit's links.
         Rest shapes are by unit, c_0 + c_1 s with s from -1 to 1."""
         s, links = self.settings, self.links
         rest = links.rest.reshape(-1, s.links_per_unit, 2).sum(axis=1)
