@@ -233,8 +233,7 @@ def test_a_conf_file_reruns_its_stage_and_no_other(pipeline):
     pipeline.restore()
 
 
-def test_a_plant_that_is_not_chosen_reruns_nothing_and_another_choice_does(pipeline, stages):
-    """The lab's settings are listed by their choice; its rig drives the same plant."""
+def test_the_chosen_plant_s_file_reruns_the_lab_and_its_rig_and_another_s_nothing(pipeline):
     chosen = OmegaConf.load(pipeline.folder / "demo/params.yaml").record.plant
     (other,) = {"cousin", "stranger"} - {chosen}
     pipeline.edit(f"demo/conf/record/plant/{other}.yaml", lambda text: f"{text}\nadded: 1\n")

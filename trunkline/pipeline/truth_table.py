@@ -91,7 +91,8 @@ def truth_table(root: Path) -> str:
     ]
     for name, row in rows.items():
         expected = expectation(truth, name)
-        cells = [f"`{name}`, {row['unit']}", _number(truth.get("parameters", {}).get(name)), _number(expected)]
+        unit = f", {row['unit']}" if row["unit"] else ""
+        cells = [f"`{name}`{unit}", _number(truth.get("parameters", {}).get(name)), _number(expected)]
         low, high = row.get("interval_95_given_model", (None, None))
         interval = "undetermined" if row["undetermined"] else f"{_number(low)} … {_number(high)}"
         held = {True: "yes", False: "**no**", None: ""}[holds(row, expected)]
