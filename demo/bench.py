@@ -87,11 +87,11 @@ class Plant(Protocol):
         """Do the trials and look at the units of these indices. `label` says what is done, for a bar of progress."""
         ...
 
-    def reach(self, commands: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+    def reach(self, pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
         """Where the tip comes to rest, from straight, with its friction, in the base frame, m. Shape (N, 3).
 
         Args:
-            commands: of the motors, m, sent at once. Shape (N, K).
+            pulls: commands of the motors, m of pull, sent at once. Shape (N, K).
             gravity: m/s². Shape (N, 3).
         """
         ...

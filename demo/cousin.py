@@ -82,11 +82,11 @@ class Cousin:
                 rotations[trial, frame] = data.site_xmat[sites].reshape(-1, 3, 3)
         return Seen(positions, rotations, wound[:, :: bench.stride][:, bench.skipped :][:, : angles.shape[1]])
 
-    def reach(self, commands: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+    def reach(self, pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
         model = copy.copy(self.model)
         model.dof_damping[:] *= CALM
-        no_hand = np.zeros_like(commands)
-        return drive(model, np.concatenate([commands, no_hand], axis=1), gravity, LONGEST_REST).end
+        controls = np.concatenate([model.tendon_length0 - pulls, np.zeros_like(pulls)], axis=1)  # no hand
+        return drive(model, controls, gravity, LONGEST_REST).end
 
     def answers(self) -> dict:
         """Stiffness, with its mean scatter, and damping are those of a unit's two joints in series, at the base."""

@@ -10,11 +10,11 @@ from trunkline.pipeline.config import load_config
 ROOT = Path(__file__).parent
 
 
-def reach(commands: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+def reach(pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
     """Where the tip of the lab's arm comes to rest, with its friction, from straight, in the base frame, m.
 
     Args:
-        commands: of the motors, m. Shape (N, K).
+        pulls: commands of the motors, m of pull from the straight arm's path length. Shape (N, K).
         gravity: in the base frame, m/s². Shape (N, 3).
     """
-    return plant_of(load_config(Config, "record", ROOT)).reach(commands, gravity)
+    return plant_of(load_config(Config, "record", ROOT)).reach(pulls, gravity)

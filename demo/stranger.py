@@ -134,15 +134,15 @@ class Stranger:
         turn = self.mount.as_matrix()
         return Seen(positions @ turn.T, turn @ rotations, wound)
 
-    def reach(self, commands: np.ndarray, gravity: np.ndarray) -> np.ndarray:
-        tips, pull = np.empty((len(commands), 3)), self.mount.inv().apply(gravity)
+    def reach(self, pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+        tips, weight = np.empty((len(pulls), 3)), self.mount.inv().apply(gravity)
         start = self._rest(self.mount.inv().apply(UPRIGHT), 0.0, np.full(self.tendons, -LOOSE))
         start.motors[:] = start.winches[:] = 0.0
 
         def one(index: int) -> None:
-            tips[index] = tip(self.links, self._rest(pull[index], 0.0, commands[index], start))
+            tips[index] = tip(self.links, self._rest(weight[index], 0.0, pulls[index], start))
 
-        self._all("drive the stranger", one, len(commands), "drives")
+        self._all("drive the stranger", one, len(pulls), "drives")
         return self.mount.apply(tips)
 
     def answers(self) -> dict:

@@ -81,9 +81,9 @@ def test_errors_beyond_one_percent_are_counted_with_what_was_said(model, chain, 
 def test_the_score_has_the_rig_beside_the_model(model, chain):
     asked = []
 
-    def rig(commands, gravity):
-        asked.append(len(commands))
-        return drive(model, commands, gravity, 10.0).end + [1e-3, 0, 0]
+    def rig(pulls, gravity):
+        asked.append(len(pulls))
+        return drive(model, chain.straight_lengths - pulls, gravity, 10.0).end + [1e-3, 0, 0]
 
     settings = AsControls(targets=12, timed=8, on_rig=4, seconds=10.0)
     rng = np.random.default_rng(0)

@@ -26,7 +26,7 @@ SHARE = 0.01  # of the arm's length; a larger error is worth a warning
 DOUBT = 0.8 * SHARE  # from which on a foreseen miss is a reason to doubt: what is foreseen has an error of its own
 PULL_SHARE = 0.8  # of the deepest pulls of the samples: together, two of them are near the motors' limits
 
-Rig = Callable[[np.ndarray, np.ndarray], np.ndarray]  # commands (N, K), m, and gravity (N, 3), m/s², to tips (N, 3), m
+Rig = Callable[[np.ndarray, np.ndarray], np.ndarray]  # m of pull (N, K) and gravity (N, 3), m/s², to tips (N, 3), m
 Ask = Callable[[np.ndarray], dict[str, np.ndarray]]  # as `ask.ask`, of one network
 
 
@@ -164,7 +164,8 @@ def score(
         return on_model, None
     few = targets[: settings.on_rig]
     answer = ask(few)
-    on_rig = _reached(few, answer, rig(answer["commands"].astype(float), gravity_in_base(few[:, 0])))
+    pulls = chain.straight_lengths - answer["commands"]  # motors count from the straight arm, as in a session's logs
+    on_rig = _reached(few, answer, rig(pulls, gravity_in_base(few[:, 0])))
     summary = on_rig.metrics(chain.length)
     twin = np.quantile(with_friction.position[: len(few)], (0.5, 0.95)) * 1e3
     return on_model, {"targets": len(few)} | summary | {"twin_mm": {"median": twin[0], "p95": twin[1]}}

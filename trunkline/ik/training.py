@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 import torch
 from pydantic import Field
+from torch.optim.adam import adam
 
 from trunkline.errors import InputError
 from trunkline.ik.network import InverseKinematics
@@ -20,6 +21,9 @@ TIE = 0.02  # weight of plain command errors, which alone tie down how long a sl
 STRETCH = 1.0  # weight of errors of the lengths over the commands
 SLACK = 1e-3  # m, most by which slack tendons are paid out where the tip is foreseen: that moves it nowhere
 WARM_UP = 0.1  # share of the steps in which the learning rate rises from zero, while Adam learns each weight's scale
+ADAM = {  # its usual numbers
+    "beta1": 0.9, "beta2": 0.999, "eps": 1e-8, "weight_decay": 0.0, "amsgrad": False, "maximize": False, "fused": True,
+}  # fmt: skip
 PARTS = 2  # of a batch, whose gradients are summed in this order whatever thread found them: more cores, same network
 
 
@@ -69,10 +73,11 @@ def train(
     rows = torch.tensor(np.flatnonzero(is_train))
     others = torch.tensor(np.flatnonzero(~is_train))
     shuffle = torch.Generator().manual_seed(training.seed)
-    optimizer = torch.optim.Adam(parameters, lr=training.learning_rate, fused=True)
     batches = len(rows) // training.batch
-    steps = training.epochs * batches
-    schedule = torch.optim.lr_scheduler.LambdaLR(optimizer, lambda step: rate(step / max(1, steps)))
+    steps = max(1, training.epochs * batches)
+    # for the function behind torch.optim.Adam: the class imports torch's compiler, which takes seconds
+    first, second = ([torch.zeros_like(parameter) for parameter in parameters] for _ in range(2))
+    counts = [torch.zeros(()) for _ in parameters]
 
     def slopes(part: torch.Tensor, spare: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
         """Gradient of the objective on these rows, summed over them, and their tip errors, m."""
@@ -90,6 +95,7 @@ def train(
     def tip_error(part: torch.Tensor) -> torch.Tensor:
         return loss(part, network.unclipped(x[part])[0] - command[part])[:, :3].norm(dim=1)
 
+    done = 0
     with ThreadPoolExecutor(min(PARTS, thread_count()), initializer=torch.set_num_threads, initargs=(1,)) as pool:
         for epoch in range(1, training.epochs + 1):
             total = 0.0
@@ -97,10 +103,11 @@ def train(
             for batch in order[: batches * training.batch].split(training.batch):
                 spare = torch.rand(len(batch), most_spare.shape[1], generator=shuffle)
                 gradients, errors = zip(*pool.map(slopes, batch.chunk(PARTS), spare.chunk(PARTS)), strict=True)
-                for parameter, *parts in zip(parameters, *gradients, strict=True):
-                    parameter.grad = sum(parts) / len(batch)
-                optimizer.step()
-                schedule.step()
+                summed = [sum(parts) / len(batch) for parts in zip(*gradients, strict=True)]
+                speed = training.learning_rate * rate(done / steps)
+                with torch.no_grad():
+                    adam(parameters, summed, first, second, [], counts, lr=speed, **ADAM)
+                done += 1
                 total += float(torch.cat(errors).mean())
             if not np.isfinite(total):
                 raise InputError(
