@@ -174,7 +174,7 @@ class Fitted:
     Attributes:
         friction: μ of pulls and of backs. Shape (2,). half_width: of what is fitted of it, 95 %, trials taken as
             independent of each other but not their segments. Shape (m,).
-        values: of the fitted parameters.
+        values: of the fitted parameters. converged: whether the search ended by itself.
         cad: errors of the CAD model, as below.
         errors: distance of every segment, mm, of trials that do not come to rest NaN. Shape (B, S).
     """
@@ -201,8 +201,9 @@ class Fitted:
             return np.nan_to_num(1e3 * (self._positions(vector) - self._seen)[fitted].reshape(-1), nan=100.0)
 
         found = least_squares(
-            residuals, start, bounds=(low, high), diff_step=STEP, x_scale=high - low, max_nfev=20, ftol=1e-4
+            residuals, start, bounds=(low, high), diff_step=STEP, x_scale=high - low, max_nfev=100, ftol=1e-5
         )
+        self.converged = bool(found.success)
         self.vector, self.errors = found.x, self._distances(found.x)
         self.values = {n: float(f"{PARAMETERS[n].value(v):.4g}") for n, v in zip(BOUNDS, found.x, strict=False)}
         self.friction = form @ found.x[len(BOUNDS) :]
@@ -287,7 +288,8 @@ def main() -> int:
         widths = ", ".join(f"± {width:.3f}" for width in fitted.half_width)
         print(f"{title}: {fitted.values}", file=sys.stderr)
         friction = f"{fitted.friction[0]:.3f}, {fitted.friction[1]:.3f} ({widths})" if form.size else ""
-        print(row(title, friction, fitted.errors, trials), flush=True)
+        shown = title if fitted.converged else f"{title} (search not ended)"
+        print(row(shown, friction, fitted.errors, trials), flush=True)
     floor = [fit_pose(model, trial.segments, *measured_pose(trial, 0)).residuals for trial in trials]
     print(row("noise floor: joint angles fitted to each shape", "", 1e3 * np.array(floor), trials))
     return 0
