@@ -52,7 +52,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     model, experiments, fit = set_up(config, reported, model)
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)
-    if "stiffness" in fit.parameters and not any(map(is_static, config.experiments)):
+    if model_path == CAD_MODEL and not any(map(is_static, config.experiments)):
         print(f"{stage}: without static tilts, stiffness comes from the shape at rest and the ring-down of releases")
     result = identify(stage, model, fitted, fit)
     identified = save_model(spec, result.models["identified"])
@@ -102,7 +102,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         write_json(folder / "parameters.json", table)
         write_json(folder / "metrics.json", metrics)
         write_tables(folder, predictions, segments)
-        write_plots(folder, result, fit.parameters, segments, predictions)
+        write_plots(folder, result, fit.parameters, segments, predictions, shapes=model_path == CAD_MODEL)
 
 
 def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
@@ -152,9 +152,9 @@ def write_tables(folder: Path, predictions: dict[str, Prediction], segments: tup
 
 
 def write_plots(
-    folder: Path, result: Identification, bounds, segments, predictions: dict[str, Prediction]
+    folder: Path, result: Identification, bounds, segments, predictions: dict[str, Prediction], shapes: bool
 ) -> None:
-    """PNGs for people and CSV for `dvc plots`."""
+    """PNGs for people and CSV for `dvc plots`: of shapes at rest (static ones, or how releases end), or of motions."""
     # pyplot and scipy.signal take long to import, so not before the first line
     from trunkline.figures import identification as plots
     from trunkline.figures.scoring import segment_figure
@@ -168,7 +168,7 @@ def write_plots(
     validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
     save_figure(segment_figure({"validate split": segment_table(validate, segments)}), folder / "segments.png")
     shown = {name: validate[name] for name in ("cad", "identified")}
-    if "stiffness" in result.values:  # shapes at rest: static ones, or how releases end
+    if shapes:
         table = curves.shape_table(shown, segments)
         table.to_csv(folder / "shapes.csv", **CSV)
         save_figure(plots.shape_figure(table), folder / "shapes.png")
