@@ -5,6 +5,8 @@ import numpy as np
 import pytest
 
 from tests.support.bent_chain import stump
+from tests.support.small_arm import small_spec
+from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.frames import gravity_in_base
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium
@@ -73,3 +75,14 @@ def test_band_grows_in_proportion_to_small_friction():
         band = friction_band(chain, TENSIONS, GRAVITY[None], np.full(3, share), np.full((chain.units, 2), share / 100))
         widths.append(np.linalg.norm(band.loaded - band.unloaded))
     assert widths[1] == pytest.approx(2 * widths[0], rel=0.02)
+
+
+def test_what_joints_creep_by_has_no_part_in_the_band():
+    """Branches and sliders hang on tendons of their own, which are none of the cables."""
+    spec = small_spec()
+    add_elements(spec, Joints([Branch(0.3, 0.5)], [Slider(0.2, 0.02)]), 1e-5)
+    model, plain = spec.compile(), small_spec().compile()
+    bands = [friction_band(read_chain(m), TENSIONS / 10, GRAVITY[None], *model_friction(m)) for m in (model, plain)]
+    assert bands[1].width > 0
+    np.testing.assert_allclose(bands[0].loaded, bands[1].loaded, atol=1e-9)
+    np.testing.assert_allclose(bands[0].unloaded, bands[1].unloaded, atol=1e-9)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from trunkline.elements import cables
 from trunkline.statics.chain import Chain
 from trunkline.statics.equilibria import Equilibrium, equilibrium_paths, follow
 from trunkline.statics.supported import unit_bodies
@@ -39,7 +40,7 @@ class Band:
 def model_friction(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     """Dry friction of the tendons, N, shape (K,), and of the units' joints, N m, shape (n, 2)."""
     joints = model.body_jntadr[unit_bodies(model)][:, None] + np.arange(2)
-    return model.tendon_frictionloss.copy(), model.dof_frictionloss[model.jnt_dofadr[joints]]
+    return model.tendon_frictionloss[cables(model)], model.dof_frictionloss[model.jnt_dofadr[joints]]
 
 
 def friction_band(
