@@ -17,7 +17,7 @@ PLATEAU_LEVEL = 1e-6  # relative change of the loss that matters
 STEP_TOLERANCE = 1e-5  # of a candidate z, relative: a smaller step of least squares is no step
 ELSEWHERE_STARTS = 2  # besides what was found,
 ELSEWHERE_CANDIDATES, ELSEWHERE_APART = 12, 0.15  # the best of so many, so far apart, as a share of a range
-ELSEWHERE_ITERATIONS, ELSEWHERE_TOLERANCE = 12, 1e-3  # of least squares from each
+ELSEWHERE_ITERATIONS, ELSEWHERE_TOLERANCE = 25, 1e-3  # of least squares from each
 AGREEING = 1.05  # times the least loss
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
 
