@@ -22,6 +22,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.identification.case import STAGES, require_demo, spread
+from trunkline.elements import BRANCH, all_elements
 from trunkline.errors import in_one_line
 from trunkline.filtering.filter import start_of
 from trunkline.frames import make_continuous
@@ -78,17 +79,21 @@ def swung(trial: Trial, rng: np.random.Generator) -> Trial:
     data, sites = mujoco.MjData(model), [model.site(f"{name}_center").id for name in trial.segments]
     azimuth, phase = rng.uniform(0, 2 * np.pi), rng.uniform(-1, 1)
     speed, rate = rng.uniform(*SWUNG), 2 * np.pi * rng.uniform(*SWING_FREQUENCY)
-    along, jacobian = np.resize([np.cos(azimuth), np.sin(azimuth)], model.nq), np.zeros((3, model.nv))
-    data.qpos[:] = start.start
+    arm = len(start.start)
+    along, jacobian = np.resize([np.cos(azimuth), np.sin(azimuth)], arm), np.zeros((3, model.nv))
+    branches = all_elements(model, BRANCH)  # which have given way, as those of an arm that is held
+    data.qpos[:arm] = start.start
     mujoco.mj_forward(model, data)
     mujoco.mj_jacSite(model, data, jacobian, None, sites[-1])
-    along *= speed / np.linalg.norm(jacobian @ along)
+    along *= speed / np.linalg.norm(jacobian[:, :arm] @ along)
     released = int(np.ceil(trial.start / step))
     positions, quaternions = np.empty(trial.positions.shape), np.empty(trial.quaternions.shape)
     for frame, time in enumerate(trial.time):
         if frame <= released:
             since = rate * (time - trial.time[released]) + phase
-            data.qpos[:], data.qvel[:] = start.start + along / rate * np.sin(since), along * np.cos(since)
+            data.qpos[:arm], data.qvel[:arm] = start.start + along / rate * np.sin(since), along * np.cos(since)
+            for one in branches:
+                data.qpos[one.own] = data.qpos[one.hinge]
             data.ctrl[:] = start.controls[0]
             data.act[:] = start.controls[0][: model.na]
         else:

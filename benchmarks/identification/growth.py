@@ -8,6 +8,7 @@ import numpy as np
 from benchmarks.identification.case import Case, ReadCase, Size
 from benchmarks.identification.timing import Spent, alternate
 from stages import build_mjcf
+from trunkline.elements import arm_hinges, cables
 from trunkline.frames import gravity_in_base
 from trunkline.identification.experiment import SLACK, Experiment
 from trunkline.identification.pose_fit import PoseFit
@@ -58,9 +59,9 @@ def _case_of_units(case: Case, units: int) -> Case:
 
 def bent_release(model: mujoco.MjModel, frames: int, frame_step: float) -> tuple[Experiment, tuple[str, ...]]:
     """A release that is compared with nothing, and the segments it tracks."""
-    units = model.nq // 2
+    units = arm_hinges(model) // 2
     start = np.tile([0.0, BEND / units], units)
-    segments = tuple(model.body(i).name for i in range(2, model.nbody))
+    segments = tuple(model.body(i).name for i in np.unique(model.jnt_bodyid[: len(start)]))
     positions = np.zeros((frames, len(segments), 3))
     experiment = Experiment(
         name="bent",
@@ -69,11 +70,11 @@ def bent_release(model: mujoco.MjModel, frames: int, frame_step: float) -> tuple
         gravity=gravity_in_base(0.0),
         start=start,
         lead=frame_step,
-        controls=np.tile(model.tendon_length0 + SLACK, (frames, 1)),
+        controls=np.tile(model.tendon_length0[cables(model)] + SLACK, (frames, 1)),
         positions=positions,
         measured=np.ones(positions.shape[:2], bool),
         frame_step=frame_step,
-        velocity=np.zeros(model.nv),
+        velocity=np.zeros(len(start)),
         fit=PoseFit(start, np.zeros(len(segments)), 0, True),
     )
     return experiment, segments

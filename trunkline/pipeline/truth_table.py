@@ -45,7 +45,7 @@ class Effect:
         return f"{self.words} (it has {modelled} of {present})" if modelled < present else ""
 
 
-SPRINGS = ("stiffness", "hardening")
+SPRINGS = ("stiffness", "hardening", "joint_place")
 LEAN = ("mount_tilt_x", "mount_tilt_y")
 REST = ("rest_bend_x", "rest_bend_y", "rest_gradient_x", "rest_gradient_y")
 RELAXING = ("relaxation", "relaxation_time", "relaxation_2", "relaxation_time_2")
@@ -65,7 +65,7 @@ LACKING = {
     "stranger": (
         Effect("a limited rate and backlash of the motors, cables that differ", MOTORS),
         Effect("dead time of the motors", MOTORS, unless="dead_time"),
-        Effect("friction that grows with a tendon's tension", (*RUBBING, "kp", "kv", "force_range")),
+        Effect("friction that grows with a tendon's tension", (*SPRINGS, *RUBBING, "kp", "kv", "force_range")),
         Effect("Maxwell branches", ("damping", *RELAXING, *MEMORY, *RUBBING, "kp", "kv"), "relaxation", "branches"),
         Effect("sliders", (*SPRINGS, "damping", *RELAXING, *MEMORY, *RUBBING, "kp"), "hysteresis", "sliders"),
         Effect("a rest shape", (*SPRINGS, *LEAN), unless="rest_bend_x"),

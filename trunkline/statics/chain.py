@@ -74,8 +74,8 @@ class Chain(NamedTuple):
 
     @property
     def length(self) -> float:
-        """Length of the arm from its first joint to the tip, m."""
-        return float(np.linalg.norm(self.offset[1:], axis=1).sum() + np.linalg.norm(self.tip))
+        """Length of the arm from its mount, over all joints, to the tip, m."""
+        return float(np.linalg.norm(self.offset, axis=1).sum() + np.linalg.norm(self.tip))
 
     @property
     def straight_lengths(self) -> np.ndarray:
