@@ -51,7 +51,8 @@ def drive(
 ) -> Driven:
     """Send commands to the straight arm and step it until its tip rests, with the model's own damping.
 
-    The time step is the longest that joint limits allow: where the arm comes to rest does not depend on it.
+    The time step is the longest that joint limits allow: where the arm comes to rest does not depend on it. Drives in
+    which MuJoCo warns are done again with half the step, down to the model's own.
 
     Args:
         commands: of the position actuators, m, sent at once. Shape (B, K), K in the order of the actuators. Or
@@ -60,11 +61,23 @@ def drive(
         seconds: longest time to simulate.
         friction: whether tendons and joints have the model's dry friction.
     """
-    model = copy.copy(model)
+    own, model = model.opt.timestep, copy.copy(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    model.opt.timestep = LOOK / np.ceil(LOOK / longest_step(model))
+    model.opt.timestep = longest_step(model)
     if not friction:
         model.tendon_frictionloss[:], model.dof_frictionloss[:] = 0, 0
+    gravity = np.broadcast_to(gravity, (len(commands), 3))
+    driven = _drive(model, commands, gravity, seconds, tip_site)
+    while model.opt.timestep > own and len(warned := np.flatnonzero(~np.isfinite(driven.end).all(axis=1))):
+        model.opt.timestep = max(model.opt.timestep / 2, own)
+        again = _drive(model, commands[warned], gravity[warned], seconds, tip_site)
+        driven.tips[warned], driven.rested[warned] = again.tips, again.rested
+    return driven
+
+
+def _drive(model: mujoco.MjModel, commands: np.ndarray, gravity: np.ndarray, seconds: float, tip_site: str) -> Driven:
+    """As `drive`, with about the model's time step."""
+    model.opt.timestep = LOOK / np.ceil(LOOK / model.opt.timestep)
     every, looks = round(LOOK / model.opt.timestep), round(seconds / LOOK)
     origin, to_world = base_frame(model)
     batch = batch_of(model, len(commands))
