@@ -1,11 +1,14 @@
 """Driving by trajectories of commands: their last row decides where a frictionless arm rests, the way there when."""
 
+import copy
+
 import numpy as np
 import pytest
 
 from tests.support.matched_plant import small_model
 from trunkline.frames import gravity_in_base
 from trunkline.simulation.drive import LOOK, ROW, drive
+from trunkline.simulation.rest import longest_step, settle
 
 
 @pytest.fixture(scope="module")
@@ -35,3 +38,17 @@ def test_a_slow_trajectory_arrives_late_at_the_same_place_and_is_waited_for(mode
     waited = late.tips[0, : round(waits / LOOK)]
     assert np.ptp(waited, axis=0).max() < 1e-3 < 0.1 * np.linalg.norm(there.end[0] - waited[-1])
     assert there.seconds_to_rest[0] < waits < late.seconds_to_rest[0]
+
+
+def test_an_arm_too_stiff_for_the_longest_step_is_driven_in_shorter_ones():
+    """MuJoCo steps springs explicitly; it warns, and what it says then is no answer."""
+    stiff = small_model(4)
+    stiff.jnt_stiffness[:] *= 1000
+    gravity = gravity_in_base(0.5)
+    command = stiff.tendon_length0 - [[0.01, -0.02, -0.02]]
+    long = copy.copy(stiff)
+    long.opt.timestep = longest_step(stiff)
+    assert not drive(long, command, gravity, 3.0).rested[0]  # as long as its own
+    own = drive(stiff, command, gravity, 3.0)
+    assert own.rested[0]
+    np.testing.assert_allclose(own.end, settle(stiff, command, gravity).position, atol=1e-5)
