@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -17,6 +18,7 @@ import trimesh
 from onnx import TensorProto, helper
 
 from tests.support.small_arm import small_mjcf
+from trunkline.arm.joints import Branch, Joints, add_elements
 from trunkline.errors import InputError
 from trunkline.ik.network import INPUTS
 from trunkline.unity.importer import as_imported
@@ -228,6 +230,18 @@ def test_a_linear_model_is_packed_as_it_is(files, sources):
     model = Manifest.model_validate_json(files[MANIFEST]).model
     assert (model.springs, model.dampers, model.changes_max_deviation_mm) == ([], [], 0)
     assert files[MODEL].decode() == sources.mjcf
+
+
+def test_branches_of_joints_are_packed_under_names_that_unity_can_hold(sources):
+    """A branch's hinge and the tendon that ties it have one name in MJCF."""
+    spec = mujoco.MjSpec.from_string(sources.mjcf)
+    add_elements(spec, Joints([Branch(0.3, 0.5)]), 1e-5)
+    files, violations = assemble(LABEL, replace(sources, mjcf=spec.to_xml()), TRAJECTORY)
+    assert not violations
+    packed = mujoco.MjModel.from_xml_string(files[MODEL].decode())
+    names = [packed.tendon(i).name for i in range(packed.ntendon)]
+    assert {"unit_01_x_branch_1_tie", "tendon_1"} <= set(names)
+    assert Manifest.model_validate_json(files[MANIFEST]).model.changes_max_deviation_mm < 1e-3
 
 
 def test_the_component_for_unity_reads_what_the_manifest_holds(files):
