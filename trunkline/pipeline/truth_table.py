@@ -148,8 +148,9 @@ def _unanswered(truth: dict) -> list[str]:
     branches = ", ".join(f"{_number(one['ratio'])} for {_number(one['time_s'])} s" for one in truth["branches"])
     sliders = ", ".join(f"{_number(one['ratio'])} up to {_number(one['bend_rad'])} rad" for one in truth["sliders"])
     return [
-        f"The lab's Maxwell branches, over its springs: {branches}.\nIts sliders: {sliders}.\nFriction in its "
-        f"holes: {_number(truth['capstan_friction'])}. Its motors wind at most {_number(truth['rate_limit_m_s'])} m/s, with "
+        f"The lab's Maxwell branches, over its springs: {branches}.\nIts sliders: {sliders}.\n"
+        f"Friction in its holes: {_number(truth['capstan_friction'])}. "
+        f"Its motors wind at most {_number(truth['rate_limit_m_s'])} m/s, with "
         f"{_number(1e3 * truth['backlash_m'])} mm of backlash."
     ]
 
