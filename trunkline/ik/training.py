@@ -63,7 +63,7 @@ def train(
     torch.set_num_threads(1)
     torch.manual_seed(training.seed)
     network = InverseKinematics(training.width, inputs[is_train], commands[is_train], lengths[is_train])
-    parameters = list(network.parameters())
+    parameters: list[torch.Tensor] = list(network.parameters())
     pose = torch.tensor(inputs, dtype=torch.float32)
     x, angle, tip = network.normalise(pose), pose[:, :1], pose[:, 1:4]
     command = torch.tensor(commands, dtype=torch.float32)
@@ -103,7 +103,7 @@ def train(
             for batch in order[: batches * training.batch].split(training.batch):
                 spare = torch.rand(len(batch), most_spare.shape[1], generator=shuffle)
                 gradients, errors = zip(*pool.map(slopes, batch.chunk(PARTS), spare.chunk(PARTS)), strict=True)
-                summed = [sum(parts) / len(batch) for parts in zip(*gradients, strict=True)]
+                summed = [sum(parts, torch.zeros(())) / len(batch) for parts in zip(*gradients, strict=True)]
                 speed = training.learning_rate * rate(done / steps)
                 with torch.no_grad():
                     adam(parameters, summed, first, second, [], counts, lr=speed, **ADAM)
