@@ -68,10 +68,8 @@ def with_parameter(
     return replace(config, parameters=config.parameters | {name: span}) if stage == in_stage else config
 
 
-def with_turned_mount(stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    """Tilt shows in shapes at rest; only the tendons' directions tell the twist."""
-    for name in ("mount_tilt_x", "mount_tilt_y"):
-        config = with_parameter(name, MOUNT, "identify_stiffness", stage, config)
+def with_twisted_mount(stage: str, config: IdentificationSettings) -> IdentificationSettings:
+    """Only the tendons' directions tell the twist."""
     return with_parameter("mount_twist", MOUNT, "identify_control", stage, config)
 
 
@@ -109,26 +107,21 @@ def with_factors_of_damping(stage: str, config: IdentificationSettings) -> Ident
     return replace(config, per_joint=["damping"]) if stage == "identify_damping" else config
 
 
-def without_factors(stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    return replace(config, per_joint=[])
-
-
 CHOICES: dict[str, Choice] = {
     "committed": Choice("as committed"),
     "no-hardening": Choice("without hardening", partial(without, "hardening")),
-    "no-creep": Choice("friction_time at its CAD value", partial(without, "friction_time")),
+    "no-creep": Choice("relaxation_time at its CAD value", partial(without, "relaxation_time")),
     "joint-friction": Choice(
         "with joint_friction", partial(with_parameter, "joint_friction", JOINT_FRICTION, "identify_damping")
     ),
     "delay": Choice(f"command_delay {COMMAND_DELAY:g} s", with_command_delay),
-    "mount": Choice("with mount_tilt_x, mount_tilt_y, mount_twist", with_turned_mount),
+    "mount": Choice("with mount_twist", with_twisted_mount),
     "markers": Choice("markers: measured", with_measured_markers),
     "velocity": Choice("started with measured velocities", trials=in_motion),
     "distances": Choice("loss: distances", with_distances),
     "least-squares": Choice("optimizer: least_squares", with_least_squares),
     "evolved-factors": Choice("fine: differential_evolution", with_evolved_factors),
     "joint-damping": Choice("per_joint damping too", with_factors_of_damping),
-    "no-factors": Choice("per_joint none", without_factors),
 }
 
 

@@ -54,7 +54,7 @@ def test_per_joint_factors_come_back():
 
 
 def test_a_maxwell_branch_comes_back():
-    """From an arm that was bent at once and let go at once: its branches had no time to give way."""
+    """From an arm that was held for long before it was let go: its branches had given way."""
     model = small_model(joints=Joints([Branch(0.3, 0.5)]))
     true = {"damping": 1.5 * PARAMETERS["damping"].read(model), "relaxation": 0.6, "relaxation_time": 0.2}
     truth = changed(model, **true)

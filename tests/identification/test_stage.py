@@ -17,7 +17,7 @@ from trunkline.identification.parameters import PARAMETERS, candidate_fields, se
 from trunkline.identification.problem import Bounds
 from trunkline.identification.saving import save_model
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.pipeline.identify import run
+from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.trials.trial import write_trials
 
 LOSS = Loss(
@@ -75,7 +75,7 @@ def test_stiffness_stage_on_one_thread_and_on_two(project, monkeypatch):
     files = {}
     for threads in ("1", "2"):
         monkeypatch.setenv("TRUNKLINE_THREADS", threads)
-        run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
+        run("identify_stiffness", config, CAD_MODEL)
         folder = root / "artifacts/identify_stiffness"
         files[threads] = {p.name: p.read_bytes() for p in folder.iterdir()}
     assert files["1"] == files["2"]

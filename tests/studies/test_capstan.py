@@ -6,6 +6,7 @@ import pytest
 
 from stages.build_mjcf import Config, cad_arm
 from studies.capstan import SLIP, chords_at, fall, find_chords, rest
+from trunkline.arm.joints import Joints
 from trunkline.frames import gravity_in_base
 from trunkline.pipeline.config import load_config
 from trunkline.statics.chain import read_chain
@@ -19,8 +20,10 @@ DIFFERENCE = 1e-6  # rad
 
 @pytest.fixture(scope="module")
 def model():
-    """Without friction of its own."""
-    model = cad_arm(load_config(Config, "build_mjcf")).spec.compile()
+    """Without friction of its own, or branches."""
+    config = load_config(Config, "build_mjcf")
+    config.joints = Joints()
+    model = cad_arm(config).spec.compile()
     model.tendon_frictionloss[:] = 0
     return model
 
