@@ -13,6 +13,7 @@ from trunkline.frames import gravity_in_base
 from trunkline.identification.experiment import SLACK, Experiment
 from trunkline.identification.pose_fit import PoseFit
 from trunkline.pipeline.config import load_config
+from trunkline.statics.supported import unit_bodies
 from trunkline.trials.splits import IDENTIFY
 
 CANDIDATES = 10
@@ -61,7 +62,7 @@ def bent_release(model: mujoco.MjModel, frames: int, frame_step: float) -> tuple
     """A release that is compared with nothing, and the segments it tracks."""
     units = arm_hinges(model) // 2
     start = np.tile([0.0, BEND / units], units)
-    segments = tuple(model.body(i).name for i in np.unique(model.jnt_bodyid[: len(start)]))
+    segments = tuple(model.body(i).name for i in unit_bodies(model))
     positions = np.zeros((frames, len(segments), 3))
     experiment = Experiment(
         name="bent",

@@ -105,7 +105,7 @@ def identification_table(root: Path) -> str:
     """Errors over all kinds on which `identify_control` is scored, of the models CAD and identified, beside null model
     and noise floor; where joints have factors of their own, of the coarse model without them too."""
     metrics = _metrics(root, "identify_control")
-    factors = (lookup(_metrics(root, "identify_stiffness"), "per_joint_gain") or {}).keys()
+    factors = lookup(_metrics(root, "identify_stiffness"), "per_joint_gain")
     lines = [
         "| model | E_internal, identify | E_internal, validate | position / tip error, mm, identify "
         "| position / tip error, mm, validate | E_internal, paper's arm |",
