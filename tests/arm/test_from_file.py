@@ -29,7 +29,8 @@ def project(tmp_path, monkeypatch):
     (tmp_path / "conf/build_mjcf/arm").mkdir(parents=True)
     for name in ("config.yaml", "arm/four_links.yaml"):
         (tmp_path / "conf/build_mjcf" / name).write_text((ROOT / "conf/build_mjcf" / name).read_text())
-    shutil.copytree(ROOT / "conf/build_mjcf/joints", tmp_path / "conf/build_mjcf/joints")
+    for group in ("holes", "joints"):
+        shutil.copytree(ROOT / "conf/build_mjcf" / group, tmp_path / "conf/build_mjcf" / group)
     (tmp_path / "conf/build_mjcf/mjcf").mkdir()
     (tmp_path / "params.yaml").write_text("build_mjcf: {arm: four_links, solver: {timestep: 0.002}}\n")
     monkeypatch.chdir(tmp_path)

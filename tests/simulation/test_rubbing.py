@@ -47,7 +47,8 @@ def shares(speed: float, stretches: int) -> np.ndarray:
 @pytest.mark.parametrize("speed", [0.5, -0.5])
 def test_tension_falls_as_the_capstan_equation_says(speed):
     found = shares(speed, 8)
-    turned = (BEND + speed * 0.001 * (STEPS - 1)) * (np.arange(UNITS) + 0.5)  # at the holes up to the chord across each unit's joint
+    bend = BEND + speed * 0.001 * (STEPS - 1)
+    turned = bend * (np.arange(UNITS) + 0.5)  # at the holes up to the chord across each unit's joint
     np.testing.assert_allclose(found, np.exp(-np.sign(speed) * FRICTION * turned), rtol=0.03)
 
 
