@@ -77,7 +77,7 @@ def test_the_truth_table_says_what_the_model_lacks(judged):
         (line,) = (line for line in truth_table(judged).splitlines() if line.startswith("| `kp`"))
         return line
 
-    assert "dead time of the motors, friction that grows" in lacking()
+    assert "dead time of the motors, friction on its holes" in lacking()
     assert "Maxwell branches (it has 0 of 3)" in lacking()
     assert "dead time" not in lacking(dead_time=1)
     assert "Maxwell branches (it has 2 of 3)" in lacking(relaxation=1, relaxation_2=1)
