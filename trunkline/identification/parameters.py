@@ -10,8 +10,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, elements
+from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 
+SHORTEST = 1e-6  # m; a unit whose ends are nearer to each other has no line along which its hinges may move
 Fields = dict[str, np.ndarray]  # name of an MjModel field → its values per candidate, (candidates, ...)
 
 
@@ -85,21 +87,39 @@ def _whole_arm(scale: Callable, reference: Callable[[mujoco.MjModel], float]) ->
 
 
 def _unit_ends(model: mujoco.MjModel) -> np.ndarray:
-    """Where each hinge's unit ends, m, in the unit's frame: the next unit's origin, or the tip. Shape (n, 3)."""
-    units = unit_of_hinge(model)
-    bodies = np.unique(model.jnt_bodyid[: len(units)])
-    ends = np.concatenate([model.body_pos[bodies[1:]], [model.site("tip").pos]])
-    return ends[units]
+    """Where each hinge's unit ends, m, in the frame of the unit's body, whose origin is its upper end: in the origin of
+    the next unit, or at the tip, of the arm as it was drawn. Shape (n, 3).
+
+    Raises:
+        InputError: a unit that the next one, or the tip, does not hang from, or that has no length.
+    """
+    hinges = model.jnt_bodyid[: arm_hinges(model)]
+    bodies, units = np.unique(hinges, return_inverse=True)
+    tip, ends = model.site("tip"), []
+    for body, below in zip(bodies, [*bodies[1:], None], strict=True):
+        at, end = (tip.bodyid[0], tip.pos) if below is None else (below, np.zeros(3))
+        while at not in (body, 0):  # through what is welded in between
+            at, end = model.body_parentid[at], model.body_pos[at] + rotation_from_wxyz(model.body_quat[at]).apply(end)
+        lower = "site 'tip'" if below is None else f"body {model.body(below).name!r}"
+        name = f"model: body {model.body(body).name!r}"
+        if at != body:
+            raise InputError(f"{name}: found {lower} to hang from another body, expected all units in one chain")
+        if np.linalg.norm(end) < SHORTEST:
+            raise InputError(f"{name}: found {lower} in its origin, expected that at the unit's lower end")
+        ends.append(end)
+    return np.array(ends)[units]
 
 
-def _read_place(model: mujoco.MjModel) -> float:
-    end = _unit_ends(model)[0]
-    return float(model.jnt_pos[0] @ end / (end @ end))
+def _places(model: mujoco.MjModel, ends: np.ndarray) -> np.ndarray:
+    """Where each hinge lies along its unit, as a share of the unit's length. Shape (n,)."""
+    return np.sum(model.jnt_pos[: len(ends)] * ends, axis=1) / np.sum(ends * ends, axis=1)
 
 
 def _write_place(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    """Move every hinge along its unit, and no other way: one that lies beside the unit's line stays as far from it."""
     ends = _unit_ends(model)
-    fields["jnt_pos"][:, : len(ends)] = values[:, None, None] * ends
+    moves = values[:, None] - _places(model, ends)
+    fields["jnt_pos"][:, : len(ends)] += moves[..., None] * ends
 
 
 def _set(name: str, index: tuple, sign: float = 1.0) -> Callable:
@@ -225,7 +245,9 @@ PARAMETERS: dict[str, Parameter] = {
     ),
     # where a unit bends, as a share of its length: 0 at its upper end, 0.5 if all along; 1 - γ, γ the characteristic
     # radius factor of pseudo-rigid-body models (L. L. Howell, Compliant Mechanisms, 2001)
-    "joint_place": Parameter("", ("jnt_pos",), _read_place, _write_place, signed=True),
+    "joint_place": Parameter(
+        "", ("jnt_pos",), lambda m: float(_places(m, _unit_ends(m))[0]), _write_place, signed=True
+    ),
     "hardening": Parameter(
         "1/rad²", STIFFNESS_FIELDS, lambda m: float(m.jnt_stiffnesspoly[0, 1] / m.jnt_stiffness[0]), _write_hardening,
     ),
