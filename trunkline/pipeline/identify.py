@@ -31,6 +31,12 @@ from trunkline.trials.trial import Trial, read_trials
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 TRIALS = Path("data/processed/filter")
 TABLED = ("identified", "cad", "null", "noise_floor")  # in trials.csv; metrics.json has all
+# kind of experiment: how a session does without it, as data/raw/README.md says too
+WITHOUT = {
+    "static_tilt": "`source: releases` under identify_stiffness, with `stiffness` and `damping` alone to identify",
+    "static_pull": "`source: tilts` under identify_stiffness, and no `kp` there",
+    "motion": "`experiments: [curl]` under identify_control",
+}
 CSV = {"index": False, "float_format": "%.6g"}
 
 
@@ -195,7 +201,9 @@ def read_reported(config: IdentificationSettings) -> list[Trial]:
     for kind in config.experiments:
         for split in DECIDING:
             if not any(t.experiment == kind and t.split == split for t in trials):
-                raise InputError(f"session.yaml: found no {kind} trial with split {split}, expected at least one")
+                found, way_out = f"found no {kind} trial with split {split}", WITHOUT.get(kind)
+                otherwise = f", or in params.yaml {way_out}: data/raw/README.md" if way_out else ""
+                raise InputError(f"session.yaml: {found}, expected at least one{otherwise}")
     segments = trials[0].segments
     for trial in trials:
         if trial.segments != segments:
