@@ -42,6 +42,16 @@ def all_elements(model: mujoco.MjModel, kind: str) -> list[Elements]:
     return found
 
 
+def give_way(model: mujoco.MjModel, qpos: np.ndarray) -> None:
+    """Put the joints' branches where they bear nothing, in place: those of an arm that was long in the pose `qpos`.
+
+    Args:
+        qpos: angles of all hinges, rad; those of the arm are read, those of branches written. Shape (..., nq).
+    """
+    for one in all_elements(model, BRANCH):
+        qpos[..., one.own] = qpos[..., one.hinge]
+
+
 def arm_hinges(model: mujoco.MjModel) -> int:
     """How many hinges are the arm's; they come first, branches after them."""
     return model.njnt - sum(len(branch.own) for branch in all_elements(model, BRANCH))
