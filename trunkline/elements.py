@@ -1,7 +1,7 @@
 """What a model's tendons and hinges are: the arm's own, or parts of its joints, by their names.
 
-`trunkline/arm/joints.py` builds those parts: Maxwell branches, named `<hinge>_branch_<number>`, and Jenkins elements,
-`<hinge>_slider_<number>`.
+`trunkline/arm/joints.py` builds those parts: Maxwell branches, hinges named `<hinge>_branch_<number>` and the
+tendons that tie them, which end in `_tie`, and Jenkins elements, tendons named `<hinge>_slider_<number>`.
 """
 
 from dataclasses import dataclass
@@ -10,6 +10,7 @@ import mujoco
 import numpy as np
 
 BRANCH, SLIDER = "branch", "slider"
+TIE = "_tie"  # ends the name of a branch's tendon: in a Unity scene it may not be called as the hinge
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,11 @@ class Elements:
 def elements(model: mujoco.MjModel, kind: str, number: int = 1) -> Elements:
     """The model's elements `kind`, BRANCH or SLIDER, of this number; none where it was built without."""
     ending = f"_{kind}_{number}"
-    tendons = [t for t in range(model.ntendon) if model.tendon(t).name.endswith(ending)]
-    names = [model.tendon(t).name for t in tendons]
-    hinges = [model.joint(name.removesuffix(ending)).id for name in names]
-    own = [model.joint(name).id for name in names] if kind == BRANCH else []
-    return Elements(*(np.array(found, dtype=int) for found in (tendons, hinges, own)))
+    names = {tendon: model.tendon(tendon).name.removesuffix(TIE) for tendon in range(model.ntendon)}
+    names = {tendon: name for tendon, name in names.items() if name.endswith(ending)}
+    hinges = [model.joint(name.removesuffix(ending)).id for name in names.values()]
+    own = [model.joint(name).id for name in names.values()] if kind == BRANCH else []
+    return Elements(*(np.array(found, dtype=int) for found in (list(names), hinges, own)))
 
 
 def all_elements(model: mujoco.MjModel, kind: str) -> list[Elements]:
