@@ -18,7 +18,7 @@ from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Bounds
 from trunkline.identification.repeatability import repeatability
 from trunkline.identification.saving import save_model
-from trunkline.identification.scoring import Compared, fingerprints, start_fit
+from trunkline.identification.scoring import Compared, fingerprints, predict, start_fit
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import check_folds, check_parameters, set_up
 from trunkline.identification.suspicion import suspicions
@@ -69,10 +69,10 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
         for field in ("qpos_spring", "site_pos", "site_sameframe"):  # rest shape and markers are no matter of scalars
             getattr(models["coarse"], field)[:] = getattr(model, field)
-    predictions = {name: Prediction(replay(m, experiments, segments), experiments) for name, m in models.items()}
+    predictions = predict(models, reported, experiments, model)
     metrics: dict = {"diverged_trials": {name: prediction.replay.diverged for name, prediction in predictions.items()}}
     like = predictions["identified"].replay
-    predictions |= references(reported, experiments, models["identified"], like)
+    predictions |= references(reported, predictions["identified"].experiments, models["identified"], like)
     metrics |= {name: prediction.scores(fit.loss, fit.weights) for name, prediction in predictions.items()}
     metrics |= {
         "noise_floor_mm": metrics["noise_floor"][VALIDATE]["e_position_mm"],
@@ -87,8 +87,9 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         "start_fit": start_fit(experiments),
     }
     if any(e.frames > 1 for e in experiments):
-        halved = Prediction(replay(models["identified"], experiments, segments, step_factor=0.5), experiments)
-        metrics["halved_step"] = halved_step(predictions["identified"], halved)
+        found = predictions["identified"]
+        halved = replay(models["identified"], found.experiments, segments, step_factor=0.5)
+        metrics["halved_step"] = halved_step(found, Prediction(halved, found.experiments))
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
@@ -188,7 +189,7 @@ def write_plots(
         save_figure(plots.error_figure(errors, floor), folder / "errors.png")
         kinds = [e for e in experiments if e.kind == experiments[-1].kind]
         widest = max(kinds, key=lambda e: float(np.ptp(e.positions, axis=0).max()))
-        one = {name: moving[name].of(lambda e: e is widest) for name in shown}
+        one = {name: moving[name].of(lambda e: e.name == widest.name) for name in shown}
         table = curves.distance_table(one, segments)
         table.to_csv(folder / "distances.csv", **CSV)
         save_figure(plots.distance_figure(table, widest.name), folder / "distances.png")
