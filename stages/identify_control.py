@@ -1,4 +1,4 @@
-"""Identify the actuators' gains, force range and time constant from curls."""
+"""Identify the motors' gains and force range from curls and motions."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Identify damping and tendon friction from releases."""
+"""Identify damping, relaxation and, once more, stiffness from releases."""
 
 from pathlib import Path
 

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.identification.case import STAGES, require_demo, spread
-from trunkline.elements import BRANCH, all_elements
+from trunkline.elements import give_way
 from trunkline.errors import in_one_line
 from trunkline.filtering.filter import start_of
 from trunkline.frames import make_continuous
@@ -81,7 +81,6 @@ def swung(trial: Trial, rng: np.random.Generator) -> Trial:
     speed, rate = rng.uniform(*SWUNG), 2 * np.pi * rng.uniform(*SWING_FREQUENCY)
     arm = len(start.start)
     along, jacobian = np.resize([np.cos(azimuth), np.sin(azimuth)], arm), np.zeros((3, model.nv))
-    branches = all_elements(model, BRANCH)  # which have given way, as those of an arm that is held
     data.qpos[:arm] = start.start
     mujoco.mj_forward(model, data)
     mujoco.mj_jacSite(model, data, jacobian, None, sites[-1])
@@ -92,8 +91,7 @@ def swung(trial: Trial, rng: np.random.Generator) -> Trial:
         if frame <= released:
             since = rate * (time - trial.time[released]) + phase
             data.qpos[:arm], data.qvel[:arm] = start.start + along / rate * np.sin(since), along * np.cos(since)
-            for one in branches:
-                data.qpos[one.own] = data.qpos[one.hinge]
+            give_way(model, data.qpos)
             data.ctrl[:] = start.controls[0]
             data.act[:] = start.controls[0][: model.na]
         else:

@@ -1,8 +1,9 @@
 """What a model's tendons and hinges are: the arm's own, or parts of its joints, by their names.
 
-`trunkline/arm/joints.py` builds those parts: Maxwell branches, named `<hinge>_branch_<number>`, and Jenkins elements,
-`<hinge>_slider_<number>`. `trunkline/arm/holes.py` gives a cable tendons by which it rubs on its holes, named
-`<cable>_hole_<number>`, and the model a number `capstan_friction`, their coefficient.
+`trunkline/arm/joints.py` builds those parts: Maxwell branches, hinges named `<hinge>_branch_<number>` and the
+tendons that tie them, which end in `_tie`, and Jenkins elements, tendons named `<hinge>_slider_<number>`.
+`trunkline/arm/holes.py` gives a cable tendons by which it rubs on its holes, named `<cable>_hole_<number>`, and the
+model a number `capstan_friction`, their coefficient.
 """
 
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import mujoco
 import numpy as np
 
 BRANCH, SLIDER, HOLE = "branch", "slider", "hole"
+TIE = "_tie"  # ends the name of a branch's tendon: in a Unity scene it may not be called as the hinge
 CAPSTAN_FRICTION = "capstan_friction"
 
 
@@ -29,11 +31,11 @@ class Elements:
 def elements(model: mujoco.MjModel, kind: str, number: int = 1) -> Elements:
     """The model's elements `kind`, BRANCH or SLIDER, of this number; none where it was built without."""
     ending = f"_{kind}_{number}"
-    tendons = [t for t in range(model.ntendon) if model.tendon(t).name.endswith(ending)]
-    names = [model.tendon(t).name for t in tendons]
-    hinges = [model.joint(name.removesuffix(ending)).id for name in names]
-    own = [model.joint(name).id for name in names] if kind == BRANCH else []
-    return Elements(*(np.array(found, dtype=int) for found in (tendons, hinges, own)))
+    names = {tendon: model.tendon(tendon).name.removesuffix(TIE) for tendon in range(model.ntendon)}
+    names = {tendon: name for tendon, name in names.items() if name.endswith(ending)}
+    hinges = [model.joint(name.removesuffix(ending)).id for name in names.values()]
+    own = [model.joint(name).id for name in names.values()] if kind == BRANCH else []
+    return Elements(*(np.array(found, dtype=int) for found in (list(names), hinges, own)))
 
 
 def all_elements(model: mujoco.MjModel, kind: str) -> list[Elements]:
@@ -42,6 +44,16 @@ def all_elements(model: mujoco.MjModel, kind: str) -> list[Elements]:
     while len((one := elements(model, kind, len(found) + 1)).tendon):
         found.append(one)
     return found
+
+
+def give_way(model: mujoco.MjModel, qpos: np.ndarray) -> None:
+    """Put the joints' branches where they bear nothing, in place: those of an arm that was long in the pose `qpos`.
+
+    Args:
+        qpos: angles of all hinges, rad; those of the arm are read, those of branches written. Shape (..., nq).
+    """
+    for one in all_elements(model, BRANCH):
+        qpos[..., one.own] = qpos[..., one.hinge]
 
 
 def arm_hinges(model: mujoco.MjModel) -> int:

@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.small_arm import small_spec
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
-from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables
+from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, give_way
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import read_chain
 
@@ -93,6 +93,20 @@ def test_elements_stand_after_the_arms_own(pair):
         assert len(found) == count
         for one in found:
             np.testing.assert_array_equal(one.hinge, np.arange(plain.njnt))
+
+
+def test_branches_that_have_given_way_bear_nothing():
+    spec, poses = small_spec(), np.random.default_rng(1).uniform(-0.2, 0.2, (2, 3 * 16))
+    add_elements(spec, Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)]), ARMATURE)
+    model = spec.compile()
+    arm = arm_hinges(model)
+    give_way(model, poses)
+    for pose in poses:
+        data = mujoco.MjData(model)
+        data.qpos[:] = pose
+        mujoco.mj_forward(model, data)
+        np.testing.assert_allclose(data.qfrc_passive[arm:], 0, atol=1e-12)
+        np.testing.assert_allclose(data.qfrc_passive[:arm], -model.jnt_stiffness[:arm] * pose[:arm], atol=1e-12)
 
 
 def test_elements_change_nothing_at_rest(pair):

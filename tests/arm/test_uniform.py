@@ -1,6 +1,7 @@
 """Chains of one diameter: tracked points, loads and no tendons, and the settings that make them."""
 
 import shutil
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -126,6 +127,15 @@ def test_a_mistake_names_the_key(project, changes, message):
         project(changes)
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("arm", ["asl_trunk", "spiral"])
+def test_units_bend_at_their_upper_ends_where_the_file_does_not_say(project, arm):
+    assert project({"joint_place": 0.25}, arm).arm.joint_place == 0.25
+    file = Path("conf/build_mjcf/arm/arm.yaml")
+    lines = file.read_text().splitlines(keepends=True)
+    file.write_text("".join(line for line in lines if not line.startswith("joint_place")))
+    assert load_config(Config, "build_mjcf").arm.joint_place == 0
 
 
 @pytest.mark.parametrize("arm", ["asl_trunk", "spiral"])

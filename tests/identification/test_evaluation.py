@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import release, segments_of, small_model, tilt
-from trunkline.identification.evaluation import period_error, replay, scores
-from trunkline.identification.experiment import prepare
+from trunkline.identification.evaluation import period_error, replay, scores, segment_positions
+from trunkline.identification.experiment import own_starts, prepare
 from trunkline.identification.loss import LossWeights
+from trunkline.identification.parameters import candidate_fields, set_fields
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
@@ -29,6 +30,21 @@ def test_trials_that_a_model_does_not_survive_are_counted():
     found.positions[1][-1, 0] = np.nan
     assert found.diverged == 1
     assert scores(found, experiments, "positions", WEIGHTS)["identify"]["e_position_mm"] > 1
+
+
+def test_every_model_starts_where_its_own_geometry_puts_the_arm():
+    cad, bent = small_model(4), small_model(4)
+    set_fields(bent, candidate_fields(cad, {"joint_place": np.array([0.5])}))
+    trials = [release(bent, 0.2, frames=20), tilt(bent, 30)]
+    experiments = [prepare(trial, bent, 20) for trial in trials]
+    own = own_starts(experiments, trials, bent, cad)
+    off = [
+        np.linalg.norm(segment_positions(cad, segments_of(cad), e.start) - trials[0].positions[0], axis=1).mean()
+        for e in (own[0], experiments[0])
+    ]
+    assert off[0] < 0.5 * off[1]
+    assert own[1] is experiments[1]
+    assert own_starts(experiments, trials, bent, bent.__copy__()) is experiments
 
 
 @pytest.mark.parametrize("longer", [1.0, 1.01, 0.98, 1.05])

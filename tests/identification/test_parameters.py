@@ -1,5 +1,7 @@
 """Parameters: what is written is what is read, and the physics that it stands for follows."""
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
@@ -8,6 +10,7 @@ from tests.support.small_arm import small_spec
 from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.elements import BRANCH, all_elements, arm_hinges
+from trunkline.errors import InputError
 from trunkline.identification.parameters import PARAMETERS, Parameter, candidate_fields, set_fields, unit_of_hinge
 from trunkline.identification.saving import save_model
 
@@ -103,6 +106,53 @@ def test_an_arm_that_bends_in_the_middle_of_its_units_is_nearer_to_a_rod(place, 
     mujoco.mj_jacSite(model, data, jacobian, None, tip.id)
     sag = force * np.sum(jacobian[0] ** 2 / model.jnt_stiffness)
     assert sag / (force * length**3 / (3 * stiffness * length / units)) == pytest.approx(1 + error, rel=1e-9)
+
+
+# Two units as a lab may draw them: a flange, upside down, between them, a cap with the tip, hinges beside the line
+DRAWN = """<mujoco><compiler angle="degree"/><worldbody><body name="base"><site name="base_center"/>
+  <body name="upper" pos="0 0 -0.01" euler="0 90 0">
+    <joint name="upper_x" axis="1 0 0" pos="0 0.01 0"/><joint name="upper_y" axis="0 1 0" pos="0 0.01 0"/>
+    <geom size="0.01"/>
+    <body name="flange" pos="0.04 0 0" euler="0 180 0">
+      <body name="lower" pos="-0.02 0 0" euler="0 90 0">
+        <joint name="lower_x" axis="1 0 0" pos="0.01 0 0.02"/><joint name="lower_y" axis="0 1 0" pos="0.01 0 0.02"/>
+        <geom size="0.01"/>
+        <body name="cap" pos="0 0 -0.03"><site name="tip" pos="0 0 -0.01"/></body>
+      </body>
+    </body>
+  </body>
+</body></worldbody></mujoco>"""
+
+
+def test_hinges_of_a_drawn_arm_move_along_their_units_and_no_other_way():
+    spec = mujoco.MjSpec.from_string(DRAWN)
+    model = spec.compile()
+    assert PARAMETERS["joint_place"].read(model) == pytest.approx(0.0)
+    straight = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, straight)
+    set_fields(model, candidate_fields(model, {"joint_place": np.array([0.25])}))
+    expected = np.repeat([[0.015, 0.01, 0.0], [0.01, 0.0, -0.01]], 2, axis=0)  # a quarter of 60 mm, and of 40 mm
+    np.testing.assert_allclose(model.jnt_pos, expected, atol=1e-12)
+    again = mujoco.MjModel.from_xml_string(save_model(spec, model))
+    np.testing.assert_allclose(again.jnt_pos, expected, atol=1e-6)
+    moved = mujoco.MjData(again)
+    mujoco.mj_kinematics(again, moved)
+    np.testing.assert_allclose(moved.site("tip").xpos, straight.site("tip").xpos, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('"lower" pos="-0.02', '"lower" pos="0.04', "body 'upper': found body 'lower' in its origin, expected that"),
+        ('"0 0 -0.01"/></body>', '"0 0 0.03"/></body>', "body 'lower': found site 'tip' in its origin, expected that"),
+        ('(?s)base_center"/>(.*)"tip"', r'base_center"/><site name="tip"/>\1"end"', "'lower': found site 'tip' to"),
+    ],
+)
+def test_units_without_a_line_have_no_joint_place(old, new, message):
+    changed, count = re.subn(old, new, DRAWN)
+    assert count == 1
+    with pytest.raises(InputError, match=message):
+        PARAMETERS["joint_place"].read(mujoco.MjModel.from_xml_string(changed))
 
 
 def test_candidates_do_not_mix():

@@ -17,7 +17,8 @@ from trunkline.identification.parameters import PARAMETERS, candidate_fields, se
 from trunkline.identification.problem import Bounds
 from trunkline.identification.saving import save_model
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.pipeline.identify import CAD_MODEL, run
+from trunkline.pipeline.identify import CAD_MODEL, read_reported, run
+from trunkline.trials.splits import DECIDING
 from trunkline.trials.trial import write_trials
 
 LOSS = Loss(
@@ -125,6 +126,21 @@ def test_a_missing_split_is_named(project):
     with pytest.raises(InputError, match="no static_tilt trial with split validate"):
         run("identify_stiffness", config, root / "artifacts/build_mjcf/arm.xml")
     assert not (root / "artifacts/identify_stiffness").exists()
+
+
+@pytest.mark.parametrize(
+    ("experiments", "way_out"),
+    [
+        (["static_tilt", "static_pull"], "static_pull .* `source: tilts` under identify_stiffness, and no `kp` there"),
+        (["release"], "no release trial with split identify, expected at least one$"),
+        (["curl", "motion"], "`experiments: [curl]` under identify_control: data/raw/README.md"),
+    ],
+)
+def test_what_to_set_without_an_experiment_is_said(project, experiments, way_out):
+    _, model, write = project
+    write([one for split in DECIDING for one in (tilt(model, 30, split), curl(model, 40, split, frames=30))])
+    with pytest.raises(InputError, match=way_out.replace("[", r"\[").replace("]", r"\]")):
+        read_reported(settings(experiments, experiments, {"stiffness": (0.3, 12.0)}))
 
 
 def test_a_missing_model_is_named(project):

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.small_arm import small_spec
 from trunkline.arm.joints import Joints, add_elements
-from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables
+from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, give_way
 from trunkline.frames import gravity_in_base, wxyz_from_rotation
 from trunkline.identification.experiment import SLACK
 from trunkline.trials.trial import Trial
@@ -52,8 +52,7 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
     data = mujoco.MjData(model)
     lengths = model.tendon_length0[cables(model)] - pulls
     data.qpos[: len(start)], data.act[:] = start, lengths[0]
-    for one in all_elements(model, BRANCH):  # held for long before, they have given way
-        data.qpos[one.own] = data.qpos[one.hinge]
+    give_way(model, data.qpos)  # held for long before
     for slider in all_elements(model, SLIDER):  # slipped on the way from the straight arm
         bend, give = data.qpos[slider.hinge], model.tendon_springyield[slider.tendon]
         for end in (0, 1):

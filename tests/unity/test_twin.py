@@ -233,7 +233,7 @@ def test_a_linear_model_is_packed_as_it_is(files, sources):
 
 
 def test_branches_of_joints_are_packed_under_names_that_unity_can_hold(sources):
-    """A branch's hinge and the tendon that ties it have one name in MJCF."""
+    """A branch's hinge and the tendon that ties it have names of their own."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)
     add_elements(spec, Joints([Branch(0.3, 0.5)]), 1e-5)
     files, violations = assemble(LABEL, replace(sources, mjcf=spec.to_xml()), TRAJECTORY)

@@ -2,7 +2,7 @@
 
 import re
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -43,7 +43,7 @@ class Chain(ABC):
     hole_ratio: Annotated[float, Field(gt=0, le=1)]
     tip_load: Annotated[float, Field(ge=0, le=100)]
     segments: dict[str, Annotated[float, Field(gt=0, le=10)]]
-    joint_place: Annotated[float, Field(ge=0, le=1)]
+    joint_place: Annotated[float, Field(ge=0, le=1)] = field(default=0.0, kw_only=True)
 
     def __post_init__(self):
         for name, distance in self.segments.items():

@@ -13,7 +13,7 @@ from typing import Annotated
 import mujoco
 from pydantic import Field
 
-from trunkline.elements import BRANCH, SLIDER
+from trunkline.elements import BRANCH, SLIDER, TIE
 
 LIGHT = 1e-9  # kg and kg m², what MuJoCo wants of a body that moves; its damping makes it follow, not its inertia
 
@@ -60,7 +60,7 @@ def add_elements(spec: mujoco.MjSpec, joints: Joints, armature: float) -> None:
                 name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=joint.axis, limited=False, armature=armature,
                 damping=[stiffness * branch.time, 0, 0],
             )  # fmt: skip
-            tie = spec.add_tendon(name=name, stiffness=[stiffness, 0, 0], springlength=[0, 0])
+            tie = spec.add_tendon(name=f"{name}{TIE}", stiffness=[stiffness, 0, 0], springlength=[0, 0])
             tie.wrap_joint(joint.name, 1)
             tie.wrap_joint(name, -1)
     for number, slider in enumerate(joints.sliders, 1):

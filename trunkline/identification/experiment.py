@@ -18,6 +18,8 @@ QUIET_FRAMES = 3  # before the start: there the low-pass has not yet smeared the
 REACH = 2  # frames to either side for the velocity at the start; the low-pass leaves nothing finer
 SWAY_FRAMES = 8  # between the poses that tell how a hand moves the arm that it is about to let go
 LOOK_BACK = 30  # frames in which to look for a start pose that enough cameras saw
+GEOMETRY = ("jnt_pos", "jnt_axis", "body_pos", "body_quat", "site_pos")
+SAME_PLACE = 1e-5  # m, and of a quaternion; what MJCF rounds away is less
 SEEN_SHARE = 0.6  # of the segments that must be measured in the frame of the start pose
 
 
@@ -82,12 +84,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
-    fit = _fit_frame(trial, model, seen)
-    start, velocity = fit.qpos, np.zeros(arm_hinges(model))
-    if trial.in_motion:
-        velocity = _velocity(trial, model, seen)
-    elif trial.swaying:
-        start, velocity = _foreseen(trial, model, seen)
+    fit, start, velocity = _start(trial, model, seen)
     lengths = commanded_lengths(trial, model)
     if command_delay and model.nu:
         lengths = np.stack(
@@ -109,6 +106,37 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         repaired=trial.repairs > 0,
         load=trial.load,
     )
+
+
+def own_starts(
+    experiments: list[Experiment], trials: list[Trial], fitted: mujoco.MjModel, model: mujoco.MjModel
+) -> list[Experiment]:
+    """Experiments that were prepared with the model `fitted`, from where `model` has its hinges in the measured poses.
+
+    They stay as they are if both models have the same geometry. So do trials at rest, whose start decides nothing.
+
+    Args:
+        experiments, trials: the same ones, in the same order.
+    """
+    if all(np.allclose(getattr(fitted, name), getattr(model, name), rtol=0, atol=SAME_PLACE) for name in GEOMETRY):
+        return experiments
+    own = []
+    for experiment, trial in zip(experiments, trials, strict=True):
+        if not is_static(experiment.kind):
+            fit, start, velocity = _start(trial, model, start_frames(trial)[1])
+            experiment = replace(experiment, fit=fit, start=start, velocity=velocity)
+        own.append(experiment)
+    return own
+
+
+def _start(trial: Trial, model: mujoco.MjModel, seen: int) -> tuple[PoseFit, np.ndarray, np.ndarray]:
+    """The model's pose in frame `seen`, and joint angles, rad, and velocities, rad/s, to start from. Shape (n,)."""
+    fit = _fit_frame(trial, model, seen)
+    if trial.in_motion:
+        return fit, fit.qpos, _velocity(trial, model, seen)
+    if trial.swaying:
+        return fit, *_foreseen(trial, model, seen)
+    return fit, fit.qpos, np.zeros(arm_hinges(model))
 
 
 def start_frames(trial: Trial) -> tuple[int, int]:

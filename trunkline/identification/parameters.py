@@ -20,8 +20,11 @@ from trunkline.elements import (
     elements,
     holes,
 )
+from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+from trunkline.trials.experiments import Kind
 
+SHORTEST = 1e-6  # m; a unit whose ends are nearer to each other has no line along which its hinges may move
 Fields = dict[str, np.ndarray]  # name of an MjModel field → its values per candidate, (candidates, ...)
 
 
@@ -37,6 +40,7 @@ class Parameter:
         signed: whether it may be 0 or less. Only others are searched on a logarithmic scale.
         part: what of an arm it belongs to, if not every arm has it: "tendons", their motors' "dead time", or a joint's
             "branch 1", "slider 1", …, or "holes" on which cables rub.
+        told_by: whether trials of a kind of experiment tell it: from others alone it comes out wrong, or anyhow.
     """
 
     unit: str
@@ -45,6 +49,7 @@ class Parameter:
     write: Callable[[Fields, np.ndarray, mujoco.MjModel], None]
     signed: bool = False
     part: str = ""
+    told_by: Callable[[Kind], bool] = lambda kind: True
 
     def belongs_to(self, model: mujoco.MjModel) -> bool:
         """Whether the arm has the part of which this is."""
@@ -64,6 +69,24 @@ class Parameter:
     def value(self, coordinate):
         """The inverse of `coordinate`."""
         return np.asarray(coordinate, dtype=float) if self.signed else np.exp(coordinate)
+
+
+def _moving(kind: Kind) -> bool:
+    """At rest friction, dampers, branches and sliders are off."""
+    return not kind.static
+
+
+def _pulled(kind: Kind) -> bool:
+    return kind.needs_motors
+
+
+def _pulled_and_moving(kind: Kind) -> bool:
+    return kind.needs_motors and not kind.static
+
+
+def _start_known(kind: Kind) -> bool:
+    """The bent pose from which a release starts is fitted beforehand, with the hinges where they were then."""
+    return kind.static or kind.needs_motors
 
 
 def _column(values: np.ndarray, field: np.ndarray) -> np.ndarray:
@@ -97,21 +120,39 @@ def _whole_arm(scale: Callable, reference: Callable[[mujoco.MjModel], float]) ->
 
 
 def _unit_ends(model: mujoco.MjModel) -> np.ndarray:
-    """Where each hinge's unit ends, m, in the unit's frame: the next unit's origin, or the tip. Shape (n, 3)."""
-    units = unit_of_hinge(model)
-    bodies = np.unique(model.jnt_bodyid[: len(units)])
-    ends = np.concatenate([model.body_pos[bodies[1:]], [model.site("tip").pos]])
-    return ends[units]
+    """Where each hinge's unit ends, m, in the frame of the unit's body, whose origin is its upper end: in the origin of
+    the next unit, or at the tip, of the arm as it was drawn. Shape (n, 3).
+
+    Raises:
+        InputError: a unit that the next one, or the tip, does not hang from, or that has no length.
+    """
+    hinges = model.jnt_bodyid[: arm_hinges(model)]
+    bodies, units = np.unique(hinges, return_inverse=True)
+    tip, ends = model.site("tip"), []
+    for body, below in zip(bodies, [*bodies[1:], None], strict=True):
+        at, end = (tip.bodyid[0], tip.pos) if below is None else (below, np.zeros(3))
+        while at not in (body, 0):  # through what is welded in between
+            at, end = model.body_parentid[at], model.body_pos[at] + rotation_from_wxyz(model.body_quat[at]).apply(end)
+        lower = "site 'tip'" if below is None else f"body {model.body(below).name!r}"
+        name = f"model: body {model.body(body).name!r}"
+        if at != body:
+            raise InputError(f"{name}: found {lower} to hang from another body, expected all units in one chain")
+        if np.linalg.norm(end) < SHORTEST:
+            raise InputError(f"{name}: found {lower} in its origin, expected that at the unit's lower end")
+        ends.append(end)
+    return np.array(ends)[units]
 
 
-def _read_place(model: mujoco.MjModel) -> float:
-    end = _unit_ends(model)[0]
-    return float(model.jnt_pos[0] @ end / (end @ end))
+def _places(model: mujoco.MjModel, ends: np.ndarray) -> np.ndarray:
+    """Where each hinge lies along its unit, as a share of the unit's length. Shape (n,)."""
+    return np.sum(model.jnt_pos[: len(ends)] * ends, axis=1) / np.sum(ends * ends, axis=1)
 
 
 def _write_place(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    """Move every hinge along its unit, and no other way: one that lies beside the unit's line stays as far from it."""
     ends = _unit_ends(model)
-    fields["jnt_pos"][:, : len(ends)] = values[:, None, None] * ends
+    moves = values[:, None] - _places(model, ends)
+    fields["jnt_pos"][:, : len(ends)] += moves[..., None] * ends
 
 
 def _set(name: str, index: tuple, sign: float = 1.0) -> Callable:
@@ -181,7 +222,8 @@ def _share(kind: str, number: int) -> Parameter:
         fields["tendon_stiffness"][:, one.tendon] = stiffness
         fields["dof_damping"][:, one.own] = times * stiffness[:, : len(one.own)]
 
-    return Parameter("", ("tendon_stiffness", "dof_damping", "jnt_stiffness"), read, write, part=f"{kind} {number}")
+    fields = ("tendon_stiffness", "dof_damping", "jnt_stiffness")
+    return Parameter("", fields, read, write, part=f"{kind} {number}", told_by=_moving)
 
 
 def _relaxation_time(number: int) -> Parameter:
@@ -193,7 +235,8 @@ def _relaxation_time(number: int) -> Parameter:
         one = elements(model, BRANCH, number)
         fields["dof_damping"][:, one.own] = values[:, None] * fields["tendon_stiffness"][:, one.tendon]
 
-    return Parameter("s", ("dof_damping", "tendon_stiffness"), read, write, part=f"{BRANCH} {number}")
+    fields = ("dof_damping", "tendon_stiffness")
+    return Parameter("s", fields, read, write, part=f"{BRANCH} {number}", told_by=_moving)
 
 
 def _yield_bend(number: int) -> Parameter:
@@ -204,7 +247,7 @@ def _yield_bend(number: int) -> Parameter:
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         fields["tendon_springyield"][:, elements(model, SLIDER, number).tendon] = values[:, None]
 
-    return Parameter("rad", ("tendon_springyield",), read, write, part=f"{SLIDER} {number}")
+    return Parameter("rad", ("tendon_springyield",), read, write, part=f"{SLIDER} {number}", told_by=_moving)
 
 
 def _rest_bend(axis: int, power: int) -> Parameter:
@@ -241,17 +284,20 @@ PARAMETERS: dict[str, Parameter] = {
     ),
     # where a unit bends, as a share of its length: 0 at its upper end, 0.5 if all along; 1 - γ, γ the characteristic
     # radius factor of pseudo-rigid-body models (L. L. Howell, Compliant Mechanisms, 2001)
-    "joint_place": Parameter("", ("jnt_pos",), _read_place, _write_place, signed=True),
+    "joint_place": Parameter(
+        "", ("jnt_pos",), lambda m: float(_places(m, _unit_ends(m))[0]), _write_place, signed=True,
+        told_by=_start_known,
+    ),
     "hardening": Parameter(
         "1/rad²", STIFFNESS_FIELDS, lambda m: float(m.jnt_stiffnesspoly[0, 1] / m.jnt_stiffness[0]), _write_hardening,
     ),
     "joint_friction": Parameter(
         "rad", ("dof_frictionloss", "jnt_stiffness"),
-        lambda m: float(m.dof_frictionloss[0] / m.jnt_stiffness[0]), _write_joint_friction,
+        lambda m: float(m.dof_frictionloss[0] / m.jnt_stiffness[0]), _write_joint_friction, told_by=_moving,
     ),
     "damping": Parameter(
         "N m s/rad", DAMPING_FIELDS, lambda m: float(m.dof_damping[0]),
-        _whole_arm(_scale_damping, lambda m: float(m.dof_damping[0])),
+        _whole_arm(_scale_damping, lambda m: float(m.dof_damping[0])), told_by=_moving,
     ),
     "relaxation": _share(BRANCH, 1),
     "relaxation_time": _relaxation_time(1),
@@ -265,34 +311,34 @@ PARAMETERS: dict[str, Parameter] = {
     "rest_gradient_y": _rest_bend(1, 1),
     "tendon_friction": Parameter(
         "N", ("tendon_frictionloss",), lambda m: float(m.tendon_frictionloss[0]), _write_tendons("tendon_frictionloss"),
-        part="tendons",
+        part="tendons", told_by=_moving,
     ),
     # the smallest speed at which a regularised friction yields falls with it: a slow one lets a hook creep straight
     "friction_time": Parameter(
         "s", ("tendon_solref_fri",), lambda m: float(m.tendon_solref_fri[0, 0]),
-        _write_tendons("tendon_solref_fri", (0,)), part="tendons",
+        _write_tendons("tendon_solref_fri", (0,)), part="tendons", told_by=_moving,
     ),
     # μ of cables on the holes that they pass, in the capstan equation
-    "capstan_friction": Parameter("", ("numeric_data",), capstan_friction, _write_capstan, part="holes"),
+    "capstan_friction": Parameter("", ("numeric_data",), capstan_friction, _write_capstan, part="holes", told_by=_pulled_and_moving),
     "kp": Parameter(
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
-        part="tendons",
+        part="tendons", told_by=_pulled,
     ),
     "kv": Parameter(
         "N s/m", ("actuator_biasprm",), lambda m: float(-m.actuator_biasprm[0, 2]),
-        _set("actuator_biasprm", (slice(None), 2), -1.0), part="tendons",
+        _set("actuator_biasprm", (slice(None), 2), -1.0), part="tendons", told_by=_pulled_and_moving,
     ),
     "force_range": Parameter(
         "N", ("actuator_forcerange",), lambda m: float(-m.actuator_forcerange[0, 0]),
-        _set("actuator_forcerange", (slice(None), 0), -1.0), part="tendons",
+        _set("actuator_forcerange", (slice(None), 0), -1.0), part="tendons", told_by=_pulled,
     ),
     "time_constant": Parameter(
         "s", ("actuator_dynprm",), lambda m: float(m.actuator_dynprm[0, 0]), _set("actuator_dynprm", (slice(None), 0)),
-        part="tendons",
+        part="tendons", told_by=_pulled_and_moving,
     ),
     "dead_time": Parameter(
         "s", ("actuator_delay",), lambda m: float(m.actuator_delay[0]), _set("actuator_delay", ()),
-        part="dead time",
+        part="dead time", told_by=_pulled_and_moving,
     ),
     "mount_tilt_x": _mount(0),
     "mount_tilt_y": _mount(1),

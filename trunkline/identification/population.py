@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.elements import BRANCH, SLIDER, all_elements
+from trunkline.elements import SLIDER, all_elements, give_way
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
 from trunkline.simulation.load import hang, slowing
@@ -97,8 +97,7 @@ class Population:
     def _remember(self, batch: Batch) -> None:
         """Joints' branches and sliders as long after a straight arm was bent into the start pose."""
         angles = batch.bind("qpos")
-        for one in all_elements(self._model, BRANCH):
-            angles[:, one.own] = angles[:, one.hinge]
+        give_way(self._model, angles)
         for one in all_elements(self._model, SLIDER):
             bend, give = angles[:, one.hinge], batch.expand("tendon_springyield")[:, one.tendon]
             place = self._model.tendon_plasticadr[one.tendon]

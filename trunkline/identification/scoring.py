@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from trunkline.identification.evaluation import Prediction, replay
-from trunkline.identification.experiment import Experiment, prepare
+from trunkline.identification.experiment import Experiment, own_starts, prepare
 from trunkline.identification.null_model import FLOOR_POSES, references
 from trunkline.identification.repeatability import repeatability
 from trunkline.identification.settings import IdentificationSettings
@@ -83,9 +83,20 @@ def _predictions(
     models, model, trials: list[Trial], experiments: list[Experiment], ended, floor_poses: int = FLOOR_POSES
 ) -> dict[str, Prediction]:
     """Of all `models`, and what stands beside them; `model` is the one to whose segments poses are fitted."""
-    segments = trials[0].segments
-    found = {name: Prediction(replay(each, experiments, segments), experiments) for name, each in models.items()}
+    found = predict(models, trials, experiments, model)
     return found | references(trials, experiments, model, next(iter(found.values())).replay, ended, floor_poses)
+
+
+def predict(
+    models: dict[str, mujoco.MjModel], trials: list[Trial], experiments: list[Experiment], fitted: mujoco.MjModel
+) -> dict[str, Prediction]:
+    """What each of `models` says of `experiments`, which were prepared from `trials` with the model `fitted`; each
+    starts where its own geometry puts the arm."""
+    found, segments = {}, trials[0].segments
+    for name, model in models.items():
+        own = own_starts(experiments, trials, fitted, model)
+        found[name] = Prediction(replay(model, own, segments), own)
+    return found
 
 
 def start_fit(experiments: list[Experiment]) -> dict:

@@ -9,7 +9,7 @@ from trunkline.identification.loss import Loss
 from trunkline.identification.parameters import PARAMETERS, ParameterName, PerJointName
 from trunkline.identification.problem import Bounds
 from trunkline.settings import settings
-from trunkline.trials.experiments import ExperimentName
+from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
 
 Experiments = Annotated[list[ExperimentName], Field(min_length=1)]
 
@@ -41,3 +41,9 @@ class IdentificationSettings(Method):
         for name, span in self.parameters.items():
             if span.low <= 0 and not PARAMETERS[name].signed:
                 raise ValueError(f"parameters.{name}.low: found {span.low}, expected more than 0")
+            telling = [kind for kind in EXPERIMENTS if PARAMETERS[name].told_by(EXPERIMENTS[kind])]
+            if not set(telling) & set(self.experiments):
+                found = f"found it to be identified from {' and '.join(self.experiments)} alone"
+                raise ValueError(f"parameters.{name}: {found}, expected one of {', '.join(telling)} too")
+            if self.rest_shape == "measured" and "qpos_spring" in PARAMETERS[name].fields:
+                raise ValueError(f"parameters.{name}: found it beside rest_shape: measured, expected one of the two")

@@ -37,21 +37,26 @@ def fit_of(config: IdentificationSettings, segments: tuple[str, ...]) -> Fit:
 
 
 def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
-    """Refuse parameters of tendons, motors and joints' elements that the arm has not got."""
+    """Refuse parameters of what the arm has not got: tendons, motors, joints' elements, units of some length."""
     for name in config.parameters:
-        part = PARAMETERS[name].part
-        if PARAMETERS[name].belongs_to(model):
-            continue
-        if part == "tendons":
-            found = "found it for an arm without tendons, expected parameters of joints alone"
-            end = "; such an arm's pipeline ends with `dvc repro identify_damping`"
-        elif part == "dead time":
-            found, end = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0", ""
-        elif part == "holes":
-            found, end = "found it for cables that do not rub, expected build_mjcf.holes: rubbing", ""
-        else:
-            found, end = f"found it for joints without {part}, expected build_mjcf.joints with one", ""
-        raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}{end}")
+        parameter, where = PARAMETERS[name], f"params.yaml: {stage}.parameters.{name}"
+        if not parameter.belongs_to(model):
+            raise InputError(f"{where}: {_lacking(parameter.part)}")
+        try:
+            parameter.read(model)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+
+
+def _lacking(part: str) -> str:
+    if part == "tendons":
+        found = "found it for an arm without tendons, expected parameters of joints alone"
+        return f"{found}; such an arm's pipeline ends with `dvc repro identify_damping`"
+    if part == "dead time":
+        return "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0"
+    if part == "holes":
+        return "found it for cables that do not rub, expected build_mjcf.holes: rubbing"
+    return f"found it for joints without {part}, expected build_mjcf.joints with one"
 
 
 def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:

@@ -19,7 +19,7 @@ from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Bounds
 from trunkline.identification.repeatability import repeatability
 from trunkline.identification.saving import save_model
-from trunkline.identification.scoring import Compared, fingerprints, start_fit
+from trunkline.identification.scoring import Compared, fingerprints, predict, start_fit
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import check_folds, check_parameters, set_up
 from trunkline.identification.suspicion import suspicions
@@ -32,6 +32,12 @@ from trunkline.trials.trial import Trial, read_trials
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 TRIALS = Path("data/processed/filter")
 TABLED = ("identified", "cad", "null", "noise_floor")  # in trials.csv; metrics.json has all
+# kind of experiment: how a session does without it, as data/raw/README.md says too
+WITHOUT = {
+    "static_tilt": "`source: releases` under identify_stiffness, with `stiffness` and `damping` alone to identify",
+    "static_pull": "`source: tilts` under identify_stiffness, and no `kp` there",
+    "motion": "`experiments: [curl]` under identify_control",
+}
 CSV = {"index": False, "float_format": "%.6g"}
 
 
@@ -67,10 +73,10 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     if capstan_friction(models["identified"]):  # as it moves where cables cannot rub, in Unity for one
         models["smooth"] = mujoco.MjModel.from_xml_string(identified)
         let_slide(models["smooth"])
-    predictions = {name: Prediction(replay(m, experiments, segments), experiments) for name, m in models.items()}
+    predictions = predict(models, reported, experiments, model)
     metrics: dict = {"diverged_trials": {name: prediction.replay.diverged for name, prediction in predictions.items()}}
     like = predictions["identified"].replay
-    predictions |= references(reported, experiments, models["identified"], like)
+    predictions |= references(reported, predictions["identified"].experiments, models["identified"], like)
     metrics |= {name: prediction.scores(fit.loss, fit.weights) for name, prediction in predictions.items()}
     metrics |= {
         "noise_floor_mm": metrics["noise_floor"][VALIDATE]["e_position_mm"],
@@ -85,8 +91,9 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         "start_fit": start_fit(experiments),
     }
     if any(e.frames > 1 for e in experiments):
-        halved = Prediction(replay(models["identified"], experiments, segments, step_factor=0.5), experiments)
-        metrics["halved_step"] = halved_step(predictions["identified"], halved)
+        found = predictions["identified"]
+        halved = replay(models["identified"], found.experiments, segments, step_factor=0.5)
+        metrics["halved_step"] = halved_step(found, Prediction(halved, found.experiments))
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
@@ -186,7 +193,7 @@ def write_plots(
         save_figure(plots.error_figure(errors, floor), folder / "errors.png")
         kinds = [e for e in experiments if e.kind == experiments[-1].kind]
         widest = max(kinds, key=lambda e: float(np.ptp(e.positions, axis=0).max()))
-        one = {name: moving[name].of(lambda e: e is widest) for name in shown}
+        one = {name: moving[name].of(lambda e: e.name == widest.name) for name in shown}
         table = curves.distance_table(one, segments)
         table.to_csv(folder / "distances.csv", **CSV)
         save_figure(plots.distance_figure(table, widest.name), folder / "distances.png")
@@ -199,7 +206,9 @@ def read_reported(config: IdentificationSettings) -> list[Trial]:
     for kind in config.experiments:
         for split in DECIDING:
             if not any(t.experiment == kind and t.split == split for t in trials):
-                raise InputError(f"session.yaml: found no {kind} trial with split {split}, expected at least one")
+                found, way_out = f"found no {kind} trial with split {split}", WITHOUT.get(kind)
+                otherwise = f", or in params.yaml {way_out}: data/raw/README.md" if way_out else ""
+                raise InputError(f"session.yaml: {found}, expected at least one{otherwise}")
     segments = trials[0].segments
     for trial in trials:
         if trial.segments != segments:

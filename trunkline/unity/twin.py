@@ -76,7 +76,6 @@ def assemble(
     """All files of the package by path, and the rules that it breaks."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)
     dead_time, friction = without_dead_time(spec), without_rubbing(spec)
-    name_apart(spec)
     calibrated = spec.compile()
     springs, dampers = linearize_joints(spec, *movement(calibrated, trajectory))
     spec.compile()
@@ -131,14 +130,6 @@ def assemble(
     )
     files[MANIFEST] = (manifest.model_dump_json(indent=2) + "\n").encode()
     return files, violations + found
-
-
-def name_apart(spec: mujoco.MjSpec) -> None:
-    """Give tendons that are called as a joint a name of their own, in place: in a Unity scene no two share one."""
-    joints = {joint.name for joint in spec.joints}
-    for tendon in spec.tendons:
-        if tendon.name in joints:
-            tendon.name += "_tie"
 
 
 def without_dead_time(spec: mujoco.MjSpec) -> float:
