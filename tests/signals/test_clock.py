@@ -1,17 +1,13 @@
 """Clocks: jitter averaged out, offsets recovered, silence where the data say nothing."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from demo.instruments import measure
 from tests.support.sessions import curl_truth, instruments
-from trunkline.signals.clock import (
-    OffsetFit,
-    agree_on_offset,
-    estimate_offset,
-    first_motion_offset,
-    fit_frames,
-)
+from trunkline.signals.clock import estimate_offset, fit_frames, offset_by_log_times
 
 
 def test_frame_numbers_average_jitter_and_ignore_late_stamps():
@@ -39,26 +35,59 @@ def test_offset_between_motors_and_cameras_is_recovered(offset):
     assert fit.ratio < 0.05
 
 
-@pytest.mark.parametrize("speed", [0.05, 0.15])
-def test_first_motion_sees_through_an_arm_that_lags(speed):
-    """The tip follows the pull with a time constant of 0.1 s, the rest later, over elastic and dry friction."""
-    time = np.arange(0, 4, 1 / 120)
-    pull = np.interp(time, [1.0, 1.6, 2.5, 3.1], [0, 0.6 * speed, 0.6 * speed, 0])
-    bend = np.zeros((len(time), 4))
-    for row in range(1, len(time)):
-        for place, (constant, slack) in enumerate([(0.4, 4e-3), (0.3, 3e-3), (0.2, 2e-3), (0.1, 0.3e-3)]):
-            gap = pull[row - 1] - bend[row - 1, place]
-            drive = np.sign(gap) * max(abs(gap) - slack, 0)
-            bend[row, place] = bend[row - 1, place] + drive / constant / 120
-    positions = 5 * bend[..., None] * np.array([1.0, 0.2, 0.5])
-    positions += np.random.default_rng(6).normal(scale=3e-4, size=positions.shape)
-    positions[200:230, 2] = np.nan
-    positions[60, 1] += 0.04
-    motor_time, pulls = time + 0.137, np.column_stack([pull, -pull])
-    rough = estimate_offset(time, positions, motor_time, pulls, limit=1.0)
-    assert rough.offset > -0.12, "a fit of the whole motion takes the lag for an offset"
-    exact = first_motion_offset(time, positions, motor_time, pulls, rough.offset)
-    assert exact == pytest.approx(-0.137, abs=0.012)
+def lagging(m, seconds):
+    """What cameras and recorder see of an arm that does later by `seconds` what it did in `m`: `seconds` a multiple of
+    the time between frames."""
+    rows = np.maximum(np.arange(len(m.stamps)) - round(seconds * 120), 0)
+    m.positions[:], m.quaternions[:] = m.positions[rows], m.quaternions[rows]
+
+
+def by_both(m):
+    """The offsets of a measurement by log times and by motion."""
+    time, logged, motor_time, motor_logged = (
+        (ns - m.stamps[0]) * 1e-9 for ns in (m.stamps, m.logged, m.tendon_stamps, m.tendon_logged)
+    )
+    motion = estimate_offset(time, m.positions[:, 1:], motor_time, m.tendon_positions, limit=1.0)
+    return offset_by_log_times(time, logged, motor_time, motor_logged), motion
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("delivery_ms", [1.0, 3.0, 10.0])
+@pytest.mark.parametrize("offset", [-0.4, 0.137])
+def test_log_times_tell_the_offset_of_an_arm_that_lags(offset, delivery_ms, seed):
+    settings = instruments(clock_offset_s=offset, dropped_frames=0, delivery_ms=delivery_ms, stamp_jitter_ms=0.2)
+    m = measure(curl_truth(40.0), settings, np.random.default_rng(seed))
+    lagging(m, 0.025)
+    logged, motion = by_both(m)
+    assert motion.offset == pytest.approx(-offset + 0.025, abs=4e-3), "a fit of the motion takes the lag for an offset"
+    assert abs(logged.offset + offset) < logged.uncertainty
+    assert 0.3e-3 * delivery_ms < logged.uncertainty < 1.5e-3 * delivery_ms
+
+
+def test_a_recorder_whose_clock_drifts_or_steps_does_not_matter():
+    m = measure(curl_truth(40.0), instruments(stamp_jitter_ms=0), np.random.default_rng(0))
+    (before, _) = by_both(m)
+    for change in (
+        lambda since: since + since // 100,
+        lambda since: since + 3_600_000_000_000 * (since > 1_200_000_000),
+        lambda since: since - 3_600_000_000_000 * (since > 1_200_000_000),
+    ):
+        drifted = replace(m, logged=m.logged[0] + change(m.logged - m.logged[0]))
+        drifted.tendon_logged = m.logged[0] + change(m.tendon_logged - m.logged[0])
+        assert by_both(drifted)[0].offset == pytest.approx(before.offset, abs=0.2 * before.uncertainty)
+
+
+def test_one_late_or_early_log_time_does_not_decide():
+    m = measure(curl_truth(40.0), instruments(), np.random.default_rng(0))
+    (before, _) = by_both(m)
+    m.tendon_logged[150] -= 500_000_000
+    m.logged[20:30] += 2_000_000_000
+    assert by_both(m)[0].offset == pytest.approx(before.offset, abs=0.2 * before.uncertainty)
+
+
+def test_no_offset_by_log_times_that_never_meet():
+    time = np.arange(100) / 100
+    assert offset_by_log_times(time, time + 5, time, time + 50) is None
 
 
 def test_tendons_at_rest_say_nothing():
@@ -66,12 +95,3 @@ def test_tendons_at_rest_say_nothing():
     positions = np.random.default_rng(0).normal(scale=3e-4, size=(121, 4, 3))
     assert estimate_offset(time, positions, time, np.full((121, 3), -0.3), 1.0) is None
     assert estimate_offset(time, positions, np.empty(0), np.empty((0, 3)), 1.0) is None
-
-
-def test_uncertain_trials_have_no_say():
-    fits = [OffsetFit(0.1, 0.01), OffsetFit(0.102, 0.02), OffsetFit(-0.7, 0.9), OffsetFit(0.101, 0.01)]
-    offset, spread = agree_on_offset(fits)
-    assert offset == pytest.approx(0.101)
-    assert spread < 0.002
-    assert agree_on_offset([OffsetFit(0.3, 0.95)]) == (0.0, np.inf)
-    assert agree_on_offset([*fits, OffsetFit(0.15, 0.1, onset=0.07)])[0] == pytest.approx(0.07)

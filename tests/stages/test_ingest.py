@@ -53,7 +53,9 @@ def test_takes_report_and_metrics(project, capsys):
     assert metrics["warnings"] == 3 * 4
     assert metrics["position_noise_mm"] == pytest.approx(0.3, rel=0.15)
     assert metrics["orientation_noise_deg"] == pytest.approx(0.3, rel=0.15)
-    assert metrics["clock_offset_ms"] == pytest.approx(-137, abs=8)
+    assert metrics["clock_offset_ms"] == pytest.approx(-137, abs=0.5)
+    assert metrics["clock_uncertainty_ms"] == pytest.approx(2.5, abs=1.5)
+    assert metrics["clock_lag_ms"] == pytest.approx(0, abs=8)
     assert metrics["rate_hz"] == pytest.approx(120, rel=1e-3)
     report = json.loads((ingest.ARTIFACTS / "quality.json").read_text())
     for trial in report["trials"].values():

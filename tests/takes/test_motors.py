@@ -9,9 +9,6 @@ import pytest
 from tests.support.sessions import curl_truth
 from tests.takes.test_intake import edit_session, one_trial, taken
 from trunkline.errors import InputError
-from trunkline.signals.clock import OffsetFit
-from trunkline.takes.agreement import align_clocks
-from trunkline.takes.checks import Findings
 
 
 def curl(folder, change=lambda m: None):
@@ -95,37 +92,6 @@ def test_tendons_take_the_names_of_the_session(tmp_path):
     edit_session(tmp_path, "motor_3:", "motor_4:")
     edit_session(tmp_path, "tendon_3", "tendon_4")
     refused_curl(tmp_path, "command topic: found motor_1, motor_2, motor_3, expected 'motor_4' as in session.yaml")
-
-
-def test_only_takes_for_identification_set_the_clock(tmp_path):
-    take, _ = curl(tmp_path)
-    identify, validate = replace(take, split="identify"), replace(take, split="validate")
-    takes, fits = [identify, validate, validate], [OffsetFit(0.1, 0.01), OffsetFit(0.3, 0.01), OffsetFit(0.3, 0.01)]
-    findings = [Findings(offset=fit) for fit in fits]
-    assert align_clocks(takes, findings, 0.1) == (0.1, 0.0)
-    assert validate.clock_offset == identify.clock_offset == 0.1
-    assert not any(found.warnings for found in findings)
-    for nothing in (None, OffsetFit(0.1, 0.9)):
-        findings = [Findings(offset=fit) for fit in (nothing, *fits[1:])]
-        assert align_clocks(takes, findings, 0.1) == (0.3, 0.0)
-        assert all("no trial of the split identify tells" in found.warnings[0] for found in findings)
-    assert identify.clock_offset == 0.3
-
-
-def test_two_estimates_of_the_clock_that_disagree_in_most_trials_are_said(tmp_path):
-    take, _ = curl(tmp_path)
-    takes = [replace(take, name=f"curl_{number}", split="identify") for number in range(3)]
-
-    def told(*apart):
-        findings = [Findings(offset=OffsetFit(0.04 + some, 0.01, 0.04)) for some in apart]
-        align_clocks(takes, findings, 0.1)
-        return [found.warnings for found in findings]
-
-    assert told(0.02, 0.14, 0.05) == [[], [], []], "a light pull alone lags"
-    first, second, third = told(0.17, 0.18, 0.02)
-    assert first[0].startswith("clock: by the whole motion the motors' offset is +0.170 s from the one by the first")
-    assert "+0.170 s in the median of 3 trials, expected at most 0.1 s" in second[0]
-    assert third == []
 
 
 def test_commands_an_hour_off_are_refused_though_positions_are_there(tmp_path):

@@ -99,6 +99,25 @@ def test_cycle_begins_with_the_first_command():
     time = np.arange(240) / RATE
     pull = np.interp(time, [0.5, 1.5], [0.0, 0.04])
     commands = np.column_stack([pull, np.full(240, -0.3)])
-    assert cycle_time(time, commands).time == pytest.approx(0.5, abs=1.5 / RATE)
+    assert cycle_time(time, commands).time == pytest.approx(0.5, abs=0.51 / RATE)
     assert cycle_time(time, np.full((240, 2), -0.3)).time == 0.0
     assert cycle_time(time, np.empty((240, 0))).time == 0.0
+
+
+def test_a_cycle_that_fades_in_begins_before_it_is_far():
+    """0.5 % of the range is passed some 70 ms after the command leaves its initial value."""
+    time = np.arange(480) / RATE
+    since = np.clip(time - 0.7123, 0, None)
+    pull = 0.04 * np.clip(since, 0, 1) * np.sin(2 * np.pi * 0.5 * since)
+    begin = cycle_time(time, np.column_stack([pull, -pull, np.full(480, -0.3)]))
+    assert begin.time == pytest.approx(0.7123, abs=0.51 / RATE)
+    assert begin.sigma == pytest.approx(1 / RATE / np.sqrt(12))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_measured_positions_in_place_of_commands_have_noise(seed):
+    time = np.arange(240) / RATE
+    pull = np.interp(time, [0.5, 1.5], [0.0, 0.04])
+    noise = np.random.default_rng(seed).normal(scale=5e-5, size=(240, 2))
+    begin = cycle_time(time, np.column_stack([pull, np.full(240, -0.3)]) + noise)
+    assert begin.time == pytest.approx(0.5, abs=1.5 / RATE)

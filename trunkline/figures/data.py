@@ -25,7 +25,7 @@ COLORS = dict(zip(EXPERIMENTS, cycle((MEASURED, IDENTIFIED, VALIDATE, INITIAL)),
 
 def quality_figure(qualities: list[Quality], gathered: Gathered) -> Figure:
     """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals."""
-    refused, offset, spread = gathered.refused, gathered.offset, gathered.spread
+    refused, agreed = gathered.refused, gathered.clock
     figure = plt.figure(figsize=(14, 13))
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 2))[0]
     _coverage(left.subplots(), qualities)
@@ -58,19 +58,17 @@ def quality_figure(qualities: list[Quality], gathered: Gathered) -> Figure:
     jitter.set(title=title, xlabel="trial", ylabel="jitter (ms)")
     jitter.set_ylim(0, max(1.4 * np.nanmax([0, *jitters]), LEAST_JITTER))
 
-    fits = [(i, q.findings.offset) for i, q in enumerate(qualities) if q.findings.offset is not None]
-    clock.axhline(1e3 * offset, color=MEASURED, lw=1)
+    clock.axhline(1e3 * agreed.offset, color=MEASURED, lw=1)
     clock.set_visible(any(len(quality.take.tendons) for quality in qualities))
-    for label, fill, value in (
-        ("by the whole motion", "none", lambda fit: fit.offset),
-        ("by the first motion", VALIDATE, lambda fit: np.nan if fit.onset is None else fit.onset),
+    for label, fill, fits in (
+        ("by motion, the arm's lag in it", "none", [q.findings.by_motion for q in qualities]),
+        ("by log times", VALIDATE, [q.findings.by_log_times for q in qualities]),
     ):
-        offsets = [1e3 * value(fit) for _, fit in fits]
-        clock.scatter(
-            [i for i, _ in fits], offsets, s=18, facecolor=fill, edgecolor=VALIDATE, label=label
-        )
+        offsets = [np.nan if fit is None else 1e3 * fit.offset for fit in fits]
+        clock.scatter(numbers, offsets, s=18, facecolor=fill, edgecolor=VALIDATE, label=label)
     clock.legend()
-    found = f"{1e3 * offset:.1f} ± {1e3 * spread:.1f} ms" if np.isfinite(spread) else "no trial tells"
+    uncertain = "" if agreed.uncertainty is None else f" ± {1e3 * agreed.uncertainty:.1f}"
+    found = "no trial tells" if agreed.by is None else f"{1e3 * agreed.offset:.1f}{uncertain} ms, by {agreed.by}"
     clock.set(title=f"Cameras' clock − motors' clock: {found}", xlabel="trial", ylabel="offset (ms)")
 
     words.axis("off")

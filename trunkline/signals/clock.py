@@ -4,10 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.signals.smoothing import fill_gaps, low_pass, outliers
-from trunkline.trials.start import onset
+from trunkline.signals.smoothing import fill_gaps
 
-LAG = 0.2  # s, the most by which the arm's lag may put a fit of the whole motion off
+WINDOW = 0.5  # s, in each of which the quickest messages of two topics are compared
 MIN_TRAVEL = 5e-3  # m; a tendon that moves less says nothing about time
 CERTAIN = 0.3  # of the tendons' motion that a fit may leave unexplained, against what it leaves on average
 SHAPE_MODES = 5  # principal motions of the arm that explain the tendons, with their products
@@ -25,16 +24,23 @@ class FrameFit:
 
 @dataclass
 class OffsetFit:
-    """time = motor time + offset, s. ratio: what remains unexplained of the tendons' motion there, over what
-    remains on average; near 0 is certain, near 1 is a guess. onset: the offset by the first motion, s, or None."""
+    """time = motor time + offset, s, by motion: the arm's lag behind its tendons is in it. ratio: what remains
+    unexplained of the tendons' motion there, over what remains on average; near 0 is certain, near 1 is a guess."""
 
     offset: float
     ratio: float
-    onset: float | None = None
 
     @property
     def certain(self) -> bool:
         return self.ratio < CERTAIN
+
+
+@dataclass
+class LoggedOffset:
+    """time = motor time + offset, s, by log times. uncertainty: s."""
+
+    offset: float
+    uncertainty: float
 
 
 def fit_frames(stamps: np.ndarray, frames: np.ndarray) -> FrameFit:
@@ -59,7 +65,8 @@ def estimate_offset(
     """The offset between the clocks at which the shape explains the tendons best; None if they rest.
 
     A taut tendon's length is a function of the arm's shape, whatever the dynamics. It is fitted as a
-    quadratic in the principal motions of the segments, for every offset within ±limit; the best fit wins.
+    quadratic in the principal motions of the segments, for every offset within ±limit; the best fit wins. Motors,
+    cables and friction let the shape lag behind what was wound or sent, and this fit takes the lag for an offset.
 
     Args:
         time (T,) s, positions (T, S, 3) m with NaN: the segments in any fixed frame.
@@ -86,59 +93,39 @@ def estimate_offset(
     return OffsetFit(float(offset), float(residuals[best] / residuals.mean()))
 
 
-def first_motion_offset(
-    time: np.ndarray, positions: np.ndarray, motor_time: np.ndarray, pulls: np.ndarray, rough: float
-) -> float | None:
-    """The offset at which the segments begin to move when the tendons do, s; None where nothing rests first.
+def offset_by_log_times(
+    time: np.ndarray, logged: np.ndarray, motor_time: np.ndarray, motor_logged: np.ndarray
+) -> LoggedOffset | None:
+    """The offset between the clocks by what one recorder saw of both; None where it never saw both.
 
-    Friction and elastic cables let the arm lag behind its motors, and a fit of the whole motion takes the lag for
-    an offset. Only the first motion, of the light tip, has next to none.
+    A message is logged after what dates it: by the offset of that clock to the recorder's, and by its delay. The
+    recorder's own clock falls out of the difference of the two, and with the quickest messages the delays do, but for
+    what the quickest of one topic takes longer than that of the other. No log tells that; it is taken to be no more
+    than the typical delay beyond the quickest, which is stated as the uncertainty. The quickest are compared every
+    WINDOW s, so that a drift or a step of the recorder's clock does not matter, and the median counts.
 
-    Args: as for `estimate_offset`, which gave `rough`, s.
+    Args:
+        time (T,) s: what dates the poses. logged (T,) s: when the recorder had them.
+        motor_time (M,), motor_logged (M,): s, the same of the motors' messages, by their own and by the same recorder.
     """
-    pull = pulls[:, np.argmax(np.ptp(pulls, axis=0))]
-    travel = np.abs(pull - pull[0])
-    rising = motor_time[np.argmax(travel > 0.15 * travel.max())]
-    resting = motor_time < motor_time[0] + 0.6 * (rising - motor_time[0])
-    if resting.sum() < 10:
+    order = np.argsort(logged, kind="stable")
+    delay, motor_delay, found = logged - time, motor_logged - motor_time, []
+    for rows in np.array_split(order, max(round(float(np.ptp(time)) / WINDOW), 1)):
+        within = (motor_logged >= logged[rows[0]]) & (motor_logged <= logged[rows[-1]])
+        if within.any():
+            quickest = delay[rows].min(), motor_delay[within].min()
+            beyond = np.median(delay[rows]) - quickest[0], np.median(motor_delay[within]) - quickest[1]
+            found.append((quickest[1] - quickest[0], max(beyond)))
+    if not found:
         return None
-    travel = np.abs(pull - np.median(pull[resting]))
-    begin = onset(motor_time, travel, resting, floor=travel.max() / 400, powers=(1, 2))
-    if begin is None:
-        return None
-    grid, smooth = _smooth(time, positions)
-    resting = (grid > begin + rough - 3 * LAG) & (grid < begin + rough - LAG)
-    if resting.sum() < 20:
-        return None
-    moved = np.sqrt(np.mean(np.square(smooth - smooth[resting].mean(axis=0)), axis=1))
-    first = onset(grid, moved, resting)
-    return None if first is None or abs(first - begin - rough) > LAG else float(first - begin)
+    offset, uncertainty = np.median(found, axis=0)
+    return LoggedOffset(float(offset), float(uncertainty))
 
 
-def _smooth(time: np.ndarray, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A uniform clock (G,) and on it the segments' coordinates (G, 3 S), without outliers, gaps and most noise."""
-    grid = np.arange(time[0], time[-1], np.median(np.diff(time)))
-    columns = []
-    for segment in np.moveaxis(positions, 1, 0):
-        good = np.isfinite(segment[:, 0])
-        good[good] &= ~outliers(time[good], segment[good], deviations=8.0)
-        columns += [np.interp(grid, time[good], axis[good]) for axis in segment.T]
-    rate = 1 / (grid[1] - grid[0])
-    return grid, low_pass(np.stack(columns, axis=1), rate, min(20.0, rate / 5), 4)
-
-
-def agree_on_offset(fits: list[OffsetFit]) -> tuple[float, float]:
-    """One offset for a session and its spread, s: median and robust deviation over the certain trials.
-
-    First motions decide where there are any. (0, inf) where no trial tells.
-    """
-    sure = [fit for fit in fits if fit.certain]
-    first = [fit.onset for fit in sure if fit.onset is not None]
-    offsets = np.array(first or [fit.offset for fit in sure])
-    if not len(offsets):
-        return 0.0, np.inf
-    offset = float(np.median(offsets))
-    return offset, float(1.4826 * np.median(np.abs(offsets - offset)))
+def agree(offsets: list[float]) -> tuple[float, float]:
+    """One offset for several trials' and its spread, s: median and robust deviation."""
+    middle = float(np.median(offsets))
+    return middle, float(1.4826 * np.median(np.abs(np.array(offsets) - middle)))
 
 
 def _shape_features(columns: np.ndarray) -> np.ndarray:

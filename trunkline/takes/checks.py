@@ -9,7 +9,7 @@ from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.logs.log import Log
-from trunkline.signals.clock import FrameFit, OffsetFit
+from trunkline.signals.clock import FrameFit, LoggedOffset, OffsetFit
 from trunkline.trials.splits import IDENTIFY
 
 Item = TypeVar("Item")
@@ -35,8 +35,8 @@ class Findings:
 
     faults: what cannot be true of the arm and the experiment, a sentence each; see `plausible`.
     where: the file and the trial, for messages.
-    frames: stamps over frame numbers. logged: stamps over log times in s. offset: of the motors' clock.
-    log: that the trial is from, without its messages.
+    frames: stamps over frame numbers. logged: stamps over log times in s.
+    by_log_times, by_motion: the offset of the motors' clock. log: that the trial is from, without its messages.
     """
 
     repairs: list[str] = field(default_factory=list)
@@ -45,7 +45,8 @@ class Findings:
     where: str = ""
     frames: FrameFit | None = None
     logged: FrameFit | None = None
-    offset: OffsetFit | None = None
+    by_log_times: LoggedOffset | None = None
+    by_motion: OffsetFit | None = None
     log: Log | None = None
 
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from trunkline.errors import InputError
 from trunkline.sessions.session import FixedBase, Session, TrialEntry
-from trunkline.takes.agreement import align_clocks, settle_vertical
+from trunkline.takes.agreement import MotorClock, align_clocks, settle_vertical
 from trunkline.takes.checks import Findings
 from trunkline.takes.plausible import Plausible, check_plausible
 from trunkline.trials.experiments import EXPERIMENTS
@@ -17,16 +17,12 @@ Refusal = Literal["stop", "leave_out"]
 
 @dataclass
 class Gathered:
-    """takes, findings: of the trials that are used. refused: why a trial is not, by its name.
-
-    offset, spread: s, of the motors' clock; spread is inf where no trial tells.
-    """
+    """takes, findings: of the trials that are used. refused: why a trial is not, by its name. clock: of the motors."""
 
     takes: list[Take] = field(default_factory=list)
     findings: list[Findings] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
-    offset: float = 0.0
-    spread: float = float("inf")
+    clock: MotorClock = field(default_factory=MotorClock)
 
 
 def gather(
@@ -74,7 +70,7 @@ def gather(
     for found in gathered.findings:
         found.warnings += found.faults + session_faults + missing
     settle_vertical(gathered.takes, gathered.findings, session)
-    gathered.offset, gathered.spread = align_clocks(gathered.takes, gathered.findings, plausible.clock)
+    gathered.clock = align_clocks(gathered.takes, gathered.findings, plausible.clock)
     return gathered
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 from trunkline.errors import InputError
 from trunkline.sessions.session import Session, TrialEntry
 from trunkline.sessions.source import Source, open_log
-from trunkline.signals.clock import OffsetFit, estimate_offset, first_motion_offset
+from trunkline.signals.clock import OffsetFit, estimate_offset
 from trunkline.takes.checks import Findings, Limits
+from trunkline.takes.delivery import logged_offset
 from trunkline.takes.motors import check_motors, read_motors
 from trunkline.takes.reading import Stretch, check_seen, columns_of, read_stretch, split_base
 from trunkline.takes.reference import Reference, reference_of
@@ -102,17 +103,14 @@ def _take(
         base_quaternions=base_quaternions,
         **vars(motors),
     )
-    findings.offset = _offset(take, limits)
+    findings.by_log_times, findings.by_motion = logged_offset(source, session, stretch), _by_motion(take, limits)
     return take
 
 
-def _offset(take: Take, limits: Limits) -> OffsetFit | None:
+def _by_motion(take: Take, limits: Limits) -> OffsetFit | None:
     """By how much the motors' clock is off, by what was wound, or else by what was commanded, while the arm moves."""
     if EXPERIMENTS[take.experiment].static:
         return None
     wound = (take.tendon_time, take.tendon_positions)
     motion = wound if len(take.tendon_time) else (take.command_time, take.commands)
-    fit = estimate_offset(take.time, take.positions, *motion, limits.clock_offset)
-    if fit is not None:
-        fit.onset = first_motion_offset(take.time, take.positions, *motion, fit.offset)
-    return fit
+    return estimate_offset(take.time, take.positions, *motion, limits.clock_offset)

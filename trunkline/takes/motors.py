@@ -38,14 +38,14 @@ def read_motors(
     tendons = next((stream.names for stream in streams if stream is not None), ())
     if session.tendons is not None:
         tendons = tuple(session.tendons.values())
-    recorder = _by_recorder(source, session)
+    recorder = by_recorder(source, session)
     arrays = []
     for stream, role in zip(streams, ROLES, strict=True):
         if stream is None or not len(stream.stamps):
             arrays += [np.empty(0), np.empty((0, len(tendons)))]
             continue
         columns = _columns(stream, session.tendons, tendons, f"{where}: {role} topic")
-        stamps = _stamps(stream, recorder, stretch)
+        stamps = dated(stream, recorder, stretch)
         if recorder and session.clock != "log":
             findings.repairs.append(f"{role} messages dated by the recorder's clock, as not all have stamps")
         rows = in_order(stamps, limits.disorder, f"{where}: {role} topic", findings)
@@ -84,7 +84,7 @@ def check_motors(
     lost = [stream for stream, some in zip(streams, within, strict=True) if stream and len(stream.stamps) and not some]
     if any(within) and not lost:
         return
-    recorder = _by_recorder(source, session)
+    recorder = by_recorder(source, session)
     found = [
         f"no {role} topic"
         if stream is None
@@ -97,13 +97,13 @@ def check_motors(
     raise InputError(f"{where}: found {' and '.join(found)}{topics}, {expected}")
 
 
-def _by_recorder(source: Source, session: Session) -> bool:
+def by_recorder(source: Source, session: Session) -> bool:
     """Whether the recorder's clock dates commands and positions: where that is meant, or one of them has no other."""
     streams = [stream for stream in (source.commands, source.tendon_positions) if stream is not None]
     return session.clock == "log" or any(not s.timed or not s.stamps.any() for s in streams if len(s.stamps))
 
 
-def _stamps(stream: JointStream, recorder: bool, stretch: Stretch) -> np.ndarray:
+def dated(stream: JointStream, recorder: bool, stretch: Stretch) -> np.ndarray:
     """When each message was sent, ns: by its header, or by the recorder, moved to the clock of the poses."""
     return stream.log_times + (stretch.epoch - stretch.logged) if recorder else stream.stamps
 
@@ -128,7 +128,7 @@ def _distance(stream: JointStream, recorder: bool, stretch: Stretch) -> str:
     """How far the stream's nearest message is from the trial, in words; nothing where it has none."""
     if not len(stream.stamps):
         return ""
-    seconds = (_stamps(stream, recorder, stretch) - stretch.epoch) * 1e-9
+    seconds = (dated(stream, recorder, stretch) - stretch.epoch) * 1e-9
     apart = np.maximum(np.maximum(-seconds, seconds - stretch.time[-1]), 0)
     nearest = int(apart.argmin())
     if apart[nearest] == 0:

@@ -34,7 +34,7 @@ class Plausible:
     still: by how much an arm at rest may move, as a share; an arm in motion moves by more.
     distance: by how much a body's distances to its neighbours may differ from the usual ones, as a share.
     pull: factor by which pulls may differ from the trial's level, and measured ones from commanded ones.
-    clock: s, by which the two estimates of the motors' clock offset may differ.
+    clock: s, by which the arm may move after its tendons, by log times, and by which its lags in trials may differ.
     otherwise: what becomes of a trial, or a session, that is not: "refuse", or "warn" and go on with it.
     """
 

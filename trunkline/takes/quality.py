@@ -69,14 +69,17 @@ def by_sentence(qualities: list[Quality], said: Callable[[Findings], list[str]])
 
 def report(qualities: list[Quality], gathered: Gathered) -> dict:
     """The quality report, per trial and for the session; None where there is nothing to measure."""
+    clock = gathered.clock
     return {
         "trials": {quality.take.name: _trial(quality) for quality in qualities},
         "refused": gathered.refused,
         "logs": {log.path.name: {"messages": log.count, "without_checksum": log.unchecked} for log in _logs(qualities)},
         "clock": {
-            "offset_s": gathered.offset,
-            "spread_s": gathered.spread if np.isfinite(gathered.spread) else None,
-            "trials": sum(quality.findings.offset is not None for quality in qualities),
+            "by": clock.by,
+            "offset_s": clock.offset,
+            "spread_s": clock.spread,
+            "uncertainty_s": clock.uncertainty,
+            "lag_s": clock.lag,
         },
     }
 
@@ -92,7 +95,7 @@ def remarks(qualities: list[Quality]) -> list[str]:
 def summary(qualities: list[Quality], gathered: Gathered) -> dict:
     """The session in a few numbers, for metrics.json. repairs: their number by split, and in all."""
     angles = [quality.angle_noise for quality in qualities if quality.angle_noise is not None]
-    gaps = np.concatenate([quality.gaps for quality in qualities])
+    gaps, clock = np.concatenate([quality.gaps for quality in qualities]), gathered.clock
     repairs = dict.fromkeys(("total", *(quality.take.split for quality in qualities)), 0)
     for quality in qualities:
         for split in ("total", quality.take.split):
@@ -110,8 +113,10 @@ def summary(qualities: list[Quality], gathered: Gathered) -> dict:
         "rate_hz": float(1 / np.median([quality.interval for quality in qualities])),
         "position_noise_mm": 1e3 * float(np.median([quality.position_noise for quality in qualities])),
         "orientation_noise_deg": float(np.degrees(np.median(angles))) if angles else None,
-        "clock_offset_ms": 1e3 * gathered.offset,
-        "clock_spread_ms": 1e3 * gathered.spread if np.isfinite(gathered.spread) else None,
+        "clock_offset_ms": 1e3 * clock.offset,
+        "clock_spread_ms": None if clock.spread is None else 1e3 * clock.spread,
+        "clock_uncertainty_ms": None if clock.uncertainty is None else 1e3 * clock.uncertainty,
+        "clock_lag_ms": None if clock.lag is None else 1e3 * clock.lag,
     }
 
 
@@ -121,6 +126,7 @@ def _logs(qualities: list[Quality]) -> list[Log]:
 
 def _trial(quality: Quality) -> dict:
     take, findings = quality.take, quality.findings
+    logged, moved = findings.by_log_times, findings.by_motion
     return {
         "experiment": take.experiment,
         "split": take.split,
@@ -138,11 +144,12 @@ def _trial(quality: Quality) -> dict:
         ),
         "clock": (
             None
-            if findings.offset is None
+            if logged is None and moved is None
             else {
-                "whole_motion_s": findings.offset.offset,
-                "first_motion_s": findings.offset.onset,
-                "unexplained": findings.offset.ratio,
+                "by_log_times_s": None if logged is None else logged.offset,
+                "uncertainty_s": None if logged is None else logged.uncertainty,
+                "by_motion_s": None if moved is None else moved.offset,
+                "unexplained": None if moved is None else moved.ratio,
             }
         ),
         "stamps_over_log_times": (

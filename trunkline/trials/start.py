@@ -16,7 +16,7 @@ SEARCHED = 0.05  # s to either side of the first guess
 DEGREE = 2  # of the hand's motion
 LEAVING = (2, 3)  # powers of time in which a released arm leaves: its far end is light, and soon at full speed
 TRIES = 4  # a frame
-RISE = (2.0, 16.0)  # times the noise: where the displacement stands out, yet grows as the square of time
+NOISES, EXACT = 5.0, 1e-6  # times its median departure, and m, by which a command that rests may depart
 SWAYING = 0.03  # share of the top speed from which on a hand gives the arm a start of its own
 
 Smooth = Callable[[np.ndarray], np.ndarray]  # the low-pass that positions went through, on columns (T, C)
@@ -144,49 +144,21 @@ def free_time(time: np.ndarray, positions: np.ndarray, begin: float) -> float:
     return float(time[swings[np.argmax(pull[swings])]]) if len(swings) else begin
 
 
-def onset(
-    time: np.ndarray,
-    moved: np.ndarray,
-    resting: np.ndarray,
-    floor: float = 1e-5,
-    powers: tuple[int, ...] = (2,),
-) -> float | None:
-    """When the displacement `moved` (T,) m begins to grow, s, after the frames `resting` (T,); None if it does not.
-
-    Under a force that sets in at t0, as under one that grows while damping prevails, the displacement grows as
-    (t - t0)². Its root is a straight line in time, and where that crosses zero is t0.
-
-    Args:
-        floor: m, what the noise is taken for at least.
-        powers: of (t - t0) that come into question; the one that fits best counts.
-    """
-    noise = max(float(np.median(moved[resting])), floor)
-    moved = np.sqrt(np.maximum(moved**2 - noise**2, 0))
-    low, high = (share * noise for share in RISE)
-    risen = np.flatnonzero((moved > high) & (time > time[resting][-1]))
-    if not len(risen):
-        return None
-    last = max(int(risen[0]), 3)
-    still = np.flatnonzero(moved[:last] < low)
-    first = min(int(still[-1]) + 1 if len(still) else 0, last - 2)
-    t, y = time[first : last + 1], moved[first : last + 1]
-    best, begin = np.inf, None
-    for power in powers:
-        slope, offset = np.polyfit(t, y ** (1 / power), 1)
-        misfit = np.square(np.maximum(slope * t + offset, 0) ** power - y).sum()
-        if slope > 0 and misfit < best:
-            best, begin = misfit, float(np.clip(-offset / slope, time[max(first - 6, 0)], t[-1]))
-    return begin
-
-
 def robust_length(vectors: np.ndarray) -> np.ndarray:
     """Upper quartile over the segments of the lengths of (T, S, 3): a few hidden segments do not matter. (T,)."""
     return np.quantile(np.linalg.norm(vectors, axis=2), 0.75, axis=1)
 
 
 def cycle_time(time: np.ndarray, commands: np.ndarray) -> Start:
-    """When a command (T, K) m first leaves its initial value by 0.5 % of its range; at 0 s if none does."""
+    """When a command (T, K) m first leaves its initial value: before it is 0.5 % of its range away; 0 s if none is.
+
+    A command is sent, not measured, and rests exactly until then; measured tendon positions in its place have noise.
+    """
     left = np.abs(commands - commands[0])
-    moved = np.any(left > np.maximum(0.005 * np.ptp(commands, axis=0), 1e-4), axis=1)
-    begin = float(time[max(np.argmax(moved) - 1, 0)]) if moved.any() else 0.0
-    return Start(begin, float(time[1] - time[0]) / np.sqrt(12))
+    far = np.any(left > np.maximum(0.005 * np.ptp(commands, axis=0), 1e-4), axis=1)
+    step = float(time[1] - time[0])
+    if not far.any():
+        return Start(0.0, step / np.sqrt(12))
+    before = left[: max(int(np.argmax(far)), 1)]
+    resting = np.all(before <= NOISES * np.median(before, axis=0) + EXACT, axis=1)
+    return Start(float(time[np.flatnonzero(resting)[-1]]) + step / 2, step / np.sqrt(12))
