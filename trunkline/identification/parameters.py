@@ -319,7 +319,9 @@ PARAMETERS: dict[str, Parameter] = {
         _write_tendons("tendon_solref_fri", (0,)), part="tendons", told_by=_moving,
     ),
     # μ of cables on the holes that they pass, in the capstan equation
-    "capstan_friction": Parameter("", ("numeric_data",), capstan_friction, _write_capstan, part="holes", told_by=_pulled_and_moving),
+    "capstan_friction": Parameter(
+        "", ("numeric_data",), capstan_friction, _write_capstan, part="holes", told_by=_pulled_and_moving,
+    ),
     "kp": Parameter(
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
         part="tendons", told_by=_pulled,
