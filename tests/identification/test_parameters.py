@@ -1,6 +1,7 @@
 """Parameters: what is written is what is read, and the physics that it stands for follows."""
 
 import re
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
@@ -13,6 +14,7 @@ from trunkline.elements import BRANCH, all_elements, arm_hinges
 from trunkline.errors import InputError
 from trunkline.identification.parameters import PARAMETERS, Parameter, candidate_fields, set_fields, unit_of_hinge
 from trunkline.identification.saving import save_model
+from trunkline.identification.setup import check_parameters
 
 VALUES = {
     "joint_place": 0.3,
@@ -151,8 +153,9 @@ def test_hinges_of_a_drawn_arm_move_along_their_units_and_no_other_way():
 def test_units_without_a_line_have_no_joint_place(old, new, message):
     changed, count = re.subn(old, new, DRAWN)
     assert count == 1
-    with pytest.raises(InputError, match=message):
-        PARAMETERS["joint_place"].read(mujoco.MjModel.from_xml_string(changed))
+    config = SimpleNamespace(parameters=["joint_place"])
+    with pytest.raises(InputError, match=f"params.yaml: identify_stiffness.parameters.joint_place: model: .*{message}"):
+        check_parameters("identify_stiffness", config, mujoco.MjModel.from_xml_string(changed))
 
 
 def test_candidates_do_not_mix():
