@@ -7,6 +7,7 @@ model a number `capstan_friction`, their coefficient.
 """
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import mujoco
 import numpy as np
@@ -28,8 +29,19 @@ class Elements:
     own: np.ndarray
 
 
+# by model: those that were looked for; names are fixed once a model is compiled, and looking through them takes long
+_KNOWN: WeakKeyDictionary[mujoco.MjModel, dict[tuple[str, int], Elements]] = WeakKeyDictionary()
+
+
 def elements(model: mujoco.MjModel, kind: str, number: int = 1) -> Elements:
     """The model's elements `kind`, BRANCH or SLIDER, of this number; none where it was built without."""
+    known = _KNOWN.setdefault(model, {})
+    if (kind, number) not in known:
+        known[kind, number] = _named(model, kind, number)
+    return known[kind, number]
+
+
+def _named(model: mujoco.MjModel, kind: str, number: int) -> Elements:
     ending = f"_{kind}_{number}"
     names = {tendon: model.tendon(tendon).name.removesuffix(TIE) for tendon in range(model.ntendon)}
     names = {tendon: name for tendon, name in names.items() if name.endswith(ending)}
