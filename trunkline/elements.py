@@ -1,4 +1,4 @@
-"""What a model's tendons and hinges are: the arm's own, or parts of its joints, by their names.
+"""What a model's tendons, hinges and sites are, by their names: the arm's own, or parts of its joints.
 
 `trunkline/arm/joints.py` builds those parts: Maxwell branches, hinges named `<hinge>_branch_<number>` and the
 tendons that tie them, which end in `_tie`, and Jenkins elements, tendons named `<hinge>_slider_<number>`.
@@ -71,6 +71,11 @@ def give_way(model: mujoco.MjModel, qpos: np.ndarray) -> None:
 def arm_hinges(model: mujoco.MjModel) -> int:
     """How many hinges are the arm's; they come first, branches after them."""
     return model.njnt - sum(len(branch.own) for branch in all_elements(model, BRANCH))
+
+
+def segment_sites(model: mujoco.MjModel, segments: tuple[str, ...]) -> np.ndarray:
+    """Numbers of the sites that are the frames of `segments`, in their order. Shape (S,)."""
+    return np.array([model.site(f"{name}_center").id for name in segments], dtype=int)
 
 
 def cables(model: mujoco.MjModel) -> list[int]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from trunkline.elements import segment_sites
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import (
     RESIDUALS,
@@ -74,7 +75,7 @@ def replay(
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     length = float(np.linalg.norm(data.site("tip").xpos - data.site("base_center").xpos))
-    tip = int(np.argmax([model.site_bodyid[model.site(f"{name}_center").id] for name in segments]))
+    tip = int(np.argmax(model.site_bodyid[segment_sites(model, segments)]))
     straight = segment_positions(model, segments, model.qpos0)
     return Replay([positions[0] for positions in simulated.positions], length, tip, straight)
 
@@ -84,7 +85,7 @@ def segment_positions(model: mujoco.MjModel, segments: tuple[str, ...], qpos: np
     data = mujoco.MjData(model)
     data.qpos[: len(qpos)] = qpos
     mujoco.mj_kinematics(model, data)
-    return np.array([data.site(f"{name}_center").xpos for name in segments])
+    return data.site_xpos[segment_sites(model, segments)]
 
 
 def scores(

@@ -3,6 +3,7 @@
 import mujoco
 import numpy as np
 
+from trunkline.elements import segment_sites
 from trunkline.identification.experiment import measured_pose, start_frames
 from trunkline.identification.pose_fit import POSITION_SIGMA, PoseProblem, fit_pose
 from trunkline.trials.splits import IDENTIFY
@@ -16,7 +17,7 @@ def with_measured_markers(model: mujoco.MjModel, trials: list[Trial]) -> mujoco.
     """A copy of `model` whose tracked sites are where the trials to identify from saw them in their start poses."""
     model = model.__copy__()
     seen = [trial for trial in trials if trial.split == IDENTIFY]
-    sites = [model.site(f"{name}_center").id for name in seen[0].segments]
+    sites = segment_sites(model, seen[0].segments)
     model.site_sameframe[sites] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # else a site at its body's origin stays there
     moved = np.zeros((len(sites), 3))
     straight = model.site_pos[sites].copy()

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.elements import SLIDER, all_elements, give_way
+from trunkline.elements import SLIDER, all_elements, give_way, segment_sites
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
 from trunkline.simulation.load import hang, slowing
@@ -47,7 +47,7 @@ class Population:
         self, model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], step_factor: float = 1.0
     ):
         self._model = model
-        self._segments = segments
+        self._sites = segment_sites(model, segments)
         self._static = [i for i, e in enumerate(experiments) if is_static(e.kind)]
         # longest first, so that those still running are a prefix of each candidate's trials
         self._dynamic = sorted(
@@ -104,9 +104,6 @@ class Population:
             for end in (0, 1):  # of the spring's length at rest
                 batch.bind("plastic")[:, place + end] = bend - np.clip(bend, -give, give)
 
-    def _sites(self) -> list[int]:
-        return [self._model.site(f"{name}_center").id for name in self._segments]
-
     def _settle(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
         """Static shapes: from the measured pose, friction off, heavily damped, until each is at rest."""
         batch = self._batch("static", experiments, fields, count)
@@ -123,7 +120,7 @@ class Population:
             steps += more
             fast = left[~(np.abs(speed[left]).max(axis=1) < CREEP_SPEED)]
             moving = np.union1d(np.setdiff1d(moving, creeping), fast)
-        shapes = seen[:, None, self._sites()]
+        shapes = seen[:, None, self._sites]
         shapes[moving] = np.nan
         shapes[batch.warning.any(axis=(1, 2))] = np.nan
         return list(shapes.reshape(len(experiments), count, *shapes.shape[1:])), steps
@@ -131,7 +128,7 @@ class Population:
     def _run(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
         """Trials in motion: from the start to the first frame, then frame by frame."""
         batch = self._batch("dynamic", experiments, fields, count)
-        frame_step, sites = experiments[0].frame_step, self._sites()
+        frame_step, sites = experiments[0].frame_step, self._sites
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))
         timestep = batch.expand("opt.timestep")
         timestep[:] = np.repeat([e.lead / substeps for e in experiments], count)

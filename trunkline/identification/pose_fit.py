@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from mujoco import minimize
 
-from trunkline.elements import arm_hinges
+from trunkline.elements import arm_hinges, segment_sites
 from trunkline.frames import rotation_from_wxyz
 
 POSITION_SIGMA = 0.5e-3  # m, what a tracked position is trusted to
@@ -54,7 +54,7 @@ class PoseProblem:
         quaternions: np.ndarray | None = None,
     ):
         self.model, self.data = model, mujoco.MjData(model)
-        self.sites = np.array([model.site(f"{name}_center").id for name in segments])
+        self.sites = segment_sites(model, segments)
         self.positions = positions
         self._targets = None if quaternions is None else rotation_from_wxyz(quaternions).as_matrix()
         seen = np.flatnonzero(np.isfinite(positions).all(axis=1))
