@@ -16,6 +16,7 @@ SEARCHED = 0.05  # s to either side of the first guess
 DEGREE = 2  # of the hand's motion
 LEAVING = (2, 3)  # powers of time in which a released arm leaves: its far end is light, and soon at full speed
 TRIES = 4  # a frame
+FAR = 0.05  # share of the largest range by which a command is far from its initial value
 NOISES, EXACT = 5.0, 1e-6  # times its median departure, and m, by which a command that rests may depart
 SWAYING = 0.03  # share of the top speed from which on a hand gives the arm a start of its own
 
@@ -150,15 +151,19 @@ def robust_length(vectors: np.ndarray) -> np.ndarray:
 
 
 def cycle_time(time: np.ndarray, commands: np.ndarray) -> Start:
-    """When a command (T, K) m first leaves its initial value: before it is 0.5 % of its range away; 0 s if none is.
+    """When a command (T, K) m first leaves its initial value; at 0 s if none does.
 
-    A command is sent, not measured, and rests exactly until then; measured tendon positions in its place have noise.
+    That is before it is far from it. A command that is sent rests exactly until then, measured tendon positions in its
+    place have noise: as much as in the first half of that time.
     """
-    left = np.abs(commands - commands[0])
-    far = np.any(left > np.maximum(0.005 * np.ptp(commands, axis=0), 1e-4), axis=1)
     step = float(time[1] - time[0])
+    least = max(FAR * float(np.ptp(commands, axis=0).max(initial=0)), 1e-4)
+    far = np.any(np.abs(commands - commands[0]) > least, axis=1)
     if not far.any():
         return Start(0.0, step / np.sqrt(12))
-    before = left[: max(int(np.argmax(far)), 1)]
-    resting = np.all(before <= NOISES * np.median(before, axis=0) + EXACT, axis=1)
-    return Start(float(time[np.flatnonzero(resting)[-1]]) + step / 2, step / np.sqrt(12))
+    before = commands[: np.argmax(far)]
+    early = before[: (len(before) + 1) // 2]
+    left = np.abs(before - np.median(early, axis=0))
+    noise = np.median(left[: len(early)], axis=0)
+    resting = np.flatnonzero(np.all(left <= NOISES * noise + EXACT, axis=1))
+    return Start(float(time[resting[-1] if len(resting) else 0]) + step / 2, step / np.sqrt(12))

@@ -1,0 +1,47 @@
+"""What `ingest` and `filter` find in the recorded demo session, against its truth, which tests alone may read."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from trunkline.filtering.filter import Filter, filter_take
+from trunkline.sessions.session import read_session
+from trunkline.takes.agreement import align_clocks
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
+
+RAW = Path(__file__).parents[2] / "data/raw"
+TRIALS = ("curl_1_040", "curl_2_3_060", "motion_15_20_m2", "motion_5_40_1")
+LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
+
+
+@pytest.fixture(scope="module")
+def found():
+    if not (RAW / "demo.truth.json").is_file():
+        pytest.skip("data/raw/demo is not recorded here: `make demo`")
+    truth, session = json.loads((RAW / "demo.truth.json").read_text()), read_session(RAW / "demo")
+    chosen = [trial for trial in session.trials if trial.name in TRIALS]
+    taken = list(take_in(RAW / "demo", session.model_copy(update={"trials": chosen}), LIMITS))
+    takes, findings = [take for _, take, _ in taken], [findings for *_, findings in taken]
+    assert {take.split for take in takes} == {"identify"}
+    return truth, takes, findings, align_clocks(takes, findings, 0.1)
+
+
+def test_the_clock_of_the_motors_is_right_within_its_uncertainty(found):
+    truth, takes, findings, clock = found
+    assert clock.by == "log times"
+    assert abs(clock.offset + truth["clock_offset_s"]) < clock.uncertainty < 5e-3
+    assert all(abs(take.clock_offset + truth["clock_offset_s"]) < clock.uncertainty for take in takes)
+    motion = np.median([said.by_motion.offset for said in findings])
+    assert abs(motion + truth["clock_offset_s"]) > 2 * abs(clock.offset + truth["clock_offset_s"])
+    assert not any(said.warnings for said in findings)
+
+
+def test_curls_and_motions_begin_when_their_commands_do(found):
+    truth, takes, *_ = found
+    for take in takes:
+        trial, _ = filter_take(take, FILTER)
+        assert abs(trial.start - truth["starts_s"][take.name]) < 3 * trial.start_sigma < 1 / 120
