@@ -100,3 +100,39 @@ def test_a_problem_starts_at_the_model_s_own_values(problem):
         problem.weights,
     )  # fmt: skip
     assert np.exp(hardening.start()[0]) == pytest.approx(np.sqrt(0.02 * 20.0))  # it has none: mid-range
+
+
+class Capped:
+    """Stands in for a `Problem`: pulls that grow with a gain up to a cap, which a small gain never reaches."""
+
+    parameters = ("kp", "force_range")
+    wound = np.linspace(0.1, 1.0, 20)
+
+    def residuals(self, vectors):
+        gain, cap = np.exp(vectors).T[..., None]
+        fitted = np.minimum(gain * self.wound, cap) - np.minimum(2.0 * self.wound, 1.0)
+        return [np.concatenate([fitted, np.full((len(vectors), 1), 0.1)], axis=1)]  # and what nothing explains
+
+    def losses(self, vectors):
+        return 0.5 * (self.residuals(vectors)[0] ** 2).sum(axis=1)
+
+    def prior(self, vectors):
+        return np.zeros_like(vectors)
+
+    def bounds(self):
+        return np.log([0.2, 0.2]), np.log([20.0, 20.0])
+
+    def start(self):
+        return np.log([1.0, 10.0])
+
+
+def test_starts_on_a_plateau_leave_it_before_they_are_compared():
+    problem = Capped()
+    stuck = descend(problem, problem.start(), 25, 1e-4, quiet)
+    assert stuck.loss > 0.1
+    assert np.exp(stuck.vector[1]) == pytest.approx(10.0)  # nothing leads from there to the cap
+    found = search(problem, LeastSquares(7, 3, 25, 1e-4), seed=3, report=quiet)
+    np.testing.assert_allclose(np.exp(found.vector), [2.0, 1.0], rtol=1e-3)
+    assert found.agreeing == found.starts == 3
+    others = np.array([problem.losses(other[None])[0] for other in found.others])
+    assert (others > 2 * found.loss).any()  # some start had to leave one

@@ -83,3 +83,13 @@ def test_what_no_residual_depends_on_does_not_spoil_the_others():
     moves = second_order.moves(weights)
     assert (np.abs(moves[:, 1]) <= LONGEST).all()
     np.testing.assert_allclose(moves[:, 0], [problem.minimum(row)[0] - vector[0] for row in weights], atol=1e-5)
+
+
+def test_seen_from_another_place_losses_and_minima_are_the_same():
+    _, surrogate_there, _ = around(bent(CURVATURE))
+    place, ahead = np.array([0.05, -0.03]), np.array([[0.0, 0.0], [0.1, 0.2]])
+    weights = np.linspace(0.5, 1.0, TRIALS)
+    moved = surrogate_there.moved(place, weights)
+    np.testing.assert_allclose(moved.losses(ahead), surrogate_there.losses(place + ahead), rtol=1e-9)
+    np.testing.assert_allclose(moved.minima(weights[None]) + place, surrogate_there.minima(weights[None]), atol=1e-6)
+    np.testing.assert_array_equal(moved.weights, weights)

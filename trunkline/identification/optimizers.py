@@ -10,8 +10,9 @@ from pydantic import Field
 class LeastSquares:
     """Descents from the best of a few starts, by scipy's trust region (Branch, Coleman, Li 1999).
 
-    starts: of a Latin hypercube, besides the given one. descents: from how many of the best. iterations: of each, at
-    most. tolerance: relative decrease of the loss at the end.
+    starts: of a Latin hypercube, besides the given one; 0 to go on from that alone. descents: from how many of the best
+    that are apart; at least three, which have to agree, unless `starts` is 0. iterations: of each, at most. tolerance:
+    relative decrease of the loss at the end.
     """
 
     starts: Annotated[int, Field(ge=0, le=10000)]

@@ -91,12 +91,13 @@ def predict(
     models: dict[str, mujoco.MjModel], trials: list[Trial], experiments: list[Experiment], fitted: mujoco.MjModel
 ) -> dict[str, Prediction]:
     """What each of `models` says of `experiments`, which were prepared from `trials` with the model `fitted`; each
-    starts where its own geometry puts the arm."""
-    found, segments = {}, trials[0].segments
-    for name, model in models.items():
-        own = own_starts(experiments, trials, fitted, model)
-        found[name] = Prediction(replay(model, own, segments), own)
-    return found
+    starts where its own geometry puts the arm. A model under two names is simulated once."""
+    found: dict[int, Prediction] = {}
+    for model in models.values():
+        if id(model) not in found:
+            own = own_starts(experiments, trials, fitted, model)
+            found[id(model)] = Prediction(replay(model, own, trials[0].segments), own)
+    return {name: found[id(model)] for name, model in models.items()}
 
 
 def start_fit(experiments: list[Experiment]) -> dict:

@@ -10,14 +10,13 @@ from trunkline.identification.linearisation import Linearisation, linearise
 from trunkline.identification.optimizers import DifferentialEvolution, Optimizer
 from trunkline.identification.problem import Problem
 
-PLATEAU_SCAN = 24  # values over the range of a parameter that does not matter, and
-PLATEAU_STARTS = 2  # from how many of the nearest that do matter to search again
-PLATEAU_ITERATIONS, PLATEAU_TOLERANCE = 4, 1e-3  # of each
+PLATEAU_SCAN = 12  # values over the range of a parameter that does not matter
 PLATEAU_LEVEL = 1e-6  # relative change of the loss that matters
 STEP_TOLERANCE = 1e-5  # of a candidate z, relative: a smaller step of least squares is no step
-ELSEWHERE_STARTS = 2  # besides what was found,
-ELSEWHERE_CANDIDATES, ELSEWHERE_APART = 12, 0.15  # the best of so many, so far apart, as a share of a range
-ELSEWHERE_ITERATIONS, ELSEWHERE_TOLERANCE = 25, 1e-3  # of least squares from each
+STARTS = 3  # of least squares, at least, that have to agree
+APART = 0.15  # as a share of a range, in one parameter at least, from one another
+CANDIDATES = 12  # drawn beside what differential evolution found, for the other starts
+ITERATIONS, TOLERANCE = 25, 1e-3  # of least squares after differential evolution
 AGREEING = 1.05  # times the least loss
 Report = Callable[[float], None]  # called with the best loss after each generation or iteration
 
@@ -54,78 +53,96 @@ def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) ->
     """The minimum within bounds, from the problem's own start or with it among the first candidates."""
     rng = np.random.default_rng(seed)
     if isinstance(optimizer, DifferentialEvolution):
-        found = _evolve(problem, optimizer, rng, report)
-    else:
-        starts = problem.start()[None]
-        if optimizer.starts:
-            starts = np.concatenate([starts, _latin_hypercube(rng, optimizer.starts, *problem.bounds())])
-            starts = starts[np.argsort(problem.losses(starts), kind="stable")]
-        found = _best_descent(problem, starts[: optimizer.descents], optimizer.iterations, optimizer.tolerance, report)
-    if not problem.parameters:
-        return found
-    if isinstance(optimizer, DifferentialEvolution) or optimizer.starts:  # else it goes on from what is known
-        found = _from_elsewhere(problem, found, rng, report)
-    return _leave_plateaus(problem, found, report)
+        evolved = _evolve(problem, optimizer, rng, report)
+        if not problem.parameters:
+            return evolved
+        drawn = _latin_hypercube(rng, CANDIDATES, *problem.bounds())
+        candidates = np.concatenate([evolved.vector[None], drawn[np.argsort(problem.losses(drawn), kind="stable")]])
+        found = _several(problem, _apart(problem, candidates, STARTS), ITERATIONS, TOLERANCE, report)
+        return replace(found, convergence=evolved.convergence, converged=evolved.converged and found.agreeing > 1)
+    candidates, count = problem.start()[None], 1
+    if optimizer.starts:  # else it goes on from what is known
+        drawn = _latin_hypercube(rng, optimizer.starts, *problem.bounds())
+        candidates = np.concatenate([candidates, drawn])
+        candidates = candidates[np.argsort(problem.losses(candidates), kind="stable")]
+        count = max(optimizer.descents, STARTS) if problem.parameters else optimizer.descents
+    starts = _apart(problem, candidates, count)
+    found = _several(problem, starts, optimizer.iterations, optimizer.tolerance, report)
+    if count == 1:
+        return replace(found, agreeing=0, starts=0)
+    return replace(found, converged=found.converged and found.agreeing > 1)
 
 
-def _from_elsewhere(problem: Problem, found: Found, rng: np.random.Generator, report: Report) -> Found:
-    """Least squares from a few starts far from what was found and from one another, and how many of them end there.
+def _apart(problem: Problem, candidates: np.ndarray, count: int) -> list[np.ndarray]:
+    """The first of the candidates (C, P) and those of the next that are far from it and from one another."""
+    low, high = problem.bounds()
+    chosen = [candidates[0]]
+    for start in candidates[1:]:
+        apart = min(np.abs((start - other) / (high - low)).max() for other in chosen)
+        if apart > APART and len(chosen) < count:
+            chosen.append(start)
+    return chosen
+
+
+def _several(
+    problem: Problem, starts: list[np.ndarray], iterations: int, tolerance: float, report: Report
+) -> Found:
+    """The best end of least squares from several starts, the best of them first, and how many of them end as well.
 
     A search that ends for its own reasons may still have ended beside the minimum. It has converged if distinct starts
-    agree with it: at least two ends, its own included, as good as the best.
+    agree with it: at least two ends, its own included, as good as the best. What counts is where each start leads once
+    it has left the plateaus on its way: on one, a start would end beside the minimum that it might have found.
     """
-    low, high = problem.bounds()
-    drawn = _latin_hypercube(rng, ELSEWHERE_CANDIDATES, low, high)
-    drawn = drawn[np.argsort(problem.losses(drawn), kind="stable")]
-    chosen = [found.vector]
-    for start in drawn:
-        apart = min(np.abs((start - other) / (high - low)).max() for other in chosen)
-        if apart > ELSEWHERE_APART and len(chosen) <= ELSEWHERE_STARTS:
-            chosen.append(start)
-    polished = descend(problem, found.vector, ELSEWHERE_ITERATIONS, ELSEWHERE_TOLERANCE, report)
-    ends = [polished, *(descend(problem, s, ELSEWHERE_ITERATIONS, ELSEWHERE_TOLERANCE, report) for s in chosen[1:])]
-    best = min(ends, key=lambda end: end.loss)
-    agreeing = sum(end.loss <= AGREEING * best.loss for end in ends)
-    others = (*found.others, *(end.vector for end in ends if end is not best))
-    return replace(
-        found, vector=best.vector, loss=best.loss, linear=best.linear, others=others, agreeing=agreeing,
-        starts=len(ends), converged=found.converged and agreeing > 1,
-    )  # fmt: skip
+    ends = [_ends(problem, start, iterations, tolerance, report, index > 0) for index, start in enumerate(starts)]
+    losses = [min(end.loss for end in each) for each in ends]
+    every = sorted((end for each in ends for end in each), key=lambda end: end.loss)
+    agreeing = sum(loss <= AGREEING * every[0].loss for loss in losses)
+    others = tuple(end.vector for end in every[1:])
+    return replace(every[0], others=others, agreeing=agreeing, starts=len(starts))
 
 
-def _leave_plateaus(problem: Problem, found: Found, report: Report) -> Found:
-    """Search again from where parameters begin to matter that do not matter at the minimum found.
+def _ends(
+    problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report, hasty: bool
+) -> list[Found]:
+    """Where least squares ends from `start`, and from where parameters begin to matter that do not matter there.
 
     A force range that no pull reaches is one: the loss is flat above the largest tension, so nothing leads from
     there to a smaller minimum below.
+
+    Args:
+        hasty: leave a plateau at once, not from its own minimum, unless nothing better is found outside.
     """
-    low, high = problem.bounds()
-    columns = np.concatenate((found.linear or linearise(problem, found.vector)).jacobians)
-    for index in np.flatnonzero(~columns.any(axis=0)):
+    ends = [descend(problem, start, iterations, tolerance, report, hasty)]
+    if not problem.parameters:
+        return ends
+    (low, high), found = problem.bounds(), ends[0]
+    plateaus = np.flatnonzero(_flat(found.linear or linearise(problem, found.vector)))
+    for index in plateaus:
         scan = np.repeat(found.vector[None], PLATEAU_SCAN, axis=0)
         scan[:, index] = np.linspace(low[index], high[index], PLATEAU_SCAN)
-        matters = np.flatnonzero(np.abs(problem.losses(scan) - found.loss) > PLATEAU_LEVEL * found.loss)
-        nearest = matters[np.argsort(np.abs(scan[matters, index] - found.vector[index]))][:PLATEAU_STARTS]
-        if len(nearest):
-            again = _best_descent(problem, scan[nearest], PLATEAU_ITERATIONS, PLATEAU_TOLERANCE, report)
-            if again.loss < found.loss:
-                others = (*found.others, found.vector)
-                found = replace(found, vector=again.vector, loss=again.loss, linear=again.linear, others=others)
-            else:
-                found = replace(found, others=(*found.others, again.vector))
-    return found
+        losses = problem.losses(scan)
+        matters = np.abs(losses - found.loss) > PLATEAU_LEVEL * found.loss
+        if matters.any():
+            edge = scan[np.argmin(np.where(matters, losses, np.inf))]
+            ends.append(descend(problem, edge, iterations, tolerance, report))
+    if hasty and len(plateaus) and min(ends, key=lambda end: end.loss) is found:
+        ends[0] = descend(problem, found.vector, iterations, tolerance, report)
+    return ends
 
 
-def _best_descent(problem: Problem, starts, iterations: int, tolerance: float, report: Report) -> Found:
-    descents = [descend(problem, start, iterations, tolerance, report) for start in starts]
-    return min(descents, key=lambda found: found.loss)
+def _flat(linear: Linearisation) -> np.ndarray:
+    """Which parameters do not matter at all. Shape (P,)."""
+    return ~np.concatenate(linear.jacobians).any(axis=0)
 
 
-def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report) -> Found:
+def descend(
+    problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report, hasty: bool = False
+) -> Found:
     """Least squares on the loss's residuals. Only a step that is taken costs a Jacobian.
 
     It ends with the first step that gains less than `tolerance` of the loss, also where less was gained than expected:
-    there scipy's own rule goes on, in ever smaller steps along a kink.
+    there scipy's own rule goes on, in ever smaller steps along a kink. If `hasty`, with the first iterate after the
+    start at which a parameter does not matter, too.
     """
     convergence = Convergence()
     known: dict[bytes, list[np.ndarray]] = {}
@@ -156,6 +173,8 @@ def descend(problem: Problem, start: np.ndarray, iterations: int, tolerance: flo
 
     def enough(_: OptimizeResult) -> None:
         if len(best := convergence.best) > 1 and best[-2] - best[-1] < tolerance * best[-2]:
+            raise StopIteration
+        if hasty and _flat(accepted[0]).any():
             raise StopIteration
 
     inside = np.clip(start, low + 1e-9, high - 1e-9)

@@ -50,6 +50,12 @@ class Surrogate:
         """Of every trial, unweighted, at places d (B, P). Shape (B, T)."""
         return np.stack([_losses(gram[None], places) for gram in self.grams], axis=1)
 
+    def moved(self, place: np.ndarray, weights: np.ndarray) -> "Surrogate":
+        """The same losses as seen from `place` (P,), of a fit in which trials weigh `weights` (T,)."""
+        places = _stencil(np.ones(self.count))
+        shift = np.linalg.inv(features_at(places)) @ features_at(place + places)  # φ(place + d) = φ(d) @ shift
+        return Surrogate(shift @ self.grams @ shift.T, weights)
+
     def tells(self, weights: np.ndarray) -> np.ndarray:
         """Which parameters trials that weigh `weights` (T,) say anything about. Shape (P,)."""
         lengths = [np.diag(np.einsum("t,tfg->fg", w, self.grams))[1 : self.count + 1] for w in (weights, self.weights)]
@@ -90,9 +96,7 @@ def surrogate(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] 
     Args:
         residuals: those at `vector`, where they are known. Per trial (R,).
     """
-    reach = np.diag([SIGNED_REACH if PARAMETERS[name].signed else REACH for name in problem.parameters])
-    rows, columns = np.tril_indices(len(vector), -1)
-    places = np.concatenate([np.zeros((1, len(vector))), reach, -reach, reach[rows] + reach[columns]])
+    places = _stencil(reaches(problem))
     coefficients = np.linalg.inv(features_at(places))
     if residuals is None:
         residuals = [block[0] for block in problem.residuals(vector[None])]
@@ -100,6 +104,18 @@ def surrogate(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] 
     blocks = [np.concatenate([base[None], block]) for base, block in zip(residuals, others, strict=True)]
     grams = np.stack([coefficients @ (block @ block.T) @ coefficients.T for block in blocks])
     return Surrogate(grams / problem.trial_weights[:, None, None], problem.trial_weights)
+
+
+def reaches(problem: Problem) -> np.ndarray:
+    """How far from its centre a surrogate of `problem` is made, along each axis. Shape (P,)."""
+    return np.array([SIGNED_REACH if PARAMETERS[name].signed else REACH for name in problem.parameters])
+
+
+def _stencil(reach: np.ndarray) -> np.ndarray:
+    """As many places as there are features, of which the features are independent, for reaches (P,). Shape (F, P)."""
+    steps = np.diag(reach)
+    rows, columns = np.tril_indices(len(reach), -1)
+    return np.concatenate([np.zeros((1, len(reach))), steps, -steps, steps[rows] + steps[columns]])
 
 
 def _losses(grams: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -66,7 +66,11 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     # score what is written, not what was in memory: MJCF keeps six digits
     models = result.models | {"identified": mujoco.MjModel.from_xml_string(identified)}
     models["cad"] = read_spec(CAD_MODEL).compile()
-    if whole:
+    if model_path == CAD_MODEL and config.markers == "unchanged":
+        models["initial"] = models["cad"]
+    if not result.factors and not any(map(has_factors, whole)):
+        models["coarse"] = models["identified"]
+    elif whole:
         models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
         for field in ("qpos_spring", "site_pos", "site_sameframe"):  # rest shape and markers are no matter of scalars
             getattr(models["coarse"], field)[:] = getattr(model, field)
@@ -114,6 +118,11 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         write_json(folder / "metrics.json", metrics)
         write_tables(folder, predictions, segments)
         write_plots(folder, result, fit.parameters, segments, predictions, shapes=model_path == CAD_MODEL)
+
+
+def has_factors(stage: str) -> bool:
+    """Whether an earlier stage gave joints their own factors."""
+    return bool(json.loads(existing(Path("artifacts") / stage / "parameters.json").read_text()).get("per_joint"))
 
 
 def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
