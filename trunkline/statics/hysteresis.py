@@ -62,7 +62,7 @@ def friction_band(
     ends = []
     for side in (1, -1):
         torques = -side * joint_friction * slides[1]
-        end = _held(doubled, commands, side * tendon_friction * slides[0], torques, gravity)
+        end = _held(doubled._replace(capstan=side * chain.capstan), commands, side * tendon_friction * slides[0], torques, gravity)
         found = (here.converged & end.converged)[:, None]
         ends.append(np.where(found, end.position, np.nan))
     return Band(*ends)
