@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from trunkline.arm.cad import CadArm
+from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Joints, add_elements
 from trunkline.arm.kinds import Arm
 from trunkline.arm.mjcf import Actuation, Solver
@@ -21,6 +22,7 @@ MODELS = "build_mjcf/mjcf"  # folder below conf/ of arms that come as MJCF
 class Config:
     arm: Arm
     joints: Joints
+    holes: Holes
     actuation: Actuation
     solver: Solver
 
@@ -28,6 +30,7 @@ class Config:
 def cad_arm(config: Config) -> CadArm:
     arm = config.arm.build(config.actuation, config.solver, own_or_project(Path("."), "conf") / MODELS)
     add_elements(arm.spec, config.joints, config.solver.armature)
+    add_holes(arm.spec, config.holes)
     return arm
 
 

@@ -1,7 +1,8 @@
 """What a model's tendons and hinges are: the arm's own, or parts of its joints, by their names.
 
 `trunkline/arm/joints.py` builds those parts: Maxwell branches, named `<hinge>_branch_<number>`, and Jenkins elements,
-`<hinge>_slider_<number>`.
+`<hinge>_slider_<number>`. `trunkline/arm/holes.py` gives a cable tendons by which it rubs on its holes, named
+`<cable>_hole_<number>`, and the model a number `capstan_friction`, their coefficient.
 """
 
 from dataclasses import dataclass
@@ -9,7 +10,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-BRANCH, SLIDER = "branch", "slider"
+BRANCH, SLIDER, HOLE = "branch", "slider", "hole"
+CAPSTAN_FRICTION = "capstan_friction"
 
 
 @dataclass(frozen=True)
@@ -48,5 +50,24 @@ def arm_hinges(model: mujoco.MjModel) -> int:
 
 
 def cables(model: mujoco.MjModel) -> list[int]:
-    """Numbers of the tendons that run along the arm; the others are parts of joints."""
-    return [t for t in range(model.ntendon) if model.wrap_type[model.tendon_adr[t]] != mujoco.mjtWrap.mjWRAP_JOINT]
+    """Numbers of the tendons that run along the arm; the others are parts of joints, or rub."""
+    along = [t for t in range(model.ntendon) if model.wrap_type[model.tendon_adr[t]] != mujoco.mjtWrap.mjWRAP_JOINT]
+    return [t for t in along if f"_{HOLE}_" not in model.tendon(t).name]
+
+
+def holes(model: mujoco.MjModel) -> np.ndarray:
+    """Numbers of the tendons by which each cable rubs, P for each. Shape (K, P), P = 0 where nothing rubs."""
+    tendons = [t for t in range(model.ntendon) if f"_{HOLE}_" in model.tendon(t).name]
+    return np.array(tendons, dtype=int).reshape(len(cables(model)), -1) if tendons else np.zeros((0, 0), dtype=int)
+
+
+def capstan_friction(model: mujoco.MjModel) -> float:
+    """The coefficient μ with which its cables rub, 0 where nothing rubs."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CAPSTAN_FRICTION)
+    return float(model.numeric_data[model.numeric_adr[number]]) if number >= 0 else 0.0
+
+
+def let_slide(model: mujoco.MjModel) -> None:
+    """Take the friction of cables on their holes from a model, in place."""
+    if capstan_friction(model):
+        model.numeric_data[model.numeric_adr[model.numeric(CAPSTAN_FRICTION).id]] = 0

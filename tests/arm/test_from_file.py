@@ -11,6 +11,7 @@ import pytest
 from stages.build_mjcf import Config, main
 from tests.support.workbench import ROOT
 from trunkline.arm.from_file import FromFile
+from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.errors import InputError
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
@@ -29,7 +30,8 @@ def project(tmp_path, monkeypatch):
     (tmp_path / "conf/build_mjcf/arm").mkdir(parents=True)
     for name in ("config.yaml", "arm/four_links.yaml"):
         (tmp_path / "conf/build_mjcf" / name).write_text((ROOT / "conf/build_mjcf" / name).read_text())
-    shutil.copytree(ROOT / "conf/build_mjcf/joints", tmp_path / "conf/build_mjcf/joints")
+    for group in ("holes", "joints"):
+        shutil.copytree(ROOT / "conf/build_mjcf" / group, tmp_path / "conf/build_mjcf" / group)
     (tmp_path / "conf/build_mjcf/mjcf").mkdir()
     (tmp_path / "params.yaml").write_text("build_mjcf: {arm: four_links, solver: {timestep: 0.002}}\n")
     monkeypatch.chdir(tmp_path)
@@ -62,6 +64,7 @@ def test_it_can_be_identified(name):
     """Every parameter can be set in it and saved."""
     spec = mujoco.MjSpec.from_string(FromFile("mjcf", FILE).build(None, None, MODELS).spec.to_xml())
     add_elements(spec, Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)]), 1e-5)
+    add_holes(spec, Holes(0.1, 2))
     for actuator in spec.actuators:
         actuator.nsample = 100
     model = spec.compile()

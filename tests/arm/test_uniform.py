@@ -95,7 +95,8 @@ def project(tmp_path, monkeypatch):
     source = OmegaConf.load("conf/build_mjcf/config.yaml")
     arms = {name: OmegaConf.load(f"conf/build_mjcf/arm/{name}.yaml") for name in ("asl_trunk", "spiral")}
     OmegaConf.save(source, conf / "config.yaml")
-    shutil.copytree("conf/build_mjcf/joints", conf / "joints")
+    for group in ("holes", "joints"):
+        shutil.copytree(f"conf/build_mjcf/{group}", conf / group)
     (tmp_path / "params.yaml").write_text("build_mjcf: {arm: arm, solver: {timestep: 0.002}}\n")
     monkeypatch.chdir(tmp_path)
 

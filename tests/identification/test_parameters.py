@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_spec
+from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.elements import BRANCH, all_elements, arm_hinges
 from trunkline.identification.parameters import PARAMETERS, Parameter, candidate_fields, set_fields, unit_of_hinge
@@ -14,6 +15,7 @@ VALUES = {
     "joint_place": 0.3,
     "stiffness": 2.5, "hardening": 0.7, "joint_friction": 0.01, "damping": 0.02, "tendon_friction": 0.8,
     "friction_time": 0.03, "kp": 1500.0, "kv": 60.0, "force_range": 45.0, "time_constant": 0.08,
+    "capstan_friction": 0.25,
     "relaxation": 0.5, "relaxation_time": 0.7, "relaxation_2": 0.1, "relaxation_time_2": 3.0, "hysteresis": 0.4,
     "yield_bend": 0.01, "rest_bend_x": 0.01, "rest_bend_y": -0.02, "rest_gradient_x": -0.01, "rest_gradient_y": 0.03,
     "dead_time": 0.04, "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
@@ -27,6 +29,7 @@ def full_spec() -> mujoco.MjSpec:
     """A small arm that has every part that a parameter may belong to."""
     spec = small_spec()
     add_elements(spec, ELEMENTS, 1e-5)
+    add_holes(spec, Holes(0.1, 2))
     for actuator in spec.actuators:
         actuator.delay, actuator.nsample = 0.02, 100
     return spec

@@ -32,7 +32,7 @@ def judged(tmp_path):
     truth = {"hardening": 1.5, "tendon_friction": 0.6, "kp": 1500.0, "force_range": 16.0, "time_constant": None}
     truth = {"parameters": truth, "forces": ["tendon_friction", "kp", "force_range"], "mass_factor": 1.2}
     truth |= {"clock_offset_s": 0.1, "starts_s": {"release_a": 0.7, "release_b": 0.7}}
-    truth |= {"stiffness_factors": [1.1, 0.9, 1.0], "plant": "stranger", "sliders": [], "capstan_friction": 0.15}
+    truth |= {"stiffness_factors": [1.1, 0.9, 1.0], "plant": "stranger", "sliders": []}
     truth |= {"branches": [{"ratio": 0.12, "time_s": 0.05}] * 3, "rate_limit_m_s": 0.25, "backlash_m": 3e-4}
     (tmp_path / TRUTH).write_text(json.dumps(truth))
     rows = {
@@ -77,7 +77,7 @@ def test_the_truth_table_says_what_the_model_lacks(judged):
         (line,) = (line for line in truth_table(judged).splitlines() if line.startswith("| `kp`"))
         return line
 
-    assert "dead time of the motors, friction that grows" in lacking()
+    assert "dead time of the motors, friction on its holes" in lacking()
     assert "Maxwell branches (it has 0 of 3)" in lacking()
     assert "dead time" not in lacking(dead_time=1)
     assert "Maxwell branches (it has 2 of 3)" in lacking(relaxation=1, relaxation_2=1)

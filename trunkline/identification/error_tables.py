@@ -9,6 +9,7 @@ from trunkline.identification.experiment import Experiment
 # by name in metrics.json: how tables and figures call a model, and what it stands beside
 LABELS = {
     "identified": "identified",
+    "smooth": "cables do not rub",
     "model": "model",
     "cad": "CAD",
     "initial": "initial",

@@ -9,7 +9,17 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, elements
+from trunkline.elements import (
+    BRANCH,
+    CAPSTAN_FRICTION,
+    SLIDER,
+    all_elements,
+    arm_hinges,
+    cables,
+    capstan_friction,
+    elements,
+    holes,
+)
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 
 Fields = dict[str, np.ndarray]  # name of an MjModel field → its values per candidate, (candidates, ...)
@@ -26,7 +36,7 @@ class Parameter:
         write: (fields, values (candidates,), model) sets it in every candidate.
         signed: whether it may be 0 or less. Only others are searched on a logarithmic scale.
         part: what of an arm it belongs to, if not every arm has it: "tendons", their motors' "dead time", or a joint's
-            "branch 1", "slider 1", …
+            "branch 1", "slider 1", …, or "holes" on which cables rub.
     """
 
     unit: str
@@ -40,6 +50,8 @@ class Parameter:
         """Whether the arm has the part of which this is."""
         if self.part == "dead time":
             return bool(model.nhistory)
+        if self.part == "holes":
+            return holes(model).size > 0
         kind, _, number = self.part.partition(" ")
         if number:
             return len(elements(model, kind, int(number)).tendon) > 0
@@ -214,6 +226,10 @@ def _rest_bend(axis: int, power: int) -> Parameter:
     return Parameter("rad", ("qpos_spring",), read, write, signed=True)
 
 
+def _write_capstan(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    fields["numeric_data"][:, model.numeric_adr[model.numeric(CAPSTAN_FRICTION).id]] = values
+
+
 STIFFNESS_FIELDS = ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "dof_damping")
 DAMPING_FIELDS = ("dof_damping", "dof_dampingpoly")
 
@@ -256,6 +272,8 @@ PARAMETERS: dict[str, Parameter] = {
         "s", ("tendon_solref_fri",), lambda m: float(m.tendon_solref_fri[0, 0]),
         _write_tendons("tendon_solref_fri", (0,)), part="tendons",
     ),
+    # μ of cables on the holes that they pass, in the capstan equation
+    "capstan_friction": Parameter("", ("numeric_data",), capstan_friction, _write_capstan, part="holes"),
     "kp": Parameter(
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
         part="tendons",

@@ -136,7 +136,8 @@ class Population:
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))
         timestep = batch.expand("opt.timestep")
         timestep[:] = np.repeat([e.lead / substeps for e in experiments], count)
-        batch.step(nstep=substeps)
+        first = np.repeat([e.controls[0] for e in experiments], count, axis=0)
+        move(batch, np.repeat(first[:, None], substeps, axis=1), ())
         timestep[:] = frame_step / substeps
         lengths = [e.frames for e in experiments]
         results = [np.empty((count, frames, len(sites), 3)) for frames in lengths]

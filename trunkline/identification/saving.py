@@ -17,6 +17,7 @@ ELEMENTS = {
     "site": ("site", lambda model, index: index),
     "tendon": ("tendon", lambda model, index: index),
     "actuator": ("actuator", lambda model, index: index),
+    "numeric": ("numeric", lambda model, index: model.numeric_adr[index] + np.arange(model.numeric_size[index])),
 }
 
 # MjModel fields that MJCF holds under another name, or as some of an attribute's numbers

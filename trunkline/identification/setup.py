@@ -47,6 +47,8 @@ def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.M
             end = "; such an arm's pipeline ends with `dvc repro identify_damping`"
         elif part == "dead time":
             found, end = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0", ""
+        elif part == "holes":
+            found, end = "found it for cables that do not rub, expected build_mjcf.holes: rubbing", ""
         else:
             found, end = f"found it for joints without {part}, expected build_mjcf.joints with one", ""
         raise InputError(f"params.yaml: {stage}.parameters.{name}: {found}{end}")

@@ -6,6 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from trunkline.elements import capstan_friction, let_slide
 from trunkline.errors import InputError, existing
 from trunkline.identification.checks import check_trials
 from trunkline.identification.cross_validation import cross_validate
@@ -63,6 +64,9 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
         for field in ("qpos_spring", "site_pos", "site_sameframe"):  # rest shape and markers are no matter of scalars
             getattr(models["coarse"], field)[:] = getattr(model, field)
+    if capstan_friction(models["identified"]):  # as it moves where cables cannot rub, in Unity for one
+        models["smooth"] = mujoco.MjModel.from_xml_string(identified)
+        let_slide(models["smooth"])
     predictions = {name: Prediction(replay(m, experiments, segments), experiments) for name, m in models.items()}
     metrics: dict = {"diverged_trials": {name: prediction.replay.diverged for name, prediction in predictions.items()}}
     like = predictions["identified"].replay

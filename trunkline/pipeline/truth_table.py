@@ -65,7 +65,7 @@ LACKING = {
     "stranger": (
         Effect("a limited rate and backlash of the motors, cables that differ", MOTORS),
         Effect("dead time of the motors", MOTORS, unless="dead_time"),
-        Effect("friction that grows with a tendon's tension", (*SPRINGS, *RUBBING, "kp", "kv", "force_range")),
+        Effect("friction on its holes", (*SPRINGS, *RUBBING, "kp", "kv", "force_range"), "capstan_friction"),
         Effect("Maxwell branches", ("damping", *RELAXING, *MEMORY, *RUBBING, "kp", "kv"), "relaxation", "branches"),
         Effect("sliders", (*SPRINGS, "damping", *RELAXING, *MEMORY, *RUBBING, "kp"), "hysteresis", "sliders"),
         Effect("a rest shape", (*SPRINGS, *LEAN), unless="rest_bend_x"),
@@ -149,7 +149,6 @@ def _unanswered(truth: dict) -> list[str]:
     sliders = ", ".join(f"{_number(one['ratio'])} up to {_number(one['bend_rad'])} rad" for one in truth["sliders"])
     return [
         f"The lab's Maxwell branches, over its springs: {branches}.\nIts sliders: {sliders}.\n"
-        f"Friction in its holes: {_number(truth['capstan_friction'])}. "
         f"Its motors wind at most {_number(truth['rate_limit_m_s'])} m/s, with "
         f"{_number(1e3 * truth['backlash_m'])} mm of backlash."
     ]

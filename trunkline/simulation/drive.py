@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from trunkline.elements import let_slide
 from trunkline.simulation.motion import batch_of, hold, move
 from trunkline.simulation.rest import base_frame, longest_step
 
@@ -59,13 +60,14 @@ def drive(
             trajectories, a row every ROW s and the last one held. Shape (B, T, K).
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate.
-        friction: whether tendons and joints have the model's dry friction.
+        friction: whether tendons and joints have the model's dry friction, and cables rub.
     """
     own, model = model.opt.timestep, copy.copy(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     model.opt.timestep = longest_step(model)
     if not friction:
         model.tendon_frictionloss[:], model.dof_frictionloss[:] = 0, 0
+        let_slide(model)
     gravity = np.broadcast_to(gravity, (len(commands), 3))
     driven = _drive(model, commands, gravity, seconds, tip_site)
     while model.opt.timestep > own and len(warned := np.flatnonzero(~np.isfinite(driven.end).all(axis=1))):

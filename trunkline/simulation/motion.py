@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from trunkline.simulation.rubbing import rubbing
 from trunkline.threads import thread_count
 
 CHUNK = 128  # steps a call: few calls, and records of some MB
@@ -61,12 +62,19 @@ def move(
     Returns:
         A record for each name. Shape (n, T / every, ...).
     """
-    length = max(CHUNK // every, 1) * every
+    rub = rubbing(batch)
+    own = np.arange(batch.nsim) if ids is None else ids
+    length = rub.steps if rub else max(CHUNK // every, 1) * every
+    if rub:
+        rub.begin(own)
     parts: dict[str, list[np.ndarray]] = {name: [] for name in record}
     for start in range(0, controls.shape[1], length):
+        if rub:
+            rub.refresh(own)
         rows = np.ascontiguousarray(controls[:, start : start + length])
         found = batch.rollout(rows.shape[1], control=rows, record=record, ids=ids)
+        chosen = slice((at - start) % every, None, every)
         for name, part in parts.items():
-            part.append(found[name][:, at::every].copy())
-        moved(rows.shape[1] // every)
+            part.append(found[name][:, chosen].copy())
+        moved(len(range(rows.shape[1])[chosen]))
     return {name: np.concatenate(part, axis=1) for name, part in parts.items()}

@@ -10,7 +10,7 @@ from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with
 from trunkline.unity.manifest import Manifest
 from trunkline.unity.roundtrip import curl, deviation, simulate
-from trunkline.unity.twin import MANIFEST, MODEL, Trajectory, without_dead_time
+from trunkline.unity.twin import MANIFEST, MODEL, Trajectory, without_dead_time, without_rubbing
 
 
 @dataclass
@@ -33,13 +33,15 @@ class Curled:
 
 
 def read_models(calibrated: str, packed: dict[str, bytes]) -> dict[str, mujoco.MjModel]:
-    """Calibrated but for dead times, packed, and as Unity imports it; in the latter two springs and dampers restored.
+    """Calibrated but for dead times and rubbing cables, packed, and as Unity imports it; in the latter two springs and
+    dampers restored.
 
     Args:
         calibrated: MJCF. packed: the package's files by path.
     """
     mjcf, spec = packed[MODEL].decode(), mujoco.MjSpec.from_string(calibrated)
     without_dead_time(spec)
+    without_rubbing(spec)
     described = Manifest.model_validate_json(packed[MANIFEST]).model
     return {
         "calibrated": spec.compile(),

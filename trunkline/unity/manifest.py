@@ -69,6 +69,11 @@ class Model(_Block):
     dead_time: float = Field(
         ge=0, description="s from a command to the motor's first answer, which the file has not: send commands so late"
     )
+    capstan_friction: float = Field(
+        ge=0,
+        description="μ of the cables on their holes, which the file has not; metrics.identify_control has errors with "
+        "it (identified) and without (smooth)",
+    )
     changes_max_deviation_mm: float = Field(
         ge=0, description="with the lines that stand in for them in the file, against the calibrated model"
     )

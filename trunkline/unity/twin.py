@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
+from trunkline.elements import CAPSTAN_FRICTION, HOLE, capstan_friction
 from trunkline.errors import InputError
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize_joints
@@ -74,7 +75,7 @@ def assemble(
 ) -> tuple[dict[str, bytes], list[Violation]]:
     """All files of the package by path, and the rules that it breaks."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)
-    dead_time = without_dead_time(spec)
+    dead_time, friction = without_dead_time(spec), without_rubbing(spec)
     name_apart(spec)
     calibrated = spec.compile()
     springs, dampers = linearize_joints(spec, *movement(calibrated, trajectory))
@@ -119,6 +120,7 @@ def assemble(
             changes_max_deviation_mm=compare(calibrated, bundled, trajectory)[0] if springs or dampers else 0.0,
             import_max_deviation_mm=import_deviation_mm,
             dead_time=dead_time,
+            capstan_friction=friction,
         ),
         network=network_block,
         meshes=mesh_blocks,
@@ -145,6 +147,17 @@ def without_dead_time(spec: mujoco.MjSpec) -> float:
     for actuator in spec.actuators:
         actuator.delay, actuator.nsample = 0, 0
     return dead_time
+
+
+def without_rubbing(spec: mujoco.MjSpec) -> float:
+    """Take the tendons by which cables rub from a model in place, as their friction has to follow the tension at every
+    step; the coefficient μ, as it was."""
+    friction = capstan_friction(spec.compile())
+    for tendon in [tendon for tendon in spec.tendons if f"_{HOLE}_" in tendon.name]:
+        spec.delete(tendon)
+    for number in [number for number in spec.numerics if number.name == CAPSTAN_FRICTION]:
+        spec.delete(number)
+    return friction
 
 
 def movement(model: mujoco.MjModel, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
