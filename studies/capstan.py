@@ -5,7 +5,7 @@
 Needs filtered trials with slow pulls (`static_pull`); of those whose name ends in `_back` the motors came from beyond.
 The CAD model's stiffness, hardening, place of joints, motor gain, mount tilt and rest shape are fitted to tilts and
 pulls at rest of the split identify, with and without friction; `test` is never read. The law of friction is that of
-`trunkline/statics/capstan.py`. Pulls and backs may slide the same way, opposite ways (the law, if nothing but the motors
+`trunkline/statics/capstan.py`. Pulls and backs may slide the same way, opposite ways (the law, if nothing but motors
 moves the tendons), or have a μ each, positive where tension falls to the tip.
 """
 

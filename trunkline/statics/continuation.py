@@ -66,19 +66,6 @@ def solve_paths(
 
 
 @kernel
-def hang(first, last, chain, gravities, chords):
-    """Fill the tendons' chords (B, n, K), m, of an arm that only its weight bends, rows `first` to `last`."""
-    units, tendons = chain.crosses.shape
-    for row in range(first, last):
-        work, nothing = new_work(units, tendons), np.zeros(tendons)
-        q = chain.rest.copy().reshape(-1)
-        slack = Pull(nothing, nothing, nothing, nothing, np.zeros((units, 2)), 0.0, chords[row])
-        _follow(chain, q, np.zeros(3), gravities[row], slack, slack, False, work)
-        for i in range(units):
-            copy(work.state.chord[i], chords[row, i])
-
-
-@kernel
 def record(found, row, state, residual, iterations, converged):
     """Write what is known of one equilibrium beside its joint angles into its row."""
     for k in range(3):

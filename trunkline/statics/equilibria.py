@@ -3,6 +3,7 @@
 Three ways to say how the tendons pull: by tensions (`equilibrium`, `equilibrium_paths`), by the lengths of
 inextensible cables (`forward`), by the commands of the model's position actuators (`actuated`).
 All start from the arm at rest without pull, its weight growing from nothing, and follow that branch of equilibria.
+Where the chain has capstan friction, its tendons have been drawn in from there; tensions are those at the motors.
 """
 
 from dataclasses import dataclass
@@ -12,8 +13,9 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.statics.chain import Chain
-from trunkline.statics.continuation import Found, hang, solve_paths
+from trunkline.statics.continuation import Found, solve_paths
 from trunkline.statics.kernel import over_rows
+from trunkline.statics.placement import place_chords
 
 PENALTY = 1e5  # N/m, stiffness by which Newton feels a cable before its multiplier is known; no result depends on it
 
@@ -148,7 +150,8 @@ def loose_chords(chain: Chain, gravities: np.ndarray) -> np.ndarray:
         return np.zeros((len(gravities), chain.units, chain.tendons))
     distinct, which = np.unique(gravities, axis=0, return_inverse=True)
     chords = np.zeros((len(distinct), chain.units, chain.tendons))
-    over_rows(hang, len(distinct), chain, distinct, chords)
+    hanging = equilibrium(chain._replace(capstan=0.0), np.zeros((len(distinct), chain.tendons)), distinct)
+    over_rows(place_chords, len(distinct), chain, hanging.qpos, chords)
     return chords[which.reshape(-1)]
 
 

@@ -89,6 +89,17 @@ def place(chain, q, state):
 
 
 @kernel
+def place_chords(first, last, chain, qpos, chords):
+    """Fill the tendons' chords (B, n, K), m, at joint angles (B, nq), rows `first` to `last`."""
+    units, tendons = chain.crosses.shape
+    state = new_state(units, tendons)
+    for row in range(first, last):
+        place(chain, qpos[row], state)
+        for i in range(units):
+            copy(state.chord[i], chords[row, i])
+
+
+@kernel
 def _place_chords(chain, i, local, first_axis, second_axis, state):
     """The tendons' chords d from the hole before joint i to the hole after it, all in the frame before the joint."""
     crosses, hole_in, hole_out = chain.crosses, chain.hole_in[i], chain.hole_out[i]
