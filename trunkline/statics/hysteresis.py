@@ -62,8 +62,9 @@ def friction_band(
     doubled = with_friction(chain)
     ends = []
     for side in (1, -1):
+        slid = doubled._replace(capstan=side * chain.capstan)
         torques = -side * joint_friction * slides[1]
-        end = _held(doubled._replace(capstan=side * chain.capstan), commands, side * tendon_friction * slides[0], torques, gravity)
+        end = _held(slid, commands, side * tendon_friction * slides[0], torques, gravity)
         found = (here.converged & end.converged)[:, None]
         ends.append(np.where(found, end.position, np.nan))
     return Band(*ends)

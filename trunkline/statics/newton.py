@@ -109,7 +109,9 @@ def _line_search(chain, q, gravity, pull, work, energy):
     """Backtrack along work.step from q, overwriting it; return the energy there and whether a step was found."""
     state, nq = work.state, q.shape[0]
     gradient = state.gradient
-    slope = -np.dot(gradient, gradient) if pull.friction != 0 else np.dot(gradient, work.step)  # ∇ of ½|∇E|² along the step
+    slope = np.dot(gradient, work.step)
+    if pull.friction != 0:
+        slope = -np.dot(gradient, gradient)  # of ½|∇E|² along the step
     longest = largest(work.step)
     share = min(1.0, MAX_STEP / longest) if longest > 0 else 1.0
     rounding = 0.0 if pull.friction != 0 else 1e-13 * max(1.0, abs(energy))

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.statics.chain import Chain
 from trunkline.statics.capstan import factorize_for, solve_for
+from trunkline.statics.chain import Chain
 from trunkline.statics.energy import Pull, evaluate, find_hessian
 from trunkline.statics.equilibria import loose_chords, plain
 from trunkline.statics.kernel import kernel, over_rows
