@@ -1,5 +1,6 @@
 """Capstan friction at rest: the belt's closed form, Newton's derivatives, the way back, and slow motors in MuJoCo."""
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -62,6 +63,40 @@ def _shortens(chain):
     work = new_work(chain.units, 3)
     evaluate(chain, np.zeros(2 * chain.units), np.zeros(3), _pull(chain, [0, 0, 0], 0.0), work.state)
     return work.state.jacobian[0, 1] > 0
+
+
+def test_torques_balance_in_mujoco(chain):
+    """Torques of springs and weight by MuJoCo, and of each chord by its own change of length with the joint."""
+    model = stump()
+    data, step, tensions = mujoco.MjData(model), 1e-6, [12.0, 5.0, 0.0]
+    model.opt.gravity[:] = GRAVITY
+    rest = equilibrium(chain, np.array([tensions]), GRAVITY)
+    hanging = equilibrium(chain, np.zeros((1, 3)), GRAVITY)
+    loose, chords = _chords(model, data, hanging.qpos[0]), _chords(model, data, rest.qpos[0])
+    slid = np.cumsum((loose - chords)[:, ::-1], axis=1)[:, ::-1]
+    assert np.abs(slid).max() > 5 * SLIP
+    turns = np.linalg.norm(rest.qpos[0].reshape(-1, 2), axis=1) * np.clip(slid / SLIP, -1, 1)  # (K, n)
+    shares = np.exp(-FRICTION * (np.cumsum(turns, axis=1) - turns / 2))
+    torques = np.zeros(model.nv)
+    for joint in range(model.nv):
+        ends = []
+        for side in (1, -1):
+            q = rest.qpos[0].copy()
+            q[joint] += side * step
+            ends.append(_chords(model, data, q))
+        torques[joint] = -np.sum(np.array(tensions)[:, None] * shares * (ends[0] - ends[1])) / (2 * step)
+    data.qpos[:] = rest.qpos[0]
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.qfrc_passive - data.qfrc_bias + data.qfrc_constraint + torques, 0, atol=1e-5)
+
+
+def _chords(model, data, q):
+    """Distances from hole to hole as MuJoCo wraps the tendons, m. Shape (K, n)."""
+    data.qpos[:] = q
+    mujoco.mj_forward(model, data)
+    points = data.wrap_xpos.reshape(-1, 3)
+    paths = [points[a : a + n] for a, n in zip(data.ten_wrapadr, data.ten_wrapnum, strict=True)]
+    return np.array([np.linalg.norm(np.diff(path, axis=0), axis=1) for path in paths])
 
 
 @pytest.mark.parametrize("slope", [0.0, 500.0], ids=["tensions", "springs"])
