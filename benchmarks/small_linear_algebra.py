@@ -101,7 +101,7 @@ def main(path: Path) -> None:
     rng = np.random.default_rng(0)
     work, gravity = new_work(chain.units, chain.tendons), gravity_in_base(1.0)
     free = np.zeros(chain.tendons)
-    pull = Pull(free, free, free, free, np.zeros((chain.units, 2)))
+    pull = Pull(free, free, free, free, np.zeros((chain.units, 2)), 0.0, np.zeros((chain.units, chain.tendons)))
     evaluate(chain, rng.uniform(-0.1, 0.1, 2 * chain.units), gravity, pull, work.state)
     hessian = find_hessian(gravity, pull, work.state)
     matrix = np.triu(hessian.left.T @ hessian.right, 1)

@@ -4,15 +4,13 @@
 
 Needs filtered trials with slow pulls (`static_pull`); of those whose name ends in `_back` the motors came from beyond.
 The CAD model's stiffness, hardening, place of joints, motor gain, mount tilt and rest shape are fitted to tilts and
-pulls at rest of the split identify, with and without friction; `test` is never read. Where a tendon turns by an angle θ
-at a hole over which it slides, its tension falls by exp(-μ θ) against the sliding. Pulls and backs may slide the same
-way, opposite ways (the law, if nothing but the motors moves the tendons), or have a μ each, positive where tension
-falls to the tip.
+pulls at rest of the split identify, with and without friction; `test` is never read. The law of friction is that of
+`trunkline/statics/capstan.py`. Pulls and backs may slide the same way, opposite ways (the law, if nothing but motors
+moves the tendons), or have a μ each, positive where tension falls to the tip.
 """
 
 import argparse
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -28,21 +26,13 @@ from trunkline.identification.parameters import PARAMETERS, candidate_fields, se
 from trunkline.identification.pose_fit import fit_pose
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.results import recorded
-from trunkline.statics.chain import Chain, read_chain
-from trunkline.statics.continuation import SLACK
-from trunkline.statics.energy import Pull
-from trunkline.statics.equilibria import actuated, plain
-from trunkline.statics.kernel import kernel
-from trunkline.statics.newton import find_equilibrium, new_work
-from trunkline.statics.vectors import copy, dot, plus, turned, vector
+from trunkline.statics.chain import read_chain
+from trunkline.statics.equilibria import actuated
 from trunkline.trials.splits import DECIDING, IDENTIFY, VALIDATE
 from trunkline.trials.trial import Trial, read_trials
 
 TRIALS = Path("data/processed/filter")
 KINDS = ("static_tilt", "static_pull")
-SLIP = 5e-4  # m of sliding within which friction builds up
-ROUNDS = 40  # of tensions and shapes in turn
-BALANCED = 1e-6  # N m, change of a joint's torque at which they end
 STEP = 1e-3  # of differences, on the axis of `Parameter.coordinate`
 BOUNDS = {"stiffness": (0.3, 12.0), "hardening": (0.02, 20.0), "joint_place": (-0.2, 1.0), "kp": (100.0, 6000.0)}
 BOUNDS |= dict.fromkeys(("mount_tilt_x", "mount_tilt_y"), (-0.1, 0.1))
@@ -56,116 +46,6 @@ FORMS = {
     "back against the way in": np.array([[1.0], [-1.0]]),
     "a μ each": np.eye(2),
 }
-
-
-@kernel
-def find_chords(chain, state, chords, turns):
-    """Fill the lengths (n, K), m, of the tendons' chords across the joints, and the angles (n, K), rad, by which a
-    tendon turns at the hole before each. It comes to the first along the arm's axis."""
-    units, tendons = chords.shape
-    along = vector(chain.offset, 1)
-    axis = plus((0.0, 0.0, 0.0), 1 / np.sqrt(dot(along, along)), along)
-    for t in range(tendons):
-        before = axis
-        for i in range(units):
-            chord = _turned(state.rotation[i], vector(chain.hole_out[i], t))
-            near = vector(chain.hole_in[i], t)
-            chord = plus(chord, -1.0, _turned(state.rotation[i - 1], near) if i else near)
-            chords[i, t] = np.sqrt(dot(chord, chord))
-            chord = plus((0.0, 0.0, 0.0), 1 / chords[i, t], chord)
-            apart = plus(chord, -1.0, before)
-            turns[i, t] = 2 * np.arcsin(min(0.5 * np.sqrt(dot(apart, apart)), 1.0))
-            before = chord
-
-
-@kernel
-def _turned(rotation, v):
-    return turned((vector(rotation, 0), vector(rotation, 1), vector(rotation, 2)), v)
-
-
-@kernel
-def fall(chords, loose, turns, friction, shares):
-    """Fill the tension on each chord over that at the motor, exp(-Σ μ θ s), (n, K): s from -1 to 1, the side to which
-    the tendon has slid at each hole since its chords were `loose` (n, K) m, positive to the motor."""
-    units, tendons = chords.shape
-    for t in range(tendons):
-        beyond, exponent = 0.0, 0.0
-        for i in range(units):
-            beyond += loose[i, t] - chords[i, t]
-        for i in range(units):
-            exponent -= friction * turns[i, t] * min(max(beyond / SLIP, -1.0), 1.0)
-            shares[i, t] = np.exp(exponent)
-            beyond -= loose[i, t] - chords[i, t]
-
-
-@kernel
-def come_to_rest(chain, loose, gravities, commands, frictions, qpos, tensions, good):
-    """Equilibria under position actuators with friction, from the joint angles `qpos` (B, nq), which it overwrites.
-
-    loose (B, n, K): m, chords where nothing pulls. gravities (B, 3). commands (B, K): m. frictions (B,): μ.
-    tensions (B, K): N, at the motors, to be filled.
-    """
-    units, tendons = chain.crosses.shape
-    chords, turns, shares = np.zeros((units, tendons)), np.zeros((units, tendons)), np.ones((units, tendons))
-    for row in range(len(qpos)):
-        work = new_work(units, tendons)
-        torque = np.zeros((units, 2))  # what friction takes from the tendons' torques
-        pull = Pull(np.zeros(tendons), chain.gain, commands[row], chain.max_tension, torque)
-        good[row] = False
-        for _ in range(ROUNDS):
-            _, _, _, stable = find_equilibrium(chain, qpos[row], gravities[row], pull, False, work)
-            find_chords(chain, work.state, chords, turns)
-            fall(chords, loose[row], turns, frictions[row], shares)
-            change = 0.0
-            for i in range(units):
-                for h in range(2):
-                    taken = 0.0
-                    for t in range(tendons):
-                        taken += work.state.tensions[t] * (1 - shares[i, t]) * work.state.jacobian[t, 2 * i + h]
-                    change = max(change, abs(taken - torque[i, h]))
-                    torque[i, h] = taken
-            if change < BALANCED:
-                good[row] = stable
-                break
-        copy(work.state.tensions, tensions[row])
-
-
-@kernel
-def chords_at(chain, qpos, gravities, chords):
-    """Fill the chords (B, n, K), m, at equilibria without pull, from the joint angles `qpos`, which it overwrites."""
-    units, tendons = chain.crosses.shape
-    turns, nothing, slack = np.zeros((units, tendons)), np.zeros(tendons), np.full(tendons, SLACK)
-    for row in range(len(qpos)):
-        work = new_work(units, tendons)
-        pull = Pull(nothing, chain.gain, slack, chain.max_tension, np.zeros((units, 2)))
-        find_equilibrium(chain, qpos[row], gravities[row], pull, False, work)
-        find_chords(chain, work.state, chords[row], turns)
-
-
-@dataclass
-class Rest:
-    """B shapes at rest. qpos: rad (B, nq). tensions: at the motors, N (B, K). good: whether it was found (B,)."""
-
-    qpos: np.ndarray
-    tensions: np.ndarray
-    good: np.ndarray
-
-
-def rest(chain: Chain, commands: np.ndarray, gravity: np.ndarray, friction: np.ndarray, guess: np.ndarray) -> Rest:
-    """Shapes at rest with capstan friction.
-
-    Args:
-        commands: target path lengths, m. Shape (B, K).
-        gravity: in the base frame, m/s². Shape (B, 3).
-        friction: μ, positive where the motors drew the tendons in last. Shape (B,).
-        guess: joint angles to start from, rad. Shape (B, nq).
-    """
-    count = len(commands)
-    loose = np.zeros((count, chain.units, chain.tendons))
-    chords_at(chain, np.tile(chain.rest.ravel(), (count, 1)), plain(gravity), loose)
-    found = Rest(plain(guess), np.zeros((count, chain.tendons)), np.zeros(count, np.bool_))
-    come_to_rest(chain, loose, plain(gravity), plain(commands), plain(friction), found.qpos, found.tensions, found.good)
-    return found
 
 
 class Fitted:
@@ -185,7 +65,6 @@ class Fitted:
         self._back = np.array([trial.name.endswith("_back") for trial in trials], dtype=int)
         self._commands = np.array([commanded_lengths(trial, model)[0] for trial in trials])
         self._seen = np.array([trial.positions[0] for trial in trials])
-        self._guess: np.ndarray | None = None
         fitted = np.array([trial.split == IDENTIFY for trial in trials])
         low, high = (
             np.array([*(PARAMETERS[name].coordinate(span[end]) for name, span in BOUNDS.items()),
@@ -223,17 +102,16 @@ class Fitted:
         chain = read_chain(model)
         turn = rotation_from_wxyz(model.body("base").quat)
         gravity = turn.inv().apply([trial.gravity for trial in self._trials])
-        if self._guess is None:
-            self._guess = actuated(chain, self._commands, gravity).qpos
-        friction = (self._form @ vector[len(BOUNDS) :] if vector.size else np.zeros(2))[self._back]
-        found = rest(chain, self._commands, gravity, friction, self._guess)
-        self._guess = np.where(found.good[:, None], found.qpos, self._guess)
+        friction = self._form @ vector[len(BOUNDS) :] if vector.size else np.zeros(2)
         data, sites = mujoco.MjData(model), [model.site(f"{s}_center").id for s in self._trials[0].segments]
         positions = np.full(self._seen.shape, np.nan)
-        for row in np.flatnonzero(found.good):
-            data.qpos[:] = found.qpos[row]
-            mujoco.mj_kinematics(model, data)
-            positions[row] = data.site_xpos[sites]
+        for side, coefficient in enumerate(friction):
+            rows = np.flatnonzero(self._back == side)
+            found = actuated(chain._replace(capstan=float(coefficient)), self._commands[rows], gravity[rows])
+            for row, qpos in zip(rows[found.converged], found.qpos[found.converged], strict=True):
+                data.qpos[:] = qpos
+                mujoco.mj_kinematics(model, data)
+                positions[row] = data.site_xpos[sites]
         return positions
 
     def _distances(self, vector: np.ndarray) -> np.ndarray:

@@ -28,13 +28,15 @@ def bent(chain, seed=0, reach=0.5):
     return np.random.default_rng(seed).uniform(-reach, reach, 2 * chain.units)
 
 
-def pulls(chain):
+def pulls(chain, friction=0.0):
     """One tendon at a fixed tension, one on a spring, one at its ceiling."""
     lengths = chain.straight_lengths
     slope, ceiling = np.array([0.0, 800.0, 800.0]), np.array([np.inf, 1e4, 3.0])
+    loose = np.linalg.norm(chain.hole_out - chain.hole_in, axis=2)
     return energy.Pull(
-        np.array([4.0, 0.0, 1.0]), slope, lengths - [0.0, 0.05, 0.2], ceiling, np.full((chain.units, 2), 0.01)
-    )
+        np.array([4.0, 0.0, 1.0]), slope, lengths - [0.0, 0.05, 0.2], ceiling, np.full((chain.units, 2), 0.01),
+        friction, loose,
+    )  # fmt: skip
 
 
 def dense(hessian):
@@ -111,7 +113,7 @@ def test_passive_torques_are_mujocos(model, chain):
     model.opt.gravity[:] = GRAVITY
     data.qpos[:] = q
     mujoco.mj_forward(model, data)
-    nothing = energy.Pull(*np.zeros((4, 3)), np.zeros((chain.units, 2)))
+    nothing = energy.Pull(*np.zeros((4, 3)), np.zeros((chain.units, 2)), 0.0, np.zeros((chain.units, 3)))
     state = new_state(chain.units, 3)
     energy.evaluate(chain, q, GRAVITY, nothing, state)
     torque = data.qfrc_passive - data.qfrc_bias

@@ -2,22 +2,23 @@
 
 import numpy as np
 
+from trunkline.statics.capstan import solve_for
 from trunkline.statics.energy import evaluate, is_elastic
-from trunkline.statics.factor import solve
 from trunkline.statics.kernel import kernel
 
 
 @kernel
 def _cable_columns(pull, hessian, work):
-    """Fill work.columns with H⁻¹ J_tᵀ and work.schur with J H⁻¹ Jᵀ for the taut tendons; zero the others."""
+    """Fill work.columns with H⁻¹ J_tᵀ (with friction, H⁻¹ on the torques of 1 N at the motor) and work.schur with
+    J H⁻¹ Jᵀ for the taut tendons; zero the others."""
     tendons, nq = work.columns.shape
     state = work.state
     for t in range(tendons):
         taut = is_elastic(state, pull, t)
         for j in range(nq):
-            work.columns[t, j] = state.jacobian[t, j] if taut else 0.0
+            work.columns[t, j] = state.share[j // 2, t] * state.jacobian[t, j] if taut else 0.0
         if taut:
-            solve(hessian, work.factor, work.columns[t])
+            solve_for(hessian, pull, work, work.columns[t])
     for t in range(tendons):
         for s in range(tendons):
             total = 0.0
@@ -86,5 +87,5 @@ def update_multipliers(chain, q, gravity, pull, hessian, work):
     if not np.dot(state.gradient, work.step) < 0:
         for j in range(nq):
             work.step[j] = -state.gradient[j]
-        solve(hessian, work.factor, work.step)
+        solve_for(hessian, pull, work, work.step)
     return energy

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from trunkline.elements import cables
+from trunkline.elements import cables, capstan_friction
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances
@@ -40,6 +40,7 @@ class Chain(NamedTuple):
         fixed_length: length of the path between sites on one body, m. Shape (K,).
         gain: position gain of the tendon's actuator, N/m. Shape (K,).
         max_tension: largest pull of the tendon's actuator, N. Shape (K,).
+        capstan: μ of capstan friction; less than zero stands for an arm let go, see `trunkline/statics/capstan.py`.
         tip: tip site from the last joint, m. Shape (3,).
         tip_quaternion: orientation of the tip site in the reference configuration. Shape (4,).
     """
@@ -61,6 +62,7 @@ class Chain(NamedTuple):
     fixed_length: np.ndarray
     gain: np.ndarray
     max_tension: np.ndarray
+    capstan: float
     tip: np.ndarray
     tip_quaternion: np.ndarray
 
@@ -129,6 +131,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         fixed_length=fixed_length,
         gain=model.actuator_gainprm[order, 0],
         max_tension=_max_tensions(model, order),
+        capstan=capstan_friction(model),
         tip=tip - anchors[-1],
         tip_quaternion=tip_quaternion,
     )

@@ -31,16 +31,16 @@ class Found(NamedTuple):
 
 @kernel
 def solve_paths(
-    first, last, chain, all_tensions, all_lengths, gravities, slope, ceiling, torques, cables, found
+    first, last, chain, all_tensions, all_lengths, gravities, slope, ceiling, torques, all_loose, cables, found
 ):  # fmt: skip
     """Paths `first` to `last` (not included) into `found`: weight first, then the pulls one after the other."""
     steps, tendons = all_tensions.shape[1:]
     for path in range(first, last):
-        gravity, torque = gravities[path], torques[path]
+        gravity, torque, loose = gravities[path], torques[path], all_loose[path]
         work = new_work(chain.mass.shape[0], tendons)
         q = chain.rest.copy().reshape(-1)
-        slack = Pull(np.zeros(tendons), slope, np.full(tendons, SLACK), ceiling, torque)
-        here = Pull(np.zeros(tendons), slope, np.zeros(tendons), ceiling, torque)
+        slack = Pull(np.zeros(tendons), slope, np.full(tendons, SLACK), ceiling, torque, 0.0, loose)
+        here = Pull(np.zeros(tendons), slope, np.zeros(tendons), ceiling, torque, chain.capstan, loose)
         loss, total, good, jumped = _follow(chain, q, np.zeros(3), gravity, slack, slack, cables, work)
         copy(work.state.lengths, here.length)
         if cables:
@@ -50,7 +50,8 @@ def solve_paths(
             for t in range(tendons):
                 here.length[t] = all_lengths[path, 0, t] + spare
         for step in range(steps):
-            goal = Pull(all_tensions[path, step].copy(), slope, all_lengths[path, step].copy(), ceiling, torque)
+            tension, length = all_tensions[path, step].copy(), all_lengths[path, step].copy()
+            goal = Pull(tension, slope, length, ceiling, torque, chain.capstan, loose)
             if good:
                 loss, more, good, snap = _follow(chain, q, gravity, gravity, here, goal, cables, work)
                 total += more
@@ -87,7 +88,8 @@ def _follow(chain, q, start_gravity, gravity, start, pull, cables, work):
     Returns (residual, iterations, converged, snapped): snapped where the branch ended (a fold) and the arm jumped.
     """
     tendons = pull.tension.shape[0]
-    now = Pull(start.tension.copy(), pull.slope, start.length.copy(), pull.ceiling, pull.torque)
+    tension, length = start.tension.copy(), start.length.copy()
+    now = Pull(tension, pull.slope, length, pull.ceiling, pull.torque, pull.friction, pull.loose)
     begin, known = now.tension.copy(), q.copy()
     loads = start_gravity.copy()
     done, share, total, snapped, residual = 0.0, 1.0, 0, False, 0.0

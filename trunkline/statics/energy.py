@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trunkline.statics.capstan import add_tendon_rows, complete_derivatives, share_tensions
 from trunkline.statics.factor import Hessian
 from trunkline.statics.kernel import kernel
 from trunkline.statics.limits import limit_energy, limit_torque
@@ -21,7 +22,7 @@ from trunkline.statics.vectors import cross, dot, plus, turned, vector
 class Pull(NamedTuple):
     """How the tendons pull, and constant torques at the joints: none, or dry friction where its band is sought.
 
-    Units N, N/m, m, N, N m. Shapes (K,), torque (n, 2).
+    Units N, N/m, m, N, N m, 1, m. Shapes (K,), torque (n, 2), friction (), loose (n, K), not read without friction.
     """
 
     tension: np.ndarray  # λ
@@ -29,6 +30,8 @@ class Pull(NamedTuple):
     length: np.ndarray  # L
     ceiling: np.ndarray  # F
     torque: np.ndarray
+    friction: float  # μ of capstan friction
+    loose: np.ndarray  # chords where nothing pulls
 
 
 @kernel
@@ -54,7 +57,8 @@ def pull_tensions(state, pull):
 
 @kernel
 def evaluate(chain, q, gravity, pull, state):
-    """Fill `state`, all but the room for the Hessian; return the energy E(q), J.
+    """Fill `state`, all but the room for the Hessian; return the energy E(q), J: what Newton's method makes small.
+    With capstan friction, which has no energy, that is half the squared gradient, (N m)².
 
     Args:
         q: joint angles, rad. Shape (nq,).
@@ -63,6 +67,9 @@ def evaluate(chain, q, gravity, pull, state):
     """
     place(chain, q, state)
     energy = pull_tensions(state, pull)
+    rubbing = pull.friction != 0
+    if rubbing:
+        share_tensions(chain, q, pull, state)
     rest, stiffness, limit, extra = chain.rest, chain.stiffness, chain.limit, pull.torque
     tensions, jacobian, gradient = state.tensions, state.jacobian, state.gradient
     for j in range(q.shape[0]):
@@ -79,9 +86,10 @@ def evaluate(chain, q, gravity, pull, state):
             state.stiffness[j] += slope
             torque += push if q[j] > limit[i, h, 1] else -push
         for t in range(tensions.shape[0]):
-            torque += tensions[t] * jacobian[t, j]
+            torque += tensions[t] * state.share[i, t] * jacobian[t, j]
         gradient[j] = torque
-    return energy + _add_gravity(chain, gravity, state)
+    energy += _add_gravity(chain, gravity, state)
+    return 0.5 * np.dot(gradient, gradient) if rubbing else energy
 
 
 @kernel
@@ -110,7 +118,9 @@ def _add_gravity(chain, gravity, state):
 
 @kernel
 def find_hessian(gravity, pull, state):
-    """The Hessian at the last `evaluate`, of the same gravity and pull, in the room that `state` has for it."""
+    """The Hessian at the last `evaluate`, of the same gravity and pull, in the room that `state` has for it.
+    With friction, the derivatives of the gradient on and above the blocks; those below are in `state.rub`.
+    """
     tensions, jacobian, chord_hessian, stiffness = state.tensions, state.jacobian, state.chord_hessian, state.stiffness
     hinges, moments, left, right, block = state.hinge, state.moment, state.left, state.right, state.block
     # gravity: ∂²E/∂q_h∂q_h' = -(g x a_h)·(a_h' x moment of h'), h the hinge nearer to the base
@@ -121,9 +131,12 @@ def find_hessian(gravity, pull, state):
             axis, j = vector(hinges[i], h), 2 * i + h
             left[0, j], left[1, j], left[2, j] = cross(axis, g)
             right[0, j], right[1, j], right[2, j] = cross(axis, moment)
-    rank = 3
+    rank, rubbing = 3, pull.friction != 0
     for t in range(tensions.shape[0]):
-        if is_elastic(state, pull, t):
+        if rubbing:
+            add_tendon_rows(t, pull.slope[t] if is_elastic(state, pull, t) else 0.0, pull, state)
+            rank += 1
+        elif is_elastic(state, pull, t):
             for j in range(jacobian.shape[1]):
                 left[rank, j] = pull.slope[t] * jacobian[t, j]
                 right[rank, j] = jacobian[t, j]
@@ -132,14 +145,17 @@ def find_hessian(gravity, pull, state):
         a, b = 2 * i, 2 * i + 1
         aa, ab, bb = stiffness[a], 0.0, stiffness[b]
         for t in range(tensions.shape[0]):
-            aa += tensions[t] * chord_hessian[i, t, 0]
-            ab += tensions[t] * chord_hessian[i, t, 1]
-            bb += tensions[t] * chord_hessian[i, t, 2]
+            tension = tensions[t] * state.share[i, t]
+            aa += tension * chord_hessian[i, t, 0]
+            ab += tension * chord_hessian[i, t, 1]
+            bb += tension * chord_hessian[i, t, 2]
         for m in range(rank):
             aa += left[m, a] * right[m, a]
             ab += left[m, a] * right[m, b]
             bb += left[m, b] * right[m, b]
         block[i, 0], block[i, 1], block[i, 2] = aa, ab, bb
+    if rubbing:
+        complete_derivatives(pull, state)
     return Hessian(left[:rank], right[:rank], block)
 
 

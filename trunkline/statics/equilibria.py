@@ -3,6 +3,7 @@
 Three ways to say how the tendons pull: by tensions (`equilibrium`, `equilibrium_paths`), by the lengths of
 inextensible cables (`forward`), by the commands of the model's position actuators (`actuated`).
 All start from the arm at rest without pull, its weight growing from nothing, and follow that branch of equilibria.
+Where the chain has capstan friction, its tendons have been drawn in from there; tensions are those at the motors.
 """
 
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.statics.chain import Chain
 from trunkline.statics.continuation import Found, solve_paths
 from trunkline.statics.kernel import over_rows
+from trunkline.statics.placement import place_chords
 
 PENALTY = 1e5  # N/m, stiffness by which Newton feels a cable before its multiplier is known; no result depends on it
 
@@ -127,12 +129,30 @@ def follow(
         raise ValueError(f"found {tendons} tendons, expected {chain.tendons}")
     if torques is None:
         torques = np.zeros((paths, chain.units, 2))
-    found = room(chain, paths * steps)
+    found, gravities = room(chain, paths * steps), plain(gravity, (paths, 3))
     over_rows(
-        solve_paths, paths, chain, plain(tensions), plain(lengths), plain(gravity, (paths, 3)), plain(slope),
-        plain(ceiling, (tendons,)), plain(torques), cables, found,
+        solve_paths, paths, chain, plain(tensions), plain(lengths), gravities, plain(slope), plain(ceiling, (tendons,)),
+        plain(torques), loose_chords(chain, gravities), cables, found,
     )  # fmt: skip
     return equilibria(chain, found)
+
+
+def loose_chords(chain: Chain, gravities: np.ndarray) -> np.ndarray:
+    """What capstan friction counts sliding from: the tendons' chords across the joints, m, of the arm without pull.
+
+    Args:
+        gravities: Shape (B, 3).
+
+    Returns:
+        Shape (B, n, K), zero where the chain has no friction.
+    """
+    if chain.capstan == 0:
+        return np.zeros((len(gravities), chain.units, chain.tendons))
+    distinct, which = np.unique(gravities, axis=0, return_inverse=True)
+    chords = np.zeros((len(distinct), chain.units, chain.tendons))
+    hanging = equilibrium(chain._replace(capstan=0.0), np.zeros((len(distinct), chain.tendons)), distinct)
+    over_rows(place_chords, len(distinct), chain, hanging.qpos, chords)
+    return chords[which.reshape(-1)]
 
 
 def plain(values: np.ndarray | float, shape: tuple | None = None) -> np.ndarray:

@@ -18,7 +18,8 @@ from trunkline.statics.kernel import kernel
 
 
 class Hessian(NamedTuple):
-    """Shapes: left, right (r, nq), block (n, 3): the entries (1, 1), (1, 2) and (2, 2) of each unit's block."""
+    """Shapes: left, right (r, nq), block (n, 4): the entries (1, 1), (1, 2) and (2, 2) of each unit's block, and
+    (2, 1) where friction makes it another."""
 
     left: np.ndarray
     right: np.ndarray
@@ -26,17 +27,20 @@ class Hessian(NamedTuple):
 
 
 class Factor(NamedTuple):
-    """Upper U with H = Uᵀ U. Shapes: row (r, nq), block (n, 3), total (r, r): Σ row rowᵀ so far."""
+    """Upper U with H = Uᵀ U. Shapes: row (r, nq), block (n, 4), total (r, r): Σ row rowᵀ so far. `column` (r, nq) is
+    for L in its place where friction makes H unsymmetric, see `capstan.eliminate`."""
 
     row: np.ndarray
     block: np.ndarray
     total: np.ndarray
+    column: np.ndarray
 
 
 @kernel
 def new_factor(units, rank):
     """Room for the factor of a Hessian of `units` units whose rank is at most `rank`."""
-    return Factor(np.zeros((rank, 2 * units)), np.zeros((units, 3)), np.zeros((rank, rank)))
+    row, column = np.zeros((rank, 2 * units)), np.zeros((rank, 2 * units))
+    return Factor(row, np.zeros((units, 4)), np.zeros((rank, rank)), column)
 
 
 @kernel

@@ -3,7 +3,8 @@
 Quasi-statically, on the way to a sample in the direction in which its tensions grow in proportion, every tendon and
 every joint slides; friction then is at its full value against the way of each (Coulomb). On the way back it is the
 other way round. So the ends of the band are equilibria with the motors' commands of the sample and, with dl and dq
-the changes on the way in, friction of tendons as tensions ±f sign(dl) and of joints as torques ∓c sign(dq).
+the changes on the way in, friction of tendons as tensions ±f sign(dl) and of joints as torques ∓c sign(dq). Capstan
+friction, which the sample has already, acts at the other end the other way: with -μ.
 """
 
 from dataclasses import dataclass
@@ -49,7 +50,7 @@ def friction_band(
     """Both ends of the band for N samples, their position actuators' commands held.
 
     Args:
-        tensions: of the samples at rest without friction, N. Shape (N, K).
+        tensions: of the samples at rest, with no friction but capstan friction, N. Shape (N, K).
         gravity: m/s². Shape (N, 3).
         tendon_friction: N. Shape (K,).
         joint_friction: N m. Shape (n, 2).
@@ -61,8 +62,9 @@ def friction_band(
     doubled = with_friction(chain)
     ends = []
     for side in (1, -1):
+        slid = doubled._replace(capstan=side * chain.capstan)
         torques = -side * joint_friction * slides[1]
-        end = _held(doubled, commands, side * tendon_friction * slides[0], torques, gravity)
+        end = _held(slid, commands, side * tendon_friction * slides[0], torques, gravity)
         found = (here.converged & end.converged)[:, None]
         ends.append(np.where(found, end.position, np.nan))
     return Band(*ends)

@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.statics.cables import update_multipliers
+from trunkline.statics.capstan import factorize_for, solve_for
 from trunkline.statics.energy import evaluate, find_hessian, is_elastic
-from trunkline.statics.factor import Factor, factorize, new_factor, solve
+from trunkline.statics.factor import Factor, new_factor
 from trunkline.statics.kernel import kernel
 from trunkline.statics.placement import State, new_state
 from trunkline.statics.vectors import largest
@@ -47,16 +48,16 @@ def new_work(units, tendons):
 
 
 @kernel
-def _factorize_shifted(hessian, factor):
+def _factorize_shifted(hessian, pull, work):
     """Factor the Hessian, its diagonal raised until it is positive definite; True if it was so as given."""
-    if factorize(hessian, factor):
+    if factorize_for(hessian, pull, work):
         return True
     shift = SHIFT
     while shift < LARGEST_SHIFT:
         for i in range(hessian.block.shape[0]):
             hessian.block[i, 0] += shift
             hessian.block[i, 2] += shift
-        if factorize(hessian, factor):
+        if factorize_for(hessian, pull, work):
             break
         shift *= 4
     return False
@@ -77,12 +78,12 @@ def find_equilibrium(chain, q, gravity, pull, cables, work):
     residual, stretch = _imbalance(state, pull, cables)
     for iteration in range(MAX_ITERATIONS):
         hessian = find_hessian(gravity, pull, state)
-        stable = _factorize_shifted(hessian, work.factor)
+        stable = _factorize_shifted(hessian, pull, work)
         if residual <= TORQUE_TOLERANCE and stretch <= LENGTH_TOLERANCE:
             return residual, stretch, iteration, stable
         for j in range(nq):
             work.step[j] = -state.gradient[j]
-        solve(hessian, work.factor, work.step)
+        solve_for(hessian, pull, work, work.step)
         if cables:
             energy = update_multipliers(chain, q, gravity, pull, hessian, work)
         energy, moved = _line_search(chain, q, gravity, pull, work, energy)
@@ -107,10 +108,13 @@ def _imbalance(state, pull, cables):
 def _line_search(chain, q, gravity, pull, work, energy):
     """Backtrack along work.step from q, overwriting it; return the energy there and whether a step was found."""
     state, nq = work.state, q.shape[0]
-    slope = np.dot(state.gradient, work.step)
+    gradient = state.gradient
+    slope = np.dot(gradient, work.step)
+    if pull.friction != 0:
+        slope = -np.dot(gradient, gradient)  # of ½|∇E|² along the step
     longest = largest(work.step)
     share = min(1.0, MAX_STEP / longest) if longest > 0 else 1.0
-    rounding = 1e-13 * max(1.0, abs(energy))
+    rounding = 0.0 if pull.friction != 0 else 1e-13 * max(1.0, abs(energy))
     for _ in range(40):
         for j in range(nq):
             work.trial[j] = q[j] + share * work.step[j]

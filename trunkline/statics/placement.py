@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from trunkline.statics.capstan import Rub, new_rub
 from trunkline.statics.kernel import kernel
 from trunkline.statics.vectors import copy, cross, dot, plus, product, turn_about, turned, vector
 
@@ -12,10 +13,12 @@ class State(NamedTuple):
     """Everything that is computed from the joint angles; one per thread, filled in place.
 
     Shapes: rotation (n, 3, 3), position (n, 3), hinge (n, 2, 3), moment (n, 3), lengths (K,), tensions (K,),
-    jacobian (K, nq), chord_hessian (n, K, 3), gradient, stiffness (nq,), left and right (3 + K, nq), block (n, 3).
+    jacobian (K, nq), chord and share (n, K), chord_hessian (n, K, 3), gradient, stiffness (nq,), left and right
+    (3 + K, nq), block (n, 4).
     rotation, position and hinge are in the base frame; moment is the first moment Σ m (x - position) of the unit and
-    all after it; stiffness is that of
-    each joint by itself, springs and limit, N m/rad; left, right and block are room for the `factor.Hessian`.
+    all after it; stiffness is that of each joint by itself, springs and limit, N m/rad; chord is the length of each
+    tendon across each joint, m, and share its tension there over that at the motor, 1 without friction; left, right and
+    block are room for the `factor.Hessian`.
     """
 
     rotation: np.ndarray
@@ -25,12 +28,15 @@ class State(NamedTuple):
     lengths: np.ndarray
     tensions: np.ndarray
     jacobian: np.ndarray
+    chord: np.ndarray
+    share: np.ndarray
     chord_hessian: np.ndarray
     gradient: np.ndarray
     stiffness: np.ndarray
     left: np.ndarray
     right: np.ndarray
     block: np.ndarray
+    rub: Rub
 
 
 @kernel
@@ -45,12 +51,15 @@ def new_state(units, tendons):
         np.zeros(tendons),
         np.zeros(tendons),
         np.zeros((tendons, nq)),
+        np.zeros((units, tendons)),
+        np.ones((units, tendons)),
         np.zeros((units, tendons, 3)),
         np.zeros(nq),
         np.zeros(nq),
         np.zeros((3 + tendons, nq)),
         np.zeros((3 + tendons, nq)),
-        np.zeros((units, 3)),
+        np.zeros((units, 4)),
+        new_rub(units, tendons),
     )
 
 
@@ -80,6 +89,17 @@ def place(chain, q, state):
 
 
 @kernel
+def place_chords(first, last, chain, qpos, chords):
+    """Fill the tendons' chords (B, n, K), m, at joint angles (B, nq), rows `first` to `last`."""
+    units, tendons = chain.crosses.shape
+    state = new_state(units, tendons)
+    for row in range(first, last):
+        place(chain, qpos[row], state)
+        for i in range(units):
+            copy(state.chord[i], chords[row, i])
+
+
+@kernel
 def _place_chords(chain, i, local, first_axis, second_axis, state):
     """The tendons' chords d from the hole before joint i to the hole after it, all in the frame before the joint."""
     crosses, hole_in, hole_out = chain.crosses, chain.hole_in[i], chain.hole_out[i]
@@ -93,6 +113,7 @@ def _place_chords(chain, i, local, first_axis, second_axis, state):
         d1, d2 = cross(first_axis, x), cross(second_axis, x)
         j1, j2 = dot(d, d1) / length, dot(d, d2) / length
         lengths[t] += length
+        state.chord[i, t] = length
         jacobian[t, 2 * i], jacobian[t, 2 * i + 1] = j1, j2
         chord_hessian[i, t, 0] = (dot(d1, d1) + dot(d, cross(first_axis, d1)) - j1 * j1) / length
         chord_hessian[i, t, 1] = (dot(d1, d2) + dot(d, cross(first_axis, d2)) - j1 * j2) / length

@@ -9,7 +9,7 @@ import numpy as np
 from trunkline.statics.chain import Chain
 from trunkline.statics.continuation import record
 from trunkline.statics.energy import Pull
-from trunkline.statics.equilibria import PENALTY, Equilibrium, equilibria, plain, room
+from trunkline.statics.equilibria import PENALTY, Equilibrium, equilibria, loose_chords, plain, room
 from trunkline.statics.kernel import kernel, over_rows
 from trunkline.statics.newton import find_equilibrium, new_work
 
@@ -26,18 +26,20 @@ def restart(
         gravity: m/s². Shape (3,) or (B, 3).
     """
     count = len(qpos)
-    found = room(chain, count)
+    found, gravities = room(chain, count), plain(gravity, (count, 3))
     found.qpos[:], found.tensions[:] = qpos, tensions
-    over_rows(_restart, count, chain, plain(lengths), plain(gravity, (count, 3)), PENALTY, found)
+    loose = loose_chords(chain, gravities)
+    over_rows(_restart, count, chain, plain(lengths), gravities, PENALTY, loose, found)
     return equilibria(chain, found)
 
 
 @kernel
-def _restart(first, last, chain, all_lengths, gravities, penalty, found):
+def _restart(first, last, chain, all_lengths, gravities, penalty, all_loose, found):
     units, tendons = chain.mass.shape[0], all_lengths.shape[1]
     slope, ceiling, torque = np.full(tendons, penalty), np.full(tendons, np.inf), np.zeros((units, 2))
     for row in range(first, last):
         work = new_work(units, tendons)
-        pull = Pull(found.tensions[row].copy(), slope, all_lengths[row], ceiling, torque)
+        tension, loose = found.tensions[row].copy(), all_loose[row]
+        pull = Pull(tension, slope, all_lengths[row], ceiling, torque, chain.capstan, loose)
         residual, _, total, good = find_equilibrium(chain, found.qpos[row], gravities[row], pull, True, work)
         record(found, row, work.state, residual, total, good)
