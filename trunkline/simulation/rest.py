@@ -44,7 +44,7 @@ def settle(
     seconds: float = 10.0,
     rest_speed: float = FINE_SPEED,
     tip_site: str = "tip",
-    creep: float = 30.0,
+    creep: float = 3.0,
 ) -> Settled:
     """Let the model hang, draw its tendons in, and step until it rests: the reference for the statics.
 
