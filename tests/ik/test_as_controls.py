@@ -1,10 +1,13 @@
 """Commands as a user sends them: exact ones bring MuJoCo's tip home, lengths sent in their place do not."""
 
+import copy
+
 import numpy as np
 import pytest
 
 from tests.support.bent_chain import stump
 from trunkline.frames import gravity_in_base
+from trunkline.ik import as_controls
 from trunkline.ik.as_controls import AsControls, draw_targets, driven, score, settled
 from trunkline.ik.polish import polish
 from trunkline.simulation.drive import drive
@@ -93,7 +96,27 @@ def test_the_score_has_the_rig_beside_the_model(model, chain):
     assert on_plant["targets"] == 4
     assert 0.5 < on_plant["position_error_mm"]["median"] < 1.5
     assert on_model["frictionless"]["position_error_mm"]["max"] < 0.02
+    assert on_model["friction"]["dry_friction"]["tendons_n"] == model.tendon_frictionloss.max() > 0
     assert score(model, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, rng)[1] is None
+
+
+def test_a_model_without_friction_is_driven_once_and_damped_at_last(model, chain, monkeypatch):
+    smooth, driven_arms = copy.copy(model), []
+    smooth.tendon_frictionloss[:] = 0
+
+    def counted(model, commands, *rest, **more):
+        driven_arms.append(len(commands))
+        return drive(model, commands, *rest, **more)
+
+    monkeypatch.setattr(as_controls, "drive", counted)
+    settings = AsControls(targets=12, timed=2, on_rig=4, seconds=10.0)
+    found, _ = score(smooth, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, np.random.default_rng(0))
+    assert driven_arms == [2, found["targets"] - 2]
+    friction = found["friction"]
+    assert friction["rested"] == 1.0
+    assert friction["position_error_mm"]["max"] < 0.02
+    assert friction["seconds_to_rest"] == found["frictionless"]["seconds_to_rest"]
+    assert friction["dry_friction"] == {"tendons_n": 0.0, "joints_nm": 0.0, "sliders": 0}
 
 
 def test_tips_of_a_drive_are_in_the_base_frame(model, chain, targets):

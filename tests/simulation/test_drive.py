@@ -7,7 +7,7 @@ import pytest
 
 from tests.support.matched_plant import small_model
 from trunkline.frames import gravity_in_base
-from trunkline.simulation.drive import LOOK, ROW, drive
+from trunkline.simulation.drive import LOOK, ROW, drive, has_friction
 from trunkline.simulation.rest import longest_step, settle
 
 
@@ -52,3 +52,30 @@ def test_an_arm_too_stiff_for_the_longest_step_is_driven_in_shorter_ones():
     own = drive(stiff, command, gravity, 3.0)
     assert own.rested[0]
     np.testing.assert_allclose(own.end, settle(stiff, command, gravity).position, atol=1e-5)
+
+
+def test_a_calmed_arm_rests_where_it_would_have_and_says_no_time_that_it_did_not_have(model):
+    light = copy.copy(model)
+    light.dof_damping[:] /= 20
+    command, gravity = light.tendon_length0 - [[0.01, -0.02, -0.02]], gravity_in_base(0.5)
+    swinging = drive(light, command, gravity, 1.0, friction=False)
+    calmed = drive(light, command, gravity, 1.0, friction=False, calm=True)
+    assert not swinging.rested[0]
+    assert calmed.rested[0]
+    assert np.isnan(calmed.seconds_to_rest[0])
+    there = settle(light, command, gravity).position
+    assert np.linalg.norm(swinging.end - there) > 1e-3
+    np.testing.assert_allclose(calmed.end, there, atol=1e-5)
+    np.testing.assert_array_equal(calmed.tips[:, :-1], swinging.tips)
+    long = drive(model, command, gravity, 12.0, friction=False, calm=True)
+    assert 0 < long.seconds_to_rest[0] < 12.0
+
+
+def test_an_arm_with_friction_is_not_calmed(model):
+    rubbing = copy.copy(model)
+    rubbing.tendon_frictionloss[:] = 0.5
+    assert has_friction(rubbing)
+    command, gravity = rubbing.tendon_length0 - [[0.01, -0.02, -0.02]], gravity_in_base(0.5)
+    with pytest.raises(ValueError, match="found friction"):
+        drive(rubbing, command, gravity, 1.0, calm=True)
+    drive(rubbing, command, gravity, 1.0, friction=False, calm=True)

@@ -13,10 +13,12 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from trunkline.dataset.sampling import around_the_arm
+from trunkline.elements import SLIDER, all_elements
 from trunkline.frames import gravity_in_base
-from trunkline.simulation.drive import drive
+from trunkline.simulation.drive import drive, has_friction
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain
+from trunkline.statics.hysteresis import model_friction
 
 REST_SPEED = 1e-5  # rad/s of the fastest joint of an arm that rests: tips are some 1e-6 m from it
 PATIENCE = 15.0  # s to rest for a pose that is to be a target; one that takes longer is between two shapes
@@ -24,6 +26,7 @@ NEAR_LIMIT = 0.95  # share of its largest force at which a motor is near it: the
 TAUT_SHARE = 0.2  # of the deepest pulls, where all motors pull: more bends hardly more and presses the units together
 SHARE = 0.01  # of the arm's length; a larger error is worth a warning
 DOUBT = 0.8 * SHARE  # from which on a foreseen miss is a reason to doubt: what is foreseen has an error of its own
+SWING = 4.0  # s that an arm without friction swings by itself before it is damped: then it has its shape
 PULL_SHARE = 0.8  # of the deepest pulls of the samples: together, two of them are near the motors' limits
 
 Rig = Callable[[np.ndarray, np.ndarray], np.ndarray]  # m of pull (N, K) and gravity (N, 3), m/s², to tips (N, 3), m
@@ -34,8 +37,9 @@ Ask = Callable[[np.ndarray], dict[str, np.ndarray]]  # as `ask.ask`, of one netw
 class AsControls:
     """See conf/train_ik/config.yaml.
 
-    targets: in all; some of them are left out where a motor is near its limit. timed: how many of them are also driven
-    without friction, to see how long that takes. on_rig: how many a rig is sent. seconds: longest time to rest.
+    targets: in all; some of them are left out where a motor is near its limit. timed: how many of them are driven
+    without friction for as long as it takes, to see how long that is. on_rig: how many a rig is sent. seconds: longest
+    time to rest.
     """
 
     targets: Annotated[int, Field(ge=8, le=100_000)]
@@ -66,7 +70,12 @@ def draw_targets(
     """
     gravity, commands = draw_commands(chain, angles, deepest, count, rng, others_pay_out)
     rest = settle(
-        model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), PATIENCE, rest_speed=REST_SPEED
+        model,
+        commands[:, model.actuator_trnid[:, 0]],
+        gravity_in_base(gravity),
+        PATIENCE,
+        rest_speed=REST_SPEED,
+        creep=0.0,
     )
     tensions = rest.tensions[:, np.argsort(model.actuator_trnid[:, 0])]
     good = rest.rested & (tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
@@ -141,6 +150,9 @@ def score(
 ) -> tuple[dict, dict | None]:
     """The network's commands as sent, without and with friction, and for shapes that the data set has none of.
 
+    "frictionless": drawn in slowly, damped. "friction": sent at once to the model as it is. Where that has no friction,
+    it is damped after SWING s, all but the timed ones; "dry_friction" says what it has, at most.
+
     Args:
         ask: the network, (N, 8) to its answer.
         angles, deepest: as in `draw_targets`.
@@ -150,14 +162,21 @@ def score(
         Metrics of the model, and of the rig beside the model's with friction on the same targets.
     """
     targets = draw_targets(model, chain, angles, PULL_SHARE * deepest, settings.targets, rng)
-    taut = draw_targets(model, chain, angles, TAUT_SHARE * deepest, settings.targets // 4, rng, others_pay_out=False)
-    few = targets[: settings.timed]
-    with_friction = driven(model, ask, targets, settings.seconds)
+    taut = draw_targets(model, chain, angles, TAUT_SHARE * deepest, settings.targets // 8, rng, others_pay_out=False)
+    timed = driven(model, ask, targets[: settings.timed], settings.seconds, friction=False, calm=True)
+    if has_friction(model):
+        sent = driven(model, ask, targets, settings.seconds)
+        seconds = sent.time_to_rest()
+    else:  # all drives are without: those that were timed are the first of them
+        rest = driven(model, ask, targets[settings.timed :], SWING, friction=False, calm=True)
+        sent = Reached(**{name: np.concatenate([values, vars(rest)[name]]) for name, values in vars(timed).items()})
+        seconds = timed.time_to_rest()
+    tendons, joints = model_friction(model)
+    dry = {"tendons_n": tendons.max(), "joints_nm": joints.max(), "sliders": len(all_elements(model, SLIDER))}
     on_model = {
         "targets": len(targets),
-        "frictionless": settled(model, ask, targets).metrics(chain.length)
-        | {"seconds_to_rest": driven(model, ask, few, settings.seconds, friction=False).time_to_rest()},
-        "friction": with_friction.metrics(chain.length),
+        "frictionless": settled(model, ask, targets).metrics(chain.length) | {"seconds_to_rest": timed.time_to_rest()},
+        "friction": sent.metrics(chain.length) | {"seconds_to_rest": seconds, "dry_friction": dry},
         "all_taut": {"targets": len(taut)} | settled(model, ask, taut).metrics(chain.length),
     }
     if rig is None:
@@ -167,7 +186,7 @@ def score(
     pulls = chain.straight_lengths - answer["commands"]  # motors count from the straight arm, as in a session's logs
     on_rig = _reached(few, answer, rig(pulls, gravity_in_base(few[:, 0])))
     summary = on_rig.metrics(chain.length)
-    twin = np.quantile(with_friction.position[: len(few)], (0.5, 0.95)) * 1e3
+    twin = np.quantile(sent.position[: len(few)], (0.5, 0.95)) * 1e3
     return on_model, {"targets": len(few)} | summary | {"twin_mm": {"median": twin[0], "p95": twin[1]}}
 
 
@@ -181,13 +200,15 @@ def settled(model: mujoco.MjModel, ask: Ask, targets: np.ndarray) -> Reached:
 
 
 def driven(
-    model: mujoco.MjModel, ask: Ask, targets: np.ndarray, seconds: float, friction: bool = True
+    model: mujoco.MjModel, ask: Ask, targets: np.ndarray, seconds: float, friction: bool = True, calm: bool = False
 ) -> Reached:
-    """The commands of the network for `targets` (N, 8), sent at once to the straight arm, which moves as it does."""
+    """The commands of the network for `targets` (N, 8), sent at once to the straight arm, which moves as it does.
+
+    With `calm`, what still moves after so many seconds is damped until it rests: not with friction.
+    """
     answer = ask(targets)
-    found = drive(
-        model, answer["commands"][:, model.actuator_trnid[:, 0]], gravity_in_base(targets[:, 0]), seconds, friction
-    )
+    commands, gravity = answer["commands"][:, model.actuator_trnid[:, 0]], gravity_in_base(targets[:, 0])
+    found = drive(model, commands, gravity, seconds, friction, calm=calm)
     return replace(_reached(targets, answer, found.end), seconds=found.seconds_to_rest, rested=found.rested)
 
 

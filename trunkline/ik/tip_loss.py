@@ -32,11 +32,15 @@ class TipLoss:
     excess: torch.Tensor
     push: torch.Tensor
 
-    def __call__(self, rows: torch.Tensor, delta: torch.Tensor) -> torch.Tensor:
-        """Change of pose, m, of samples `rows` for commands that are `delta` (B, K) m too long. Shape (B, D)."""
-        shortage = torch.relu(torch.einsum("nst,nt->ns", self.excess[rows], delta))
-        moved = torch.einsum("nkt,nt->nk", self.direct[rows], delta)
-        return moved + torch.einsum("nks,ns->nk", self.push[rows], shortage)
+    def __getitem__(self, rows: torch.Tensor | slice) -> "TipLoss":
+        """Of these samples alone."""
+        return TipLoss(self.direct[rows], self.excess[rows], self.push[rows])
+
+    def __call__(self, delta: torch.Tensor) -> torch.Tensor:
+        """Change of pose, m, of the samples for commands that are `delta` (N, K) m too long. Shape (N, D)."""
+        longer = delta[:, :, None]
+        shortage = torch.relu(self.excess @ longer)
+        return (self.direct @ longer + self.push @ shortage)[:, :, 0]
 
 
 def tip_loss(tensions: np.ndarray, pose_by_tension: np.ndarray, command_by_tension: np.ndarray) -> TipLoss:

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import torch
@@ -39,6 +39,44 @@ class Training:
     seed: Seed
 
 
+class Samples(NamedTuple):
+    """What training reads of N samples.
+
+    x: normalised features (N, 15). angle: rad (N, 1). tip: m (N, 3). command: m (N, K). stretch: length over command,
+    m (N, K). pulls: commands as shares of their range (N, K). spare: most by which slack tendons are paid out where the
+    tip is foreseen, likewise (N, K).
+    """
+
+    x: torch.Tensor
+    angle: torch.Tensor
+    tip: torch.Tensor
+    command: torch.Tensor
+    stretch: torch.Tensor
+    pulls: torch.Tensor
+    spare: torch.Tensor
+    loss: TipLoss
+
+    def at(self, rows: torch.Tensor | slice) -> "Samples":
+        return Samples(*(part[rows] for part in self))
+
+
+def samples(
+    network: InverseKinematics, inputs: np.ndarray, commands: np.ndarray, lengths: np.ndarray, loss: TipLoss
+) -> Samples:
+    """Arguments as those of `train`."""
+    pose, command = torch.tensor(inputs, dtype=torch.float32), torch.tensor(commands, dtype=torch.float32)
+    return Samples(
+        x=network.normalise(pose),
+        angle=pose[:, :1],
+        tip=pose[:, 1:4],
+        command=command,
+        stretch=torch.tensor(lengths - commands, dtype=torch.float32),
+        pulls=(command - network.middle) / network.half_range,
+        spare=torch.tensor(SLACK * (lengths <= commands), dtype=torch.float32) / network.half_range,
+        loss=loss,
+    )
+
+
 def train(
     inputs: np.ndarray,
     commands: np.ndarray,
@@ -64,14 +102,9 @@ def train(
     torch.manual_seed(training.seed)
     network = InverseKinematics(training.width, inputs[is_train], commands[is_train], lengths[is_train])
     parameters: list[torch.Tensor] = list(network.parameters())
-    pose = torch.tensor(inputs, dtype=torch.float32)
-    x, angle, tip = network.normalise(pose), pose[:, :1], pose[:, 1:4]
-    command = torch.tensor(commands, dtype=torch.float32)
-    stretch = torch.tensor(lengths - commands, dtype=torch.float32)
-    pulls = (command - network.middle) / network.half_range
-    most_spare = torch.tensor(SLACK * (lengths <= commands), dtype=torch.float32) / network.half_range
+    known = samples(network, inputs, commands, lengths, loss)
     rows = torch.tensor(np.flatnonzero(is_train))
-    others = torch.tensor(np.flatnonzero(~is_train))
+    others = known.at(torch.tensor(np.flatnonzero(~is_train)))
     shuffle = torch.Generator().manual_seed(training.seed)
     batches = len(rows) // training.batch
     steps = max(1, training.epochs * batches)
@@ -79,44 +112,54 @@ def train(
     first, second = ([torch.zeros_like(parameter) for parameter in parameters] for _ in range(2))
     counts = [torch.zeros(()) for _ in parameters]
 
-    def slopes(part: torch.Tensor, spare: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
-        """Gradient of the objective on these rows, summed over them, and their tip errors, m."""
-        commands, stretches = network.unclipped(x[part])
-        delta = commands - command[part]
-        moved = loss(part, delta)
-        size = (moved.square().sum(dim=1) + ROUNDING**2).sqrt()
-        missed = network.foresee(angle[part], pulls[part] + spare * most_spare[part]) - tip[part]
-        foreseen = (missed.square().sum(dim=1) + ROUNDING**2).sqrt()
-        stretched = (stretches - stretch[part]).abs().mean(dim=1)
-        objective = (size + foreseen + TIE * delta.abs().mean(dim=1) + STRETCH * stretched).sum()
-        return torch.autograd.grad(objective, parameters), moved.detach()[:, :3].norm(dim=1)
+    def slopes(part: Samples, spare: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
+        """Gradient of the batch's mean objective as far as these samples make it, and the sum of their tip errors."""
+        commands, stretches = network.unclipped(part.x)
+        delta = commands - part.command
+        moved = part.loss(delta)
+        missed = network.foresee(part.angle, part.pulls + spare * part.spare) - part.tip
+        errors = torch.cat([moved.square().sum(dim=1), missed.square().sum(dim=1)])
+        plain = (TIE * delta.abs() + STRETCH * (stretches - part.stretch).abs()).sum() / delta.shape[1]
+        objective = ((errors + ROUNDING**2).sqrt().sum() + plain) / training.batch
+        return torch.autograd.grad(objective, parameters), moved.detach()[:, :3].norm(dim=1).sum()
 
     @torch.no_grad()
-    def tip_error(part: torch.Tensor) -> torch.Tensor:
-        return loss(part, network.unclipped(x[part])[0] - command[part])[:, :3].norm(dim=1)
+    def tip_error(part: Samples) -> torch.Tensor:
+        return part.loss(network.unclipped(part.x)[0] - part.command)[:, :3].norm(dim=1)
 
-    done = 0
+    done, size = 0, -(-training.batch // PARTS)
     with ThreadPoolExecutor(min(PARTS, thread_count()), initializer=torch.set_num_threads, initargs=(1,)) as pool:
         for epoch in range(1, training.epochs + 1):
             total = 0.0
-            order = rows[torch.randperm(len(rows), generator=shuffle)]
-            for batch in order[: batches * training.batch].split(training.batch):
-                spare = torch.rand(len(batch), most_spare.shape[1], generator=shuffle)
-                gradients, errors = zip(*pool.map(slopes, batch.chunk(PARTS), spare.chunk(PARTS)), strict=True)
-                summed = [sum(parts, torch.zeros(())) / len(batch) for parts in zip(*gradients, strict=True)]
+            order = known.at(rows[torch.randperm(len(rows), generator=shuffle)])  # in a row: batches are parts of it
+            spares = torch.rand(len(rows), known.spare.shape[1], generator=shuffle)
+            for batch in pieces(batches * training.batch, training.batch):
+                parts = [slice(batch.start + p.start, batch.start + p.stop) for p in pieces(training.batch, size)]
+                found = pool.map(slopes, [order.at(part) for part in parts], [spares[part] for part in parts])
+                (gradient, error), *rest = found
+                for more, further in rest:
+                    for mine, other in zip(gradient, more, strict=True):
+                        mine += other
+                    error += further
                 speed = training.learning_rate * rate(done / steps)
                 with torch.no_grad():
-                    adam(parameters, summed, first, second, [], counts, lr=speed, **ADAM)
+                    adam(parameters, list(gradient), first, second, [], counts, lr=speed, **ADAM)
                 done += 1
-                total += float(torch.cat(errors).mean())
+                total += float(error) / training.batch
             if not np.isfinite(total):
                 raise InputError(
                     f"train_ik.learning_rate: found {training.learning_rate}, by which the tip error is not finite in"
                     f" epoch {epoch}, expected a smaller one"
                 )
-            validate = torch.cat(list(pool.map(tip_error, others.split(4096))))
+            held = pool.map(tip_error, map(others.at, pieces(len(others.x), 4096)))
+            validate = torch.cat(list(held))
             report(epoch, total / batches, float(validate.mean()))
     return network.eval()
+
+
+def pieces(count: int, size: int) -> list[slice]:
+    """Of range(count), each of `size` but the last one."""
+    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
 
 
 def rate(done: float) -> float:

@@ -6,15 +6,17 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.elements import let_slide
+from trunkline.elements import SLIDER, all_elements, capstan_friction, let_slide
 from trunkline.simulation.motion import batch_of, hold, move
-from trunkline.simulation.rest import base_frame, longest_step
+from trunkline.simulation.rest import base_frame, come_to_rest, longest_step, relax
 
 LOOK = 0.25  # s between looks at the tips
 WINDOW = 4  # looks in which a tip has moved no more than STILL: a swing of up to 2 s shows in them
 STILL = 1e-4  # m
 NEAR = 1e-3  # m, from its end, within which a tip counts as there
 ROW = 0.01  # s between rows of a trajectory of commands
+CALM = 15.0  # s in which a damped arm must come to rest
+CALM_SPEED = 1e-5  # rad/s of its fastest joint then: tips are some 1e-6 m from rest
 
 
 @dataclass
@@ -23,11 +25,14 @@ class Driven:
 
     Attributes:
         tips: in the base frame at every LOOK s, held once at rest, m. Shape (B, F, 3). NaN once MuJoCo has warned.
+            If calmed, the last one is where the damped arm came to rest.
         rested: whether the tip came to rest in the time given. Shape (B,).
+        calmed: whether the arms were damped at last.
     """
 
     tips: np.ndarray
     rested: np.ndarray
+    calmed: bool = False
 
     @property
     def end(self) -> np.ndarray:
@@ -36,10 +41,16 @@ class Driven:
 
     @property
     def seconds_to_rest(self) -> np.ndarray:
-        """From when on each tip stayed within NEAR of its end, s; NaN where it never rested. Shape (B,)."""
+        """From when on each tip stayed within NEAR of its end by itself, s; NaN where it never did. Shape (B,)."""
         away = np.linalg.norm(self.tips - self.tips[:, -1:], axis=2) > NEAR
-        last = away.shape[1] - np.argmax(away[:, ::-1], axis=1)
-        return np.where(self.rested, LOOK * np.where(away.any(axis=1), last, 0), np.nan)
+        last = np.where(away.any(axis=1), away.shape[1] - np.argmax(away[:, ::-1], axis=1), 0)
+        return np.where(self.rested & (last < away.shape[1] - self.calmed), LOOK * last, np.nan)
+
+
+def has_friction(model: mujoco.MjModel) -> bool:
+    """Whether where the model rests depends on how it came there: friction of tendons or hinges, sliders, holes."""
+    sliding = any(model.tendon_stiffness[slider.tendon].any() for slider in all_elements(model, SLIDER))
+    return bool(sliding or capstan_friction(model) or model.tendon_frictionloss.any() or model.dof_frictionloss.any())
 
 
 def drive(
@@ -49,6 +60,7 @@ def drive(
     seconds: float,
     friction: bool = True,
     tip_site: str = "tip",
+    calm: bool = False,
 ) -> Driven:
     """Send commands to the straight arm and step it until its tip rests, with the model's own damping.
 
@@ -60,7 +72,12 @@ def drive(
             trajectories, a row every ROW s and the last one held. Shape (B, T, K).
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate.
-        friction: whether tendons and joints have the model's dry friction, and cables rub.
+        friction: whether tendons and joints have the model's dry friction, and its sliders, and cables rub.
+        calm: whether arms are damped after these `seconds` until they rest. That does not change where, if there is no
+            friction.
+
+    Raises:
+        ValueError: to calm an arm with friction.
     """
     own, model = model.opt.timestep, copy.copy(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -68,16 +85,22 @@ def drive(
     if not friction:
         model.tendon_frictionloss[:], model.dof_frictionloss[:] = 0, 0
         let_slide(model)
+        for slider in all_elements(model, SLIDER):
+            model.tendon_stiffness[slider.tendon] = 0
+    if calm and has_friction(model):
+        raise ValueError("found friction in a model to be calmed, expected none: where it rests depends on its way")
     gravity = np.broadcast_to(gravity, (len(commands), 3))
-    driven = _drive(model, commands, gravity, seconds, tip_site)
+    driven = _drive(model, commands, gravity, seconds, tip_site, calm)
     while model.opt.timestep > own and len(warned := np.flatnonzero(~np.isfinite(driven.end).all(axis=1))):
         model.opt.timestep = max(model.opt.timestep / 2, own)
-        again = _drive(model, commands[warned], gravity[warned], seconds, tip_site)
+        again = _drive(model, commands[warned], gravity[warned], seconds, tip_site, calm)
         driven.tips[warned], driven.rested[warned] = again.tips, again.rested
     return driven
 
 
-def _drive(model: mujoco.MjModel, commands: np.ndarray, gravity: np.ndarray, seconds: float, tip_site: str) -> Driven:
+def _drive(
+    model: mujoco.MjModel, commands: np.ndarray, gravity: np.ndarray, seconds: float, tip_site: str, calm: bool
+) -> Driven:
     """As `drive`, with about the model's time step."""
     model.opt.timestep = LOOK / np.ceil(LOOK / model.opt.timestep)
     every, looks = round(LOOK / model.opt.timestep), round(seconds / LOOK)
@@ -88,7 +111,7 @@ def _drive(model: mujoco.MjModel, commands: np.ndarray, gravity: np.ndarray, sec
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
     hold(batch, model, model.tendon_length0[model.actuator_trnid[:, 0]])
     site = model.site(tip_site).id
-    tips = np.full((len(commands), looks, 3), np.nan)
+    tips = np.full((len(commands), looks + calm, 3), np.nan)
     moving = np.arange(len(commands), dtype=np.int32)
     for look in range(looks):
         controls = _sent(trajectories[moving], (look * every + np.arange(every)) * model.opt.timestep)
@@ -102,11 +125,18 @@ def _drive(model: mujoco.MjModel, commands: np.ndarray, gravity: np.ndarray, sec
             moving = moving[~still]
         if not len(moving):
             break
+    if calm:
+        timestep, places = relax(batch, model), batch.bind("site_xpos")
+        batch.bind("qvel")[:] = 0
+        sound = np.flatnonzero(~batch.warning.any(axis=(1, 2)))
+        moving, _ = come_to_rest(batch, timestep, CALM, CALM_SPEED, sound)
+        batch.forward()
+        tips[:, -1] = (places[:, site] - origin) @ to_world
     warned = batch.warning.any(axis=(1, 2))
     tips[warned, -1] = np.nan
     rested = ~warned
     rested[moving] = False
-    return Driven(tips, rested)
+    return Driven(tips, rested, calm)
 
 
 def _sent(trajectories: np.ndarray, time: np.ndarray) -> np.ndarray:

@@ -41,9 +41,10 @@ def settle(
     model: mujoco.MjModel,
     commands: np.ndarray,
     gravity: np.ndarray,
-    seconds: float = 40.0,
+    seconds: float = 10.0,
     rest_speed: float = FINE_SPEED,
     tip_site: str = "tip",
+    creep: float = 3.0,
 ) -> Settled:
     """Let the model hang, draw its tendons in, and step until it rests: the reference for the statics.
 
@@ -52,6 +53,7 @@ def settle(
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate once the tendons are drawn in.
         rest_speed: rad/s of the fastest joint, at rest.
+        creep: s, longest time after that, in which what still creeps is led to its end, see `creep_to_rest`.
     """
     model = copy.copy(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
@@ -66,6 +68,7 @@ def settle(
         control[:] = straight + share * (commands - straight)
         batch.step(nstep=int(np.ceil(RAMP / RAMP_STEPS / timestep)))
     moving, _ = come_to_rest(batch, timestep, seconds, rest_speed)
+    moving, _ = creep_to_rest(batch, timestep, moving, creep, rest_speed)
     site, turn, force = batch.bind("site_xpos"), batch.bind("site_xmat"), batch.bind("actuator_force")
     batch.forward()
     tip = model.site(tip_site).id
@@ -104,15 +107,20 @@ def relax(batch: Batch, model: mujoco.MjModel, step_factor: float = 1.0) -> floa
     return timestep
 
 
-def come_to_rest(batch: Batch, timestep: float, seconds: float, rest_speed: float) -> tuple[np.ndarray, int]:
+def come_to_rest(
+    batch: Batch, timestep: float, seconds: float, rest_speed: float, moving: np.ndarray | None = None
+) -> tuple[np.ndarray, int]:
     """Step relaxed simulations, each until its fastest joint is slower than `rest_speed`, rad/s; positions then hold.
 
     A mode that relaxes in RELAXATION has about that time times `rest_speed` still to go.
 
+    Args:
+        moving: which of them, all by default.
+
     Returns:
         Which simulations still move after `seconds`, and how many steps were taken.
     """
-    moving, steps = np.arange(batch.nsim, dtype=np.int32), 0
+    moving, steps = np.array(range(batch.nsim) if moving is None else moving, dtype=np.int32), 0
     speed, chunk = batch.bind("qvel"), round(CHUNK / timestep)
     for _ in range(round(seconds / CHUNK)):
         if not len(moving):
