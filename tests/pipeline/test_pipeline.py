@@ -34,8 +34,6 @@ ACTIVE = ("trunkline/pipeline/identify.py",)
 
 LONG = ("distances.csv", "errors.csv", "deviation.csv")  # plot data of thousands of rows: in the cache
 
-pytestmark = pytest.mark.xdist_group("pipeline")  # one worker, so that the stub pipeline runs once
-
 
 @pytest.fixture(scope="module")
 def repo():
