@@ -1,14 +1,39 @@
-"""Tests that need the same slow thing go to one worker of `pytest --dist loadgroup`, so that it is made once."""
+"""Tests of one file go to one worker of pytest-xdist, so that what they share is made once.
+
+Marks `xdist_group` would be the way to say so, but pytest 9.2 hides them from xdist 3.8, which then spreads
+every file over all workers, so that each of them makes every fixture and compiles every kernel for itself.
+"""
+
+from pathlib import PurePosixPath
 
 import pytest
 
-# Folders whose tests run the kernels of trunkline.statics. To compile them takes more than a minute the first time,
-# and every worker that needs them before the first has written them to the cache compiles them too.
-KERNELS = ("ik", "reachability", "statics")
+# Files and folders whose tests run the kernels of trunkline.statics. To compile them takes most of a minute the first
+# time, in every worker that needs them before the first has written them to the cache. So these share a worker.
+KERNELS = ("ik", "reachability", "statics", "test_capstan.py", "test_library.py")
 
 
-@pytest.hookimpl(tryfirst=True)
-def pytest_collection_modifyitems(items):
-    for item in items:
-        if item.path.parent.name in KERNELS and not item.get_closest_marker("xdist_group"):
-            item.add_marker(pytest.mark.xdist_group("kernels"))
+def pytest_configure(config):
+    if not config.pluginmanager.hasplugin("xdist"):
+        return
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByFile(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = PurePosixPath(nodeid.partition("::")[0])
+            return "kernels" if {file.name, file.parent.name} & set(KERNELS) else str(file)
+
+    class Workers:
+        @pytest.hookimpl
+        def pytest_xdist_make_scheduler(self, config, log):
+            return ByFile(config, log)
+
+    config.pluginmanager.register(Workers())
+
+
+@pytest.fixture
+def figures_not_laid_out(monkeypatch):
+    """Figures are drawn whole, but where their parts lie is not sought: most of the time, and nobody looks."""
+    import matplotlib
+
+    monkeypatch.setitem(matplotlib.rcParams, "figure.constrained_layout.use", False)

@@ -1,6 +1,7 @@
 """`python -m trunkline.evaluate`: any model against any session, and what it refuses in one line."""
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,22 +37,31 @@ def softer(model):
     model.jnt_stiffness[:] *= 0.7
 
 
-@pytest.fixture
-def lab(tmp_path, monkeypatch):
-    """The right model, a softer one, and filtered trials of every kind and split."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A project with the right model, a softer one, and filtered trials of every kind and split."""
+    root = tmp_path_factory.mktemp("made")
+    (root / "params.yaml").write_text((ROOT / "params.yaml").read_text())
     model = small_model(4)
     trials = [
         *(tilt(model, angle, split) for angle, split in ((30, "identify"), (60, "identify"), (45, "validate"))),
         *(release(model, bend, split, 40) for bend, split in ((0.2, "identify"), (0.3, "validate"), (0.25, "test"))),
         curl(model, 40, "test", frames=60),
     ]
-    folder = tmp_path / "data/processed/filter"
+    folder = root / "data/processed/filter"
     folder.mkdir(parents=True)
     write_trials(folder, trials)
-    write_model(tmp_path / "artifacts/build_mjcf/arm.xml", softer)
-    return tmp_path, write_model(tmp_path / "right/arm.xml"), folder
+    write_model(root / "artifacts/build_mjcf/arm.xml", softer)
+    write_model(root / "right/arm.xml")
+    return root
+
+
+@pytest.fixture
+def lab(made, tmp_path, monkeypatch):
+    """A copy of it to work in, its right model, and its trials."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path, tmp_path / "right/arm.xml", tmp_path / "data/processed/filter"
 
 
 def evaluate(*words) -> int:
@@ -88,6 +98,7 @@ def test_it_prints_and_writes_every_trial_beside_what_its_errors_stand_beside(la
     assert "the model was fitted to" not in printed  # nothing lies beside it that knows
 
 
+@pytest.mark.usefixtures("figures_not_laid_out")
 def test_an_arm_that_aged_shows_against_a_reference(lab, capsys):
     root, right, folder = lab
     evaluate(right, folder, "--out", root / "july")
@@ -114,6 +125,7 @@ def test_an_arm_that_aged_shows_against_a_reference(lab, capsys):
     assert "the reference is of another model" in capsys.readouterr().out
 
 
+@pytest.mark.usefixtures("figures_not_laid_out")
 def test_trials_that_the_model_was_fitted_to_are_marked_and_another_session_s_are_not(lab, capsys):
     root, _, folder = lab
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.5, 8.0)})
@@ -175,6 +187,7 @@ def test_a_mistake_is_one_line_and_nothing_is_written(lab, capsys, words, messag
     assert not (root / "evaluation").exists()
 
 
+@pytest.mark.usefixtures("figures_not_laid_out")
 def test_a_reference_is_not_written_over(lab, capsys):
     _, right, folder = lab
     evaluate(right, folder)

@@ -23,8 +23,6 @@ ROOT = Path(__file__).parents[2]
 # Kernels as plain Python: two equilibria take less time than to compile what the checkout has compiled already.
 ENVIRONMENT = {"NUMBA_DISABLE_JIT": "1"}
 
-pytestmark = pytest.mark.xdist_group("wheel")
-
 
 def run(folder: Path, *command: str | Path) -> subprocess.CompletedProcess:
     words = [str(part) for part in command]

@@ -1,6 +1,7 @@
 """How often the truth lies inside the reported 95 % intervals, over seeded repetitions at a reduced size.
 
-From near the truth, so that the intervals alone are tried; `python -m studies.coverage` searches over the whole range.
+From near the truth, so that the intervals alone are tried; `python -m studies.coverage` searches over the whole range,
+for the same arm and trials.
 """
 
 from dataclasses import dataclass
@@ -10,7 +11,8 @@ import pytest
 from scipy.stats import binom
 from scipy.stats import t as student
 
-from tests.support.matched_plant import segments_of, small_model
+from studies.coverage import FRAMES, STEPS, UNITS
+from tests.support.matched_plant import FRAME, segments_of, small_model
 from tests.support.noisy_trials import STAGES, TRIALS, WEIGHTS, measured, with_values
 from trunkline.identification.certainty import bootstrap, certainty
 from trunkline.identification.experiment import prepare
@@ -18,7 +20,8 @@ from trunkline.identification.problem import Bounds, Problem
 from trunkline.identification.search import descend
 from trunkline.identification.surrogate import surrogate
 
-REPETITIONS, FRAMES = 20, 60
+REPETITIONS = 20
+RESAMPLINGS = 5000  # of which some five lie beyond each end of an interval
 
 
 @dataclass
@@ -34,26 +37,25 @@ class Repetitions:
     resampled: np.ndarray
 
 
-# a stage's repetitions take a minute: its tests go to one worker, so that they run once
-ONCE = [pytest.param(name, marks=pytest.mark.xdist_group(f"coverage {name}")) for name in STAGES]
-
-
-@pytest.fixture(scope="module", params=ONCE)
+@pytest.fixture(scope="module", params=STAGES)
 def repetitions(request) -> Repetitions:
-    stage, model = STAGES[request.param], small_model(4)
-    clean = stage.trials(with_values(model, stage.true), FRAMES)
+    stage, model, frames = STAGES[request.param], small_model(UNITS), FRAMES[request.param]
+    model.opt.timestep = FRAME / STEPS
+    clean = stage.trials(with_values(model, stage.true), frames)
     bounds = {name: Bounds(value / 10, value * 10) for name, value in stage.true.items()}
     exact, rng = np.log(list(stage.true.values())), np.random.default_rng(1)
     errors, widths, resampled = [], [], []
     for _ in range(REPETITIONS):
-        experiments = [prepare(measured(trial, rng), model, FRAMES) for trial in clean]
+        experiments = [prepare(measured(trial, rng), model, frames) for trial in clean]
         problem = Problem(model, experiments, segments_of(model), bounds, "positions", WEIGHTS)
         found = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 12, 1e-6, lambda best: None)
         assert found.converged
         moves = surrogate(problem, found.vector).moves
         errors.append(found.vector - exact)
         widths.append(certainty(found.linear, moves=moves).half_width)
-        resampled.append(bootstrap(found.linear, 1, moves) - exact)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr("trunkline.identification.certainty.RESAMPLINGS", RESAMPLINGS)
+            resampled.append(bootstrap(found.linear, 1, moves) - exact)
     return Repetitions(list(stage.true), np.array(errors), np.array(widths), np.array(resampled))
 
 

@@ -51,16 +51,21 @@ def edit(folder, old, new):
     path.write_text(path.read_text().replace(old, new))
 
 
+@pytest.fixture(scope="module")
+def right(tmp_path_factory):
+    """The takes of the session to which nothing happened."""
+    return session(tmp_path_factory.mktemp("session") / "right")[0]
+
+
 @pytest.mark.parametrize("frames", [slice(60, 110), slice(60, 61), slice(200, None), slice(0, 250)])
 @pytest.mark.parametrize("bodies", [(1, 2), (2, 3), (3, 4), (1, 2, 3)])
-def test_bodies_taken_for_each_other_are_put_right(tmp_path, frames, bodies):
+def test_bodies_taken_for_each_other_are_put_right(tmp_path, right, frames, bodies):
     """Each label on the next one's pose: pairs, the base among them, and rounds of three."""
 
     def swap(m):
         for values in (m.positions, m.quaternions):
             values[frames, list(bodies)] = values[frames, [*bodies[1:], bodies[0]]]
 
-    right, _ = session(tmp_path / "right")
     takes, findings = session(tmp_path / "wrong", swap)
     names = " and ".join(repr(("base", *SEGMENTS)[body]) for body in bodies)
     assert f"{names} were taken for each other in" in " ".join(findings[0].repairs)
@@ -73,8 +78,8 @@ def test_bodies_taken_for_each_other_are_put_right(tmp_path, frames, bodies):
     np.testing.assert_array_equal(takes[0].base_quaternions[same], right[0].base_quaternions[same])
 
 
-def test_a_segment_taken_for_the_base_is_put_right(tmp_path):
-    test_bodies_taken_for_each_other_are_put_right(tmp_path, slice(60, 110), (0, 1))
+def test_a_segment_taken_for_the_base_is_put_right(tmp_path, right):
+    test_bodies_taken_for_each_other_are_put_right(tmp_path, right, slice(60, 110), (0, 1))
 
 
 @pytest.mark.parametrize("bodies", [(2, 3, 4, 5), (0, 2, 1, 3), (4, 7, 5, 6)])

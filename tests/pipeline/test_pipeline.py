@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
 
@@ -33,8 +34,6 @@ INERT += ("trunkline/figures/", "trunkline/pipeline/")
 ACTIVE = ("trunkline/pipeline/identify.py",)
 
 LONG = ("distances.csv", "errors.csv", "deviation.csv")  # plot data of thousands of rows: in the cache
-
-pytestmark = pytest.mark.xdist_group("pipeline")  # one worker, so that the stub pipeline runs once
 
 
 @pytest.fixture(scope="module")
@@ -97,9 +96,9 @@ def test_the_lab_lists_its_settings(stages):
 def test_a_stage_lists_the_libraries_that_its_numbers_go_through(stages, address):
     """Those that it imports, directly or through its rooms, so that another version of one runs it again."""
     (listed,) = (dep.params for dep in stages[address].deps if _relative(dep) == "versions.yaml")
-    distributions, imported = packages_distributions(), set()
+    distributions, imported = _distributions(), set()
     for file in _imported(stages[address].cmd.split()[-1].replace(".", "/") + ".py"):
-        for node in ast.walk(ast.parse((ROOT / file).read_text())):
+        for node in ast.walk(_tree(file)):
             modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             modules += [node.module] if isinstance(node, ast.ImportFrom) and not node.level else []
             names = {name for module in modules for name in distributions.get(module.partition(".")[0], [])}
@@ -385,10 +384,19 @@ def _and_below(stages, name: str) -> set[str]:
     return found
 
 
+_distributions = cache(packages_distributions)
+
+
+@cache
+def _tree(file: str) -> ast.Module:
+    return ast.parse((ROOT / file).read_text())
+
+
 def _inert(name: str) -> bool:
     return name.startswith(INERT) and name not in ACTIVE
 
 
+@cache
 def _imported(file: str) -> set[str]:
     """Files of this project that `file` imports, directly or not, itself included."""
     found, todo = set(), [file]
@@ -396,7 +404,7 @@ def _imported(file: str) -> set[str]:
         name = todo.pop()
         if name in found or _inert(name) or not (ROOT / name).is_file():
             continue
-        tree = ast.parse((ROOT / name).read_text())
+        tree = _tree(name)
         if [type(node) for node in tree.body] == [ast.Expr]:  # a docstring alone, as in most __init__.py
             continue
         found.add(name)

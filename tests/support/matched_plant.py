@@ -105,11 +105,12 @@ def _rest_pose(model, tilt_deg, pulls) -> np.ndarray:
     settled.tendon_frictionloss[:] = 0
     settled.dof_damping[:] = 0.1 * settled.jnt_stiffness[settled.dof_jntid]
     settled.opt.gravity[:] = gravity_in_base(np.radians(tilt_deg))
+    settled.opt.timestep = FRAME / 2  # where it rests does not depend on the steps
     data = mujoco.MjData(settled)
     data.ctrl[:] = data.act[:] = settled.tendon_length0 - pulls[0]
-    mujoco.mj_step(settled, data, 4000)
+    mujoco.mj_step(settled, data, 1000)
     while np.abs(data.qvel).max() > 1e-6:  # rad/s; the hinges are then some 1e-6 rad from rest
-        mujoco.mj_step(settled, data, 1000)
+        mujoco.mj_step(settled, data, 250)
     return data.qpos.copy()
 
 

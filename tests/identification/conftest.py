@@ -1,0 +1,10 @@
+"""What the tests of this room share."""
+
+import pytest
+
+
+@pytest.fixture(autouse=True)
+def few_resamplings(request, monkeypatch):
+    """The bootstrap of 20,000 is half of a small fit. tests/identification/test_certainty.py tries it as it is."""
+    if request.path.name != "test_certainty.py":
+        monkeypatch.setattr("trunkline.identification.certainty.RESAMPLINGS", 2000)
