@@ -20,7 +20,6 @@ from trunkline.identification.surrogate import Surrogate, reaches, surrogate
 from trunkline.progress import progress
 from trunkline.trials.splits import IDENTIFY
 
-COARSER_TOLERANCE = 1e-2  # relative decrease of the loss at a coarser step, whose minimum lies elsewhere anyway
 NEAR = 0.5  # of a surrogate's reach: from so near it is seen as well as from its centre
 REWEIGHINGS, SAME_WEIGHT = 4, 0.05  # at most; weights that change by less leave the minimum where it is
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
@@ -71,15 +70,14 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     rough, exact = fit.problem(model, short, method.rough.step_factor), fit.problem(model, seen)
     searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}
     problems, found = [rough, exact], searches["coarse"]
-    near, polish, last = exact, method.polish, "polish"
+    near, last = exact, "polish"
     if method.rough.step_factor > 1 and any(e.frames > 1 for e in seen):  # at rest, the step changes nothing
         near, last = fit.problem(model, seen, method.rough.step_factor), "whole"
         problems.append(near)
-        polish = replace(polish, tolerance=max(polish.tolerance, COARSER_TOLERANCE))
-    searches[last] = found = _polish(near, found, polish, f"{label} {last}")
+    searches[last] = found = _polish(near, found, method.polish, f"{label} {last}")
     # what outlies, and by how much an estimate answers a trial, is as plain at a coarser step, which costs less
     around = surrogate(near, found.vector, found.linear.residuals if found.linear else None)
-    searches[last], around = _reweigh(near, found, around, fit, polish, f"{label} reweighed")
+    searches[last], around = _reweigh(near, found, around, fit, f"{label} reweighed")
     found = searches[last]
     if near is not exact:
         exact.trial_weights = near.trial_weights
@@ -155,15 +153,14 @@ def _polish(problem: Problem, rough: Found, polish: Polish, label: str) -> Found
         )  # fmt: skip
 
 
-def _reweigh(
-    problem: Problem, found: Found, around: Surrogate, fit: Fit, polish: Polish, label: str
-) -> tuple[Found, Surrogate]:
+def _reweigh(problem: Problem, found: Found, around: Surrogate, fit: Fit, label: str) -> tuple[Found, Surrogate]:
     """The minimum in which outlying trials count less, and the surrogate around it; what it was if there are none.
 
     The surrogate says which, and about where the minimum then is; least squares goes there, until the weights stay.
     Within reach of what a surrogate was made of, it is not made anew.
     """
-    kinds, made_at, made = [e.kind for e in problem.experiments], found.vector, around
+    kinds, polish = [e.kind for e in problem.experiments], fit.method.polish
+    made_at, made = found.vector, around
     for _ in range(REWEIGHINGS):
         weights, place = reweighted(around, kinds, fit.weights.outlying)
         if np.abs(weights - problem.trial_weights).max() < SAME_WEIGHT:
