@@ -1,7 +1,6 @@
 """How often the truth lies inside the reported 95 % intervals, over seeded repetitions at a reduced size.
 
-From near the truth, so that the intervals alone are tried; `python -m studies.coverage` searches over the whole range,
-for the same arm and trials.
+From near the truth, so that the intervals alone are tried; `python -m studies.coverage` searches over the whole range.
 """
 
 from dataclasses import dataclass
@@ -11,7 +10,6 @@ import pytest
 from scipy.stats import binom
 from scipy.stats import t as student
 
-from studies.coverage import FRAMES, STEPS, UNITS
 from tests.support.matched_plant import FRAME, segments_of, small_model
 from tests.support.noisy_trials import STAGES, TRIALS, WEIGHTS, measured, with_values
 from trunkline.identification.certainty import bootstrap, certainty
@@ -20,7 +18,8 @@ from trunkline.identification.problem import Bounds, Problem
 from trunkline.identification.search import descend
 from trunkline.identification.surrogate import surrogate
 
-REPETITIONS = 20
+REPETITIONS, FRAMES = 20, 60
+STEPS = 4  # of a frame
 RESAMPLINGS = 5000  # of which some five lie beyond each end of an interval
 
 
@@ -39,14 +38,14 @@ class Repetitions:
 
 @pytest.fixture(scope="module", params=STAGES)
 def repetitions(request) -> Repetitions:
-    stage, model, frames = STAGES[request.param], small_model(UNITS), FRAMES[request.param]
+    stage, model = STAGES[request.param], small_model(4)
     model.opt.timestep = FRAME / STEPS
-    clean = stage.trials(with_values(model, stage.true), frames)
+    clean = stage.trials(with_values(model, stage.true), FRAMES)
     bounds = {name: Bounds(value / 10, value * 10) for name, value in stage.true.items()}
     exact, rng = np.log(list(stage.true.values())), np.random.default_rng(1)
     errors, widths, resampled = [], [], []
     for _ in range(REPETITIONS):
-        experiments = [prepare(measured(trial, rng), model, frames) for trial in clean]
+        experiments = [prepare(measured(trial, rng), model, FRAMES) for trial in clean]
         problem = Problem(model, experiments, segments_of(model), bounds, "positions", WEIGHTS)
         found = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 12, 1e-6, lambda best: None)
         assert found.converged
