@@ -54,8 +54,8 @@ def test_tension_falls_as_the_capstan_equation_says(chain, side):
 
 def _pull(chain, tensions, friction, slope=0.0):
     free, loose = np.zeros(3), np.linalg.norm(chain.hole_out - chain.hole_in, axis=2)
-    slope, length = np.full(3, slope), chain.straight_lengths - [0.02, 0.01, 0.3]
-    return Pull(np.array(tensions, float), slope, length, free + 50, np.zeros((chain.units, 2)), friction, loose)
+    slope, length = np.full(3, slope), chain.straight_lengths - [0.004, 0.002, 0.3]
+    return Pull(np.array(tensions, float), slope, length, free + 9, np.zeros((chain.units, 2)), friction, loose)
 
 
 def _shortens(chain):

@@ -42,7 +42,7 @@ def pulls(chain, friction=0.0):
 def dense(hessian):
     """The whole matrix from its products of rank r and the blocks of its units. Shape (nq, nq)."""
     upper = np.triu(hessian.left.T @ hessian.right)
-    for i, (aa, ab, bb) in enumerate(hessian.block):
+    for i, (aa, ab, bb, _) in enumerate(hessian.block):
         upper[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = [[aa, ab], [0, bb]]
     return upper + np.triu(upper, 1).T
 

@@ -168,8 +168,10 @@ def score(
         sent = driven(model, ask, targets, settings.seconds)
         seconds = sent.time_to_rest()
     else:  # all drives are without: those that were timed are the first of them
-        rest = driven(model, ask, targets[settings.timed :], SWING, friction=False, calm=True)
-        sent = Reached(**{name: np.concatenate([values, vars(rest)[name]]) for name, values in vars(timed).items()})
+        parts = [timed]
+        if len(targets) > settings.timed:
+            parts.append(driven(model, ask, targets[settings.timed :], SWING, friction=False, calm=True))
+        sent = Reached(**{name: np.concatenate([vars(part)[name] for part in parts]) for name in vars(timed)})
         seconds = timed.time_to_rest()
     tendons, joints = model_friction(model)
     dry = {"tendons_n": tendons.max(), "joints_nm": joints.max(), "sliders": len(all_elements(model, SLIDER))}

@@ -57,7 +57,8 @@ class Samples(NamedTuple):
     loss: TipLoss
 
     def at(self, rows: torch.Tensor | slice) -> "Samples":
-        return Samples(*(part[rows] for part in self))
+        """Of these samples alone."""
+        return self._replace(**{name: part[rows] for name, part in self._asdict().items()})
 
 
 def samples(

@@ -17,7 +17,9 @@ from trunkline.statics.continuation import Found, solve_paths
 from trunkline.statics.kernel import over_rows
 from trunkline.statics.placement import place_chords
 
-PENALTY = 1e5  # N/m, stiffness by which Newton feels a cable before its multiplier is known; no result depends on it
+# N/m, stiffness by which Newton feels a cable before its multiplier is known; an equilibrium does not depend on it
+PENALTY = 1e5
+SOFT_PENALTY = 10.0  # with capstan friction: a stiffer one leaps to other shapes that have the same lengths
 
 
 @dataclass
@@ -98,7 +100,13 @@ def forward(chain: Chain, lengths: np.ndarray, gravity: np.ndarray) -> Equilibri
         gravity: Shape (3,) or (B, 3).
     """
     lengths = np.ascontiguousarray(lengths, float)[:, None, :]
-    return follow(chain, np.zeros_like(lengths), lengths, gravity, np.full(chain.tendons, PENALTY), np.inf, cables=True)
+    slope = np.full(chain.tendons, penalty(chain))
+    return follow(chain, np.zeros_like(lengths), lengths, gravity, slope, np.inf, cables=True)
+
+
+def penalty(chain: Chain) -> float:
+    """Stiffness of cables before their multipliers are known, N/m."""
+    return SOFT_PENALTY if chain.capstan else PENALTY
 
 
 def follow(

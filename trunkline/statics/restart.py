@@ -9,7 +9,7 @@ import numpy as np
 from trunkline.statics.chain import Chain
 from trunkline.statics.continuation import record
 from trunkline.statics.energy import Pull
-from trunkline.statics.equilibria import PENALTY, Equilibrium, equilibria, loose_chords, plain, room
+from trunkline.statics.equilibria import Equilibrium, equilibria, loose_chords, penalty, plain, room
 from trunkline.statics.kernel import kernel, over_rows
 from trunkline.statics.newton import find_equilibrium, new_work
 
@@ -29,14 +29,14 @@ def restart(
     found, gravities = room(chain, count), plain(gravity, (count, 3))
     found.qpos[:], found.tensions[:] = qpos, tensions
     loose = loose_chords(chain, gravities)
-    over_rows(_restart, count, chain, plain(lengths), gravities, PENALTY, loose, found)
+    over_rows(_restart, count, chain, plain(lengths), gravities, penalty(chain), loose, found)
     return equilibria(chain, found)
 
 
 @kernel
-def _restart(first, last, chain, all_lengths, gravities, penalty, all_loose, found):
+def _restart(first, last, chain, all_lengths, gravities, stiffness, all_loose, found):
     units, tendons = chain.mass.shape[0], all_lengths.shape[1]
-    slope, ceiling, torque = np.full(tendons, penalty), np.full(tendons, np.inf), np.zeros((units, 2))
+    slope, ceiling, torque = np.full(tendons, stiffness), np.full(tendons, np.inf), np.zeros((units, 2))
     for row in range(first, last):
         work = new_work(units, tendons)
         tension, loose = found.tensions[row].copy(), all_loose[row]
