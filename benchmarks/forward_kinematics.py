@@ -27,7 +27,7 @@ SETTLED, SOLVED, DIRECTIONS, STEPS = 48, 1000, 72, 100
 @recorded("forward_kinematics")
 def main(path: Path) -> None:
     model = read_model(path)
-    chain = read_chain(model)
+    chain = read_chain(model).smooth
     rng = np.random.default_rng(0)
     tensions = pull_directions(chain, rng.uniform(0, 2 * np.pi, SOLVED)) * rng.uniform(0, 1, (SOLVED, 1)) ** 2
     gravity = gravity_in_base(rng.uniform(0, np.radians(120), SOLVED))

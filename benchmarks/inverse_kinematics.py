@@ -33,7 +33,7 @@ TARGETS, SINGLE, PROBLEMS = 400, 5000, 4000
 @recorded("inverse_kinematics")
 def main(path: Path) -> None:
     compare_least_squares()
-    chain = read_chain(read_model(MODEL))
+    chain = read_chain(read_model(MODEL)).smooth
     rng = np.random.default_rng(0)
     angles = rng.uniform(0, np.radians(120), TARGETS)
     tensions = pull_directions(chain, rng.uniform(0, 2 * np.pi, TARGETS)) * rng.uniform(0, 1, (TARGETS, 1)) ** 2

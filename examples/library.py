@@ -15,7 +15,7 @@ from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import actuated, equilibrium
 
 model, network = sys.argv[1:]
-chain = read_chain(mujoco.MjModel.from_xml_path(model))
+chain = read_chain(mujoco.MjModel.from_xml_path(model)).smooth  # the network's arm, its tendons without friction
 tilt = np.array([0.3])  # rad, between the straight arm and gravity
 gravity = gravity_in_base(tilt)
 tensions = np.zeros((1, chain.tendons))

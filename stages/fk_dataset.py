@@ -20,7 +20,7 @@ Config = settings(Sampling)
 
 def main(config: Sampling) -> None:
     model = read_model(MODEL)
-    chain = read_chain(model)
+    chain = read_chain(model).smooth
     with progress(len(config.angles_deg), "fk_dataset", "angles") as bar:
         found = gather(model, chain, config, lambda **counts: bar.update(1, **counts))
 

@@ -26,7 +26,7 @@ Config = settings(Survey)
 
 
 def main(config: Survey) -> None:
-    chain = read_chain(read_model(MODEL))
+    chain = read_chain(read_model(MODEL)).smooth
     tips_at = read_tips(SAMPLES, chain, config.soft, config.seed)
     with progress(config.parts(tips_at), "reachability", "parts") as bar:
         maps, check = survey(tips_at, config, lambda part: bar.update(1, done=part))

@@ -25,7 +25,7 @@ Config = settings(Learning)
 
 def main(config: Learning) -> None:
     model = read_model(MODEL)
-    chain = read_chain(model)
+    chain = read_chain(model).smooth
     table = read_samples(SAMPLES, chain.tendons, "split")
     rig = None if config.rig is None else load_rig("train_ik.rig", config.rig)
     learned = learn(model, chain, table, config, rig)

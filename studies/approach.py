@@ -114,7 +114,7 @@ def main() -> None:
     chain = read_chain(model)
     rest, gravity = targets(chain, arguments.targets, np.random.default_rng(0))
     friction = model_friction(model)
-    band = friction_band(chain, rest.tensions, gravity, *friction)
+    band = friction_band(chain, rest.tensions, gravity, *friction, capstan=chain.capstan)
     known = np.isfinite(band.width)
     print(f"{len(rest.position)} targets; a tip error is its median / 95th percentile / maximum over them, in mm")
     pulling = np.linalg.norm(band.loaded - rest.position, axis=1)

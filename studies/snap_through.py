@@ -48,7 +48,7 @@ def main() -> None:
     parser.add_argument("--guesses", type=int, default=24)
     parser.add_argument("--figure", type=Path)
     arguments = parser.parse_args()
-    chain = read_chain(read_model(arguments.model))
+    chain = read_chain(read_model(arguments.model)).smooth
     rng = np.random.default_rng(0)
     tensions, gravity = random_loads(chain, arguments.targets, rng)
     rest = equilibrium(chain, tensions, gravity)

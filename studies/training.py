@@ -50,7 +50,7 @@ def main() -> int:
     parser.add_argument("settings", type=setting, nargs="+")
     parser.add_argument("--targets", type=int, default=2000, help="of each kind (default: %(default)s)")
     arguments = parser.parse_args()
-    chain = read_chain(read_model(MODEL))
+    chain = read_chain(read_model(MODEL)).smooth
     table = pd.read_parquet(existing(SAMPLES))
     tendons, rng = chain.tendons, np.random.default_rng(1)
     pose = np.concatenate([tip_by_tension(table, tendons), LEVER * turn_by_tension(table, tendons)], axis=1)

@@ -5,11 +5,11 @@ import numpy as np
 import pandas as pd
 
 from trunkline.dataset.columns import command_columns, tension_columns
+from trunkline.elements import capstan_friction
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain
-from trunkline.statics.equilibria import actuated
 from trunkline.statics.hysteresis import friction_band, model_friction
 
 
@@ -17,9 +17,6 @@ def mujoco_deviation(
     model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, count: int, rng: np.random.Generator
 ) -> pd.DataFrame:
     """Distance of `count` random samples' tips from those of MuJoCo settled to rest under the same actuators.
-
-    Samples of an arm with capstan friction hold its shapes where tendons were drawn in; what is compared then is the
-    shape that the same commands give without that friction.
 
     Returns:
         Columns theta_g (rad), largest_tension (N), deviation_mm, rested, and friction_band_mm: how far apart friction,
@@ -37,9 +34,7 @@ def mujoco_deviation(
     gravity = gravity_in_base(rows["theta_g"].to_numpy())
     settled = settle(model, commands[:, by_actuator], gravity)
     position = rows[["x", "y", "z"]].to_numpy()
-    if chain.capstan:
-        position = actuated(chain._replace(capstan=0.0), commands, gravity).position
-    band = friction_band(chain, tensions, gravity, *model_friction(model))
+    band = friction_band(chain, tensions, gravity, *model_friction(model), capstan=capstan_friction(model))
     deviation = np.linalg.norm(settled.position - position, axis=1)
     return pd.DataFrame(
         {

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from trunkline.dataset.sampling import around_the_arm
-from trunkline.elements import SLIDER, all_elements
+from trunkline.elements import SLIDER, all_elements, capstan_friction
 from trunkline.frames import gravity_in_base
 from trunkline.simulation.drive import drive, has_friction
 from trunkline.simulation.rest import settle
@@ -175,6 +175,7 @@ def score(
         seconds = timed.time_to_rest()
     tendons, joints = model_friction(model)
     dry = {"tendons_n": tendons.max(), "joints_nm": joints.max(), "sliders": len(all_elements(model, SLIDER))}
+    dry["capstan"] = capstan_friction(model)
     on_model = {
         "targets": len(targets),
         "frictionless": settled(model, ask, targets).metrics(chain.length) | {"seconds_to_rest": timed.time_to_rest()},

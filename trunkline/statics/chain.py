@@ -67,6 +67,11 @@ class Chain(NamedTuple):
     tip_quaternion: np.ndarray
 
     @property
+    def smooth(self) -> "Chain":
+        """The same arm, its tendons sliding without friction: its rest is between what friction can hold."""
+        return self._replace(capstan=0.0)
+
+    @property
     def units(self) -> int:
         return len(self.mass)
 

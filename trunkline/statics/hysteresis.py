@@ -4,7 +4,7 @@ Quasi-statically, on the way to a sample in the direction in which its tensions 
 every joint slides; friction then is at its full value against the way of each (Coulomb). On the way back it is the
 other way round. So the ends of the band are equilibria with the motors' commands of the sample and, with dl and dq
 the changes on the way in, friction of tendons as tensions ±f sign(dl) and of joints as torques ∓c sign(dq). Capstan
-friction, which the sample has already, acts at the other end the other way: with -μ.
+friction acts with μ where tendons were drawn in, and with -μ where all have slid back: its band is the widest there is.
 """
 
 from dataclasses import dataclass
@@ -45,16 +45,23 @@ def model_friction(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
 
 
 def friction_band(
-    chain: Chain, tensions: np.ndarray, gravity: np.ndarray, tendon_friction: np.ndarray, joint_friction: np.ndarray
+    chain: Chain,
+    tensions: np.ndarray,
+    gravity: np.ndarray,
+    tendon_friction: np.ndarray,
+    joint_friction: np.ndarray,
+    capstan: float = 0.0,
 ) -> Band:
     """Both ends of the band for N samples, their position actuators' commands held.
 
     Args:
-        tensions: of the samples at rest, with no friction but capstan friction, N. Shape (N, K).
+        tensions: of the samples at rest without friction, N. Shape (N, K).
         gravity: m/s². Shape (N, 3).
         tendon_friction: N. Shape (K,).
         joint_friction: N m. Shape (n, 2).
+        capstan: μ of capstan friction.
     """
+    chain = chain.smooth
     way = equilibrium_paths(chain, tensions[:, None] * np.array([BACK, 1.0])[:, None], gravity)
     before, here = way[0::2], way[1::2]
     commands = here.lengths - tensions / chain.gain
@@ -62,7 +69,7 @@ def friction_band(
     doubled = with_friction(chain)
     ends = []
     for side in (1, -1):
-        slid = doubled._replace(capstan=side * chain.capstan)
+        slid = doubled._replace(capstan=side * capstan)
         torques = -side * joint_friction * slides[1]
         end = _held(slid, commands, side * tendon_friction * slides[0], torques, gravity)
         found = (here.converged & end.converged)[:, None]
