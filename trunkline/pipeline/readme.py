@@ -52,7 +52,7 @@ RESULTS = {
             "mm",
         ),
         ("… 95th percentile", "as_controls.frictionless.position_error_mm.p95", "mm"),
-        ("… seconds until the arm rests: median", "as_controls.friction.seconds_to_rest.median", "s"),
+        ("… seconds until the arm rests: median", "as_controls.frictionless.seconds_to_rest.median", "s"),
         ("… sent to the lab's own arm: median", "on_plant.position_error_mm.median", "mm"),
     ],
     "reachability": [
