@@ -124,6 +124,7 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "kp": True,
         "kv": False,
         "force_range": False,
+        "capstan_friction": False,
     }
 
 

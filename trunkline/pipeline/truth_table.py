@@ -50,8 +50,9 @@ LEAN = ("mount_tilt_x", "mount_tilt_y")
 REST = ("rest_bend_x", "rest_bend_y", "rest_gradient_x", "rest_gradient_y")
 RELAXING = ("relaxation", "relaxation_time", "relaxation_2", "relaxation_time_2")
 MEMORY = ("hysteresis", "yield_bend")
+CURLED = ("kp", "capstan_friction")
 RUBBING = ("tendon_friction", "friction_time")
-MOTORS = ("kp", "kv", "time_constant", "dead_time")
+MOTORS = (*CURLED, "kv", "time_constant", "dead_time")
 LACKING = {
     "cousin": (
         Effect("a motor with a limited rate and a delay", ("kp", "kv")),
@@ -67,7 +68,7 @@ LACKING = {
         Effect("dead time of the motors", MOTORS, unless="dead_time"),
         Effect("friction on its holes", (*SPRINGS, *RUBBING, "kp", "kv", "force_range"), "capstan_friction"),
         Effect("Maxwell branches", ("damping", *RELAXING, *MEMORY, *RUBBING, "kp", "kv"), "relaxation", "branches"),
-        Effect("sliders", (*SPRINGS, "damping", *RELAXING, *MEMORY, *RUBBING, "kp"), "hysteresis", "sliders"),
+        Effect("sliders", (*SPRINGS, "damping", *RELAXING, *MEMORY, *RUBBING, *CURLED), "hysteresis", "sliders"),
         Effect("a rest shape", (*SPRINGS, *LEAN), unless="rest_bend_x"),
         Effect("a mount that leans", (*SPRINGS, *REST), unless="mount_tilt_x"),
         Effect("several links in every unit", (*SPRINGS, "damping", "kp"), unless="joint_place"),
