@@ -371,5 +371,5 @@ def test_float_arrays_count_by_log_time(tmp_path):
     # the recorder dates all messages by one clock, so that of the offset of 137 ms only the delivery's jitter is left
     pulls = np.interp(take.command_time, stamped.command_time - 0.137, stamped.commands[:, 0])
     np.testing.assert_allclose(take.commands[:, 0], pulls, atol=2e-3)
-    assert found.offset.offset == pytest.approx(0, abs=0.02)
+    assert found.by_log_times.offset == pytest.approx(0, abs=0.02)
     assert abs(take.command_time[0]) < 0.02

@@ -175,7 +175,7 @@ def test_a_trial_can_be_left_out_and_is_reported(project, capsys):
     report = json.loads((ingest.ARTIFACTS / "quality.json").read_text())
     assert list(report["refused"]) == ["curl_40"]
     assert "cut off at byte 3000" in report["refused"]["curl_40"]
-    assert json.loads((ingest.ARTIFACTS / "metrics.json").read_text())["clock_spread_ms"] is None
+    assert json.loads((ingest.ARTIFACTS / "metrics.json").read_text())["clock_spread_ms"] < 1, "of the others"
     for log in (project / "data/raw/demo").glob("*.mcap"):
         log.write_bytes(b"")
     code, stderr = run(capsys)

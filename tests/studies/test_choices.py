@@ -21,7 +21,7 @@ CHANGED = {  # name → stage → the settings that it changes
     "velocity": {},
     "delay": {stage: {"command_delay"} for stage in STAGES},
     "distances": {stage: {"loss"} for stage in STAGES},
-    "least-squares": {"identify_damping": {"optimizer"}, "identify_control": {"optimizer"}},
+    "least-squares": {"identify_damping": {"optimizer"}},
     "evolved-factors": {stage: {"fine"} for stage in STAGES},
     "joint-damping": {"identify_damping": {"per_joint"}},
 }

@@ -274,7 +274,7 @@ def test_static_pulls_have_no_say_in_the_clocks(tmp_path):
     truth.tendon_positions = truth.tendon_positions * np.clip(np.arange(len(truth.time)) / 200, 0, 1)[:, None]
     record(tmp_path, [truth], instruments())
     ((_, _, found),) = take_in(tmp_path, read_session(tmp_path), LIMITS)
-    assert found.offset is None
+    assert found.by_motion is None
 
 
 def test_exchanged_topics_are_named(sound):
@@ -312,8 +312,8 @@ def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
 
 def test_a_level_that_the_base_contradicts_is_said(folder, sound):
     trial, take, _ = sound["tilt_60"]
-    taken = {name: (t, some, Findings()) for name, (t, some, _) in sound.items()}
-    taken["tilt_60"] = trial, replace(take, level=10.0), Findings()
+    taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
+    taken["tilt_60"] = trial, replace(take, level=10.0), taken["tilt_60"][2]
     gathered = gather(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
     said = {take.name: found.warnings for take, found in zip(gathered.takes, gathered.findings, strict=True)}
     assert said["tilt_60"][0].startswith("level: found 10, but the base is tilted by 60°")
@@ -321,7 +321,8 @@ def test_a_level_that_the_base_contradicts_is_said(folder, sound):
 
 
 def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
-    taken = [(t, some, Findings()) for name, (t, some, _) in sound.items() if name != "curl_60"]
+    kept = [trial for name, trial in sound.items() if name != "curl_60"]
+    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in kept]
     gathered = gather(taken, read_session(folder), PLAUSIBLE, "stop", "here")
     said = ["splits: no curl of the split validate, which the session has"]
     assert all(found.warnings == said for found in gathered.findings)

@@ -132,7 +132,7 @@ def _ends(
 
 def _flat(linear: Linearisation) -> np.ndarray:
     """Which parameters do not matter at all. Shape (P,)."""
-    return ~np.concatenate(linear.jacobians).any(axis=0)
+    return np.asarray(~np.concatenate(linear.jacobians).any(axis=0))
 
 
 def descend(

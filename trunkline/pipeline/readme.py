@@ -113,7 +113,7 @@ def identification_table(root: Path) -> str:
         "|---|---:|---:|---:|---:|---:|",
     ]
     for model, words in MODELS.items():
-        if (model == "coarse" and not factors) or model not in metrics:
+        if (model == "coarse" and not factors) or lookup(metrics, model) is None:
             continue
         cells = []
         for split in DECIDING:
