@@ -20,7 +20,7 @@ FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
 
 @pytest.fixture(scope="module")
 def found():
-    if not (RAW / "demo.truth.json").is_file():
+    if not (RAW / "demo/session.yaml").is_file():
         pytest.skip("data/raw/demo is not recorded here: `make demo`")
     truth, session = json.loads((RAW / "demo.truth.json").read_text()), read_session(RAW / "demo")
     chosen = [trial for trial in session.trials if trial.name in TRIALS]
