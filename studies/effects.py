@@ -23,6 +23,7 @@ from benchmarks.identification.case import STAGES
 from stages.build_mjcf import Config as CadConfig
 from stages.build_mjcf import cad_arm
 from studies.choices import Chain, next_link
+from trunkline.arm.holes import Holes
 from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.errors import in_one_line
 from trunkline.identification.cross_validation import errors_left_out
@@ -40,7 +41,7 @@ from trunkline.trials.splits import VALIDATE
 class Effect:
     """A term of the model, the stage that identifies it, and its parameters with their ranges.
 
-    joints: what it adds to them. dead_time: guess of the motors', s.
+    joints, holes: what it adds to them. dead_time: guess of the motors', s.
     """
 
     title: str
@@ -48,6 +49,7 @@ class Effect:
     parameters: dict[str, Bounds]
     joints: Joints = field(default_factory=Joints)
     dead_time: float = 0.0
+    holes: Holes = field(default_factory=Holes)
 
 
 def ranges(low: float, high: float, *names: str) -> dict[str, Bounds]:
@@ -79,6 +81,9 @@ EFFECTS: dict[str, Effect] = {
         "tendon friction", "identify_damping",
         ranges(0.005, 3.0, "tendon_friction") | ranges(0.003, 0.3, "friction_time"),
     ),
+    "holes": Effect(
+        "capstan friction", "identify_control", ranges(0.005, 2.0, "capstan_friction"), holes=Holes(0.2, 6)
+    ),
     "dead_time": Effect("dead time", "identify_control", ranges(0.001, 0.2, "dead_time"), dead_time=0.02),
 }  # fmt: skip
 OPTIONAL = {name for effect in EFFECTS.values() for name in effect.parameters}
@@ -91,6 +96,7 @@ def cad_model(effects: list[Effect]) -> mujoco.MjModel:
         [branch for effect in effects for branch in effect.joints.branches],
         [slider for effect in effects for slider in effect.joints.sliders],
     )
+    config.holes = next((effect.holes for effect in effects if effect.holes.stretches), Holes())
     config.actuation.dead_time = max((effect.dead_time for effect in effects), default=0.0)
     model = cad_arm(config).spec.compile()
     if not any("tendon_friction" in effect.parameters for effect in effects):
@@ -121,7 +127,7 @@ def chain(effects: list[Effect], last: str, known: dict[str, Chain]) -> Chain:
     found, key = Chain(cad_model(effects), [], None, []), ""
     for stage in STAGES:
         config = settings_of(stage, effects)
-        key += f"{stage} {config} {found.model.nq} {found.model.nhistory}\n"
+        key += f"{stage} {config} {found.model.nq} {found.model.ntendon} {found.model.nhistory}\n"
         if key not in known:
             with contextlib.redirect_stdout(sys.stderr):
                 known[key] = next_link(found, stage, config, read_reported(config), is_quick=False)

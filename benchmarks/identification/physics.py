@@ -9,6 +9,7 @@ import numpy as np
 from benchmarks.identification.case import ReadCase, Size
 from benchmarks.identification.timing import alternate
 from stages.build_mjcf import Config, cad_arm
+from trunkline.arm.holes import Holes
 from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.population import Population
@@ -43,7 +44,7 @@ def report(read_case: ReadCase, size: Size) -> None:
 def model_with(joints: Joints, dead_time: float = 0.0) -> mujoco.MjModel:
     """The CAD model of the pipeline's settings, with these joints."""
     config = load_config(Config, "build_mjcf")
-    config.joints, config.actuation.dead_time = joints, dead_time
+    config.joints, config.holes, config.actuation.dead_time = joints, Holes(), dead_time
     return cad_arm(config).spec.compile()
 
 
