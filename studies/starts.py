@@ -8,6 +8,7 @@ of least squares from the truth and from more starts. `converged` is what the st
 """
 
 import argparse
+import contextlib
 import sys
 from pathlib import Path
 
@@ -67,7 +68,8 @@ def main() -> int:
         print("|---|---:|---:|---:|---:|---:|", flush=True)
         for name in STAGES:
             rows = []
-            with progress(arguments.sessions, f"starts of {name}", "sessions") as bar:
+            counting = progress(arguments.sessions, f"starts of {name}", "sessions")
+            with contextlib.redirect_stdout(sys.stderr), counting as bar:
                 for seed in range(arguments.sessions):
                     rows.append(session(name, seed))
                     bar.update(1)
