@@ -16,7 +16,7 @@ from trunkline.dataset.sampling import around_the_arm
 from trunkline.elements import SLIDER, all_elements, capstan_friction
 from trunkline.frames import gravity_in_base
 from trunkline.simulation.drive import drive, has_friction
-from trunkline.simulation.rest import settle
+from trunkline.simulation.rest import base_frame, settle
 from trunkline.statics.chain import Chain
 from trunkline.statics.hysteresis import model_friction
 
@@ -29,7 +29,7 @@ DOUBT = 0.8 * SHARE  # from which on a foreseen miss is a reason to doubt: what 
 SWING = 4.0  # s that an arm without friction swings by itself before it is damped: then it has its shape
 PULL_SHARE = 0.8  # of the deepest pulls of the samples: together, two of them are near the motors' limits
 
-Rig = Callable[[np.ndarray, np.ndarray], np.ndarray]  # m of pull (N, K) and gravity (N, 3), m/s², to tips (N, 3), m
+Rig = Callable[[np.ndarray, np.ndarray], np.ndarray]  # m of pull (N, K), gravity (N, 3), m/s², to tips (N, 3), m
 Ask = Callable[[np.ndarray], dict[str, np.ndarray]]  # as `ask.ask`, of one network
 
 
@@ -187,7 +187,9 @@ def score(
     few = targets[: settings.on_rig]
     answer = ask(few)
     pulls = chain.straight_lengths - answer["commands"]  # motors count from the straight arm, as in a session's logs
-    on_rig = _reached(few, answer, rig(pulls, gravity_in_base(few[:, 0])))
+    origin, turn = base_frame(model)  # a rig knows the tracked base, in which the arm's mount is turned
+    tips = rig(pulls, gravity_in_base(few[:, 0]) @ turn.T)
+    on_rig = _reached(few, answer, (tips - origin) @ turn)
     summary = on_rig.metrics(chain.length)
     twin = np.quantile(sent.position[: len(few)], (0.5, 0.95)) * 1e3
     return on_model, {"targets": len(few)} | summary | {"twin_mm": {"median": twin[0], "p95": twin[1]}}
