@@ -80,23 +80,60 @@ def segment_sites(model: mujoco.MjModel, segments: tuple[str, ...]) -> np.ndarra
 
 def cables(model: mujoco.MjModel) -> list[int]:
     """Numbers of the tendons that run along the arm; the others are parts of joints, or rub."""
-    along = [t for t in range(model.ntendon) if model.wrap_type[model.tendon_adr[t]] != mujoco.mjtWrap.mjWRAP_JOINT]
-    return [t for t in along if f"_{HOLE}_" not in model.tendon(t).name]
+    return [t for t in range(model.ntendon) if model.wrap_type[model.tendon_adr[t]] != mujoco.mjtWrap.mjWRAP_JOINT]
+
+
+def hole_name(cable: str, number: int) -> str:
+    """Of the tendon by which a cable rubs in a stretch of the arm, counted from 1."""
+    return f"{cable}_{HOLE}_{number}"
 
 
 def holes(model: mujoco.MjModel) -> np.ndarray:
     """Numbers of the tendons by which each cable rubs, P for each. Shape (K, P), P = 0 where nothing rubs."""
-    tendons = [t for t in range(model.ntendon) if f"_{HOLE}_" in model.tendon(t).name]
+    tendons = [t for t in range(model.ntendon) if is_hole(model.tendon(t).name)]
     return np.array(tendons, dtype=int).reshape(len(cables(model)), -1) if tendons else np.zeros((0, 0), dtype=int)
+
+
+def is_hole(tendon: str) -> bool:
+    """Whether a tendon of this name is one by which a cable rubs."""
+    return f"_{HOLE}_" in tendon
+
+
+def stretch_edges(units: int, stretches: int) -> np.ndarray:
+    """At which units the stretches of an arm begin in which a cable rubs, and where the last one ends. Shape (P + 1,).
+
+    There are at most as many as units.
+    """
+    count = min(stretches, units)
+    return np.arange(count + 1) * units // count
+
+
+def actuators(model: mujoco.MjModel) -> np.ndarray:
+    """Number of the actuator that draws each cable in, in the order of the cables. Shape (K,)."""
+    return np.array([np.flatnonzero(model.actuator_trnid[:, 0] == cable)[0] for cable in cables(model)], dtype=int)
+
+
+def friction_place(model: mujoco.MjModel) -> int | None:
+    """Where among the model's `numeric_data` the coefficient μ is with which its cables rub; None if it has none."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CAPSTAN_FRICTION)
+    return int(model.numeric_adr[number]) if number >= 0 else None
 
 
 def capstan_friction(model: mujoco.MjModel) -> float:
     """The coefficient μ with which its cables rub, 0 where nothing rubs."""
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CAPSTAN_FRICTION)
-    return float(model.numeric_data[model.numeric_adr[number]]) if number >= 0 else 0.0
+    place = friction_place(model)
+    return 0.0 if place is None else float(model.numeric_data[place])
 
 
 def let_slide(model: mujoco.MjModel) -> None:
     """Take the friction of cables on their holes from a model, in place."""
-    if capstan_friction(model):
-        model.numeric_data[model.numeric_adr[model.numeric(CAPSTAN_FRICTION).id]] = 0
+    place = friction_place(model)
+    if place is not None:
+        model.numeric_data[place] = 0
+
+
+def let_hang(model: mujoco.MjModel) -> None:
+    """Take all cables from a model in place, for where they are slack and so move nothing: each is cut down to a
+    point, as its path takes much of a step."""
+    let_slide(model)
+    model.tendon_num[cables(model)] = 1

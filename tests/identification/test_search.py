@@ -84,7 +84,7 @@ def test_differences_stay_within_the_bounds(problem):
         *(getattr(problem, name) for name in ("model", "experiments", "segments", "parameters", "loss", "weights"))
     )
     residuals = watched.residuals
-    watched.residuals = lambda vectors: seen.append(vectors) or residuals(vectors)
+    watched.residuals = lambda vectors, near=None: seen.append(vectors) or residuals(vectors)
     edge = linearise(watched, high)
     assert (np.concatenate(seen) <= high).all()
     inside = linearise(watched, high - 2e-3)
@@ -108,7 +108,7 @@ class Capped:
     parameters = ("kp", "force_range")
     wound = np.linspace(0.1, 1.0, 20)
 
-    def residuals(self, vectors):
+    def residuals(self, vectors, near=None):
         gain, cap = np.exp(vectors).T[..., None]
         fitted = np.minimum(gain * self.wound, cap) - np.minimum(2.0 * self.wound, 1.0)
         return [np.concatenate([fitted, np.full((len(vectors), 1), 0.1)], axis=1)]  # and what nothing explains

@@ -22,7 +22,7 @@ class BentResiduals:
     parameters = ("stiffness", "damping")
     trial_weights = np.ones(TRIALS)
 
-    def residuals(self, vectors):
+    def residuals(self, vectors, near=None):
         lines = np.einsum("trp,cp->tcr", self.slopes, vectors)
         bends = np.einsum("trpq,cp,cq->tcr", self.bends, vectors, vectors)
         return list(self.offsets[:, None] + lines + bends)

@@ -56,6 +56,21 @@ def test_friction_taken_together_bends_as_much():
     np.testing.assert_allclose(shares(0.5, 4).mean(), shares(0.5, 8).mean(), rtol=0.04)
 
 
+def test_friction_acts_where_the_cable_does():
+    """In a bent arm, the last unit's arms of every stretch's friction are those of the cable itself."""
+    model = rubbing_arm(4)
+    controls = np.tile(model.tendon_length0[cables(model)] - [0.05, 0, 0], (1, 400, 1))
+    batch = batch_of(model, 1)
+    hold(batch, model, controls[:, 0])
+    slope = batch.bind("ten_J")
+    move(batch, controls, ())
+    last = model.tendon_adr[holes(model)] + model.tendon_num[holes(model)] - 1  # of the hinge y
+    for cable, entries in zip(cables(model), last, strict=True):
+        row = model.ten_J_rowadr[cable] + model.ten_J_rownnz[cable] - 1
+        assert abs(model.wrap_prm[entries[0]] / slope[0, row] - 1) > 0.02, "or the arm is straight"
+        np.testing.assert_allclose(batch.expand("wrap_prm")[0, entries], slope[0, row], rtol=0.01)
+
+
 def test_a_cable_without_tension_does_not_rub():
     model = rubbing_arm()
     batch = batch_of(model, 1)

@@ -2,18 +2,22 @@
 
 Where a cable turns by an angle θ at a hole over which it slides, its tension T falls by exp(-μ θ): the capstan
 equation. So what it loses in a stretch of the arm is a dry friction of at most about μ θ T against the sliding there,
-and what slides is the rest of the cable, from there to its anchor. Each stretch is a further tendon on the cable's path
-from the stretch's middle to the anchor, without stiffness. Its `frictionloss` is that limit. It is 0 in the file, where
-the cable does not rub, as MJCF knows constants alone; `trunkline/simulation/rubbing.py` sets it while the arm moves.
+and what slides is the rest of the cable, from there to its anchor. Each stretch is a further tendon without stiffness:
+a sum of hinges' angles, each times the cable's distance from that hinge. (A tendon through the holes themselves would
+do, but six for each cable cost more than all the rest of a step.) Its `frictionloss` is that limit, 0 in the file,
+where the cable does not rub: MJCF knows constants alone. `trunkline/simulation/rubbing.py` sets it, and the distances,
+which are those of the straight arm in the file, while the arm moves.
 """
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 import mujoco
+import numpy as np
 from pydantic import Field
 
-from trunkline.elements import CAPSTAN_FRICTION, HOLE
+from trunkline.elements import CAPSTAN_FRICTION, hole_name, stretch_edges
 
 RIGID_TIME, RIGID = 0.004, 0.999  # s and impedance of the friction: nearer to rigid than MuJoCo's own 0.02 and 0.95
 
@@ -33,15 +37,27 @@ def add_holes(spec: mujoco.MjSpec, holes: Holes) -> None:
     if not holes.stretches or not cables:
         return
     spec.add_numeric(name=CAPSTAN_FRICTION, data=[holes.friction], size=1)
+    straight = spec.compile()
+    data = mujoco.MjData(straight)
+    mujoco.mj_forward(straight, data)
     for cable in cables:
-        sites = [wrap.target.name for wrap in cable.path]
-        units = len(sites) - 1  # the first site is the base's
-        stretches = min(holes.stretches, units)
-        for number in range(stretches):
+        arms = _moment_arms(straight, data, straight.tendon(cable.name).id)
+        edges = stretch_edges(len(arms), holes.stretches)
+        for number, (begin, end) in enumerate(pairwise(edges), start=1):
             rubbing = spec.add_tendon(
-                name=f"{cable.name}_{HOLE}_{number + 1}", solref_friction=[RIGID_TIME, 1],
-                solimp_friction=[RIGID, RIGID, 0.001, 0.5, 2], rgba=(0, 0, 0, 0),
+                name=hole_name(cable.name, number), solref_friction=[RIGID_TIME, 1],
+                solimp_friction=[RIGID, RIGID, 0.001, 0.5, 2],
             )  # fmt: skip
-            begin, end = (n * units // stretches for n in (number, number + 1))
-            for site in sites[(begin + end) // 2 :]:
-                rubbing.wrap_site(site)
+            for unit in arms[(begin + end) // 2 :]:
+                for hinge, arm in unit.items():
+                    rubbing.wrap_joint(hinge, arm)
+
+
+def _moment_arms(model: mujoco.MjModel, data: mujoco.MjData, cable: int) -> list[dict[str, float]]:
+    """For each unit that a cable crosses, by hinge: how its path answers the angle, m/rad."""
+    row = model.ten_J_rowadr[cable] + np.arange(model.ten_J_rownnz[cable])
+    hinges = model.dof_jntid[model.ten_J_colind[row]]
+    units: dict[int, dict[str, float]] = {}
+    for hinge, arm in zip(hinges, data.ten_J[row], strict=True):
+        units.setdefault(int(model.jnt_bodyid[hinge]), {})[model.joint(hinge).name] = float(arm)
+    return list(units.values())

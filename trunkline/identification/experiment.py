@@ -61,6 +61,11 @@ class Experiment:
     def frames(self) -> int:
         return len(self.positions)
 
+    def slack(self, model: mujoco.MjModel) -> bool:
+        """Whether all cables of `model` are let out throughout, as where the trial commands nothing."""
+        straight = model.tendon_length0[model.actuator_trnid[:, 0]]
+        return bool((self.controls > straight + 0.9 * SLACK).all())
+
     def shortened(self, frames: int) -> "Experiment":
         """Its first `frames` frames."""
         parts = {name: getattr(self, name)[:frames] for name in ("controls", "positions", "measured")}

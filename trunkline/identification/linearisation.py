@@ -44,10 +44,8 @@ def linearise(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] 
     steps = np.where(vector + DIFFERENCE > high, -DIFFERENCE, DIFFERENCE)
     candidates = vector + np.diag(steps)
     if residuals is None:
-        blocks = problem.residuals(np.concatenate([vector[None], candidates]))
-        residuals, blocks = [block[0] for block in blocks], [block[1:] for block in blocks]
-    else:
-        blocks = problem.residuals(candidates)
+        residuals = [block[0] for block in problem.residuals(vector[None])]
+    blocks = problem.residuals(candidates, near=vector)
     columns = [((moved - base) / steps[:, None]).T for moved, base in zip(blocks, residuals, strict=True)]
     weights = problem.prior(np.full((1, len(vector)), 2.0))[0]  # of f - 1 = 1
     return Linearisation(vector, residuals, columns, weights if weights.any() else None)

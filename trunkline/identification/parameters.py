@@ -11,13 +11,13 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.elements import (
     BRANCH,
-    CAPSTAN_FRICTION,
     SLIDER,
     all_elements,
     arm_hinges,
     cables,
     capstan_friction,
     elements,
+    friction_place,
     holes,
 )
 from trunkline.errors import InputError
@@ -270,7 +270,7 @@ def _rest_bend(axis: int, power: int) -> Parameter:
 
 
 def _write_capstan(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
-    fields["numeric_data"][:, model.numeric_adr[model.numeric(CAPSTAN_FRICTION).id]] = values
+    fields["numeric_data"][:, friction_place(model)] = values
 
 
 STIFFNESS_FIELDS = ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "dof_damping")

@@ -1,24 +1,23 @@
 """All candidates times all trials as one batch of simulations."""
 
+import copy
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.elements import SLIDER, all_elements, give_way, segment_sites
+from trunkline.elements import SLIDER, all_elements, arm_hinges, cables, give_way, let_hang, let_slide, segment_sites
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
-from trunkline.simulation.load import hang, slowing
+from trunkline.simulation.load import hang
 from trunkline.simulation.motion import batch_of, hold, move
-from trunkline.simulation.rest import come_to_rest, creep_to_rest, relax
-from trunkline.trials.experiments import EXPERIMENTS, is_static
+from trunkline.simulation.rest import come_to_rest, lead_to_rest, relax
+from trunkline.trials.experiments import is_static
 
-SETTLE_TIME = 10.0  # s, the most; a shape that does not rest by then counts as diverged
-CREEP_TIME = 30.0  # s more for trials with pulls or a load, which may press on the arm
-REST_SPEED = 2e-5  # rad/s of the fastest hinge: some 1e-5 rad are left then
-CREEP_SPEED = 1e-3  # rad/s, with which a pressed arm may still creep after that: less than any trial at rest shows
+SETTLE_TIME = 30.0  # s, the most; a shape that does not rest by then counts as diverged
 
 
 @dataclass
@@ -28,11 +27,20 @@ class Simulated:
     positions: per trial (C, T, S, 3), m; not finite from where a candidate diverged.
     diverged: which candidates left the physics in any trial, or made MuJoCo warn. Shape (C,).
     steps: simulation steps taken.
+    rests: angles of the arm's hinges where the first candidate rests, rad; NaN for trials in motion. Shape (T, n).
     """
 
     positions: list[np.ndarray]
     diverged: np.ndarray
     steps: int
+    rests: np.ndarray
+
+
+class Group(NamedTuple):
+    """Trials that one batch simulates: whether they are at rest, and whether all cables are slack in them."""
+
+    static: bool
+    slack: bool
 
 
 class Population:
@@ -48,44 +56,58 @@ class Population:
     ):
         self._model = model
         self._sites = segment_sites(model, segments)
-        self._static = [i for i, e in enumerate(experiments) if is_static(e.kind)]
         # longest first, so that those still running are a prefix of each candidate's trials
-        self._dynamic = sorted(
-            (i for i, e in enumerate(experiments) if not is_static(e.kind)), key=lambda i: -experiments[i].frames
-        )
+        order = sorted(range(len(experiments)), key=lambda i: -experiments[i].frames)
+        self._groups: dict[Group, list[int]] = {}
+        for i in order:
+            group = Group(is_static(experiments[i].kind), experiments[i].slack(model))
+            self._groups.setdefault(group, []).append(i)
         self._experiments = experiments
         self._step_factor = step_factor
-        self._batches: dict[tuple[str, int], Batch] = {}
+        self._batches: dict[Group, Batch] = {}
 
-    def simulate(self, fields: Fields) -> Simulated:
-        """Run every candidate (the first axis of `fields`) through every experiment."""
+    def simulate(self, fields: Fields, rests: np.ndarray | None = None) -> Simulated:
+        """Run every candidate (the first axis of `fields`) through every experiment.
+
+        Args:
+            rests: near which all of them rest, as `Simulated.rests` has it of another candidate.
+        """
         count = len(next(iter(fields.values())))
         positions: list = [None] * len(self._experiments)
+        found = np.full((len(self._experiments), arm_hinges(self._model)), np.nan)
         steps = 0
-        for chosen, run in ((self._static, self._settle), (self._dynamic, self._run)):
-            if chosen:
-                results, taken = run([self._experiments[i] for i in chosen], fields, count)
-                steps += taken
-                for index, result in zip(chosen, results, strict=True):
-                    positions[index] = result
+        for group, chosen in self._groups.items():
+            own = [self._experiments[i] for i in chosen]
+            batch = self._batch(group, own, fields, count)
+            if group.static:
+                results, taken, found[chosen] = self._settle(batch, len(own), rests if rests is None else rests[chosen])
+            else:
+                results, taken = self._run(batch, own, count)
+            steps += taken
+            for index, result in zip(chosen, results, strict=True):
+                positions[index] = result
         diverged = np.zeros(count, dtype=bool)
         for result in positions:
             diverged |= ~np.isfinite(result).all(axis=(1, 2, 3))
-        return Simulated(positions, diverged, steps)
+        return Simulated(positions, diverged, steps, found)
 
-    def _batch(self, kind: str, experiments: list[Experiment], fields: Fields, count: int) -> Batch:
+    def _batch(self, group: Group, experiments: list[Experiment], fields: Fields, count: int) -> Batch:
         """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start."""
-        key = (kind, count)
-        if key not in self._batches:
-            self._batches = {key: batch_of(self._model, count * len(experiments))}
-        batch = self._batches[key]
+        batch = self._batches.get(group)
+        if batch is None or batch.nsim != count * len(experiments):
+            model = _without_idle(self._model, group, fields)
+            batch = self._batches[group] = batch_of(model, count * len(experiments))
+        if group.static or group.slack:  # cables do not rub
+            fields = {name: values for name, values in fields.items() if name != "numeric_data"}
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         for name, values in fields.items():
             batch.expand(name)[:] = np.tile(values, (len(experiments),) + (1,) * (values.ndim - 1))
         batch.expand("opt.gravity")[:] = np.repeat([e.gravity for e in experiments], count, axis=0)
         loads = np.repeat([e.load for e in experiments], count)
         if loads.any():
-            hang(batch, self._model, loads, tuple(fields))
+            hang(batch, batch.model, loads, tuple(fields))
+        elif "jnt_pos" in fields:  # what softens joint limits follows, as when such a model is compiled
+            batch.set_const()
         arm = len(experiments[0].start)
         batch.bind("qpos")[:, :arm] = np.repeat([e.start for e in experiments], count, axis=0)
         batch.bind("qvel")[:, :arm] = np.repeat([e.velocity for e in experiments], count, axis=0)
@@ -104,30 +126,33 @@ class Population:
             for end in (0, 1):  # of the spring's length at rest
                 batch.bind("plastic")[:, place + end] = bend - np.clip(bend, -give, give)
 
-    def _settle(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
-        """Static shapes: from the measured pose, friction off, heavily damped, until each is at rest."""
-        batch = self._batch("static", experiments, fields, count)
-        timestep = relax(batch, self._model, self._step_factor)
-        loads = np.array([e.load for e in experiments])
-        if loads.any():
-            batch.expand("dof_damping")[:] *= np.repeat(slowing(self._model, loads), count)[:, None]
-        seen, speed = batch.bind("site_xpos"), batch.bind("qvel")
-        moving, steps = come_to_rest(batch, timestep, SETTLE_TIME, REST_SPEED)
-        pressed = [EXPERIMENTS[e.kind].needs_motors or e.load > 0 for e in experiments]
-        creeping = moving[np.repeat(pressed, count)[moving]]
-        if len(creeping):
-            left, more = creep_to_rest(batch, timestep, creeping, CREEP_TIME, REST_SPEED)
-            steps += more
-            fast = left[~(np.abs(speed[left]).max(axis=1) < CREEP_SPEED)]
-            moving = np.union1d(np.setdiff1d(moving, creeping), fast)
-        shapes = seen[:, None, self._sites]
-        shapes[moving] = np.nan
-        shapes[batch.warning.any(axis=(1, 2))] = np.nan
-        return list(shapes.reshape(len(experiments), count, *shapes.shape[1:])), steps
+    def _settle(
+        self, batch: Batch, trials: int, rests: np.ndarray | None
+    ) -> tuple[list[np.ndarray], int, np.ndarray]:
+        """Static shapes: friction off, heavily damped, from the measured pose, if not from near `rests` (T, n).
 
-    def _run(self, experiments: list[Experiment], fields: Fields, count: int) -> tuple[list[np.ndarray], int]:
+        Returns:
+            Segments (C, 1, S, 3) of every trial, steps, and angles where the first candidate rests (T, n).
+        """
+        timestep, looks = relax(batch, self._model), 0
+        angles, sites, moving = batch.bind("qpos"), batch.bind("site_xpos"), np.arange(batch.nsim, dtype=np.int32)
+        if rests is not None:
+            begun = angles.copy()
+            angles[:, : rests.shape[1]] = np.repeat(rests, batch.nsim // trials, axis=0)
+            near = np.isfinite(angles).all(axis=1)
+            left, looks = lead_to_rest(batch, moving[near])
+            moving = np.union1d(left, moving[~near])
+            angles[moving] = begun[moving]
+        moving, steps = come_to_rest(batch, timestep, SETTLE_TIME, moving)
+        batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
+        shapes, ends = sites[:, None, self._sites], angles[:, : arm_hinges(self._model)].copy()
+        lost = np.union1d(moving, np.flatnonzero(batch.warning.any(axis=(1, 2))))
+        shapes[lost], ends[lost] = np.nan, np.nan
+        shapes = shapes.reshape(trials, -1, *shapes.shape[1:])
+        return list(shapes), steps + looks, ends[:: batch.nsim // trials]
+
+    def _run(self, batch: Batch, experiments: list[Experiment], count: int) -> tuple[list[np.ndarray], int]:
         """Trials in motion: from the start to the first frame, then frame by frame."""
-        batch = self._batch("dynamic", experiments, fields, count)
         frame_step, sites = experiments[0].frame_step, self._sites
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))
         timestep = batch.expand("opt.timestep")
@@ -153,3 +178,16 @@ class Population:
             result[:, -1] = last[t * count : (t + 1) * count, sites]
             result[warned[t]] = np.nan
         return results, substeps * sum(lengths) * count
+
+
+def _without_idle(model: mujoco.MjModel, group: Group, fields: Fields) -> mujoco.MjModel:
+    """A copy of the model without what moves nothing in such trials and takes most of a step: friction of cables on
+    their holes where nothing pulls or the arm settles, and cables that are slack."""
+    model = copy.copy(model)
+    own = (model.tendon_frictionloss, model.tendon_stiffness, model.tendon_damping)
+    bare = "tendon_frictionloss" not in fields and not any(values[cables(model)].any() for values in own)
+    if group.slack and (bare or group.static):
+        let_hang(model)
+    elif group.slack or group.static:
+        let_slide(model)
+    return model

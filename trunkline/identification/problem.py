@@ -62,6 +62,7 @@ class Problem:
         if self.trial_weights is None:
             self.trial_weights = np.ones(len(self.experiments))
         self._population = Population(self.model, self.experiments, self.segments, self.step_factor)
+        self._last: tuple[np.ndarray, np.ndarray] | None = None  # candidate that was alone, and where it rests
         self.units = int(unit_of_hinge(self.model).max()) + 1
 
     def fields(self, vectors: np.ndarray) -> dict[str, np.ndarray]:
@@ -76,10 +77,17 @@ class Problem:
             fields["qpos_spring"] = spring_references(fields, self.model, self.rest)
         return fields
 
-    def residuals(self, vectors: np.ndarray) -> list[np.ndarray]:
-        """Residuals per trial, weighted so that the sum of ½ r² over all of them is the loss. Each (C, R)."""
+    def residuals(self, vectors: np.ndarray, near: np.ndarray | None = None) -> list[np.ndarray]:
+        """Residuals per trial, weighted so that the sum of ½ r² over all of them is the loss. Each (C, R).
+
+        Args:
+            near: a candidate (P,) that is close to all of them, in whose shapes at rest theirs are looked for.
+        """
+        rests = None if near is None or all(e.frames > 1 for e in self.experiments) else self._rests_at(near)
         begun = time.perf_counter()
-        simulated = self._population.simulate(self.fields(vectors))
+        simulated = self._population.simulate(self.fields(vectors), rests)
+        if len(vectors) == 1:
+            self._last = vectors[0].copy(), simulated.rests
         self.seconds += time.perf_counter() - begun
         self.evaluations += len(vectors)
         self.diverged += int(simulated.diverged.sum())
@@ -95,6 +103,13 @@ class Problem:
             block[simulated.diverged] = np.sqrt(2 * DIVERGED_LOSS / len(self.experiments) / block.shape[1])
             blocks.append(block)
         return blocks
+
+    def _rests_at(self, vector: np.ndarray) -> np.ndarray:
+        """Angles at which a candidate rests, rad; NaN for trials in motion. Shape (T, n)."""
+        if self._last is None or not np.array_equal(self._last[0], vector):
+            simulated = self._population.simulate(self.fields(vector[None]))
+            self._last = vector.copy(), simulated.rests
+        return self._last[1]
 
     def losses(self, vectors: np.ndarray) -> np.ndarray:
         """Loss of each candidate (C, P) → (C,), that of the prior included."""

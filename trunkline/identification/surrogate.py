@@ -100,7 +100,7 @@ def surrogate(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] 
     coefficients = np.linalg.inv(features_at(places))
     if residuals is None:
         residuals = [block[0] for block in problem.residuals(vector[None])]
-    others = problem.residuals(vector + places[1:])
+    others = problem.residuals(vector + places[1:], near=vector)
     blocks = [np.concatenate([base[None], block]) for base, block in zip(residuals, others, strict=True)]
     grams = np.stack([coefficients @ (block @ block.T) @ coefficients.T for block in blocks])
     return Surrogate(grams / problem.trial_weights[:, None, None], problem.trial_weights)

@@ -20,7 +20,6 @@ from trunkline.simulation.rest import base_frame, settle
 from trunkline.statics.chain import Chain
 from trunkline.statics.hysteresis import model_friction
 
-REST_SPEED = 1e-5  # rad/s of the fastest joint of an arm that rests: tips are some 1e-6 m from it
 PATIENCE = 15.0  # s to rest for a pose that is to be a target; one that takes longer is between two shapes
 NEAR_LIMIT = 0.95  # share of its largest force at which a motor is near it: there other commands hold the same pose
 TAUT_SHARE = 0.2  # of the deepest pulls, where all motors pull: more bends hardly more and presses the units together
@@ -69,14 +68,7 @@ def draw_targets(
         Inputs of the network, rad and m. Shape (N, 8), N at most `count`.
     """
     gravity, commands = draw_commands(chain, angles, deepest, count, rng, others_pay_out)
-    rest = settle(
-        model,
-        commands[:, model.actuator_trnid[:, 0]],
-        gravity_in_base(gravity),
-        PATIENCE,
-        rest_speed=REST_SPEED,
-        creep=0.0,
-    )
+    rest = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), PATIENCE)
     tensions = rest.tensions[:, np.argsort(model.actuator_trnid[:, 0])]
     good = rest.rested & (tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
     return np.column_stack([gravity, rest.position, rest.quaternion])[good]
@@ -198,9 +190,7 @@ def score(
 def settled(model: mujoco.MjModel, ask: Ask, targets: np.ndarray) -> Reached:
     """The commands of the network for `targets` (N, 8), each at rest without friction."""
     answer = ask(targets)
-    rest = settle(
-        model, answer["commands"][:, model.actuator_trnid[:, 0]], gravity_in_base(targets[:, 0]), rest_speed=REST_SPEED
-    )
+    rest = settle(model, answer["commands"][:, model.actuator_trnid[:, 0]], gravity_in_base(targets[:, 0]))
     return replace(_reached(targets, answer, rest.position), rested=rest.rested)
 
 

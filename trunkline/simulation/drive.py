@@ -16,7 +16,6 @@ STILL = 1e-4  # m
 NEAR = 1e-3  # m, from its end, within which a tip counts as there
 ROW = 0.01  # s between rows of a trajectory of commands
 CALM = 15.0  # s in which a damped arm must come to rest
-CALM_SPEED = 1e-5  # rad/s of its fastest joint then: tips are some 1e-6 m from rest
 
 
 @dataclass
@@ -129,7 +128,7 @@ def _drive(
         timestep, places = relax(batch, model), batch.bind("site_xpos")
         batch.bind("qvel")[:] = 0
         sound = np.flatnonzero(~batch.warning.any(axis=(1, 2)))
-        moving, _ = come_to_rest(batch, timestep, CALM, CALM_SPEED, sound)
+        moving, _ = come_to_rest(batch, timestep, CALM, sound)
         batch.forward()
         tips[:, -1] = (places[:, site] - origin) @ to_world
     warned = batch.warning.any(axis=(1, 2))

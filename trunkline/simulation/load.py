@@ -3,7 +3,6 @@
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
-from scipy.linalg import eigvalsh
 from scipy.spatial.transform import Rotation
 
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
@@ -48,19 +47,3 @@ def hang(batch: Batch, model: mujoco.MjModel, loads: np.ndarray, given: tuple[st
     batch.expand("body_sameframe")[chosen, body] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     batch.set_const()
 
-
-def slowing(model: mujoco.MjModel, loads: np.ndarray) -> np.ndarray:
-    """By how many times each load (B,), kg at the site `tip`, slows the straight model's slowest swing. Shape (B,).
-
-    What is critical damping without the load is by so much too little with it. Hinges without a spring are left out.
-    """
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    mass, jacobian = np.empty((model.nv, model.nv)), np.empty((3, model.nv))
-    mujoco.mj_fullM(model, data, mass)
-    mujoco.mj_jacSite(model, data, jacobian, None, model.site("tip").id)
-    springs = np.flatnonzero(model.jnt_stiffness[model.dof_jntid])
-    stiffness = np.diag(model.jnt_stiffness[model.dof_jntid[springs]])
-    mass, added = mass[np.ix_(springs, springs)], (jacobian.T @ jacobian)[np.ix_(springs, springs)]
-    periods = {load: eigvalsh(mass + load * added, stiffness)[-1] ** 0.5 for load in {0.0, *loads.tolist()}}
-    return np.array([periods[load] / periods[0.0] for load in loads.tolist()])

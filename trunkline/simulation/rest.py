@@ -1,4 +1,4 @@
-"""Settling: heavily damped and without friction, MuJoCo is stepped until every joint rests.
+"""Settling: heavily damped and without friction, MuJoCo is stepped until every joint is near rest, and led there.
 
 Friction and the joints' branches and sliders are off, damping is what settles soonest: nothing of it moves the shape
 at rest, or it is the middle of a band of them; though which of several shapes an arm comes to may depend on its way.
@@ -12,16 +12,17 @@ import numpy as np
 from mujoco.batch import Batch
 from scipy.spatial.transform import Rotation
 
-from trunkline.elements import BRANCH, SLIDER, all_elements
+from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, let_slide
 from trunkline.frames import wxyz_from_rotation
 from trunkline.simulation.motion import batch_of, hold
 
 LONGEST_STEP = 0.005  # s
 RELAXATION = 0.3  # s, damping over stiffness of each joint: about critical for the slowest swing of an arm
-CHUNK = 0.1  # s between looks at which simulations rest
-FINE_SPEED = 5e-9  # rad/s of the fastest joint, where MuJoCo is the reference: tips are some 1e-9 m from rest
-SPAN = 0.5  # s between the places from which the end of a slow motion is extrapolated
-STRIDE = 0.95  # of a motion that shrinks by this share in SPAN or more slowly: no longer leaps than this gives
+FIRST_SPAN = 0.5  # s until simulations are led to rest for the first time; each further span is twice as long
+ROUNDS, STEPS = 4, 4  # of Newton's method: how often derivatives are taken at most, and steps with each
+DIFFERENCE = 1e-6  # rad, of one hinge, for the derivatives
+LEAP = 0.1  # rad that any hinge may be from rest; from farther, an arm might come to another of its shapes
+ARRIVED = 1e-9  # rad, the last step
 RAMP, RAMP_STEPS = 1.0, 50  # s in which tendons are drawn in, and in how many steps
 
 
@@ -41,10 +42,8 @@ def settle(
     model: mujoco.MjModel,
     commands: np.ndarray,
     gravity: np.ndarray,
-    seconds: float = 10.0,
-    rest_speed: float = FINE_SPEED,
+    seconds: float = 20.0,
     tip_site: str = "tip",
-    creep: float = 3.0,
 ) -> Settled:
     """Let the model hang, draw its tendons in, and step until it rests: the reference for the statics.
 
@@ -52,11 +51,10 @@ def settle(
         commands: target path lengths of the position actuators, m. Shape (B, K), K in the order of the actuators.
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate once the tendons are drawn in.
-        rest_speed: rad/s of the fastest joint, at rest.
-        creep: s, longest time after that, in which what still creeps is led to its end, see `creep_to_rest`.
     """
     model = copy.copy(model)
     model.opt.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    let_slide(model)
     batch = batch_of(model, len(commands))
     origin, to_world = base_frame(model)
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
@@ -67,8 +65,8 @@ def settle(
     for share in np.arange(1, RAMP_STEPS + 1) / RAMP_STEPS:
         control[:] = straight + share * (commands - straight)
         batch.step(nstep=int(np.ceil(RAMP / RAMP_STEPS / timestep)))
-    moving, _ = come_to_rest(batch, timestep, seconds, rest_speed)
-    moving, _ = creep_to_rest(batch, timestep, moving, creep, rest_speed)
+    hold(batch, model, commands)
+    moving, _ = come_to_rest(batch, timestep, seconds)
     site, turn, force = batch.bind("site_xpos"), batch.bind("site_xmat"), batch.bind("actuator_force")
     batch.forward()
     tip = model.site(tip_site).id
@@ -87,17 +85,16 @@ def base_frame(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
     return data.xpos[base].copy(), data.xmat[base].reshape(3, 3).copy()
 
 
-def relax(batch: Batch, model: mujoco.MjModel, step_factor: float = 1.0) -> float:
+def relax(batch: Batch, model: mujoco.MjModel) -> float:
     """Take friction and what joints remember from all simulations, damp them so that they settle soon.
 
     Args:
         model: the one of the batch, whose fields each simulation may have changed before.
-        step_factor: how much longer a step than `longest_step`.
 
     Returns:
         Their time step, s.
     """
-    timestep = step_factor * longest_step(model)
+    timestep = longest_step(model)
     batch.expand("opt.timestep")[:] = timestep
     for name in ("dof_frictionloss", "tendon_frictionloss", "dof_dampingpoly"):
         batch.expand(name)[:] = 0
@@ -108,56 +105,78 @@ def relax(batch: Batch, model: mujoco.MjModel, step_factor: float = 1.0) -> floa
 
 
 def come_to_rest(
-    batch: Batch, timestep: float, seconds: float, rest_speed: float, moving: np.ndarray | None = None
+    batch: Batch, timestep: float, seconds: float, moving: np.ndarray | None = None
 ) -> tuple[np.ndarray, int]:
-    """Step relaxed simulations, each until its fastest joint is slower than `rest_speed`, rad/s; positions then hold.
-
-    A mode that relaxes in RELAXATION has about that time times `rest_speed` still to go.
+    """Step relaxed simulations, each until it can be led to rest; positions then hold.
 
     Args:
+        seconds: longest time to simulate.
         moving: which of them, all by default.
 
     Returns:
-        Which simulations still move after `seconds`, and how many steps were taken.
+        Which simulations found no rest, and how many steps were taken; to compute the forces of a pose counts as one.
     """
-    moving, steps = np.array(range(batch.nsim) if moving is None else moving, dtype=np.int32), 0
-    speed, chunk = batch.bind("qvel"), round(CHUNK / timestep)
-    for _ in range(round(seconds / CHUNK)):
-        if not len(moving):
-            break
-        batch.step(ids=moving, nstep=chunk, stage=mujoco.mjtStage.mjSTAGE_POS)
-        steps += chunk * len(moving)
-        moving = moving[~(np.abs(speed[moving]).max(axis=1) < rest_speed)]
+    begun = np.array(range(batch.nsim) if moving is None else moving, dtype=np.int32)
+    moving, steps, span = begun, 0, FIRST_SPAN
+    while len(moving) and seconds > 0:
+        count = round(span / timestep)
+        batch.step(ids=moving, nstep=count)
+        steps += count * len(moving)
+        moving, looks = lead_to_rest(batch, moving)
+        steps += looks
+        seconds, span = seconds - span, 2 * span
+    batch.forward(ids=begun, stage=mujoco.mjtStage.mjSTAGE_POS)
     return moving, steps
 
 
-def creep_to_rest(
-    batch: Batch, timestep: float, moving: np.ndarray, seconds: float, rest_speed: float
-) -> tuple[np.ndarray, int]:
-    """Bring to rest what `come_to_rest` left `moving`, up to `seconds` later; arguments and returns as there.
+def lead_to_rest(batch: Batch, ids: np.ndarray) -> tuple[np.ndarray, int]:
+    """Put simulations where nothing accelerates their arms any more, if that is near: Newton's method.
 
-    Pulls and loads that press on an arm take most of its stiffness against some bend, and in that it creeps long after
-    all else rests. What is left of such a motion d shrinks by a factor λ in each SPAN, and its end is d λ / (1 - λ)
-    ahead (Aitken). Simulations go there, and creep on from there.
+    A simulation stays where it is, without its speed, if the way is long, does not end, or ends where the arm would
+    fall from.
+
+    Returns:
+        Those that stay, and how often forces were computed.
     """
-    steps, span, moving = 0, round(SPAN / timestep), np.array(moving, dtype=np.int32)
-    place, speed = batch.bind("qpos"), batch.bind("qvel")
-    for _ in range(round(seconds / (3 * SPAN))):
-        if not len(moving):
+    hinges, looks = arm_hinges(batch.model), 0
+    place, push = batch.bind("qpos"), batch.bind("qacc")
+    batch.bind("qvel")[ids] = 0
+    begun, there, going = place[ids].copy(), np.zeros(len(ids), dtype=bool), np.arange(len(ids))
+    for _ in range(ROUNDS):
+        now = ids[going]
+        slopes = _slopes(batch, now, hinges)
+        sound = np.isfinite(np.linalg.slogdet(slopes).logabsdet)
+        going, now, slopes = going[sound], now[sound], slopes[sound]
+        back = np.linalg.inv(-slopes)
+        looks += len(sound) * (1 + hinges)
+        for _ in range(STEPS):
+            batch.forward(ids=now)
+            looks += len(now)
+            step = (back @ push[now, :hinges, None])[..., 0]
+            near = np.abs(place[now, :hinges] + step - begun[going, :hinges]).max(axis=1) < LEAP
+            going, now, slopes, back, step = going[near], now[near], slopes[near], back[near], step[near]
+            place[now, :hinges] += step
+        arrived = np.abs(step).max(axis=1) < ARRIVED
+        there[going[arrived]] = np.linalg.eigvals(slopes[arrived]).real.max(axis=1) < 0
+        going = going[~arrived]
+        if not len(going):
             break
-        places = [place[moving].copy()]
-        for _ in range(2):
-            batch.step(ids=moving, nstep=span)
-            places.append(place[moving].copy())
-        before, last = places[1] - places[0], places[2] - places[1]
-        shrinks = np.sum(before * last, axis=1) / np.maximum(np.sum(before * before, axis=1), 1e-300)
-        shrinks = np.clip(shrinks, 0.0, STRIDE)[:, None]
-        place[moving] = places[2] + last * shrinks / (1 - shrinks)
-        speed[moving] = 0.0
-        batch.step(ids=moving, nstep=span, stage=mujoco.mjtStage.mjSTAGE_POS)
-        steps += 3 * span * len(moving)
-        moving = moving[~(np.abs(speed[moving]).max(axis=1) < rest_speed)]
-    return moving, steps
+    place[ids[~there]] = begun[~there]
+    return ids[~there], looks
+
+
+def _slopes(batch: Batch, ids: np.ndarray, hinges: int) -> np.ndarray:
+    """How the accelerations of simulations answer each hinge's angle, 1/s². Shape (B, n, n)."""
+    place, push = batch.bind("qpos"), batch.bind("qacc")
+    batch.forward(ids=ids)
+    here, slopes = push[ids, :hinges], np.empty((len(ids), hinges, hinges))
+    for hinge in range(hinges):
+        angle = place[ids, hinge]
+        place[ids, hinge] = angle + DIFFERENCE
+        batch.forward(ids=ids)
+        slopes[:, :, hinge] = (push[ids, :hinges] - here) / DIFFERENCE
+        place[ids, hinge] = angle
+    return slopes
 
 
 def longest_step(model: mujoco.MjModel) -> float:

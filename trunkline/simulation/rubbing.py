@@ -1,15 +1,16 @@
-"""Cables that rub on their holes while a batch moves: the limits of dry friction that MJCF cannot keep up with.
+"""Cables that rub on their holes while a batch moves: limits of dry friction, and its arms, that MJCF cannot keep up with.
 
 `trunkline/arm/holes.py` says what rubs. The limit of a stretch is μ θ T exp(-s μ θ / 2) in N: θ the sum of its units'
 bends, rad, T the cable's tension where the stretch begins, s the side to which the cable slides there, 1 to the motor
 and -1 from it. Behind the stretch the tension is T exp(-s μ θ). MuJoCo's solver finds what friction acts within limits.
+The friction's arms about the hinges are those that the cable itself has there.
 """
 
 import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.elements import CAPSTAN_FRICTION, cables, capstan_friction, holes
+from trunkline.elements import actuators, cables, capstan_friction, friction_place, holes, stretch_edges
 
 REFRESH = 1 / 120  # s between new limits: the motors' tensions and the bends change little within
 CREEP = 1e-3  # m/s of sliding below which s is less than ±1
@@ -25,35 +26,37 @@ class Rubbing:
     def __init__(self, batch: Batch) -> None:
         model = batch.model
         self._batch, self._tendons = batch, holes(model)
-        self._actuators = [int(np.flatnonzero(model.actuator_trnid[:, 0] == cable)[0]) for cable in cables(model)]
+        self._actuators = actuators(model)
         self._hinges = _hinges(model)
-        stretches = self._tendons.shape[1]
-        count = self._hinges.shape[1]
-        self._edges = np.arange(stretches) * count // stretches
-        self._address = model.numeric_adr[model.numeric(CAPSTAN_FRICTION).id]
+        self._begins = stretch_edges(self._hinges.shape[1], self._tendons.shape[1])[:-1]
+        self._place = friction_place(model)
         timestep = batch.expanded("opt.timestep")
         longest = float(np.max(model.opt.timestep if timestep is None else timestep))
         self.steps = max(1, round(REFRESH / longest))
-        self._limits = batch.expand("tendon_frictionloss")
+        self._entries, self._slopes = _arms(model, self._tendons)
+        self._limits, self._arms = batch.expand("tendon_frictionloss"), batch.expand("wrap_prm")
         self._friction = batch.expand("numeric_data")
         self._angles, self._force = batch.bind("qpos"), batch.bind("actuator_force")
-        self._speed = batch.bind("ten_velocity")
+        self._speed, self._jacobian = batch.bind("ten_velocity"), batch.bind("ten_J")
 
     def begin(self, ids) -> None:
-        """Find the tensions of simulations that have just been put where they are."""
+        """Find tensions, arms and speeds in simulations that have just been put where they are."""
         self._limits[np.ix_(ids, self._tendons.ravel())] = 0
+        self._batch.forward(ids=ids)
+        self._arms[np.ix_(ids, self._entries)] = self._jacobian[np.ix_(ids, self._slopes)]
         self._batch.forward(ids=ids)
 
     def refresh(self, ids) -> None:
-        """Set the limits for the next `steps` steps of the simulations `ids`, from their last one."""
+        """Set limits and arms for the next `steps` steps of the simulations `ids`, from their last one."""
         bends = np.linalg.norm(self._angles[ids][:, self._hinges], axis=3)  # (B, K, n)
-        turns = self._friction[ids, self._address, None, None] * np.add.reduceat(bends, self._edges, axis=2)
+        turns = self._friction[ids, self._place, None, None] * np.add.reduceat(bends, self._begins, axis=2)
         side = np.clip(-self._speed[ids][:, self._tendons] / CREEP, -1, 1)  # (B, K, P)
         falls = side * turns
         tension = np.maximum(-self._force[ids][:, self._actuators], 0)[..., None]
         before = np.exp(-(np.cumsum(falls, axis=2) - falls / 2))
         limits = tension * before * turns
         self._limits[np.ix_(ids, self._tendons.ravel())] = limits.reshape(len(ids), -1)
+        self._arms[np.ix_(ids, self._entries)] = self._jacobian[np.ix_(ids, self._slopes)]
 
 
 def rubbing(batch: Batch) -> Rubbing | None:
@@ -71,3 +74,19 @@ def _hinges(model: mujoco.MjModel) -> np.ndarray:
         units = model.body_weldid[model.site_bodyid[model.wrap_objid[path]]][1:]
         found.append(model.jnt_qposadr[model.body_jntadr[units][:, None] + np.arange(2)])
     return np.array(found)
+
+
+def _arms(model: mujoco.MjModel, tendons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Addresses of the arms of friction in `wrap_prm`, and those of the cables' arms about the same hinges in `ten_J`.
+
+    Args:
+        tendons: by which cables rub. Shape (K, P).
+    """
+    entries, slopes = [], []
+    for cable, own in zip(cables(model), tendons, strict=True):
+        row = model.ten_J_rowadr[cable] + np.arange(model.ten_J_rownnz[cable])
+        place = dict(zip(model.ten_J_colind[row].tolist(), row.tolist(), strict=True))
+        for tendon in own:
+            entries.append(model.tendon_adr[tendon] + np.arange(model.tendon_num[tendon]))
+            slopes.append([place[dof] for dof in model.jnt_dofadr[model.wrap_objid[entries[-1]]].tolist()])
+    return np.concatenate(entries), np.concatenate(slopes)

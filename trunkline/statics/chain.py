@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from trunkline.elements import cables, capstan_friction
+from trunkline.elements import actuators, cables, capstan_friction
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances
@@ -116,7 +116,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
     holes = tendon_holes(model, data, units)
     hole_in, hole_out, crosses, fixed_length = tendon_crossings(holes, data, base, to_base, anchors)
     gains, impedances = limit_gains(model, joints), limit_impedances(model, joints)
-    order = [int(np.flatnonzero(model.actuator_trnid[:, 0] == t)[0]) for t in cables(model)]
+    order = actuators(model)
     tip, tip_quaternion = _tip(model, data, tip_site, units, base, to_base)
     return Chain(
         offset=np.diff(anchors, axis=0, prepend=0.0),

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.elements import CAPSTAN_FRICTION, HOLE, capstan_friction
+from trunkline.elements import CAPSTAN_FRICTION, capstan_friction, is_hole
 from trunkline.errors import InputError
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize_joints
@@ -144,7 +144,7 @@ def without_rubbing(spec: mujoco.MjSpec) -> float:
     """Take the tendons by which cables rub from a model in place, as their friction has to follow the tension at every
     step; the coefficient μ, as it was."""
     friction = capstan_friction(spec.compile())
-    for tendon in [tendon for tendon in spec.tendons if f"_{HOLE}_" in tendon.name]:
+    for tendon in [tendon for tendon in spec.tendons if is_hole(tendon.name)]:
         spec.delete(tendon)
     for number in [number for number in spec.numerics if number.name == CAPSTAN_FRICTION]:
         spec.delete(number)
