@@ -219,7 +219,8 @@ def test_what_joints_remember_begins_as_the_hand_left_it():
         controls=np.zeros((1, 3)), slack=lambda _: False,
     )  # fmt: skip
     population = Population(model, [experiment], ())
-    batch = population._batch(Group(static=False, slack=False), [experiment], {"jnt_stiffness": model.jnt_stiffness[None]}, 1)
+    moving = Group(static=False, slack=False)
+    batch = population._batch(moving, [experiment], {"jnt_stiffness": model.jnt_stiffness[None]}, 1)
     branch, slider = elements(model, BRANCH), elements(model, SLIDER)
     np.testing.assert_allclose(batch.bind("qpos")[0, branch.own], start)
     places = model.tendon_plasticadr[slider.tendon]

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
+from trunkline.elements import capstan_friction
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, unit_of_hinge
@@ -64,6 +65,12 @@ class Problem:
         self._population = Population(self.model, self.experiments, self.segments, self.step_factor)
         self._last: tuple[np.ndarray, np.ndarray] | None = None  # candidate that was alone, and where it rests
         self.units = int(unit_of_hinge(self.model).max()) + 1
+
+    @property
+    def rubs(self) -> bool:
+        """Whether cables that rub on their holes move the arm in any trial."""
+        rubbing = capstan_friction(self.model) > 0
+        return rubbing and any(e.frames > 1 and not e.slack(self.model) for e in self.experiments)
 
     def fields(self, vectors: np.ndarray) -> dict[str, np.ndarray]:
         """Model fields of candidates (C, P)."""

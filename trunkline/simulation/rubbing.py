@@ -1,4 +1,4 @@
-"""Cables that rub on their holes while a batch moves: limits of dry friction, and its arms, that MJCF cannot keep up with.
+"""Cables that rub on their holes while a batch moves: limits and arms of dry friction, which are no constants.
 
 `trunkline/arm/holes.py` says what rubs. The limit of a stretch is μ θ T exp(-s μ θ / 2) in N: θ the sum of its units'
 bends, rad, T the cable's tension where the stretch begins, s the side to which the cable slides there, 1 to the motor

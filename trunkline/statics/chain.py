@@ -153,7 +153,7 @@ def _unit_inertials(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarra
     return mass, center
 
 
-def _max_tensions(model: mujoco.MjModel, order: list[int]) -> np.ndarray:
+def _max_tensions(model: mujoco.MjModel, order: np.ndarray) -> np.ndarray:
     force = -model.actuator_forcerange[order, 0]
     tendon_limit = np.where(model.tendon_actfrclimited, -model.tendon_actfrcrange[:, 0], np.inf)[cables(model)]
     return np.minimum(force, tendon_limit)
