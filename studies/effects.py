@@ -82,7 +82,7 @@ EFFECTS: dict[str, Effect] = {
         ranges(0.005, 3.0, "tendon_friction") | ranges(0.003, 0.3, "friction_time"),
     ),
     "holes": Effect(
-        "capstan friction", "identify_control", ranges(0.005, 2.0, "capstan_friction"), holes=Holes(0.2, 6)
+        "capstan friction", "identify_control", ranges(0.005, 2.0, "capstan_friction"), holes=Holes(0.2, 8)
     ),
     "dead_time": Effect("dead time", "identify_control", ranges(0.001, 0.2, "dead_time"), dead_time=0.02),
 }  # fmt: skip
