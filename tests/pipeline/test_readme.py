@@ -123,7 +123,7 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "relaxation_time": None,
         "kp": True,
         "kv": False,
-        "force_range": False,
+        "force_range": True,
         "capstan_friction": False,
     }
 
