@@ -107,6 +107,7 @@ class Capped:
 
     parameters = ("kp", "force_range")
     wound = np.linspace(0.1, 1.0, 20)
+    rubs = False
 
     def residuals(self, vectors, near=None):
         gain, cap = np.exp(vectors).T[..., None]
