@@ -199,6 +199,7 @@ def _add_cable(spec: mujoco.MjSpec, index: int, tendons: Tendons, solver: Solver
     if tendons.dead_time:
         actuator.delay = tendons.dead_time
         actuator.nsample = int(np.ceil(LONGEST_DEAD_TIME / solver.timestep)) + 1
+        actuator.interp = 1  # linear: else a dead time that is longer by less than a step changes nothing
     return cable
 
 

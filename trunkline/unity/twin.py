@@ -136,7 +136,7 @@ def without_dead_time(spec: mujoco.MjSpec) -> float:
     """Take the motors' dead time from a model in place, as no component of the importer has it; s, as it was."""
     dead_time = max((float(actuator.delay) for actuator in spec.actuators), default=0.0)
     for actuator in spec.actuators:
-        actuator.delay, actuator.nsample = 0, 0
+        actuator.delay, actuator.nsample, actuator.interp = 0, 0, 0
     return dead_time
 
 
