@@ -123,7 +123,9 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "relaxation_time": None,
         "kp": True,
         "kv": False,
-        "force_range": True,
+        "time_constant": True,
+        "dead_time": False,
+        "force_range": False,
         "capstan_friction": False,
     }
 
