@@ -114,6 +114,15 @@ def test_weights_are_the_derivatives_of_the_robust_loss():
 
 def test_what_is_usual_is_told_by_trials_of_the_same_kind_and_by_three_at_least():
     losses = np.array([1.0, 2.0, 30.0, 100.0, 200.0])
-    usual = usual_losses(losses, ["tilt", "tilt", "tilt", "curl", "curl"])
+    usual = usual_losses(losses, ["tilt", "tilt", "tilt", "curl", "curl"], np.ones(5))
     np.testing.assert_array_equal(usual, [2, 2, 2, np.inf, np.inf])
     assert trial_weights(losses, usual, 4.0).tolist() == pytest.approx([1, 1, (8 / 30) ** 2, 1, 1])
+
+
+def test_a_trial_that_bends_the_arm_farther_may_be_farther_off():
+    """Errors of 5 % of the bend in every trial: none is outlying, and a shallow one may be as far off as the median."""
+    bends = np.array([1.0, 4.0, 9.0, 64.0]) * 1e-4
+    usual = usual_losses(0.05**2 * bends, ["curl"] * 4, bends)
+    assert trial_weights(0.05**2 * bends, usual, 4.0).tolist() == [1, 1, 1, 1]
+    assert usual[0] == usual[1] == pytest.approx(0.05**2 * 6.5e-4)
+    assert trial_weights(np.full(4, 0.05**2 * 64e-4), usual, 4.0)[0] < 0.2

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from trunkline.identification.certainty import Certainty, bootstrap, certainty
+from trunkline.identification.evaluation import segment_positions
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.fit import Fit, Polish
 from trunkline.identification.influence import Influence, influence
@@ -160,9 +161,11 @@ def _reweigh(problem: Problem, found: Found, around: Surrogate, fit: Fit, label:
     Within reach of what a surrogate was made of, it is not made anew.
     """
     kinds, polish = [e.kind for e in problem.experiments], fit.method.polish
+    straight = segment_positions(problem.model, problem.segments, problem.model.qpos0)
+    bends = np.array([np.square(e.positions - straight).sum(axis=2)[e.measured].mean() for e in problem.experiments])
     made_at, made = found.vector, around
     for _ in range(REWEIGHINGS):
-        weights, place = reweighted(around, kinds, fit.weights.outlying)
+        weights, place = reweighted(around, kinds, bends, fit.weights.outlying)
         if np.abs(weights - problem.trial_weights).max() < SAME_WEIGHT:
             break
         problem.trial_weights = weights

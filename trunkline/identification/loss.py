@@ -18,7 +18,7 @@ class LossWeights:
     delta_position, delta_velocity: Huber thresholds δ of the relative residuals.
     epsilon: m, keeps relative residuals finite near the base. epsilon_velocity: m a frame, likewise.
     weight_position, weight_velocity: w_pos and w_vel.
-    outlying: a trial counts less from that many times the median loss of its kind on, see `robust`.
+    outlying: a trial counts less from that many times the usual loss on, see `robust`.
     """
 
     delta_position: Annotated[float, Field(gt=0, le=1000)]

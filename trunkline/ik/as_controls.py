@@ -13,14 +13,14 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from trunkline.dataset.sampling import around_the_arm
-from trunkline.elements import SLIDER, all_elements, capstan_friction
+from trunkline.elements import SLIDER, actuators, all_elements, capstan_friction
 from trunkline.frames import gravity_in_base
 from trunkline.simulation.drive import drive, has_friction
 from trunkline.simulation.rest import base_frame, settle
 from trunkline.statics.chain import Chain
 from trunkline.statics.hysteresis import model_friction
 
-PATIENCE = 15.0  # s to rest for a pose that is to be a target; one that takes longer is between two shapes
+PATIENCE = 15.0  # s to rest for a pose that is to be a target
 NEAR_LIMIT = 0.95  # share of its largest force at which a motor is near it: there other commands hold the same pose
 TAUT_SHARE = 0.2  # of the deepest pulls, where all motors pull: more bends hardly more and presses the units together
 SHARE = 0.01  # of the arm's length; a larger error is worth a warning
@@ -69,7 +69,7 @@ def draw_targets(
     """
     gravity, commands = draw_commands(chain, angles, deepest, count, rng, others_pay_out)
     rest = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), PATIENCE)
-    tensions = rest.tensions[:, np.argsort(model.actuator_trnid[:, 0])]
+    tensions = rest.tensions[:, actuators(model)]
     good = rest.rested & (tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
     return np.column_stack([gravity, rest.position, rest.quaternion])[good]
 

@@ -43,7 +43,7 @@ class Rubbing:
         """Find tensions, arms and speeds in simulations that have just been put where they are."""
         self._limits[np.ix_(ids, self._tendons.ravel())] = 0
         self._batch.forward(ids=ids)
-        self._arms[np.ix_(ids, self._entries)] = self._jacobian[np.ix_(ids, self._slopes)]
+        self._turn_arms(ids)
         self._batch.forward(ids=ids)
 
     def refresh(self, ids) -> None:
@@ -56,6 +56,10 @@ class Rubbing:
         before = np.exp(-(np.cumsum(falls, axis=2) - falls / 2))
         limits = tension * before * turns
         self._limits[np.ix_(ids, self._tendons.ravel())] = limits.reshape(len(ids), -1)
+        self._turn_arms(ids)
+
+    def _turn_arms(self, ids) -> None:
+        """Give friction the arms that the cables have now."""
         self._arms[np.ix_(ids, self._entries)] = self._jacobian[np.ix_(ids, self._slopes)]
 
 

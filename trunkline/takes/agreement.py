@@ -15,6 +15,7 @@ from trunkline.trials.take import Take
 AHEAD = 0.03  # s, by which a fit of its motion may put an arm ahead of its tendons
 LEAST = 1e-3  # s, by which clocks of trials may differ at least before it is said
 
+
 @dataclass
 class MotorClock:
     """What a session's trials say of the motors' clock: time = motor time + offset, s.

@@ -14,7 +14,9 @@ FORESEEN_FRAMES = 3  # at least, or there was no hold
 HOLD, FREE = 0.15, 0.07  # s before and after the release that are fitted
 SEARCHED = 0.05  # s to either side of the first guess
 DEGREE = 2  # of the hand's motion
-LEAVING = (2, 3)  # powers of time in which a released arm leaves: its far end is light, and soon at full speed
+LEAVING = ((2, 3), (2, 2.5, 3))  # powers of time in which a released arm leaves: as a mass on springs, or, as the end
+# of a long beam leaves by the 1.5th, its mobility falling with the root of the frequency (Cremer, Heckl), between these
+PLAINLY = 0.5  # share of the residual that is left by then, or the arm leaves in the simpler way
 TRIES = 4  # a frame
 FAR = 0.05  # share of the largest range by which a command is far from its initial value
 NOISES, EXACT = 5.0, 1e-6  # times its median departure, and m, by which a command that rests may depart
@@ -45,8 +47,8 @@ def release_time(time: np.ndarray, positions: np.ndarray, smooth: Smooth) -> Sta
     A hand sways and creeps, but smoothly: where the arm will be a moment later can be foreseen. An arm that is let go
     accelerates most at once, and departs from that (`departures`): a first guess. Around it, positions are fitted by
     the hand's motion, a polynomial, and from an instant on powers of the time since, which went through the same
-    low-pass; the instant with the least residual counts. Its uncertainty is that of the fit, how far it is from the
-    first guess, which was made in another way, and a frame.
+    low-pass; the instant with the least residual counts, of the fewest powers that do. Its uncertainty is that of the
+    fit, how far it is from the first guess, which was made in another way, and a frame.
 
     Args:
         time (T,) s, uniform. positions (T, S, 3) m, filtered, of an arm that is held, then swings.
@@ -71,14 +73,18 @@ def _let_go(
     seen = positions[window].reshape(window.sum(), -1)
     held = np.vander((time[window] - guess) / HOLD, DEGREE + 1)
     instants = np.arange(max(guess - SEARCHED, time[window][0]), guess + min(SEARCHED, FREE / 2), step / TRIES)
-    residuals, fits = [], []
-    for instant in instants:
+
+    def explain(instant: float, powers: tuple[float, ...]) -> tuple[float, np.ndarray]:
         since = np.maximum(time - instant, 0)[:, None] / FREE
-        left = smooth(since ** np.array(LEAVING))[window]
-        design = np.hstack([held, left])
+        design = np.hstack([held, smooth(since ** np.array(powers))[window]])
         fit = np.linalg.lstsq(design, seen)[0]
-        residuals.append(float(np.square(seen - design @ fit).sum()))
-        fits.append(fit)
+        return float(np.square(seen - design @ fit).sum()), fit
+
+    residuals, fits = np.full(len(instants), np.inf), []
+    for powers in LEAVING:
+        found, tried = zip(*(explain(instant, powers) for instant in instants), strict=True)
+        if min(found) < PLAINLY * residuals.min():
+            residuals, fits = np.array(found), tried
     best = int(np.argmin(residuals))
     spare = max(seen.size / 3 - fits[best].size, 1)  # of three frames, the low-pass leaves about one
     inner = int(np.clip(best, 1, len(instants) - 2))
