@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 import networkx
@@ -43,27 +44,35 @@ MODELS = {
 # stage: [(what it is, dotted key in metrics.json, unit)]
 RESULTS = {
     "fk_dataset": [
-        ("FK against MuJoCo settled to rest: median", "mujoco_deviation_mm.median", "mm"),
+        ("FK against MuJoCo settled to rest, without friction: median", "mujoco_deviation_mm.median", "mm"),
+        ("Band in which friction may hold the tip: median", "friction_band_mm.median", "mm"),
     ],
     "train_ik": [
         (
-            "The network's commands sent to MuJoCo, tip error at rest: median",
+            "The network's commands sent to MuJoCo, without friction, tip error at rest: median",
             "as_controls.frictionless.position_error_mm.median",
             "mm",
         ),
         ("… 95th percentile", "as_controls.frictionless.position_error_mm.p95", "mm"),
-        ("… seconds until the arm rests: median", "as_controls.frictionless.seconds_to_rest.median", "s"),
+        ("… with friction, all sent at once: median", "as_controls.friction.position_error_mm.median", "mm"),
+        ("… 95th percentile", "as_controls.friction.position_error_mm.p95", "mm"),
+        ("… seconds until the arm rests: median", "as_controls.friction.seconds_to_rest.median", "s"),
         ("… sent to the lab's own arm: median", "on_plant.position_error_mm.median", "mm"),
+        ("… 95th percentile", "on_plant.position_error_mm.p95", "mm"),
     ],
     "reachability": [
-        ("Rigid map: share of points on which IK agrees that knows nothing of it", "rigid.accuracy", ""),
+        ("Rigid map: share of points on which inverse kinematics of the same Panda agrees", "rigid.accuracy", ""),
         ("Soft maps: smallest overlap half-way between their angles", "soft.heldout_iou_min", ""),
     ],
     "package_unity": [
-        ("Rules of the Unity importer broken", "rule_violations", ""),
-        ("Packed model against the calibrated one: largest deviation", "roundtrip_max_deviation_mm", "mm"),
+        (
+            "Packed model against the calibrated one, without what the importer drops: largest deviation",
+            "roundtrip_max_deviation_mm",
+            "mm",
+        ),
     ],
 }
+GOAL = {"e_internal": 0.2, "e_position": 0.6, "e_tip": 2.0}  # % of the arm's length, of every kind of experiment
 
 
 BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")  # an identified model
@@ -82,7 +91,10 @@ def pipeline_graph(root: Path) -> str:
     names = {address: address.removesuffix(".yaml").rpartition(":")[2] for address in order}
     lines = ["```mermaid", "flowchart LR"]
     lines += [f"    {names[a]}" for a in order if not reduced.degree(a)]
-    lines += [f"    {names[a]} --> {names[b]}" for a in order for b in order if reduced.has_edge(a, b)]
+    while reduced.edges:
+        path = networkx.dag_longest_path(reduced, topo_order=order)
+        lines.append(f"    {' --> '.join(names[stage] for stage in path)}")
+        reduced.remove_edges_from(pairwise(path))
     lines += ["```", "", "| stage | what it does |", "|---|---|"]
     lines += [f"| `{names[a]}` | {stages[a].desc} |" for a in order]
     return "\n".join(lines)
@@ -138,7 +150,8 @@ def score_table(root: Path) -> str:
         *words, last = (KINDS[kind][0] for kind in KINDS if kind in scored)
         what = f"{', '.join(words)} and {last}" if words else last
         rows.append(f"| {what}, `{together}` | {' | '.join(_beside(lookup(metrics, together), f'{TEST}.'))} |")
-    return "\n".join([*_head(f"trials of `{TEST}`"), *rows])
+    goal = f"| goal | {GOAL['e_internal']:g} % | {GOAL['e_position']:g} / {GOAL['e_tip']:g} % |{' |' * len(BESIDE)}"
+    return "\n".join([*_head(f"trials of `{TEST}`"), goal, *rows])
 
 
 def example_table(folder: Path) -> str:
@@ -169,7 +182,8 @@ def _head(what: str) -> list[str]:
 
 def _beside(metrics: dict | None, at: str) -> list[str]:
     """E_internal, then position / tip error of the identified model, of CAD, null models and the noise floor."""
-    found = [_number(lookup(metrics, f"identified.{at}e_internal_mm")), _pair(metrics, f"identified.{at}", share=True)]
+    internal = [_number(lookup(metrics, f"identified.{at}e_internal_{unit}")) for unit in ("mm", "pct")]
+    found = [f"{internal[0]} ({internal[1]} %)", _pair(metrics, f"identified.{at}", share=True)]
     return found + [_pair(metrics, f"{name}.{at}") for name in BESIDE]
 
 
