@@ -1,7 +1,8 @@
 """What a model's tendons, hinges and sites are, by their names: the arm's own, or parts of its joints.
 
 `trunkline/arm/joints.py` builds those parts: Maxwell branches, hinges named `<hinge>_branch_<number>` and the
-tendons that tie them, which end in `_tie`, and Jenkins elements, tendons named `<hinge>_slider_<number>`.
+tendons that tie them, which end in `_tie`, Jenkins elements, tendons named `<hinge>_slider_<number>`, and the
+diagonals of a round joint, tendons named `<hinge>_diagonal_<number>` after its first hinge.
 `trunkline/arm/holes.py` gives a cable tendons by which it rubs on its holes, named `<cable>_hole_<number>`, and the
 model a number `capstan_friction`, their coefficient.
 """
@@ -12,9 +13,10 @@ from weakref import WeakKeyDictionary
 import mujoco
 import numpy as np
 
-BRANCH, SLIDER, HOLE = "branch", "slider", "hole"
+BRANCH, SLIDER, DIAGONAL, HOLE = "branch", "slider", "diagonal", "hole"
 TIE = "_tie"  # ends the name of a branch's tendon: in a Unity scene it may not be called as the hinge
 CAPSTAN_FRICTION = "capstan_friction"
+HINGE_SHARE, DIAGONAL_SHARE = 2 / 3, 1 / 6  # of the hardening K c of a round joint, see `trunkline/arm/joints.py`
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ _KNOWN: WeakKeyDictionary[mujoco.MjModel, dict[tuple[str, int], Elements]] = Wea
 
 
 def elements(model: mujoco.MjModel, kind: str, number: int = 1) -> Elements:
-    """The model's elements `kind`, BRANCH or SLIDER, of this number; none where it was built without."""
+    """The model's elements `kind`, BRANCH, SLIDER or DIAGONAL, of this number; none where it was built without."""
     known = _KNOWN.setdefault(model, {})
     if (kind, number) not in known:
         known[kind, number] = _named(model, kind, number)
@@ -56,6 +58,16 @@ def all_elements(model: mujoco.MjModel, kind: str) -> list[Elements]:
     while len((one := elements(model, kind, len(found) + 1)).tendon):
         found.append(one)
     return found
+
+
+def diagonal_lengths(model: mujoco.MjModel, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Numbers of the tendons that are diagonals of round joints (D,), and how long they are, rad, at joint angles
+    (..., nq): the sum of the joint's two, and their difference. Shape (..., D)."""
+    tendons, lengths = [np.zeros(0, dtype=int)], [np.zeros((*angles.shape[:-1], 0))]
+    for one, sign in zip(all_elements(model, DIAGONAL), (1, -1), strict=False):
+        tendons.append(one.tendon)
+        lengths.append(angles[..., one.hinge] + sign * angles[..., one.hinge + 1])
+    return np.concatenate(tendons), np.concatenate(lengths, axis=-1)
 
 
 def give_way(model: mujoco.MjModel, qpos: np.ndarray) -> None:

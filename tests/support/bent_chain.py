@@ -8,6 +8,7 @@ from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
 from trunkline.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.arm.spiral import spiral_chain
+from trunkline.elements import DIAGONAL
 
 
 def stump_spec(units: int = 7) -> mujoco.MjSpec:
@@ -29,8 +30,8 @@ def stump() -> mujoco.MjModel:
 
 
 def hardening_stump() -> mujoco.MjModel:
-    """The stump with hardening, lopsided springs that rest bent, other limits and tilted hinge axes: everything that
-    the plain one leaves at zero."""
+    """The stump with hardening, lopsided springs that rest bent, other limits, tilted hinge axes and diagonals:
+    everything that the plain one leaves at zero."""
     spec = stump_spec()
     rng = np.random.default_rng(7)
     for joint in spec.joints:
@@ -40,6 +41,12 @@ def hardening_stump() -> mujoco.MjModel:
         joint.margin = 0.02
         joint.solimp_limit = [0.5, 0.95, 0.05, 0.4, 3]
         joint.axis = np.array(joint.axis) + rng.uniform(-0.1, 0.1, 3)
+    for first, second in zip(spec.joints[::2], spec.joints[1::2], strict=True):
+        for number, sign in enumerate((1, -1), 1):
+            name = f"{first.name}_{DIAGONAL}_{number}"
+            diagonal = spec.add_tendon(name=name, stiffness=[0, 0, number * first.stiffness[0]])
+            diagonal.wrap_joint(first.name, 1)
+            diagonal.wrap_joint(second.name, sign)
     return spec.compile()
 
 

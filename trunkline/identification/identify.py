@@ -12,7 +12,7 @@ from trunkline.identification.fit import Fit, Polish
 from trunkline.identification.influence import Influence, influence
 from trunkline.identification.linearisation import linearise
 from trunkline.identification.optimizers import Optimizer
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, follow_rest, set_fields
 from trunkline.identification.problem import Problem
 from trunkline.identification.resting import RestShape, spring_references
 from trunkline.identification.robust import reweighted
@@ -202,7 +202,9 @@ def with_parameters(
         )
         set_fields(changed, fields)
     if rest is not None:
-        set_fields(changed, {"qpos_spring": spring_references({}, changed, rest)})
+        fields = {"qpos_spring": spring_references({}, changed, rest)}
+        follow_rest(fields, changed)
+        set_fields(changed, fields)
     return changed
 
 

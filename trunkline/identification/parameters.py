@@ -11,11 +11,15 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.elements import (
     BRANCH,
+    DIAGONAL,
+    DIAGONAL_SHARE,
+    HINGE_SHARE,
     SLIDER,
     all_elements,
     arm_hinges,
     cables,
     capstan_friction,
+    diagonal_lengths,
     elements,
     friction_place,
     holes,
@@ -98,6 +102,8 @@ def _scale_stiffness(fields: Fields, factors: np.ndarray, model: mujoco.MjModel)
     arm = factors.shape[1]
     fields["jnt_stiffness"][:, :arm] *= factors
     fields["jnt_stiffnesspoly"][:, :arm] *= factors[..., None]
+    for one in all_elements(model, DIAGONAL):
+        fields["tendon_stiffnesspoly"][:, one.tendon] *= factors[:, one.hinge, None]
     for one in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
         fields["tendon_stiffness"][:, one.tendon] *= factors[:, one.hinge]
         fields["dof_damping"][:, one.own] *= factors[:, one.hinge[: len(one.own)]]
@@ -170,8 +176,29 @@ def _write_kp(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None
     fields["actuator_biasprm"][:, :, 1] = -values[:, None]
 
 
+def _hinge_share(model: mujoco.MjModel) -> float:
+    """How much of a joint's hardening its hinges have; its diagonals have the rest."""
+    return HINGE_SHARE if all_elements(model, DIAGONAL) else 1.0
+
+
+def _read_hardening(model: mujoco.MjModel) -> float:
+    return float(model.jnt_stiffnesspoly[0, 1] / model.jnt_stiffness[0] / _hinge_share(model))
+
+
 def _write_hardening(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
-    fields["jnt_stiffnesspoly"][:, :, 1] = values[:, None] * fields["jnt_stiffness"]  # 0 for branches' hinges
+    hardening = values[:, None] * fields["jnt_stiffness"]  # 0 for branches' hinges
+    fields["jnt_stiffnesspoly"][:, :, 1] = _hinge_share(model) * hardening
+    for one in all_elements(model, DIAGONAL):
+        fields["tendon_stiffnesspoly"][:, one.tendon, 1] = DIAGONAL_SHARE * hardening[:, one.hinge]
+
+
+def follow_rest(fields: Fields, model: mujoco.MjModel) -> None:
+    """Let the diagonals of round joints be slack where the hinges are, whose `qpos_spring` (C, nq) is in `fields`."""
+    tendons, lengths = diagonal_lengths(model, fields["qpos_spring"])
+    if len(tendons):
+        shape = (len(lengths), *model.tendon_lengthspring.shape)
+        slack = fields.setdefault("tendon_lengthspring", np.broadcast_to(model.tendon_lengthspring, shape).copy())
+        slack[:, tendons] = lengths[..., None]
 
 
 def _write_joint_friction(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
@@ -265,6 +292,7 @@ def _rest_bend(axis: int, power: int) -> Parameter:
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         hinges, shape = basis(model)
         fields["qpos_spring"][:, hinges] += (values - read(model))[:, None] * shape
+        follow_rest(fields, model)
 
     return Parameter("rad", ("qpos_spring",), read, write, signed=True)
 
@@ -273,7 +301,7 @@ def _write_capstan(fields: Fields, values: np.ndarray, model: mujoco.MjModel) ->
     fields["numeric_data"][:, friction_place(model)] = values
 
 
-STIFFNESS_FIELDS = ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "dof_damping")
+STIFFNESS_FIELDS = ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "tendon_stiffnesspoly", "dof_damping")
 DAMPING_FIELDS = ("dof_damping", "dof_dampingpoly")
 
 # Order matters: what scales with stiffness is written after it.
@@ -289,7 +317,7 @@ PARAMETERS: dict[str, Parameter] = {
         told_by=_start_known,
     ),
     "hardening": Parameter(
-        "1/rad²", STIFFNESS_FIELDS, lambda m: float(m.jnt_stiffnesspoly[0, 1] / m.jnt_stiffness[0]), _write_hardening,
+        "1/rad²", STIFFNESS_FIELDS, _read_hardening, _write_hardening,
     ),
     "joint_friction": Parameter(
         "rad", ("dof_frictionloss", "jnt_stiffness"),

@@ -11,7 +11,7 @@ from pydantic import Field
 from trunkline.elements import capstan_friction
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, unit_of_hinge
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, follow_rest, unit_of_hinge
 from trunkline.identification.population import Population
 from trunkline.identification.resting import RestShape, spring_references
 
@@ -82,6 +82,7 @@ class Problem:
         )
         if self.rest is not None:
             fields["qpos_spring"] = spring_references(fields, self.model, self.rest)
+            follow_rest(fields, self.model)
         return fields
 
     def residuals(self, vectors: np.ndarray, near: np.ndarray | None = None) -> list[np.ndarray]:

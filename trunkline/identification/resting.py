@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from scipy.optimize import newton
 
+from trunkline.elements import DIAGONAL, HINGE_SHARE, elements
 from trunkline.errors import InputError
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
@@ -45,13 +46,18 @@ def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) ->
     """Joint angles q_0 at which each candidate's springs are slack, so that it rests in `rest`. Shape (C, nq).
 
     The torque of a spring is -(a x + b x² + c x³), x = q - q_0. At rest it balances the load, which bends it by x:
-    the stiffer the arm, the less of its shape comes from gravity. Fields that `fields` lacks are the model's. NaN where
-    no bend balances the load.
+    the stiffer the arm, the less of its shape comes from gravity. A round joint bends to where its load points, by as
+    much as both its hinges together. Fields that `fields` lacks are the model's. NaN where no bend balances the load.
     """
     springs = {name: getattr(model, name)[None] for name in ("jnt_stiffness", "jnt_stiffnesspoly")} | fields
     arm = len(rest.pose)  # hinges; those of Maxwell branches come after them and have no springs
     poly = springs["jnt_stiffnesspoly"][:, :arm]
-    a, b, c, load = np.broadcast_arrays(springs["jnt_stiffness"][:, :arm], poly[..., 0], poly[..., 1], rest.load)
+    load, share = rest.load, 1.0
+    if diagonals := elements(model, DIAGONAL).hinge.tolist():
+        share, pairs = HINGE_SHARE, np.array(diagonals)[:, None] + np.arange(2)
+        load = np.zeros(arm)
+        load[pairs] = np.linalg.norm(rest.load[pairs], axis=1)[:, None]
+    a, b, c, load = np.broadcast_arrays(springs["jnt_stiffness"][:, :arm], poly[..., 0], poly[..., 1] / share, load)
     bend, settled, _ = newton(
         lambda x: x * (a + x * (b + x * c)) - load,
         load / a,
@@ -60,7 +66,8 @@ def spring_references(fields: Fields, model: mujoco.MjModel, rest: RestShape) ->
         full_output=True,
     )
     references = np.repeat(model.qpos_spring[None], len(bend), axis=0)
-    references[:, :arm] = rest.pose - np.where(settled, bend, np.nan)
+    toward = rest.load / np.where(load > 0, load, 1.0)  # 1 or -1, or of a round joint its share of the whole
+    references[:, :arm] = rest.pose - np.where(settled, bend * np.where(share < 1, toward, 1.0), np.nan)
     return references
 
 

@@ -32,6 +32,7 @@ PLACES = {
     "dof_solimp": ("solimp_friction", slice(None)),
     "qpos_spring": ("springref", slice(None)),
     "tendon_stiffness": ("stiffness", 0),
+    "tendon_stiffnesspoly": ("stiffness", slice(1, None)),
     "tendon_damping": ("damping", 0),
     "tendon_solref_fri": ("solref_friction", slice(None)),
     "tendon_solimp_fri": ("solimp_friction", slice(None)),

@@ -72,7 +72,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         models["coarse"] = models["identified"]
     elif whole:
         models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
-        for field in ("qpos_spring", "site_pos", "site_sameframe"):  # rest shape and markers are no matter of scalars
+        # rest shape and markers are no matter of scalars
+        for field in ("qpos_spring", "tendon_lengthspring", "site_pos", "site_sameframe"):
             getattr(models["coarse"], field)[:] = getattr(model, field)
     if capstan_friction(models["identified"]):  # as it moves where cables cannot rub, in Unity for one
         models["smooth"] = mujoco.MjModel.from_xml_string(identified)

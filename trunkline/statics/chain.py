@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from trunkline.elements import actuators, cables, capstan_friction
+from trunkline.elements import DIAGONAL, actuators, all_elements, cables, capstan_friction
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances
@@ -29,6 +29,8 @@ class Chain(NamedTuple):
         mass: kg. Shape (n,).
         center: centre of mass from the unit's joint, m. Shape (n, 3).
         stiffness: a, b, c of the elastic torque -(a x + b x² + c x³), x the angle from `rest`. Shape (n, 2, 3).
+        diagonal: c of the torque -c x³ on the sum of both angles from `rest`, and on their difference, of joints that
+            are round. Shape (n, 2).
         rest: spring references, rad. Shape (n, 2).
         limit: lower and upper angle at which a limit starts to push, rad (infinite if none). Shape (n, 2, 2).
         limit_gain: k / dof_invweight0, N m/rad: see `limits.limit_torque`. Shape (n, 2).
@@ -51,6 +53,7 @@ class Chain(NamedTuple):
     mass: np.ndarray
     center: np.ndarray
     stiffness: np.ndarray
+    diagonal: np.ndarray
     rest: np.ndarray
     limit: np.ndarray
     limit_gain: np.ndarray
@@ -125,6 +128,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         mass=mass,
         center=(center - data.xpos[base]) @ to_base.T - anchors,
         stiffness=np.concatenate([model.jnt_stiffness[joints][..., None], model.jnt_stiffnesspoly[joints]], axis=2),
+        diagonal=_diagonals(model, joints),
         rest=model.qpos_spring[joints],
         limit=limit_angles(model, joints),
         limit_gain=gains,
@@ -151,6 +155,14 @@ def _unit_inertials(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarra
         moment = (model.body_mass[welded, None] * data.xipos[welded]).sum(axis=0)
         center[index] = moment / mass[index] if mass[index] > 0 else data.xpos[unit]
     return mass, center
+
+
+def _diagonals(model: mujoco.MjModel, joints: np.ndarray) -> np.ndarray:
+    """Of units with the hinges `joints` (n, 2), see `Chain`."""
+    found = np.zeros(joints.shape)
+    for column, one in enumerate(all_elements(model, DIAGONAL)):
+        found[np.searchsorted(joints[:, 0], one.hinge), column] = model.tendon_stiffnesspoly[one.tendon, 1]
+    return found
 
 
 def _max_tensions(model: mujoco.MjModel, order: np.ndarray) -> np.ndarray:

@@ -1,10 +1,11 @@
 """Potential energy of a chain at rest, with its exact gradient and Hessian, as compiled kernels.
 
-    E(q) = Σ_j U_j(q_j) + Σ_j P_j(q_j) - Σ_i m_i g·x_i(q) + Σ_t Φ_t(l_t(q))
+    E(q) = Σ_j U_j(q_j) + Σ_i R_i(q_2i, q_2i+1) + Σ_j P_j(q_j) - Σ_i m_i g·x_i(q) + Σ_t Φ_t(l_t(q))
 
-U: elastic joints and constant torques, P: joint limits, x_i: centres of mass, l_t: tendon path lengths. A tendon's
-energy has the tension Φ' = clip(λ + ρ (l - L), 0, F): a fixed tension (ρ = 0, never clipped), a position actuator
-(λ = 0, ρ = kp, L its command) and the augmented Lagrangian of a cable of length L (ρ a penalty) are all of this form.
+U: elastic joints and constant torques, R: what round ones have beside, P: joint limits, x_i: centres of mass, l_t:
+tendon path lengths. A tendon's energy has the tension Φ' = clip(λ + ρ (l - L), 0, F): a fixed tension (ρ = 0, never
+clipped), a position actuator (λ = 0, ρ = kp, L its command) and the augmented Lagrangian of a cable of length L (ρ a
+penalty) are all of this form.
 """
 
 from typing import NamedTuple
@@ -88,8 +89,26 @@ def evaluate(chain, q, gravity, pull, state):
         for t in range(tensions.shape[0]):
             torque += tensions[t] * state.share[i, t] * jacobian[t, j]
         gradient[j] = torque
+    energy += _add_diagonals(chain, q, state)
     energy += _add_gravity(chain, gravity, state)
     return 0.5 * np.dot(gradient, gradient) if rubbing else energy
+
+
+@kernel
+def _add_diagonals(chain, q, state):
+    """Add the torques of round joints' diagonals to the gradient, and how they change; return their energy, J."""
+    energy, diagonal, rest, gradient = 0.0, chain.diagonal, chain.rest, state.gradient
+    for i in range(diagonal.shape[0]):
+        x, y = q[2 * i] - rest[i, 0], q[2 * i + 1] - rest[i, 1]
+        both, apart = x + y, x - y
+        one, other = diagonal[i, 0] * both * both, diagonal[i, 1] * apart * apart
+        energy += 0.25 * (one * both * both + other * apart * apart)
+        gradient[2 * i] += one * both + other * apart
+        gradient[2 * i + 1] += one * both - other * apart
+        state.stiffness[2 * i] += 3 * (one + other)
+        state.stiffness[2 * i + 1] += 3 * (one + other)
+        state.coupling[i] = 3 * (one - other)
+    return energy
 
 
 @kernel
@@ -143,7 +162,7 @@ def find_hessian(gravity, pull, state):
             rank += 1
     for i in range(block.shape[0]):
         a, b = 2 * i, 2 * i + 1
-        aa, ab, bb = stiffness[a], 0.0, stiffness[b]
+        aa, ab, bb = stiffness[a], state.coupling[i], stiffness[b]
         for t in range(tensions.shape[0]):
             tension = tensions[t] * state.share[i, t]
             aa += tension * chord_hessian[i, t, 0]

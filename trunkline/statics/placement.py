@@ -13,12 +13,12 @@ class State(NamedTuple):
     """Everything that is computed from the joint angles; one per thread, filled in place.
 
     Shapes: rotation (n, 3, 3), position (n, 3), hinge (n, 2, 3), moment (n, 3), lengths (K,), tensions (K,),
-    jacobian (K, nq), chord and share (n, K), chord_hessian (n, K, 3), gradient, stiffness (nq,), left and right
-    (3 + K, nq), block (n, 4).
+    jacobian (K, nq), chord and share (n, K), chord_hessian (n, K, 3), gradient, stiffness (nq,), coupling (n,), left
+    and right (3 + K, nq), block (n, 4).
     rotation, position and hinge are in the base frame; moment is the first moment Σ m (x - position) of the unit and
-    all after it; stiffness is that of each joint by itself, springs and limit, N m/rad; chord is the length of each
-    tendon across each joint, m, and share its tension there over that at the motor, 1 without friction; left, right and
-    block are room for the `factor.Hessian`.
+    all after it; stiffness is that of each hinge by itself, springs and limit, and coupling that between the two of a
+    round joint, N m/rad; chord is the length of each tendon across each joint, m, and share its tension there over
+    that at the motor, 1 without friction; left, right and block are room for the `factor.Hessian`.
     """
 
     rotation: np.ndarray
@@ -33,6 +33,7 @@ class State(NamedTuple):
     chord_hessian: np.ndarray
     gradient: np.ndarray
     stiffness: np.ndarray
+    coupling: np.ndarray
     left: np.ndarray
     right: np.ndarray
     block: np.ndarray
@@ -56,6 +57,7 @@ def new_state(units, tendons):
         np.zeros((units, tendons, 3)),
         np.zeros(nq),
         np.zeros(nq),
+        np.zeros(units),
         np.zeros((3 + tendons, nq)),
         np.zeros((3 + tendons, nq)),
         np.zeros((units, 4)),

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from trunkline.elements import BRANCH, SLIDER, all_elements, cables, holes
+from trunkline.elements import BRANCH, DIAGONAL, SLIDER, all_elements, cables, holes
 from trunkline.errors import InputError
 
 _POSITION_DYNAMICS = (
@@ -97,7 +97,7 @@ def _geom_name(model: mujoco.MjModel, geom: int) -> str:
 
 
 def _require_site_tendons(model: mujoco.MjModel) -> None:
-    parts = [one.tendon for kind in (BRANCH, SLIDER) for one in all_elements(model, kind)]
+    parts = [one.tendon for kind in (BRANCH, SLIDER, DIAGONAL) for one in all_elements(model, kind)]
     parts.append(holes(model).ravel())
     for tendon in np.setdiff1d(np.arange(model.ntendon), np.concatenate(parts)):
         name = model.tendon(tendon).name
