@@ -5,7 +5,9 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_spec
-from trunkline.unity.linearize import compile_with, linearize_joints
+from trunkline.arm.joints import Joints, add_elements
+from trunkline.elements import diagonal_lengths
+from trunkline.unity.linearize import Laws, compile_with, linearize
 
 
 def test_the_slope_is_the_least_squares_one():
@@ -15,7 +17,8 @@ def test_the_slope_is_the_least_squares_one():
     joint.stiffness, joint.damping = [a, b, c], [a, b, c]
     draws = np.random.default_rng(0)
     angles, speeds = draws.uniform(-0.5, 0.4, (50, 16)), draws.normal(0, 3, (50, 16))
-    (stiffness,), (damping,) = linearize_joints(spec, angles, speeds)
+    laws = linearize(spec, angles, speeds)
+    (stiffness,), (damping,) = laws.springs, laws.dampers
     model = spec.compile()
     index = model.joint("unit_03_x").id
     q, v = angles[:, index], speeds[:, index]
@@ -41,7 +44,9 @@ def test_the_law_it_replaces_is_the_simulator_s():
 
 
 def test_a_linear_model_is_left_alone():
-    assert linearize_joints(small_spec(), np.ones((2, 16)), np.ones((2, 16))) == ([], [])
+    found = linearize(small_spec(), np.ones((2, 16)), np.ones((2, 16)))
+    assert found == Laws([], [], [])
+    assert not found
 
 
 def test_springs_and_dampers_come_back_exactly():
@@ -51,12 +56,31 @@ def test_springs_and_dampers_come_back_exactly():
     for joint in spec.joints[7:]:
         joint.damping = draws.uniform(0.1, 1, 3)
     calibrated = spec.compile()
-    springs, dampers = linearize_joints(spec, np.ones((2, 16)), np.ones((2, 16)))
-    assert (len(springs), len(dampers)) == (6, 9)
+    laws = linearize(spec, np.ones((2, 16)), np.ones((2, 16)))
+    assert (len(laws.springs), len(laws.dampers), len(laws.diagonals)) == (6, 9, 0)
     spec.compile()
-    restored = compile_with(spec.to_xml(), springs, dampers)
+    restored = compile_with(spec.to_xml(), laws)
     replaced = calibrated.jnt_stiffnesspoly.any(axis=1), calibrated.dof_dampingpoly.any(axis=1)
     assert (restored.jnt_stiffness[replaced[0]] == calibrated.jnt_stiffness[replaced[0]]).all()
     assert (restored.dof_damping[replaced[1]] == calibrated.dof_damping[replaced[1]]).all()
     assert (restored.jnt_stiffnesspoly == calibrated.jnt_stiffnesspoly).all()
     assert (restored.dof_dampingpoly == calibrated.dof_dampingpoly).all()
+
+
+def test_a_round_joint_s_diagonals_come_back_too():
+    spec, angles = small_spec(), np.random.default_rng(2).uniform(-0.3, 0.4, (50, 16))
+    for joint in spec.joints:
+        joint.stiffness, joint.springref = [0.5, 0, 1.5], 0.01
+    add_elements(spec, Joints(round=True), 1e-5)
+    calibrated = spec.compile()
+    laws = linearize(spec, angles, np.ones((50, 16)))
+    assert (len(laws.springs), len(laws.dampers), len(laws.diagonals)) == (16, 0, 16)
+    both = angles[:, 2] + angles[:, 3]
+    assert laws.diagonals[1].tendon == "unit_02_x_diagonal_1"
+    assert laws.diagonals[1].line == pytest.approx(0.25 * both**4 @ np.ones(50) / (both @ both))
+    spec.compile()
+    restored = compile_with(spec.to_xml(), laws)
+    assert (restored.tendon_stiffnesspoly == calibrated.tendon_stiffnesspoly).all()
+    assert (restored.tendon_stiffness == calibrated.tendon_stiffness).all()
+    diagonals, _ = diagonal_lengths(calibrated, calibrated.qpos_spring)
+    np.testing.assert_allclose(restored.tendon_lengthspring[diagonals], calibrated.tendon_lengthspring[diagonals])

@@ -22,7 +22,7 @@ from trunkline.arm.joints import Branch, Joints, add_elements
 from trunkline.errors import InputError
 from trunkline.ik.network import INPUTS
 from trunkline.unity.importer import as_imported
-from trunkline.unity.linearize import JointLaw, compile_with
+from trunkline.unity.linearize import JointLaw, Laws, compile_with
 from trunkline.unity.manifest import Manifest, Model
 from trunkline.unity.package import read_tarball, write_tarball
 from trunkline.unity.roundtrip import curl, simulate
@@ -215,7 +215,8 @@ def test_springs_that_stiffen_are_restored_from_the_manifest(sources):
     model = Manifest.model_validate_json(files[MANIFEST]).model
     calibrated, mjcf = mujoco.MjModel.from_xml_string(sources.mjcf), files[MODEL].decode()
     linear = mujoco.MjModel.from_xml_string(mjcf)
-    assert compare(calibrated, compile_with(mjcf, model.springs, model.dampers), TRAJECTORY) == (0.0, 0)
+    laws = Laws(model.springs, model.dampers, model.diagonals)
+    assert compare(calibrated, compile_with(mjcf, laws), TRAJECTORY) == (0.0, 0)
     assert model.import_max_deviation_mm < 0.01
     assert model.changes_max_deviation_mm == compare(calibrated, linear, TRAJECTORY)[0] > 1
     for laws, first, higher in (

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 
 from trunkline.unity.importer import as_imported
-from trunkline.unity.linearize import compile_with
+from trunkline.unity.linearize import Laws, compile_with
 from trunkline.unity.manifest import Manifest
 from trunkline.unity.roundtrip import curl, deviation, simulate
 from trunkline.unity.twin import MANIFEST, MODEL, Trajectory, without_dead_time, without_rubbing
@@ -43,10 +43,11 @@ def read_models(calibrated: str, packed: dict[str, bytes]) -> dict[str, mujoco.M
     without_dead_time(spec)
     without_rubbing(spec)
     described = Manifest.model_validate_json(packed[MANIFEST]).model
+    laws = Laws(described.springs, described.dampers, described.diagonals)
     return {
         "calibrated": spec.compile(),
-        "packed": compile_with(mjcf, described.springs, described.dampers),
-        "imported": compile_with(as_imported(mjcf), described.springs, described.dampers),
+        "packed": compile_with(mjcf, laws),
+        "imported": compile_with(as_imported(mjcf), laws),
     }
 
 

@@ -2,13 +2,16 @@
 
 MuJoCo's joint torque is -(a q + b q² + c q³) for a spring and -(a v + b v|v| + c v³) for a damper. The line
 that stands in for it is nearest in the mean square over the angles and speeds of a given movement, Σ τ q / Σ q².
-In Unity, `csharp/CalibratedSprings.cs` writes the polynomials back; `compile_with` does the same here.
+So it is for a round joint's diagonals, whose lengths are sums and differences of angles. In Unity,
+`csharp/CalibratedSprings.cs` writes the polynomials back; `compile_with` does the same here.
 """
 
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+
+from trunkline.elements import diagonal_lengths
 
 
 @dataclass(frozen=True)
@@ -26,39 +29,81 @@ class JointLaw:
     line: float
 
 
-def linearize_joints(
-    spec: mujoco.MjSpec, angles: np.ndarray, speeds: np.ndarray
-) -> tuple[list[JointLaw], list[JointLaw]]:
-    """Replace polynomial springs and dampers of hinges by lines, in place.
+@dataclass(frozen=True)
+class TendonLaw:
+    """The spring of one diagonal, as `JointLaw` has them.
+
+    Attributes:
+        tendon: its name.
+        coefficients, line: as of a joint.
+    """
+
+    tendon: str
+    coefficients: tuple[float, float, float]
+    line: float
+
+
+@dataclass(frozen=True)
+class Laws:
+    """What a model has that is no line: springs and dampers of hinges, and springs of round joints' diagonals."""
+
+    springs: list[JointLaw]
+    dampers: list[JointLaw]
+    diagonals: list[TendonLaw]
+
+    def __bool__(self) -> bool:
+        return bool(self.springs or self.dampers or self.diagonals)
+
+
+def linearize(spec: mujoco.MjSpec, angles: np.ndarray, speeds: np.ndarray) -> Laws:
+    """Replace polynomial springs and dampers by lines, in place.
 
     Args:
         spec: a model of hinges only.
         angles, speeds: of every joint while it moves, rad and rad/s. Shape (steps, njnt).
 
     Returns:
-        The springs and the dampers that were replaced.
+        Those that were replaced.
     """
-    laws = {"stiffness": [], "damping": []}
+    diagonals, lengths = diagonal_lengths(spec.compile(), angles)
+    laws, tendons = {"stiffness": [], "damping": []}, []
     for joint, q, v in zip(spec.joints, angles.T, speeds.T, strict=True):
         for attribute, x, even in (("stiffness", q, q**2), ("damping", v, v * np.abs(v))):
             a, b, c = map(float, getattr(joint, attribute))
             if b == 0 and c == 0:
                 continue
-            slope = float((a * x + b * even + c * x**3) @ x / (x @ x)) if x.any() else a
+            slope = _slope((a, b, c), x, even)
             laws[attribute].append(JointLaw(joint.name, (a, b, c), slope))
             setattr(joint, attribute, [slope, 0, 0])
-    return laws["stiffness"], laws["damping"]
+    for index, length in zip(diagonals, lengths.T, strict=True):
+        tendon = spec.tendons[index]
+        a, b, c = map(float, tendon.stiffness)
+        if b == 0 and c == 0:
+            continue
+        slope = _slope((a, b, c), length, length**2)
+        tendons.append(TendonLaw(tendon.name, (a, b, c), slope))
+        tendon.stiffness = [slope, 0, 0]
+    return Laws(laws["stiffness"], laws["damping"], tendons)
 
 
-def compile_with(mjcf: str, springs: list[JointLaw], dampers: list[JointLaw]) -> mujoco.MjModel:
-    """The model of an MJCF with these springs and dampers, its own being lines."""
+def _slope(coefficients: tuple[float, float, float], x: np.ndarray, even: np.ndarray) -> float:
+    a, b, c = coefficients
+    return float((a * x + b * even + c * x**3) @ x / (x @ x)) if x.any() else a
+
+
+def compile_with(mjcf: str, laws: Laws) -> mujoco.MjModel:
+    """The model of an MJCF with these laws, its own being lines."""
     model = mujoco.MjModel.from_xml_string(mjcf)
-    for spring in springs:
+    for spring in laws.springs:
         index = model.joint(spring.joint).id
         a, *higher = spring.coefficients
         model.jnt_stiffness[index], model.jnt_stiffnesspoly[index] = a, higher
-    for damper in dampers:
+    for damper in laws.dampers:
         index = model.jnt_dofadr[model.joint(damper.joint).id]
         a, *higher = damper.coefficients
         model.dof_damping[index], model.dof_dampingpoly[index] = a, higher
+    for diagonal in laws.diagonals:
+        index = model.tendon(diagonal.tendon).id
+        a, *higher = diagonal.coefficients
+        model.tendon_stiffness[index], model.tendon_stiffnesspoly[index] = a, higher
     return model

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from trunkline.elements import cables
 from trunkline.unity.frame import unity_position
-from trunkline.unity.linearize import JointLaw
+from trunkline.unity.linearize import JointLaw, TendonLaw
 
 
 class _Block(BaseModel):
@@ -66,6 +66,9 @@ class Model(_Block):
         description="of hinges, polynomials that the importer cannot read: CalibratedSprings.cs restores them"
     )
     dampers: list[JointLaw] = Field(description="likewise")
+    diagonals: list[TendonLaw] = Field(
+        description="likewise, of tendons by which a round joint hardens by its whole bend; the file's names say which"
+    )
     dead_time: float = Field(
         ge=0, description="s from a command to the motor's first answer, which the file has not: send commands so late"
     )

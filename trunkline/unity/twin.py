@@ -11,7 +11,7 @@ from pydantic import Field
 from trunkline.elements import CAPSTAN_FRICTION, capstan_friction, is_hole
 from trunkline.errors import InputError
 from trunkline.unity.importer import as_imported
-from trunkline.unity.linearize import compile_with, linearize_joints
+from trunkline.unity.linearize import compile_with, linearize
 from trunkline.unity.manifest import Manifest, Versions, describe_model, hashes
 from trunkline.unity.network import describe_network
 from trunkline.unity.package import package_json, with_metas
@@ -77,13 +77,13 @@ def assemble(
     spec = mujoco.MjSpec.from_string(sources.mjcf)
     dead_time, friction = without_dead_time(spec), without_rubbing(spec)
     calibrated = spec.compile()
-    springs, dampers = linearize_joints(spec, *movement(calibrated, trajectory))
+    laws = linearize(spec, *movement(calibrated, trajectory))
     spec.compile()
     mjcf = spec.to_xml()
     violations = lint_mjcf(mjcf)
 
     bundled = mujoco.MjModel.from_xml_string(mjcf)
-    imported = compile_with(as_imported(mjcf), springs, dampers)
+    imported = compile_with(as_imported(mjcf), laws)
     import_deviation_mm, complaints = compare(calibrated, imported, trajectory)
     if complaints:  # MjScene.CheckForPhysicsException
         violations.append(
@@ -114,9 +114,10 @@ def assemble(
         model=describe_model(
             bundled,
             MODEL,
-            springs=springs,
-            dampers=dampers,
-            changes_max_deviation_mm=compare(calibrated, bundled, trajectory)[0] if springs or dampers else 0.0,
+            springs=laws.springs,
+            dampers=laws.dampers,
+            diagonals=laws.diagonals,
+            changes_max_deviation_mm=compare(calibrated, bundled, trajectory)[0] if laws else 0.0,
             import_max_deviation_mm=import_deviation_mm,
             dead_time=dead_time,
             capstan_friction=friction,

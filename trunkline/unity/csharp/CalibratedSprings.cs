@@ -1,6 +1,7 @@
 // Gives the arm its calibrated springs and dampers back, which MuJoCo's importer cannot read.
 //
-// MuJoCo's joint torque is -(a q + b q^2 + c q^3) for a spring and -(a v + b v|v| + c v^3) for a damper.
+// MuJoCo's joint torque is -(a q + b q^2 + c q^3) for a spring and -(a v + b v|v| + c v^3) for a damper,
+// and so is the force of a diagonal, a tendon by which a round joint hardens by its whole bend.
 // The importer knows one number for each, so arm.xml holds straight lines and manifest.json the
 // coefficients. This component writes them into every model that MjScene compiles.
 
@@ -27,11 +28,18 @@ public class CalibratedSprings : MonoBehaviour {
   public class Model {
     public JointLaw[] springs;
     public JointLaw[] dampers;
+    public TendonLaw[] diagonals;
   }
 
   [Serializable]
   public class JointLaw {
     public string joint;
+    public double[] coefficients;
+  }
+
+  [Serializable]
+  public class TendonLaw {
+    public string tendon;
     public double[] coefficients;
   }
 
@@ -69,12 +77,23 @@ public class CalibratedSprings : MonoBehaviour {
     var joints = GetComponentsInChildren<MjHingeJoint>();
     foreach (var spring in _calibrated.springs) {
       foreach (var joint in Find(spring, joints)) {
-        Write(spring, joint.MujocoId, model->jnt_stiffness, model->jnt_stiffnesspoly);
+        Write(spring.coefficients, joint.MujocoId, model->jnt_stiffness, model->jnt_stiffnesspoly);
       }
     }
     foreach (var damper in _calibrated.dampers) {
       foreach (var joint in Find(damper, joints)) {
-        Write(damper, joint.DofAddress, model->dof_damping, model->dof_dampingpoly);
+        Write(damper.coefficients, joint.DofAddress, model->dof_damping, model->dof_dampingpoly);
+      }
+    }
+    var tendons = GetComponentsInChildren<MjFixedTendon>();
+    foreach (var diagonal in _calibrated.diagonals) {
+      var found = Array.FindAll(tendons, tendon => tendon.name == diagonal.tendon);
+      if (found.Length == 0) {
+        Debug.LogError($"Calibrated Springs: found no tendon {diagonal.tendon} below {name}, expected one", this);
+      }
+      // One that has just been added has no number before the next model, which is then due.
+      foreach (var tendon in Array.FindAll(found, tendon => tendon.MujocoId >= 0)) {
+        Write(diagonal.coefficients, tendon.MujocoId, model->tendon_stiffness, model->tendon_stiffnesspoly);
       }
     }
   }
@@ -89,10 +108,10 @@ public class CalibratedSprings : MonoBehaviour {
     return Array.FindAll(found, joint => joint.DofAddress >= 0);
   }
 
-  private static unsafe void Write(JointLaw law, int index, double* linear, double* higher) {
-    linear[index] = law.coefficients[0];
+  private static unsafe void Write(double[] coefficients, int index, double* linear, double* higher) {
+    linear[index] = coefficients[0];
     for (int order = 0; order < _higherOrders; order++) {
-      higher[_higherOrders * index + order] = law.coefficients[1 + order];
+      higher[_higherOrders * index + order] = coefficients[1 + order];
     }
   }
 }
