@@ -251,8 +251,9 @@ def test_the_component_for_unity_reads_what_the_manifest_holds(files):
     read = {name: set(re.findall(r"public [\w[\]]+ (\w+);", body)) for name, body in classes}
     assert read == {
         "Manifest": {"model"},
-        "Model": {"springs", "dampers"},
+        "Model": {"springs", "dampers", "diagonals"},
         "JointLaw": {"joint", "coefficients"},
+        "TendonLaw": {"tendon", "coefficients"},
     }
     for block in (Manifest, Model):
         assert read[block.__name__] <= set(block.model_fields)
