@@ -34,7 +34,7 @@ from trunkline.trials.trial import Trial, read_trials
 TRIALS = Path("data/processed/filter")
 KINDS = ("static_tilt", "static_pull")
 STEP = 1e-3  # of differences, on the axis of `Parameter.coordinate`
-BOUNDS = {"stiffness": (0.3, 12.0), "hardening": (0.02, 20.0), "joint_place": (-0.2, 1.0), "kp": (100.0, 6000.0)}
+BOUNDS = {"stiffness": (0.3, 12.0), "hardening": (0.02, 20.0), "joint_place": (-0.2, 1.0), "kp": (100.0, 20000.0)}
 BOUNDS |= dict.fromkeys(("mount_tilt_x", "mount_tilt_y"), (-0.1, 0.1))
 BOUNDS |= dict.fromkeys(("rest_bend_x", "rest_bend_y", "rest_gradient_x", "rest_gradient_y"), (-0.05, 0.05))
 FRICTION = (-0.5, 0.5)
@@ -109,7 +109,7 @@ class Fitted:
             rows = np.flatnonzero(self._back == side)
             found = actuated(chain._replace(capstan=float(coefficient)), self._commands[rows], gravity[rows])
             for row, qpos in zip(rows[found.converged], found.qpos[found.converged], strict=True):
-                data.qpos[:] = qpos
+                data.qpos[: len(qpos)] = qpos
                 mujoco.mj_kinematics(model, data)
                 positions[row] = data.site_xpos[sites]
         return positions
