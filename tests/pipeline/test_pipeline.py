@@ -58,6 +58,13 @@ def test_one_name_everywhere():
         assert stage["desc"]
 
 
+@pytest.mark.parametrize("file", ["dvc.yaml", "demo/dvc.yaml", *sorted({e.partition(":")[0] for e in EXAMPLES})])
+def test_a_pipeline_can_be_read_like_a_table_of_contents(file):
+    lines = (ROOT / file).read_text().splitlines()
+    assert [line for line in lines if len(line) > 120] == []
+    assert len(lines) < 250
+
+
 @pytest.mark.parametrize("address", [*STAGES, *EXAMPLES])
 def test_a_stage_lists_its_settings(stages, address):
     folder, name = _folder_and_name(address)
