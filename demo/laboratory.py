@@ -10,8 +10,8 @@ import numpy as np
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
-from demo.bench import COMMAND_RATE, LOOSE, SAMPLE_RATE, Bench, Plant, Seen
 from demo.experiments import Experiments, curl_trials, motion_trials, pull_trials, release_trials, tilt_trials
+from demo.plants.bench import COMMAND_RATE, LOOSE, SAMPLE_RATE, Bench, Plant, Seen
 from demo.truth import Truth
 from trunkline.arm.mjcf import unit_name
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation

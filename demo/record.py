@@ -6,15 +6,14 @@ from pathlib import Path
 import numpy as np
 
 from demo.answers import start_in_log
-from demo.bench import Plant
 from demo.experiments import PLANS, Experiments, loaded_trials
 from demo.instruments import InstrumentSettings, measure
 from demo.laboratory import record
-from demo.plants import Arm, PlantSettings, build_plant
+from demo.plants.choice import Choice, distinct, expect, plant_of
 from demo.recorder import write_log, write_session
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
-from trunkline.settings import Seed, settings
+from trunkline.settings import settings
 from trunkline.trials.recording import Planned
 from trunkline.trials.splits import IDENTIFY, VALIDATE
 
@@ -23,59 +22,40 @@ ANSWERS = SESSION.with_name("demo.truth.json")  # beside the session, not in it:
 
 
 @settings
-class Config:
-    seed: Seed
-    arm: Arm
-    plant: PlantSettings
+class Config(Choice):
     experiments: Experiments
     instruments: InstrumentSettings
 
     def __post_init__(self):
+        super().__post_init__()
         arm, tests = self.arm, self.experiments
-        _expect(arm.tip_width < arm.base_width, "arm.tip_width", arm.tip_width, f"less than {arm.base_width}")
-        tracked = max(arm.tracked) <= arm.units and _distinct(arm.tracked)
-        _expect(tracked, "arm.tracked", arm.tracked, f"distinct units from 1 to {arm.units}")
         for group in [*tests.curl_tendons, *tests.test.curl_tendons]:
-            known = max(group) <= arm.tendons and _distinct(group)
-            _expect(known, "experiments.curl_tendons", group, f"distinct tendons from 1 to {arm.tendons}")
+            known = max(group) <= arm.tendons and distinct(group)
+            expect(known, "experiments.curl_tendons", group, f"distinct tendons from 1 to {arm.tendons}")
         for key, pulls in (("experiments.pulls", tests.pulls), ("experiments.test.pulls", tests.test.pulls)):
             for pull in pulls:
-                _expect(len(pull.levels) == arm.tendons, key, pull.levels, f"a level for each of {arm.tendons} tendons")
+                expect(len(pull.levels) == arm.tendons, key, pull.levels, f"a level for each of {arm.tendons} tendons")
         shortest, longest = self.instruments.occlusion_ms
-        _expect(shortest <= longest, "instruments.occlusion_ms", [shortest, longest], "the shortest first")
-        _expect(any(self.instruments.up), "instruments.up", list(self.instruments.up), "a direction")
+        expect(shortest <= longest, "instruments.occlusion_ms", [shortest, longest], "the shortest first")
+        expect(any(self.instruments.up), "instruments.up", list(self.instruments.up), "a direction")
         for key, plan in PLANS.values():
             if trials := plan(tests):
                 _check_trials(f"experiments.{key}", trials, plan(tests.tested()), tests)
         loaded = [trial.name for trial in [*loaded_trials(tests), *loaded_trials(tests.tested())]]
-        _expect(_distinct(loaded), "experiments.loads", _repeated(loaded), "a log of its own for each trial")
+        expect(distinct(loaded), "experiments.loads", _repeated(loaded), "a log of its own for each trial")
 
 
 def _check_trials(key: str, trials: list[Planned], tested: list[Planned], experiments: Experiments) -> None:
     names = [trial.name for trial in trials + tested]
-    _expect(_distinct(names), key, _repeated(names), "a log of its own for each trial (names hold whole numbers)")
+    expect(distinct(names), key, _repeated(names), "a log of its own for each trial (names hold whole numbers)")
     splits = {trial.split for trial in trials}
     every = experiments.validate_every
     expected = f"trials of {key} in the splits {IDENTIFY} and {VALIDATE}"
-    _expect(len(splits) == 2, "experiments.validate_every", every, expected)
-
-
-def _expect(holds: bool, key: str, found, expected: str) -> None:
-    if not holds:
-        raise ValueError(f"{key}: found {found}, expected {expected}")
-
-
-def _distinct(values: list) -> bool:
-    return len(set(values)) == len(values)
+    expect(len(splits) == 2, "experiments.validate_every", every, expected)
 
 
 def _repeated(values: list) -> str:
     return next((f"{value!r} twice" for value in values if values.count(value) > 1), "no repetition")
-
-
-def plant_of(config: Config) -> Plant:
-    """The arm on the bench: the same one for whoever asks."""
-    return build_plant(config.arm, config.plant, np.random.default_rng(config.seed).spawn(1)[0])
 
 
 def main(config: Config) -> None:

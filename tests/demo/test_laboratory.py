@@ -11,8 +11,6 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from demo.bench import SAMPLE_RATE
-from demo.cousin import Cousin, CousinSettings
 from demo.experiments import (
     PLANS,
     ForTest,
@@ -27,6 +25,8 @@ from demo.experiments import (
     tilt_trials,
 )
 from demo.laboratory import Laboratory, record
+from demo.plants.bench import SAMPLE_RATE
+from demo.plants.cousin import Cousin, CousinSettings
 from demo.record import Config
 from tests.support.small_arm import small_spec
 from trunkline.arm.spiral import spiral_chain

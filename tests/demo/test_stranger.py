@@ -9,10 +9,21 @@ import pytest
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from demo.bench import COMMAND_RATE, LOOSE, Bench
+from demo.plants.bench import COMMAND_RATE, LOOSE, Bench
+from demo.plants.stranger import Stranger, StrangerSettings
+from demo.plants.stranger_kernel import (
+    State,
+    advance,
+    bend,
+    path_lengths,
+    place,
+    pull,
+    remember,
+    simulate,
+    wind,
+    work_for,
+)
 from demo.record import Config
-from demo.stranger import Stranger, StrangerSettings
-from demo.stranger_kernel import State, advance, bend, path_lengths, place, pull, remember, simulate, wind, work_for
 from trunkline.arm.spiral import spiral_chain
 from trunkline.pipeline.config import load_config
 

@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import fields
 from functools import cache
 from importlib.metadata import packages_distributions
 from pathlib import Path
@@ -15,6 +16,7 @@ import yaml
 from dvc.repo import Repo
 from omegaconf import OmegaConf
 
+from demo.plants.choice import Choice
 from tests.support.stub_pipeline import StubPipeline
 from trunkline.pipeline import lock, versions
 from trunkline.pipeline.config import SHARED, check_settings, group_options
@@ -58,14 +60,21 @@ def test_one_name_everywhere():
         assert stage["desc"]
 
 
+@pytest.mark.parametrize("file", ["dvc.yaml", "demo/dvc.yaml", *sorted({e.partition(":")[0] for e in EXAMPLES})])
+def test_a_pipeline_can_be_read_like_a_table_of_contents(file):
+    lines = (ROOT / file).read_text().splitlines()
+    assert [line for line in lines if len(line) > 120] == []
+    assert len(lines) < 250
+
+
 @pytest.mark.parametrize("address", [*STAGES, *EXAMPLES])
 def test_a_stage_lists_its_settings(stages, address):
     folder, name = _folder_and_name(address)
     params = {_relative(dep): dep.params for dep in stages[address].deps if hasattr(dep, "params")}
     section = OmegaConf.to_container(OmegaConf.load(ROOT / folder / "params.yaml"))[name] or {}
     expected = {f"{folder}params.yaml": [name], **_settings("conf", name, section)}
-    if section.get("rig") == "demo.rig":  # which reads the lab's settings
-        expected |= LAB_S_SETTINGS
+    if section.get("rig") == "demo.rig":
+        expected |= _settings_of_the_rig()
     params.pop("versions.yaml")  # the next test's
     assert params == expected
 
@@ -86,6 +95,19 @@ LAB_S_SETTINGS = {
 }
 
 
+def _settings_of_the_rig() -> dict[str, list]:
+    """Those of the lab's that choose its plant, and no more."""
+    params = OmegaConf.load(ROOT / "demo/params.yaml").record
+    drawing = OmegaConf.load(ROOT / "demo/conf/record/config.yaml")
+    keys = [field.name for field in fields(Choice)]
+    groups = [key for key in keys if (ROOT / "demo/conf/record" / key).is_dir()]
+    return {
+        "demo/params.yaml": [f"record.{key}" for key in keys if key in params],
+        "demo/conf/record/config.yaml": [key for key in keys if key in drawing and key not in params],
+        **{f"demo/conf/record/{key}/{params[key]}.yaml": [] for key in groups},
+    }
+
+
 def test_the_lab_lists_its_settings(stages):
     params = {_relative(dep): dep.params for dep in stages["demo/dvc.yaml:record"].deps if hasattr(dep, "params")}
     params.pop("versions.yaml")
@@ -97,7 +119,7 @@ def test_a_stage_lists_the_libraries_that_its_numbers_go_through(stages, address
     """Those that it imports, directly or through its rooms, so that another version of one runs it again."""
     (listed,) = (dep.params for dep in stages[address].deps if _relative(dep) == "versions.yaml")
     distributions, imported = _distributions(), set()
-    for file in _imported(stages[address].cmd.split()[-1].replace(".", "/") + ".py"):
+    for file in _code(stages[address]):
         for node in ast.walk(_tree(file)):
             modules = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             modules += [node.module] if isinstance(node, ast.ImportFrom) and not node.level else []
@@ -128,10 +150,9 @@ def test_an_example_s_settings_are_checked(address):
 
 @pytest.mark.parametrize("name", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record"])
 def test_a_stage_depends_on_the_code_it_imports_and_no_other(stages, name):
-    ours = ("stages", "trunkline", *(["demo"] if name.startswith("demo") else []))  # a rig is its lab's, no import
-    deps = {dep for dep in map(_relative, stages[name].deps) if dep.startswith(ours)}
+    deps = {dep for dep in map(_relative, stages[name].deps) if dep.startswith(("stages", "trunkline", "demo"))}
     deps = {dep for dep in deps if not dep.endswith(".yaml")}
-    modules = _imported(stages[name].cmd.split()[-1].replace(".", "/") + ".py")
+    modules = _code(stages[name])
     covers = {dep: {m for m in modules if m == dep or m.startswith(f"{dep}/")} for dep in deps}
     assert modules - set().union(*covers.values()) == set()
     assert [dep for dep, covered in covers.items() if not covered] == []
@@ -394,6 +415,14 @@ def _tree(file: str) -> ast.Module:
 
 def _inert(name: str) -> bool:
     return name.startswith(INERT) and name not in ACTIVE
+
+
+def _code(stage) -> set[str]:
+    """Files of this project that a stage's module imports, directly or not, and the rig that its settings name."""
+    folder, name = _folder_and_name(stage.addressing)
+    section = OmegaConf.load(ROOT / folder / "params.yaml")[name] or {}
+    begins = [module for module in (stage.cmd.split()[-1], section.get("rig")) if module]
+    return set().union(*(_imported(f"{module.replace('.', '/')}.py") for module in begins))
 
 
 @cache

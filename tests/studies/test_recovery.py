@@ -1,6 +1,6 @@
 """The study of recovery: its settings are those that its stages take, and the lab's are of the cousin."""
 
-from demo.cousin import CousinSettings
+from demo.plants.cousin import CousinSettings
 from demo.record import Config
 from studies.recovery import set_up
 from trunkline.pipeline.config import check_settings, load_config, settings_of

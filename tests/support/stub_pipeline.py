@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 RESULTS = ("artifacts/", "dvc.lock", "demo/dvc.lock", ".dvc/", "examples/")
 
 STUB = '''
-import hashlib, json, pathlib
+import functools, hashlib, json, pathlib
 from omegaconf import OmegaConf
 
 def run(stage):
@@ -30,7 +30,8 @@ def run(stage):
                 digest.update(file.read_bytes())
     for file, keys in declared["params"].items():
         values = OmegaConf.to_container(OmegaConf.load(file))
-        digest.update(json.dumps({k: values[k] for k in keys or sorted(values)}).encode())
+        chosen = {k: functools.reduce(dict.get, k.split("."), values) for k in keys or sorted(values)}
+        digest.update(json.dumps(chosen).encode())
     for name in declared["outs"]:
         path = pathlib.Path(name) if pathlib.Path(name).suffix else pathlib.Path(name, "digest.txt")
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from demo.bench import COMMAND_RATE, SAMPLE_RATE, Bench, PrintedArm, Seen, Share
+from demo.plants.bench import COMMAND_RATE, SAMPLE_RATE, Bench, PrintedArm, Seen, Share
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import unit_properties
 from trunkline.arm.mjcf import Solref, unit_name

@@ -14,8 +14,8 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from demo.bench import COMMAND_RATE, LOOSE, Bench, PrintedArm, Seen
-from demo.stranger_kernel import Links, State, come_to_rest, path_lengths, simulate, tip
+from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, PrintedArm, Seen
+from demo.plants.stranger_kernel import Links, State, come_to_rest, path_lengths, simulate, tip
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import unit_properties
 from trunkline.frames import STANDARD_GRAVITY
