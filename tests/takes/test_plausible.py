@@ -180,6 +180,12 @@ def test_a_base_that_moves_while_a_segment_rests_is_named(sound):
         ("curl_40", "static_pull", None, "expected at most 2 % in a static_pull: is it another experiment"),
         ("motion_identify", "static_pull", None, "commands: 'tendon_1' is wound by .* expected a static_pull to hold"),
         ("pull_40_-20_-20", "motion", None, "expected more than 2 % in a motion"),
+        (
+            "pull_40_-20_-20",
+            "static_tilt",
+            0.0,
+            "experiment: commands: 'tendon_1' is drawn in by 40 mm, expected a static_tilt without actuation",
+        ),
         ("motion_identify", "release", None, "commands: 'tendon_1' is wound by"),
     ],
 )
@@ -187,6 +193,62 @@ def test_a_trial_labelled_as_another_experiment_is_named(sound, name, experiment
     trials, _ = judged(sound, **{name: replace(take_of(sound, name), experiment=experiment, level=level)})
     assert list(trials) == [name]
     assert any(re.search(message, said) for said in trials[name]), trials
+
+
+def with_tendons(take, commands_mm, positions_mm):
+    """The take beside motors that log these pulls of the three tendons throughout; nothing where None."""
+    time = np.arange(-0.5, take.time[-1] + 0.5, 0.01)
+    rows = [
+        np.empty((0, 3)) if pulls is None else 1e-3 * np.tile(pulls, (len(time), 1))
+        for pulls in (commands_mm, positions_mm)
+    ]
+    times = {"command_time": time[: len(rows[0])], "tendon_time": time[: len(rows[1])]}
+    return replace(take, tendons=TENDONS, commands=rows[0], tendon_positions=rows[1], **times)
+
+
+SLACK, PULLED = (-300.0, -300.0, -300.0), (-300.0, 40.0, -300.0)
+
+
+@pytest.mark.parametrize("name", ["tilt_30", "release_a"])
+@pytest.mark.parametrize(
+    ("commands", "positions", "key"),
+    [
+        (PULLED, None, "commands"),
+        (PULLED, PULLED, "commands"),
+        (PULLED, SLACK, "commands"),
+        (None, PULLED, "tendon positions"),
+        (SLACK, PULLED, "tendon positions"),
+    ],
+)
+def test_a_pull_that_is_held_where_nothing_is_to_pull_is_named(sound, name, commands, positions, key):
+    trials, _ = judged(sound, **{name: with_tendons(take_of(sound, name), commands, positions)})
+    assert list(trials) == [name]
+    (said,) = trials[name]
+    found = rf"experiment: {key}: 'tendon_2' is drawn in by 40\.?\d* mm, expected a \w+ without actuation"
+    assert re.fullmatch(found, said), said
+
+
+@pytest.mark.parametrize("name", ["tilt_30", "release_a"])
+@pytest.mark.parametrize("commands", [None, (0.0, 0.0, 0.0), (2.0, -1.0, -1.0), SLACK])
+def test_loose_tendons_where_nothing_is_to_pull_are_left(sound, name, commands):
+    assert judged(sound, **{name: with_tendons(take_of(sound, name), commands, SLACK)}) == ({}, [])
+    assert judged(sound, **{name: with_tendons(take_of(sound, name), commands, None)}) == ({}, [])
+
+
+def test_loose_tendons_of_encoders_that_start_anywhere_are_left(sound):
+    def shifted(name, millimetres):
+        take = take_of(sound, name)
+        return replace(take, tendon_positions=take.tendon_positions + 1e-3 * millimetres)
+
+    driven = [name for name in sound if name.startswith(("curl", "pull", "motion"))]
+    loose = with_tendons(take_of(sound, "tilt_30"), SLACK, (200.0, 200.0, 200.0))
+    same = {name: shifted(name, 500.0) for name in driven}  # slack is 200 mm then
+    assert judged(sound, tilt_30=loose, **same) == ({}, [])
+    anywhere = {name: shifted(name, 100.0 * index) for index, name in enumerate(driven)}
+    assert judged(sound, tilt_30=loose, **anywhere) == ({}, [])
+    drawn_in = with_tendons(take_of(sound, "tilt_30"), SLACK, (200.0, 540.0, 200.0))
+    (said,) = judged(sound, tilt_30=drawn_in, **same)[0]["tilt_30"]
+    assert said.startswith("experiment: tendon positions: 'tendon_2' is drawn in by 40")
 
 
 def test_a_static_tilt_in_which_the_arm_swings_is_named(sound):
