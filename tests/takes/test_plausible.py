@@ -29,6 +29,7 @@ from trunkline.takes.plausible import Plausible, check_plausible
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 PLAUSIBLE = Plausible(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
+NO_TEST = "splits: no trial of the split test: no error is of trials that nothing was decided on"
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "asl_trunk"
 
 
@@ -87,7 +88,7 @@ def moved(take, body, offset):
 def test_a_sound_session_has_no_fault_and_no_warning(folder, sound):
     assert judged(sound) == ({}, [])
     gathered = gather(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
-    assert [found.repairs + found.warnings for found in gathered.findings] == [[]] * len(sound)
+    assert [found.repairs + found.warnings for found in gathered.findings] == [[NO_TEST]] * len(sound)
 
 
 def test_real_recordings_have_no_fault(tmp_path):
@@ -102,7 +103,11 @@ def test_real_recordings_have_no_fault(tmp_path):
     session = read_session(tmp_path)
     gathered = gather(take_in(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
     assert len(gathered.takes) == 13
-    assert [found.warnings for found in gathered.findings] == [[]] * 13
+    for found in gathered.findings:
+        no_validate, no_test, no_others = found.warnings
+        assert no_validate == "splits: no trial of the split validate: no error is of trials that were not fitted"
+        assert no_test == NO_TEST
+        assert no_others.startswith("experiments: no static_tilt, curl, static_pull, motion in the session: data/raw")
 
 
 @pytest.mark.parametrize("name", ["tilt_30", "release_a", "release_b", "curl_60"])
@@ -378,16 +383,40 @@ def test_a_level_that_the_base_contradicts_is_said(folder, sound):
     taken["tilt_60"] = trial, replace(take, level=10.0), taken["tilt_60"][2]
     gathered = gather(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
     said = {take.name: found.warnings for take, found in zip(gathered.takes, gathered.findings, strict=True)}
-    assert said["tilt_60"][0].startswith("level: found 10, but the base is tilted by 60°")
-    assert not any(said[name] for name in said if name != "tilt_60")
+    assert said["tilt_60"][1].startswith("level: found 10, but the base is tilted by 60°")
+    assert all(said[name] == [NO_TEST] for name in said if name != "tilt_60")
 
 
 def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
     kept = [trial for name, trial in sound.items() if name != "curl_60"]
     taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in kept]
     gathered = gather(taken, read_session(folder), PLAUSIBLE, "stop", "here")
-    said = ["splits: no curl of the split validate, which the session has"]
+    said = [NO_TEST, "splits: no curl of the split validate, which the session has"]
     assert all(found.warnings == said for found in gathered.findings)
+
+
+@pytest.mark.parametrize(
+    ("kept", "said"),
+    [
+        (
+            lambda take: take.split == "identify",
+            ["splits: no trial of the split validate: no error is of trials that were not fitted", NO_TEST],
+        ),
+        (
+            lambda take: take.split == "validate",
+            ["splits: no trial of the split identify: nothing can be identified", NO_TEST],
+        ),
+        (
+            lambda take: take.experiment != "curl",
+            [NO_TEST, "experiments: no curl in the session: data/raw/README.md tells which settings do without"],
+        ),
+    ],
+    ids=["identify alone", "validate alone", "no curl"],
+)
+def test_a_split_or_an_experiment_that_the_session_lacks_is_said(folder, sound, kept, said):
+    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in sound.values() if kept(some)]
+    for found in gather(taken, read_session(folder), PLAUSIBLE, "stop", "here").findings:
+        assert [one for one in found.warnings if one.startswith(("splits:", "experiments:"))] == said
 
 
 def test_usual_distances_of_other_splits_are_said(tmp_path):
