@@ -96,6 +96,68 @@ def test_motions_pass_and_show_exchanged_tendons(model, seed):
         assert "\n" not in str(caught.value)
 
 
+@pytest.fixture(scope="module")
+def driven(model):
+    """Of each kind with motors: pulls of one and of several tendons, motions, a curl."""
+    pulls = ([30, -300, -300], [40, -18, -20], [-300, 25, 30])
+    moved = [motion(model, seed=seed, reach_mm=80, noise=3e-4) for seed in range(2)]
+    return [*(static_pull(model, some, noise=3e-4) for some in pulls), *moved, curl(model, 40, noise=3e-4)]
+
+
+def with_scale(trial, factor):
+    return replace(trial, commands=factor * trial.commands, tendon_positions=factor * trial.tendon_positions)
+
+
+@pytest.mark.parametrize("factor", [0.01, 0.1, 0.5])
+def test_pulls_that_are_commanded_too_small_show(model, driven, factor):
+    check_trials(driven, model)
+    for trial in driven:
+        if factor == 0.5 and trial.experiment == "motion":
+            continue  # the arm lags behind them by as much
+        said = rf"tendons: trial {re.escape(trial.name)}: found paths that are shorter by [\d.e+]+ times the pulls"
+        with pytest.raises(InputError, match=said) as caught:
+            check_trials([with_scale(trial, factor)], model)
+        assert "expected 0.4 to 1.5 times: are signs reversed, are commands in another unit than m" in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("factor", [-1, 4, 10, 100])
+def test_pulls_and_motions_that_are_reversed_or_commanded_too_large_show(model, driven, factor):
+    for trial in driven:
+        if trial.level is None:
+            with pytest.raises(InputError, match=f"tendons: trial {re.escape(trial.name)}: found .*signs reversed"):
+                check_trials([with_scale(trial, factor)], model)
+
+
+def test_all_trials_of_another_scale_are_counted_and_the_first_are_named(model, driven):
+    first, second, third = (re.escape(trial.name) for trial in driven[:3])
+    said = f"trials {first}, {second}, {third} and 3 more: found paths that are shorter by .* to .* times"
+    with pytest.raises(InputError, match=said):
+        check_trials([with_scale(trial, 0.1) for trial in driven], model)
+    with pytest.raises(InputError, match=f"trials {first}, {second}: found"):
+        check_trials([with_scale(trial, 0.1) for trial in driven[:2]] + driven[2:], model)
+
+
+def test_slack_tendons_of_an_arm_that_gravity_bends_are_let_alone(model):
+    trial = static_pull(model, [10, -300, -300], 90)
+    check_trials([trial], model)
+    upright = replace(trial, gravity=np.array([0, 0, -9.81]))
+    with pytest.raises(InputError, match="found paths that are shorter by"):
+        check_trials([upright], model)
+
+
+def test_weak_motors_and_soft_cables_are_let_alone(model):
+    """A curl's level says how far motors were told to pull, and they may not reach it."""
+    weak, soft = model.__copy__(), model.__copy__()
+    weak.actuator_forcerange[:, 0] *= 0.02
+    curls = [curl(weak, 90, tendon=tendon, frames=110) for tendon in range(3)]
+    assert max(float(np.ptp(trial.positions, axis=0).max()) for trial in curls) < 0.2
+    soft.actuator_gainprm[:, 0] *= 0.3
+    soft.actuator_biasprm[:, 1] *= 0.3
+    pulls = [static_pull(soft, pulls) for pulls in ([30, -300, -300], [60, -30, -30])]
+    check_trials([*curls, *pulls, motion(soft, seed=1, reach_mm=60, noise=3e-4)], model)
+
+
 def test_what_is_said_names_key_trial_and_both_tendons(model, curls):
     said = "tendons: trial curl_40_0_identify: found 'tendon_2' wound by 40 mm .* to the side of 'tendon_1', expected"
     with pytest.raises(InputError, match=said) as caught:

@@ -42,7 +42,9 @@ def test_takes_report_and_metrics(project, capsys):
     code, said = run(capsys)
     assert code == 0
     told = [line.removeprefix("ingest: warning: ") for line in said.splitlines()]
-    assert [line.split(":")[1].strip() for line in told] == ["splits", "splits"], "a session of four trials"
+    assert [line.split(":")[1].strip() for line in told] == ["splits", "experiments", "splits", "splits"]
+    assert told[0].startswith("all trials: splits: no trial of the split test")
+    assert told[1].startswith("all trials: experiments: no static_pull, motion in the session")
     takes = read_takes(ingest.PROCESSED, SPLITS)
     assert [take.name for take in takes] == ["tilt_00", "tilt_60", "release_a", "curl_40"]
     assert {take.segments for take in takes} == {SEGMENTS}
@@ -50,7 +52,7 @@ def test_takes_report_and_metrics(project, capsys):
     assert metrics["trials"] == 4
     assert metrics["refused"] == 0
     assert metrics["repairs"] == {"identify": 0, "validate": 0, "total": 0}
-    assert metrics["warnings"] == 2 * 4
+    assert metrics["warnings"] == 4 * 4
     assert metrics["position_noise_mm"] == pytest.approx(0.3, rel=0.15)
     assert metrics["orientation_noise_deg"] == pytest.approx(0.3, rel=0.15)
     assert metrics["clock_offset_ms"] == pytest.approx(-137, abs=0.5)

@@ -29,6 +29,7 @@ from trunkline.takes.plausible import Plausible, check_plausible
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 PLAUSIBLE = Plausible(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
+NO_TEST = "splits: no trial of the split test: no error is of trials that nothing was decided on"
 SHARED = Path(__file__).parents[3] / "shared" / "data" / "asl_trunk"
 
 
@@ -87,7 +88,7 @@ def moved(take, body, offset):
 def test_a_sound_session_has_no_fault_and_no_warning(folder, sound):
     assert judged(sound) == ({}, [])
     gathered = gather(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
-    assert [found.repairs + found.warnings for found in gathered.findings] == [[]] * len(sound)
+    assert [found.repairs + found.warnings for found in gathered.findings] == [[NO_TEST]] * len(sound)
 
 
 def test_real_recordings_have_no_fault(tmp_path):
@@ -102,7 +103,11 @@ def test_real_recordings_have_no_fault(tmp_path):
     session = read_session(tmp_path)
     gathered = gather(take_in(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
     assert len(gathered.takes) == 13
-    assert [found.warnings for found in gathered.findings] == [[]] * 13
+    for found in gathered.findings:
+        no_validate, no_test, no_others = found.warnings
+        assert no_validate == "splits: no trial of the split validate: no error is of trials that were not fitted"
+        assert no_test == NO_TEST
+        assert no_others.startswith("experiments: no static_tilt, curl, static_pull, motion in the session: data/raw")
 
 
 @pytest.mark.parametrize("name", ["tilt_30", "release_a", "release_b", "curl_60"])
@@ -180,6 +185,12 @@ def test_a_base_that_moves_while_a_segment_rests_is_named(sound):
         ("curl_40", "static_pull", None, "expected at most 2 % in a static_pull: is it another experiment"),
         ("motion_identify", "static_pull", None, "commands: 'tendon_1' is wound by .* expected a static_pull to hold"),
         ("pull_40_-20_-20", "motion", None, "expected more than 2 % in a motion"),
+        (
+            "pull_40_-20_-20",
+            "static_tilt",
+            0.0,
+            "experiment: commands: 'tendon_1' is drawn in by 40 mm, expected a static_tilt without actuation",
+        ),
         ("motion_identify", "release", None, "commands: 'tendon_1' is wound by"),
     ],
 )
@@ -187,6 +198,62 @@ def test_a_trial_labelled_as_another_experiment_is_named(sound, name, experiment
     trials, _ = judged(sound, **{name: replace(take_of(sound, name), experiment=experiment, level=level)})
     assert list(trials) == [name]
     assert any(re.search(message, said) for said in trials[name]), trials
+
+
+def with_tendons(take, commands_mm, positions_mm):
+    """The take beside motors that log these pulls of the three tendons throughout; nothing where None."""
+    time = np.arange(-0.5, take.time[-1] + 0.5, 0.01)
+    rows = [
+        np.empty((0, 3)) if pulls is None else 1e-3 * np.tile(pulls, (len(time), 1))
+        for pulls in (commands_mm, positions_mm)
+    ]
+    times = {"command_time": time[: len(rows[0])], "tendon_time": time[: len(rows[1])]}
+    return replace(take, tendons=TENDONS, commands=rows[0], tendon_positions=rows[1], **times)
+
+
+SLACK, PULLED = (-300.0, -300.0, -300.0), (-300.0, 40.0, -300.0)
+
+
+@pytest.mark.parametrize("name", ["tilt_30", "release_a"])
+@pytest.mark.parametrize(
+    ("commands", "positions", "key"),
+    [
+        (PULLED, None, "commands"),
+        (PULLED, PULLED, "commands"),
+        (PULLED, SLACK, "commands"),
+        (None, PULLED, "tendon positions"),
+        (SLACK, PULLED, "tendon positions"),
+    ],
+)
+def test_a_pull_that_is_held_where_nothing_is_to_pull_is_named(sound, name, commands, positions, key):
+    trials, _ = judged(sound, **{name: with_tendons(take_of(sound, name), commands, positions)})
+    assert list(trials) == [name]
+    (said,) = trials[name]
+    found = rf"experiment: {key}: 'tendon_2' is drawn in by 40\.?\d* mm, expected a \w+ without actuation"
+    assert re.fullmatch(found, said), said
+
+
+@pytest.mark.parametrize("name", ["tilt_30", "release_a"])
+@pytest.mark.parametrize("commands", [None, (0.0, 0.0, 0.0), (2.0, -1.0, -1.0), SLACK])
+def test_loose_tendons_where_nothing_is_to_pull_are_left(sound, name, commands):
+    assert judged(sound, **{name: with_tendons(take_of(sound, name), commands, SLACK)}) == ({}, [])
+    assert judged(sound, **{name: with_tendons(take_of(sound, name), commands, None)}) == ({}, [])
+
+
+def test_loose_tendons_of_encoders_that_start_anywhere_are_left(sound):
+    def shifted(name, millimetres):
+        take = take_of(sound, name)
+        return replace(take, tendon_positions=take.tendon_positions + 1e-3 * millimetres)
+
+    driven = [name for name in sound if name.startswith(("curl", "pull", "motion"))]
+    loose = with_tendons(take_of(sound, "tilt_30"), SLACK, (200.0, 200.0, 200.0))
+    same = {name: shifted(name, 500.0) for name in driven}  # slack is 200 mm then
+    assert judged(sound, tilt_30=loose, **same) == ({}, [])
+    anywhere = {name: shifted(name, 100.0 * index) for index, name in enumerate(driven)}
+    assert judged(sound, tilt_30=loose, **anywhere) == ({}, [])
+    drawn_in = with_tendons(take_of(sound, "tilt_30"), SLACK, (200.0, 540.0, 200.0))
+    (said,) = judged(sound, tilt_30=drawn_in, **same)[0]["tilt_30"]
+    assert said.startswith("experiment: tendon positions: 'tendon_2' is drawn in by 40")
 
 
 def test_a_static_tilt_in_which_the_arm_swings_is_named(sound):
@@ -316,16 +383,40 @@ def test_a_level_that_the_base_contradicts_is_said(folder, sound):
     taken["tilt_60"] = trial, replace(take, level=10.0), taken["tilt_60"][2]
     gathered = gather(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
     said = {take.name: found.warnings for take, found in zip(gathered.takes, gathered.findings, strict=True)}
-    assert said["tilt_60"][0].startswith("level: found 10, but the base is tilted by 60°")
-    assert not any(said[name] for name in said if name != "tilt_60")
+    assert said["tilt_60"][1].startswith("level: found 10, but the base is tilted by 60°")
+    assert all(said[name] == [NO_TEST] for name in said if name != "tilt_60")
 
 
 def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
     kept = [trial for name, trial in sound.items() if name != "curl_60"]
     taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in kept]
     gathered = gather(taken, read_session(folder), PLAUSIBLE, "stop", "here")
-    said = ["splits: no curl of the split validate, which the session has"]
+    said = [NO_TEST, "splits: no curl of the split validate, which the session has"]
     assert all(found.warnings == said for found in gathered.findings)
+
+
+@pytest.mark.parametrize(
+    ("kept", "said"),
+    [
+        (
+            lambda take: take.split == "identify",
+            ["splits: no trial of the split validate: no error is of trials that were not fitted", NO_TEST],
+        ),
+        (
+            lambda take: take.split == "validate",
+            ["splits: no trial of the split identify: nothing can be identified", NO_TEST],
+        ),
+        (
+            lambda take: take.experiment != "curl",
+            [NO_TEST, "experiments: no curl in the session: data/raw/README.md tells which settings do without"],
+        ),
+    ],
+    ids=["identify alone", "validate alone", "no curl"],
+)
+def test_a_split_or_an_experiment_that_the_session_lacks_is_said(folder, sound, kept, said):
+    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in sound.values() if kept(some)]
+    for found in gather(taken, read_session(folder), PLAUSIBLE, "stop", "here").findings:
+        assert [one for one in found.warnings if one.startswith(("splits:", "experiments:"))] == said
 
 
 def test_usual_distances_of_other_splits_are_said(tmp_path):

@@ -2,16 +2,22 @@
 
 import shutil
 import subprocess
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
+import torch
 
 from tests.unity.test_twin import files, sources  # noqa: F401
+from trunkline.ik.network import InverseKinematics
+from trunkline.ik.onnx import to_onnx
+from trunkline.unity import readers
 from trunkline.unity.package import read_tarball, write_tarball
-from trunkline.unity.readers import refusals
+from trunkline.unity.readers import ENGINES, refusals
 from trunkline.unity.twin import MANIFEST, MODEL, NETWORK
 
+BUILT = sorted((Path(__file__).parents[2] / "artifacts/package_unity").glob("*.tgz"))
 OBJ = "Runtime/Reachability/soft_030.obj"
 GRID = "Runtime/Reachability/soft_030.bytes"
 
@@ -28,6 +34,62 @@ def test_tar_unpacks_the_same_files_and_the_model_loads_from_there(files, tmp_pa
     root = tmp_path / "package"
     assert {str(path.relative_to(root)): path.read_bytes() for path in root.rglob("*") if path.is_file()} == files
     assert mujoco.MjModel.from_xml_path(str(root / MODEL)).nu == 3
+
+
+@pytest.fixture(scope="module")
+def built():
+    """The files of the package that the stage made last."""
+    if not BUILT:
+        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
+    (path,) = BUILT
+    return read_tarball(path)
+
+
+def test_no_reader_refuses_a_file_of_the_package_that_was_built(built):
+    assert refusals(built) == {}
+
+
+def poses(count):
+    """Random inputs of the network, far beyond the arm's reach too. Shape (count, 8)."""
+    rng = np.random.default_rng(1)
+    quaternions = rng.normal(size=(count, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    values = [rng.uniform(-np.pi, np.pi, (count, 1)), rng.uniform(-0.6, 0.6, (count, 3)), quaternions]
+    return np.hstack(values).astype(np.float32)
+
+
+def assert_agreement(network: bytes):
+    """All engines answer alike to 1e-6 m: commands, lengths and tips."""
+    asked = poses(2000)
+    answers = {name: answer(network, asked) for name, answer in ENGINES.items()}
+    assert list(answers) == ["onnxruntime", "ONNX's reference", "tract"]
+    expected = answers.pop("onnxruntime")
+    assert [values.shape for values in expected] == [(2000, 3)] * 3
+    assert min(np.ptp(values, axis=0).min() for values in expected) > 1e-3  # the inputs matter
+    for found in answers.values():
+        for one, other in zip(found, expected, strict=True):
+            np.testing.assert_allclose(one, other, rtol=0, atol=1e-6)
+
+
+def test_all_engines_agree_on_a_network():
+    rng = np.random.default_rng(0)
+    commands = rng.uniform(0.3, 0.5, (500, 3))
+    torch.manual_seed(0)
+    network = InverseKinematics(64, poses(500), commands, commands + rng.uniform(0, 0.02, (500, 3)))
+    assert_agreement(to_onnx(network, ["tendon_1", "tendon_2", "tendon_3"], 5e-3).SerializeToString())
+
+
+def test_all_engines_agree_on_the_network_of_the_package_that_was_built(built):
+    assert_agreement(built[NETWORK])
+
+
+def test_an_engine_that_answers_otherwise_is_named(files, monkeypatch):  # noqa: F811
+    def off(data, asked):
+        return [values + np.float32(2e-6) for values in ENGINES["ONNX's reference"](data, asked)]
+
+    monkeypatch.setattr(readers, "ENGINES", ENGINES | {"tract": off})
+    (said,) = refusals(files).values()
+    assert said.startswith("ValueError: onnxruntime and tract are ")
 
 
 def without_a_face(obj: bytes) -> bytes:

@@ -1,10 +1,12 @@
-"""Whether trials are of this arm: its segments, its tendons, and every tendon where its name says."""
+"""Whether trials are of this arm: its segments and tendons, each where its name says and pulled as far as it says."""
 
 import mujoco
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.optimize import linear_sum_assignment
 
 from trunkline.errors import InputError
+from trunkline.frames import tilt_of_gravity
 from trunkline.identification.experiment import SEEN_SHARE, check_names, measured_pose, start_frames
 from trunkline.identification.pose_fit import fit_pose
 from trunkline.trials.experiments import EXPERIMENTS
@@ -15,10 +17,17 @@ PLACES = 12  # frames of a trial in which several tendons pull in turn
 SHORTER = 0.75  # of the cables' stretch that other names may leave at least, where those given are right
 STRETCH = 2.5e-3  # m, all tendons together, in the mean over frames, from which on more stretch than need be counts
 ALIKE = 0.5  # of how well pulls and path lengths agree at best; two of three tendons exchanged: -0.5, out of six: 0.5
+SHORTEST, LONGEST = 0.4, 1.5  # of a pull, by which its path is shorter: weak motors and cables that stretch take of it
+OFF = 1e-2  # m between a pull and its path, which an arm bent at rest may have too
+APART = 0.1  # s between a command and what the arm does about it
+UPRIGHT = np.radians(15)  # up to which gravity does not bend the arm by itself
+HELD_FRAMES = 6  # of a trial, with deep pulls
+NAMED = 3  # trials in a message, before the others are counted
 
 
 def check_trials(trials: list[Trial], model: mujoco.MjModel) -> None:
-    """Refuse trials whose names are not those of the model, and then those that bend to the side of other tendons.
+    """Refuse trials whose names are not those of the model, then those that bend to the side of other tendons, and
+    then those that bend by another amount.
 
     Raises:
         InputError: naming the key of session.yaml, the trial, what was found and what was expected.
@@ -29,6 +38,7 @@ def check_trials(trials: list[Trial], model: mujoco.MjModel) -> None:
         if trial.tendons:
             kind = EXPERIMENTS[trial.experiment]
             (check_lengths if kind.needs_motors and kind.level is None else check_sides)(trial, model)
+    check_scales([trial for trial in trials if trial.tendons and EXPERIMENTS[trial.experiment].needs_motors], model)
 
 
 def check_sides(trial: Trial, model: mujoco.MjModel) -> None:
@@ -76,10 +86,67 @@ def check_lengths(trial: Trial, model: mujoco.MjModel) -> None:
         return
     worst = int(np.argmax(np.diag(stretch)))
     found = f"found the path of {trial.tendons[worst]!r} {1e3 * stretch[worst, worst]:.0f} mm longer than commanded"
+    mirrored = np.maximum(-trial.commands[frames] - shorter, 0).mean(axis=0).sum()
+    cause = "signs reversed" if mirrored < best else "names exchanged"
     raise InputError(
-        f"session.yaml: tendons: trial {trial.name}: {found}, which fits with names exchanged, expected a tendon to be "
-        "slack or about as long as its command: are names exchanged, or is the base body turned about the arm?"
+        f"session.yaml: tendons: trial {trial.name}: {found}, which fits with {cause}, expected a tendon to be "
+        "slack or about as long as its command: are names exchanged, signs reversed, or is the base body turned about "
+        "the arm?"
     )
+
+
+def check_scales(trials: list[Trial], model: mujoco.MjModel) -> None:
+    """Refuse trials whose tendons' paths are shorter by much less or much more than the pulls that are commanded.
+
+    So are those of commands, and of measured positions with them, that have the sign reversed or are in another unit.
+    """
+    off = {trial.name: scale for trial in trials if (scale := path_scale(trial, model)) is not None}
+    if not off:
+        return
+    names, scales = list(off), sorted(off.values())
+    who = f"trial{'s' if len(names) > 1 else ''} {', '.join(names[:NAMED])}"
+    who += f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    by = " to ".join(dict.fromkeys(f"{scale:.3g}" for scale in (scales[0], scales[-1])))
+    raise InputError(
+        f"session.yaml: tendons: {who}: found paths that are shorter by {by} times the pulls that are commanded, "
+        f"expected {SHORTEST:g} to {LONGEST:g} times: are signs reversed, are commands in another unit than m, or is "
+        "the model of another arm?"
+    )
+
+
+def path_scale(trial: Trial, model: mujoco.MjModel) -> float | None:
+    """By how many times its deep pulls the paths of a trial's tendons are shorter, if that cannot be; else None.
+
+    The model's tendons are threaded through poses that were measured, and ratios over deep pulls have a median. A path
+    is longer than commanded only if it is longer than by all commands shortly before and after, and shorter likewise.
+    Of a trial with a level, which says how deep pulls are, only too short paths are of interest: a weak motor may not
+    reach it. Where gravity bends the arm by itself, slack tendons have any shorter path.
+    """
+    pulls = np.maximum(trial.commands, 0)
+    step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 else np.inf
+    width = 2 * int(APART / step) + 1
+    low, high = minimum_filter1d(pulls, width, axis=0), maximum_filter1d(pulls, width, axis=0)
+    seen = trial.measured.mean(axis=1) >= SEEN_SHARE
+    deepest = np.where(seen, low.max(axis=1), 0.0)
+    held = np.flatnonzero(seen & (deepest > 0) & (deepest >= deepest.max() / 2))
+    if not len(held):
+        return None
+    frames = held[:: -(-len(held) // HELD_FRAMES)]
+    tendons = [model.tendon(name).id for name in trial.tendons]
+    shorter = np.array([model.tendon_length0 - _path_lengths(trial, model, frame) for frame in frames])[:, tendons]
+
+    def compared(asked: np.ndarray) -> tuple[float, float]:
+        """Paths over the deep pulls of `asked` (N, K), and how much deeper those are, m; medians."""
+        deep = asked >= asked.max() / 2
+        return float(np.median(shorter[deep] / asked[deep])), float(np.median(asked[deep] - shorter[deep]))
+
+    ratio, deeper = compared(low[frames])
+    if EXPERIMENTS[trial.experiment].level is None and ratio < SHORTEST and deeper > OFF:
+        return ratio
+    ratio, deeper = compared(high[frames])
+    if ratio > LONGEST and -deeper > OFF and tilt_of_gravity(trial.gravity) < UPRIGHT:
+        return ratio
+    return None
 
 
 def _agreement(pulls: np.ndarray, shorter: np.ndarray) -> float:

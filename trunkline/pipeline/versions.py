@@ -21,7 +21,7 @@ LOCKS = ("requirements.lock", "requirements-torch.txt")
 LIBRARIES = (
     "fast-simplification", "lz4", "mcap", "mcap-protobuf-support", "mcap-ros2-support", "mujoco", "numba",
     "numpy", "onnx", "onnxruntime", "pandas", "point-cloud-utils", "protobuf", "pyarrow", "scikit-image",
-    "scipy", "torch", "trimesh", "zstandard",
+    "scipy", "torch", "tract", "trimesh", "zstandard",
 )  # fmt: skip
 HEADER = "# Versions that results depend on, from requirements.lock by `make requirements`; dvc.yaml names them.\n"
 

@@ -10,9 +10,16 @@ from trunkline.takes.agreement import MotorClock, align_clocks, settle_vertical
 from trunkline.takes.checks import Findings
 from trunkline.takes.plausible import Plausible, check_plausible
 from trunkline.trials.experiments import EXPERIMENTS
+from trunkline.trials.splits import IDENTIFY, SPLITS, TEST, VALIDATE
 from trunkline.trials.take import Take
 
 Refusal = Literal["stop", "leave_out"]
+# split: what a session without it cannot have
+WITHOUT = {
+    IDENTIFY: "nothing can be identified",
+    VALIDATE: "no error is of trials that were not fitted",
+    TEST: "no error is of trials that nothing was decided on",
+}
 
 
 @dataclass
@@ -75,12 +82,17 @@ def gather(
 
 
 def _missing(takes: list[Take]) -> list[str]:
-    """Experiments that a split of the session lacks, a sentence each."""
-    splits = dict.fromkeys(take.split for take in takes)
+    """Splits and experiments that the session lacks, and experiments that one of its splits lacks, a sentence each."""
+    splits, kinds = ({getattr(take, key) for take in takes} for key in ("split", "experiment"))
     done = {(take.experiment, take.split) for take in takes}
-    return [
+    said = [f"splits: no trial of the split {split}: {WITHOUT[split]}" for split in SPLITS if split not in splits]
+    lacking = [experiment for experiment in EXPERIMENTS if experiment not in kinds]
+    if lacking:
+        told = "data/raw/README.md tells which settings do without"
+        said.append(f"experiments: no {', '.join(lacking)} in the session: {told}")
+    return said + [
         f"splits: no {experiment} of the split {split}, which the session has"
         for experiment in EXPERIMENTS
-        for split in splits
-        if (experiment, split) not in done and any(kind == experiment for kind, _ in done)
+        for split in SPLITS
+        if experiment in kinds and split in splits and (experiment, split) not in done
     ]

@@ -15,7 +15,7 @@ from pydantic import Field
 from trunkline.frames import rotation_from_wxyz
 from trunkline.signals.smoothing import fill_gaps
 from trunkline.takes.checks import Findings, deciding
-from trunkline.takes.pulls import check_pulls
+from trunkline.takes.pulls import check_pulls, encoder_zeros
 from trunkline.takes.swaps import usual_distances
 from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.take import Take
@@ -55,11 +55,12 @@ def check_plausible(takes: list[Take], findings: list[Findings], base: str | Non
     chosen, _ = deciding(takes, lambda take: take.split)
     usual = usual_distances([_bodies(take) for take in chosen])
     length = float(np.nanmax(usual[0]))
-    names = (base or "base", *takes[0].segments)
+    names, idle = (base or "base", *takes[0].segments), settings.still * length
+    zeros = encoder_zeros(chosen, idle)
     for take, found in zip(takes, findings, strict=True):
         found.faults += _misplaced(take, usual, names, settings.distance * length)
         found.faults += _motion(take, length, settings.still)
-        found.faults += check_pulls(take, length, settings.still * length, settings.pull)
+        found.faults += check_pulls(take, length, idle, settings.pull, zeros)
     said = _order(takes[0].segments, usual) + _loose(chosen, usual, settings, length)
     return said if base is None else said + _base_at_rest(chosen, base)
 

@@ -15,13 +15,29 @@ NOISIER = 5.0  # times the measurements' noise, that no command has
 HELD = MIN_TRAVEL  # m, to either side, by which a tendon that is held may be wound
 
 
-def check_pulls(take: Take, length: float, idle: float, factor: float) -> list[str]:
+def encoder_zeros(takes: list[Take], idle: float) -> dict[str, float]:
+    """What each tendon's measured position reads where its command is 0, m, by the takes that pull.
+
+    None of a tendon of which most of them are off by more than `idle`: its encoder starts anywhere in each trial.
+    """
+    found: dict[str, list[float]] = {}
+    for take in takes:
+        if EXPERIMENTS[take.experiment].needs_motors and take.commands.size and take.tendon_positions.size:
+            ahead = np.median(take.tendon_positions - _commanded(take), axis=0)
+            for name, reads in zip(take.tendons, ahead.tolist(), strict=True):
+                found.setdefault(name, []).append(reads)
+    middle = {name: float(np.median(reads)) for name, reads in found.items()}
+    return {name: zero for name, zero in middle.items() if np.median(np.abs(np.array(found[name]) - zero)) <= idle}
+
+
+def check_pulls(take: Take, length: float, idle: float, factor: float, zeros: dict[str, float]) -> list[str]:
     """What cannot be true of a take's tendons, a sentence each.
 
     Args:
         length: m, of the arm, from which no tendon can be drawn in by more than that.
-        idle: m, by which tendons may move in an experiment that does not pull them.
+        idle: m, by which tendons may be drawn in, or commands may move, in an experiment that does not pull them.
         factor: by which pulls may differ from the level, and measured from commanded ones.
+        zeros: as `encoder_zeros` gives them.
     """
     kind = EXPERIMENTS[take.experiment]
     if kind.needs_motors and kind.level is PULL and take.level is not None:
@@ -36,14 +52,40 @@ def check_pulls(take: Take, length: float, idle: float, factor: float) -> list[s
         said += _beyond("tendon positions", take.tendon_positions - take.tendon_positions[:1], length)
         if said:
             return said
-    elif not kind.needs_motors and not kind.static and take.commands.size:  # a loose tendon may well move by itself
+    elif said := _pulled(take, kind.static, idle, zeros):
+        return said
+    if take.commands.size and take.tendon_positions.size:
+        return _against_commands(take, factor)
+    return []
+
+
+def _pulled(take: Take, static: bool, idle: float, zeros: dict[str, float]) -> list[str]:
+    """In an experiment without motors, commands do not move while the arm does, and most of the time no tendon is drawn
+    in. A loose one may well move by itself, and may be let out by any length.
+
+    Measured positions tell it where what they read without a pull is known; and where there are no commands, as they
+    stand for them then.
+    """
+    expected = f"expected a {take.experiment} without actuation"
+    if take.commands.size and not static:
         wound = np.ptp(take.commands, axis=0)
         most = int(np.argmax(wound))
         if wound[most] > idle:
             found = f"{take.tendons[most]!r} is wound by {1e3 * wound[most]:.4g} mm"
-            return [f"experiment: commands: {found}, expected a {take.experiment} without actuation"]
-    if take.commands.size and take.tendon_positions.size:
-        return _against_commands(take, factor)
+            return [f"experiment: commands: {found}, {expected}"]
+    unknown = np.nan if take.commands.size else 0.0
+    zero = np.array([zeros.get(name, unknown) for name in take.tendons])
+    for key, time, pulls in (
+        ("commands", take.command_time, take.commands),
+        ("tendon positions", take.tendon_time, take.tendon_positions - zero),
+    ):
+        if not pulls.size:
+            continue
+        inside = (time >= 0) & (time <= take.time[-1])
+        held = np.nan_to_num(np.median(pulls[inside] if inside.any() else pulls, axis=0))
+        most = int(np.argmax(held))
+        if held[most] > idle:
+            return [f"experiment: {key}: {take.tendons[most]!r} is drawn in by {1e3 * held[most]:.4g} mm, {expected}"]
     return []
 
 
@@ -86,8 +128,7 @@ def _against_level(key: str, wound: np.ndarray, level: float, factor: float) -> 
 
 def _against_commands(take: Take, factor: float) -> list[str]:
     """Each tendon's measured position follows its own command, forwards, by about as much, and not ahead of it."""
-    time, measured = take.tendon_time, take.tendon_positions
-    commanded = np.stack([np.interp(time, take.command_time, one) for one in take.commands.T], axis=1)
+    measured, commanded = take.tendon_positions, _commanded(take)
     said = []
     for tendon, name in enumerate(take.tendons):
         if max(np.ptp(measured[:, tendon]), np.ptp(commanded[:, tendon])) < MIN_TRAVEL:
@@ -126,6 +167,11 @@ def _exchanged(take: Take, commanded: np.ndarray) -> list[str]:
     if lag < -EARLY:
         found = f"what is measured comes {-1e3 * lag:.0f} ms before its command"
     return [f"topics: {found}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
+
+
+def _commanded(take: Take) -> np.ndarray:
+    """Commands at the times of the measured positions, m. Shape (Tm, K)."""
+    return np.stack([np.interp(take.tendon_time, take.command_time, one) for one in take.commands.T], axis=1)
 
 
 def _correlation(one: np.ndarray, other: np.ndarray) -> float:

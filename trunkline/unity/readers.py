@@ -1,25 +1,29 @@
 """Every file of a finished package, opened by readers that had no part in making it.
 
-Meshes: trimesh, and MuJoCo's reader of OBJ files. Models: MuJoCo. The network: ONNX's checker, and its reference
-implementation beside onnxruntime. Grids: numpy, by the manifest's words alone, beside the meshes of the same name. The
-rest: JSON, YAML, text. Of C# only its brackets are counted: no compiler reads it here.
+Meshes: trimesh, and MuJoCo's reader of OBJ files. Models: MuJoCo. The network: ONNX's checker, and three engines that
+share no code: onnxruntime (C++), ONNX's reference implementation (numpy) and tract (Rust). Grids: numpy, by the
+manifest's words alone, beside the meshes of the same name. The rest: JSON, YAML, text. Of C# only its brackets are
+counted: no compiler reads it here.
 """
 
 import io
 import json
 from collections.abc import Callable
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import mujoco
 import numpy as np
 import onnx
 import onnxruntime
+import tract
 import trimesh
 import yaml
 from onnx.reference import ReferenceEvaluator
 
 from trunkline.unity.twin import MANIFEST
 
-RUNTIMES_APART = 1e-5  # m or rad, of two runtimes on the same network
+ENGINES_APART = 1e-6  # m, of two engines' answers of the same network; its numbers are of 32 bits
 POSES = 64  # on which they are compared
 MESH_OFF_GRID = 1.0  # lattice steps (the largest), of any vertex from the surface of the grid of its name
 ASSET = (
@@ -68,12 +72,37 @@ def _network(path: str, data: bytes, files: dict[str, bytes]) -> None:
     (entry,) = model.graph.input
     poses = np.random.default_rng(0).uniform(-0.5, 0.5, (POSES, entry.type.tensor_type.shape.dim[-1].dim_value))
     poses[:, -4:] /= np.linalg.norm(poses[:, -4:], axis=1, keepdims=True)  # a quaternion
-    inputs = {entry.name: poses.astype(np.float32)}
+    known, *others = ((name, answer(data, poses.astype(np.float32))) for name, answer in ENGINES.items())
+    for name, found in others:
+        apart = max(np.abs(first - second).max() for first, second in zip(known[1], found, strict=True))
+        if not apart <= ENGINES_APART:
+            raise ValueError(f"{known[0]} and {name} are {apart:g} apart")
+
+
+def _by_onnxruntime(data: bytes, poses: np.ndarray) -> list[np.ndarray]:
     session = onnxruntime.InferenceSession(data, providers=["CPUExecutionProvider"])
-    for first, second in zip(session.run(None, inputs), ReferenceEvaluator(model).run(None, inputs), strict=True):
-        apart = np.abs(first - second).max()
-        if not apart <= RUNTIMES_APART:
-            raise ValueError(f"onnxruntime and ONNX's reference are {apart:g} apart")
+    return session.run(None, {session.get_inputs()[0].name: poses})
+
+
+def _by_reference(data: bytes, poses: np.ndarray) -> list[np.ndarray]:
+    model = onnx.load_model_from_string(data)
+    return [np.asarray(values) for values in ReferenceEvaluator(model).run(None, {model.graph.input[0].name: poses})]
+
+
+def _by_tract(data: bytes, poses: np.ndarray) -> list[np.ndarray]:
+    with TemporaryDirectory() as folder:  # tract opens files alone
+        path = Path(folder) / "network.onnx"
+        path.write_bytes(data)
+        engine = tract.onnx().load(path).into_model().into_runnable()
+    return [tensor.to_numpy() for tensor in engine.run([poses])]
+
+
+# name: what it answers of a network's file and poses (N, I), each output of the graph in its order, (N, O)
+ENGINES: dict[str, Callable[[bytes, np.ndarray], list[np.ndarray]]] = {
+    "onnxruntime": _by_onnxruntime,
+    "ONNX's reference": _by_reference,
+    "tract": _by_tract,
+}
 
 
 def _grid(path: str, data: bytes, files: dict[str, bytes]) -> None:
