@@ -7,6 +7,7 @@ import pytest
 from tests.support.small_arm import small_spec
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, give_way
+from trunkline.identification.parameters import candidate_fields, set_fields
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import read_chain
 
@@ -75,6 +76,25 @@ def test_a_slider_turns_round_and_encloses_an_area_as_an_elastic_plastic_spring(
     assert back == pytest.approx(0, abs=0.01 * stiffness * YIELD)  # half way through the reversal
     area = np.trapezoid(extra[8000:], angles[8000:])
     assert area == pytest.approx(4 * stiffness * YIELD * (reach - YIELD), rel=0.01)
+
+
+def test_several_sliders_add_up_and_each_has_parameters_of_its_own():
+    """Iwan: on the way out each bears k x up to its yield, on the way back it turns round by twice that (Masing)."""
+    model = one_joint(Joints(sliders=[Slider(0.1, 0.1)] * 3))
+    values = {
+        "hysteresis": 0.3, "yield_bend": 0.01, "hysteresis_2": 0.2, "yield_bend_2": 0.03,
+        "hysteresis_3": 0.1, "yield_bend_3": 0.1,
+    }  # fmt: skip
+    set_fields(model, candidate_fields(model, {name: np.array([value]) for name, value in values.items()}))
+    shares, yields = np.array(list(values.values())).reshape(3, 2).T
+    out = np.linspace(0, 0.2, 4000)
+    angles = np.concatenate([out, out[::-1]])
+    extra = -torques(model, angles) - STIFFNESS * angles
+    way, full = extra[:4000], STIFFNESS * shares * yields
+    expected = np.minimum(STIFFNESS * shares * out[:, None], full).sum(axis=1)
+    back = (full - np.minimum(STIFFNESS * shares * (0.2 - out[::-1, None]), 2 * full)).sum(axis=1)
+    np.testing.assert_allclose(way, expected, atol=0.005 * full.sum())
+    np.testing.assert_allclose(extra[4000:], back, atol=0.005 * full.sum())
 
 
 @pytest.fixture(scope="module")

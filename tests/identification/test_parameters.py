@@ -22,12 +22,14 @@ VALUES = {
     "friction_time": 0.03, "kp": 1500.0, "kv": 60.0, "force_range": 45.0, "time_constant": 0.08,
     "capstan_friction": 0.25,
     "relaxation": 0.5, "relaxation_time": 0.7, "relaxation_2": 0.1, "relaxation_time_2": 3.0, "hysteresis": 0.4,
-    "yield_bend": 0.01, "rest_bend_x": 0.01, "rest_bend_y": -0.02, "rest_gradient_x": -0.01, "rest_gradient_y": 0.03,
+    "yield_bend": 0.01, "hysteresis_2": 0.15, "yield_bend_2": 0.06, "hysteresis_3": 0.08, "yield_bend_3": 0.2,
+    "rest_bend_x": 0.01, "rest_bend_y": -0.02, "rest_gradient_x": -0.01, "rest_gradient_y": 0.03,
     "dead_time": 0.04, "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
 }  # fmt: skip
 
 
-ELEMENTS = Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)])
+SLIDERS = [Slider(0.2, 0.02), Slider(0.1, 0.05), Slider(0.05, 0.1)]
+ELEMENTS = Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], SLIDERS)
 
 
 def full_spec() -> mujoco.MjSpec:

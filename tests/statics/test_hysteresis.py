@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.support.bent_chain import stump
+from tests.support.bent_chain import stump, stump_spec
 from tests.support.small_arm import small_spec
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.frames import gravity_in_base
@@ -14,11 +14,14 @@ from trunkline.statics.hysteresis import friction_band, model_friction
 
 GRAVITY = gravity_in_base(0.6)
 TENSIONS = np.array([[24.0, 9.0, 0.0]])
+SLIDERS = [Slider(1.0, 0.005), Slider(0.5, 0.01)]  # they slip at small bends, as all joints bend by more
 
 
-def rubbing_stump(tendon_friction=1.0, joint_friction=0.0):
+def rubbing_stump(tendon_friction=1.0, joint_friction=0.0, sliders=()):
     """The stump, heavily damped so that it follows slow motors without swinging, its friction as dry as it gets."""
-    model = stump()
+    spec = stump_spec()
+    add_elements(spec, Joints(sliders=list(sliders)), 1e-5)
+    model = spec.compile()
     model.tendon_frictionloss[:], model.dof_frictionloss[:] = tendon_friction, joint_friction
     model.tendon_solimp_fri[:, :2] = model.dof_solimp[:, :2] = 0.9999
     model.tendon_solref_fri[:, 0] = model.dof_solref[:, 0] = 0.002
@@ -41,7 +44,9 @@ def tip_after(model, commands):
 
 
 @pytest.mark.parametrize(
-    ("friction", "agreement"), [((1.0, 0.0), 0.05), ((0.0, 0.02), 0.15)], ids=["tendons", "joints"]
+    ("friction", "agreement"),
+    [((1.0, 0.0), 0.05), ((0.0, 0.02), 0.15), ((0.0, 0.0, SLIDERS), 0.1)],
+    ids=["tendons", "joints", "sliders"],
 )
 def test_band_ends_where_mujoco_stops_on_the_way_in_and_on_the_way_back(friction, agreement):
     model = rubbing_stump(*friction)
@@ -77,12 +82,16 @@ def test_band_grows_in_proportion_to_small_friction():
     assert widths[1] == pytest.approx(2 * widths[0], rel=0.02)
 
 
-def test_what_joints_creep_by_has_no_part_in_the_band():
-    """Branches and sliders hang on tendons of their own, which are none of the cables."""
-    spec = small_spec()
-    add_elements(spec, Joints([Branch(0.3, 0.5)], [Slider(0.2, 0.02)]), 1e-5)
-    model, plain = spec.compile(), small_spec().compile()
-    bands = [friction_band(read_chain(m), TENSIONS / 10, GRAVITY[None], *model_friction(m)) for m in (model, plain)]
-    assert bands[1].width > 0
+def test_a_slider_is_dry_friction_of_its_joint_and_a_branch_is_none():
+    """Both hang on tendons of their own, which are none of the cables."""
+    joints, bands = Joints([Branch(0.3, 0.5)], [Slider(0.2, 0.02), Slider(0.1, 0.01)]), []
+    for elements, friction in ((joints, 0.0), (Joints(), 0.2 * 0.02 + 0.1 * 0.01), (Joints(joints.branches), 0.0)):
+        spec = small_spec()
+        add_elements(spec, elements, 1e-5)
+        model = spec.compile()
+        model.tendon_frictionloss[:] = 0
+        model.dof_frictionloss[:] += friction * model.jnt_stiffness[model.dof_jntid]
+        bands.append(friction_band(read_chain(model), TENSIONS / 10, GRAVITY[None], *model_friction(model)))
+    assert bands[0].width > 1e-3 > 1e-6 > bands[2].width
     np.testing.assert_allclose(bands[0].loaded, bands[1].loaded, atol=1e-9)
     np.testing.assert_allclose(bands[0].unloaded, bands[1].unloaded, atol=1e-9)

@@ -38,7 +38,7 @@ class Effect:
 
     def lacking(self, truth: dict, identified: Collection[str]) -> str:
         """What of it a model lacks of which these parameters are identified; empty if nothing."""
-        modelled = len({self.unless, f"{self.unless}_2"} & set(identified))
+        modelled = len({self.unless, f"{self.unless}_2", f"{self.unless}_3"} & set(identified))
         if not self.count:
             return "" if modelled else self.words
         present = len(truth[self.count])
@@ -49,7 +49,7 @@ SPRINGS = ("stiffness", "hardening", "joint_place")
 LEAN = ("mount_tilt_x", "mount_tilt_y")
 REST = ("rest_bend_x", "rest_bend_y", "rest_gradient_x", "rest_gradient_y")
 RELAXING = ("relaxation", "relaxation_time", "relaxation_2", "relaxation_time_2")
-MEMORY = ("hysteresis", "yield_bend")
+MEMORY = ("hysteresis", "yield_bend", "hysteresis_2", "yield_bend_2", "hysteresis_3", "yield_bend_3")
 CURLED = ("kp", "capstan_friction")
 RUBBING = ("tendon_friction", "friction_time")
 MOTORS = (*CURLED, "kv", "time_constant", "dead_time")

@@ -1,10 +1,11 @@
 """What dry friction adds to the statics: rest is a band of poses, its ends those reached by pulling and by letting go.
 
-Quasi-statically, on the way to a sample in the direction in which its tensions grow in proportion, every tendon and
-every joint slides; friction then is at its full value against the way of each (Coulomb). On the way back it is the
-other way round. So the ends of the band are equilibria with the motors' commands of the sample and, with dl and dq
-the changes on the way in, friction of tendons as tensions ±f sign(dl) and of joints as torques ∓c sign(dq). Capstan
-friction acts with μ where tendons were drawn in, and with -μ where all have slid back: its band is the widest there is.
+Quasi-statically, on the way to a sample in the direction in which its tensions grow in proportion, every tendon, every
+joint and every slider of a joint slides; friction then is at its full value against the way of each (Coulomb). On the
+way back it is the other way round. So the ends of the band are equilibria with the motors' commands of the sample and,
+with dl and dq the changes on the way in, friction of tendons as tensions ±f sign(dl) and of joints as torques
+∓c sign(dq). Capstan friction acts with μ where tendons were drawn in, and with -μ where all have slid back: its band is
+the widest there is.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.elements import cables
+from trunkline.elements import SLIDER, all_elements, cables
 from trunkline.statics.chain import Chain
 from trunkline.statics.equilibria import Equilibrium, equilibrium_paths, follow
 from trunkline.statics.supported import unit_bodies
@@ -39,9 +40,13 @@ class Band:
 
 
 def model_friction(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
-    """Dry friction of the tendons, N, shape (K,), and of the units' joints, N m, shape (n, 2)."""
+    """Dry friction of the tendons, N, shape (K,), and of the units' joints, N m, shape (n, 2). A joint's sliders count
+    with the torque at which they slip: so much they bear against its way, once it has bent by more than their yield."""
     joints = model.body_jntadr[unit_bodies(model)][:, None] + np.arange(2)
-    return model.tendon_frictionloss[cables(model)], model.dof_frictionloss[model.jnt_dofadr[joints]]
+    torque = model.dof_frictionloss[model.jnt_dofadr]
+    for slider in all_elements(model, SLIDER):
+        torque[slider.hinge] += model.tendon_stiffness[slider.tendon] * model.tendon_springyield[slider.tendon]
+    return model.tendon_frictionloss[cables(model)], torque[joints]
 
 
 def friction_band(
