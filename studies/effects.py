@@ -59,6 +59,7 @@ def ranges(low: float, high: float, *names: str) -> dict[str, Bounds]:
 SHARES, TIMES = (0.01, 3.0), (0.02, 20.0)  # of a spring's stiffness; s
 EFFECTS: dict[str, Effect] = {
     "hardening": Effect("hardening", "identify_stiffness", ranges(0.02, 20.0, "hardening")),
+    "round": Effect("round joints", "identify_stiffness", {}, Joints(round=True)),
     "place": Effect("place of the joints", "identify_stiffness", ranges(-0.2, 1.0, "joint_place")),
     "mount": Effect("mount tilt", "identify_stiffness", ranges(-0.1, 0.1, "mount_tilt_x", "mount_tilt_y")),
     "bend": Effect("rest shape, even", "identify_stiffness", ranges(-0.05, 0.05, "rest_bend_x", "rest_bend_y")),
@@ -95,6 +96,7 @@ def cad_model(effects: list[Effect]) -> mujoco.MjModel:
     config.joints = Joints(
         [branch for effect in effects for branch in effect.joints.branches],
         [slider for effect in effects for slider in effect.joints.sliders],
+        any(effect.joints.round for effect in effects),
     )
     config.holes = next((effect.holes for effect in effects if effect.holes.stretches), Holes())
     config.actuation.dead_time = max((effect.dead_time for effect in effects), default=0.0)
