@@ -28,9 +28,28 @@ def chain(model):
 
 @pytest.fixture(scope="module")
 def targets(model, chain):
-    found = draw_targets(model, chain, ANGLES, np.full(3, 0.01), 12, np.random.default_rng(0))
+    found = draw_targets(model, chain, ANGLES, np.full(3, 0.01), 12, np.random.default_rng(0)).targets
     assert len(found) >= 6
     return found
+
+
+def test_targets_that_are_left_out_are_counted(model, chain, targets, monkeypatch):
+    def drawn():
+        return draw_targets(model, chain, ANGLES, np.full(3, 0.01), 12, np.random.default_rng(0))
+
+    assert drawn().counts()["targets"] == len(targets)
+    assert sum(drawn().counts()["left_out"].values()) == 12 - len(targets)
+    rest_as_it_is = as_controls.settle
+
+    def settled_but_three(*arguments):
+        found = rest_as_it_is(*arguments)
+        found.rested[:] = np.arange(12) >= 3
+        found.tensions[2:7] = chain.max_tension
+        found.tensions[7:] = 0.0
+        return found
+
+    monkeypatch.setattr(as_controls, "settle", settled_but_three)
+    assert drawn().counts() == {"targets": 5, "left_out": {"near_limit": 4, "unrested": 3}}
 
 
 def exact(chain, wrong: str | None = None):
@@ -92,7 +111,9 @@ def test_the_score_has_the_rig_beside_the_model(model, chain):
     rng = np.random.default_rng(0)
     on_model, on_plant = score(model, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, rng, rig)
     assert asked == [4]
-    assert on_model["targets"] <= 12
+    assert on_model["targets"] + sum(on_model["left_out"].values()) == 12
+    taut = on_model["all_taut"]
+    assert taut["targets"] + sum(taut["left_out"].values()) == 12 // 8
     assert on_plant["targets"] == 4
     assert 0.5 < on_plant["position_error_mm"]["median"] < 1.5
     assert on_model["frictionless"]["position_error_mm"]["max"] < 0.02

@@ -79,7 +79,8 @@ def chunks(data: bytes) -> list[tuple[int, int]]:
 def trusted(data: bytes) -> list[tuple[str, int, bytes]]:
     """As `messages`, in any order: what the makers' own reader finds from the beginning until it stops.
 
-    It gives a chunk whole or not at all."""
+    It gives a chunk whole or not at all.
+    """
     topics, found = {}, []
     with suppress(Exception):  # whatever it raises, it goes no further
         for record in StreamReader(BytesIO(data), validate_crcs=True).records:

@@ -69,12 +69,12 @@ def test_the_truth_is_held_against_the_intervals(judged):
 def test_the_truth_table_says_what_the_model_lacks(judged):
     """What a parameter that is identified stands for is lacking no more, or is so many of the lab's."""
 
-    def lacking(**more) -> str:
+    def lacking(name: str = "kp", **more) -> str:
         path = judged / "artifacts/identify_control/parameters.json"
-        rows = {name: {"value": 1.0, "unit": "1", "undetermined": False} for name in ("kp", *more)}
+        rows = {name: {"value": 1.0, "unit": "1", "undetermined": False} for name in {name: 1, **more}}
         path.parent.mkdir(exist_ok=True)
         path.write_text(json.dumps({"parameters": rows}))
-        (line,) = (line for line in truth_table(judged).splitlines() if line.startswith("| `kp`"))
+        (line,) = (line for line in truth_table(judged).splitlines() if line.startswith(f"| `{name}`"))
         return line
 
     assert "dead time of the motors, friction on its holes" in lacking()
@@ -83,6 +83,11 @@ def test_the_truth_table_says_what_the_model_lacks(judged):
     assert "Maxwell branches (it has 2 of 3)" in lacking(relaxation=1, relaxation_2=1)
     assert "sliders" not in lacking(), "this lab has none"
     assert "0.12 for 0.05 s, 0.12 for 0.05 s" in truth_table(judged)
+    grows = "a rest shape that grows towards the tip, "
+    bends = {"rest_bend_x": 1, "rest_bend_y": 1}
+    assert lacking("mount_tilt_y", **bends).endswith(f"| {grows}scatter from link to link |")
+    gradients = {"rest_gradient_x": 1, "rest_gradient_y": 1}
+    assert grows not in lacking("mount_tilt_y", **bends, **gradients)
     plants = {yaml.safe_load(file.read_text())["kind"] for file in ROOT.glob("demo/conf/record/plant/*.yaml")}
     assert set(LACKING) == plants
     named = {name for effects in LACKING.values() for effect in effects for name in (*effect.on, effect.unless) if name}

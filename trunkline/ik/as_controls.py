@@ -36,7 +36,7 @@ Ask = Callable[[np.ndarray], dict[str, np.ndarray]]  # as `ask.ask`, of one netw
 class AsControls:
     """See conf/train_ik/config.yaml.
 
-    targets: in all; some of them are left out where a motor is near its limit. timed: how many of them are driven
+    targets: that are drawn; some of them are left out, see `Drawn`. timed: how many of them are driven
     without friction for as long as it takes, to see how long that is. on_rig: how many a rig is sent. seconds: longest
     time to rest.
     """
@@ -47,6 +47,25 @@ class AsControls:
     seconds: Annotated[PositiveFloat, Field(le=120)]
 
 
+@dataclass
+class Drawn:
+    """Poses in which an arm rests, of those that were drawn.
+
+    Attributes:
+        targets: inputs of the network, rad and m. Shape (N, 8).
+        near_limit: how many were left out in which a motor is near its limit.
+        unrested: how many were left out in which the arm had not come to rest, whatever its motors then did.
+    """
+
+    targets: np.ndarray
+    near_limit: int
+    unrested: int
+
+    def counts(self) -> dict:
+        left_out = {"near_limit": self.near_limit, "unrested": self.unrested}
+        return {"targets": len(self.targets), "left_out": left_out}
+
+
 def draw_targets(
     model: mujoco.MjModel,
     chain: Chain,
@@ -55,7 +74,7 @@ def draw_targets(
     count: int,
     rng: np.random.Generator,
     others_pay_out: bool = True,
-) -> np.ndarray:
+) -> Drawn:
     """Poses in which MuJoCo rests without friction under one or two neighbouring motors, none near its limit.
 
     Args:
@@ -63,15 +82,13 @@ def draw_targets(
         deepest: of each tendon, how far it is drawn in at most, m. Shape (K,).
         others_pay_out: whether motors that do not pull give way; else they stay where the straight arm has them, and
             pull against the others as the arm bends: shapes that the data set has none of.
-
-    Returns:
-        Inputs of the network, rad and m. Shape (N, 8), N at most `count`.
     """
     gravity, commands = draw_commands(chain, angles, deepest, count, rng, others_pay_out)
     rest = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), PATIENCE)
     tensions = rest.tensions[:, actuators(model)]
-    good = rest.rested & (tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
-    return np.column_stack([gravity, rest.position, rest.quaternion])[good]
+    near_limit = ~(tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
+    found = np.column_stack([gravity, rest.position, rest.quaternion])[rest.rested & ~near_limit]
+    return Drawn(found, int((rest.rested & near_limit).sum()), int((~rest.rested).sum()))
 
 
 def draw_commands(
@@ -153,8 +170,9 @@ def score(
     Returns:
         Metrics of the model, and of the rig beside the model's with friction on the same targets.
     """
-    targets = draw_targets(model, chain, angles, PULL_SHARE * deepest, settings.targets, rng)
+    drawn = draw_targets(model, chain, angles, PULL_SHARE * deepest, settings.targets, rng)
     taut = draw_targets(model, chain, angles, TAUT_SHARE * deepest, settings.targets // 8, rng, others_pay_out=False)
+    targets = drawn.targets
     timed = driven(model, ask, targets[: settings.timed], settings.seconds, friction=False, calm=True)
     if has_friction(model):
         sent = driven(model, ask, targets, settings.seconds)
@@ -169,10 +187,10 @@ def score(
     dry = {"tendons_n": tendons.max(), "joints_nm": joints.max(), "sliders": len(all_elements(model, SLIDER))}
     dry["capstan"] = capstan_friction(model)
     on_model = {
-        "targets": len(targets),
+        **drawn.counts(),
         "frictionless": settled(model, ask, targets).metrics(chain.length) | {"seconds_to_rest": timed.time_to_rest()},
         "friction": sent.metrics(chain.length) | {"seconds_to_rest": seconds, "dry_friction": dry},
-        "all_taut": {"targets": len(taut)} | settled(model, ask, taut).metrics(chain.length),
+        "all_taut": taut.counts() | settled(model, ask, taut.targets).metrics(chain.length),
     }
     if rig is None:
         return on_model, None

@@ -47,7 +47,8 @@ class Effect:
 
 SPRINGS = ("stiffness", "hardening", "joint_place")
 LEAN = ("mount_tilt_x", "mount_tilt_y")
-REST = ("rest_bend_x", "rest_bend_y", "rest_gradient_x", "rest_gradient_y")
+BENDS = ("rest_bend_x", "rest_bend_y")
+REST = (*BENDS, "rest_gradient_x", "rest_gradient_y")
 RELAXING = ("relaxation", "relaxation_time", "relaxation_2", "relaxation_time_2")
 MEMORY = ("hysteresis", "yield_bend", "hysteresis_2", "yield_bend_2", "hysteresis_3", "yield_bend_3")
 CURLED = ("kp", "capstan_friction")
@@ -70,9 +71,10 @@ LACKING = {
         Effect("Maxwell branches", ("damping", *RELAXING, *MEMORY, *RUBBING, "kp", "kv"), "relaxation", "branches"),
         Effect("sliders", (*SPRINGS, "damping", *RELAXING, *MEMORY, *RUBBING, *CURLED), "hysteresis", "sliders"),
         Effect("a rest shape", (*SPRINGS, *LEAN), unless="rest_bend_x"),
+        Effect("a rest shape that grows towards the tip", (*BENDS, *LEAN), unless="rest_gradient_x"),
         Effect("a mount that leans", (*SPRINGS, *REST), unless="mount_tilt_x"),
         Effect("several links in every unit", (*SPRINGS, "damping", "kp"), unless="joint_place"),
-        Effect("scatter from link to link", (*SPRINGS, *REST)),
+        Effect("scatter from link to link", (*SPRINGS, *REST, *LEAN)),
         Effect("masses off", ("stiffness", "damping", "tendon_friction", "kp", "kv", "force_range")),
     ),
 }
