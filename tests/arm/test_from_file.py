@@ -3,19 +3,24 @@
 import json
 import re
 import shutil
+from pathlib import Path
+from types import SimpleNamespace
 
 import mujoco
 import numpy as np
 import pytest
 
-from stages.build_mjcf import Config, main
+from stages.build_mjcf import Config, cad_arm, main
 from tests.support.workbench import ROOT
 from trunkline.arm.from_file import FromFile
 from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.elements import BRANCH, elements, holes
 from trunkline.errors import InputError
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.problem import Bounds
 from trunkline.identification.saving import save_model
+from trunkline.identification.setup import check_parameters
 from trunkline.pipeline.config import load_config
 from trunkline.statics.chain import read_chain
 
@@ -72,6 +77,30 @@ def test_it_can_be_identified(name):
     set_fields(model, candidate_fields(model, {name: np.array([value])}))
     saved = mujoco.MjModel.from_xml_string(save_model(spec, model))
     assert PARAMETERS[name].read(saved) == pytest.approx(value, rel=1e-5)
+
+
+def test_what_the_settings_name_is_added_and_its_motors_stay_its_own(project):
+    drawn = cad_arm(project(TEXT)).spec.compile()
+    names = "build_mjcf: {arm: four_links, joints: viscoelastic, holes: rubbing, solver: {timestep: 0.002}}"
+    Path("params.yaml").write_text(names)
+    added = cad_arm(project(TEXT)).spec.compile()
+    one = elements(added, BRANCH, 1)
+    assert (len(one.own), len(elements(drawn, BRANCH, 1).own)) == (8, 0)
+    np.testing.assert_allclose(added.dof_armature[one.own], 1e-5)
+    assert (holes(added).size, holes(drawn).size) == (12, 0)
+    for name in ("actuator_gainprm", "actuator_dynprm", "actuator_delay"):
+        np.testing.assert_array_equal(getattr(added, name), getattr(drawn, name))
+    assert added.opt.timestep == drawn.opt.timestep == 0.001
+
+
+def test_the_way_to_a_dead_time_is_said_and_leads_there(project):
+    config = SimpleNamespace(parameters={"dead_time": Bounds(0.002, 0.1)})
+    with pytest.raises(InputError, match="dead_time: found .*; of an arm that comes as MJCF, expected `delay`"):
+        check_parameters("identify_control", config, cad_arm(project(TEXT)).spec.compile())
+    delayed = TEXT.replace("<position ", '<position delay="0.02" nsample="200" interp="linear" ', 1)
+    model = cad_arm(project(delayed)).spec.compile()
+    check_parameters("identify_control", config, model)
+    assert PARAMETERS["dead_time"].read(model) == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,7 @@ def test_scores_are_told_by_kind_and_together(tmp_path):
 def test_errors_of_starts_and_of_the_clock_are_against_the_truth(judged):
     lines = dict(line.strip("| ").split(" | ", 1) for line in error_table(judged).splitlines()[2:])
     assert lines["detected start of a release, late"] == "-2.00 ms | -5.00 ms | 2 trials, all splits"
-    assert lines["detected start of a curl, late"] == "– | – | 0 trials, all splits"
+    assert "detected start of a curl, late" not in lines, "the session has none"
     assert lines["clock of the motors against the cameras'"].split(" | ")[-2].strip(" |") == "2 ms"
 
 

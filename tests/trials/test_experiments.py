@@ -18,9 +18,10 @@ def test_a_kind_rests_throughout_or_tells_when_it_begins(name):
     assert kind.level is None or kind.level.low < kind.level.high
 
 
-def test_no_two_kinds_are_proposed_by_the_same_word():
+def test_no_two_kinds_have_the_same_words():
     words = [word for kind in EXPERIMENTS.values() for word in kind.words]
     assert len(words) == len(set(words))
+    assert len({kind.plural for kind in EXPERIMENTS.values()}) == len(EXPERIMENTS), "tables tell kinds by it"
     told = {name: (kind.needs_motors, kind.static) for name, kind in EXPERIMENTS.items()}
     assert {(True, False), (False, True), (False, False)} <= set(told.values()), "what a log without a word can be"
 

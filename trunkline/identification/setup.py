@@ -53,7 +53,8 @@ def _lacking(part: str) -> str:
         found = "found it for an arm without tendons, expected parameters of joints alone"
         return f"{found}; such an arm's pipeline ends with `dvc repro identify_damping`"
     if part == "dead time":
-        return "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0"
+        found = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0"
+        return f"{found}; of an arm that comes as MJCF, expected `delay` and `nsample` of its actuators in that file"
     if part == "holes":
         return "found it for cables that do not rub, expected build_mjcf.holes: rubbing"
     return f"found it for joints without {part}, expected build_mjcf.joints with one"

@@ -25,19 +25,13 @@ from trunkline.identification.setup import check_folds, check_parameters, set_up
 from trunkline.identification.suspicion import suspicions
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json
-from trunkline.trials.experiments import is_static
+from trunkline.trials.experiments import EXPERIMENTS, is_static
 from trunkline.trials.splits import DECIDING, VALIDATE
 from trunkline.trials.trial import Trial, read_trials
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 TRIALS = Path("data/processed/filter")
 TABLED = ("identified", "cad", "null", "noise_floor")  # in trials.csv; metrics.json has all
-# kind of experiment: how a session does without it, as data/raw/README.md says too
-WITHOUT = {
-    "static_tilt": "`source: releases` under identify_stiffness, with `stiffness` and `damping` alone to identify",
-    "static_pull": "`source: tilts` under identify_stiffness, and no `kp` there",
-    "motion": "`experiments: [curl]` under identify_control",
-}
 CSV = {"index": False, "float_format": "%.6g"}
 
 
@@ -216,7 +210,7 @@ def read_reported(config: IdentificationSettings) -> list[Trial]:
     for kind in config.experiments:
         for split in DECIDING:
             if not any(t.experiment == kind and t.split == split for t in trials):
-                found, way_out = f"found no {kind} trial with split {split}", WITHOUT.get(kind)
+                found, way_out = f"found no {kind} trial with split {split}", EXPERIMENTS[kind].without
                 otherwise = f", or in params.yaml {way_out}: data/raw/README.md" if way_out else ""
                 raise InputError(f"session.yaml: {found}, expected at least one{otherwise}")
     segments = trials[0].segments

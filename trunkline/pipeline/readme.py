@@ -20,6 +20,7 @@ from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.limits import Limit, lookup, metrics_folder, read_limits
 from trunkline.pipeline.results import block
 from trunkline.pipeline.truth_table import KINDS, error_table, truth_table
+from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.splits import DECIDING, TEST
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
@@ -136,6 +137,15 @@ def identification_table(root: Path) -> str:
     return "\n".join(lines)
 
 
+def experiment_table() -> str:
+    """The kinds of experiment, for whoever writes a session.yaml."""
+    lines = ["| `experiment` | what | `level` | commands or tendon positions |", "|---|---|---|---|"]
+    for name, kind in EXPERIMENTS.items():
+        level = kind.level.says if kind.level else ""
+        lines.append(f"| `{name}` | {kind.what} | {level} | {'needed' if kind.needs_motors else ''} |")
+    return "\n".join(lines)
+
+
 def score_table(root: Path) -> str:
     """Errors on the trials of the split test, by kind of experiment, of the stage that identifies from it; last of all
     kinds on which the last stage is scored."""
@@ -235,7 +245,8 @@ def with_blocks(text: str, blocks: dict[str, str]) -> str:
 
 
 def generate(root: Path) -> dict[Path, str]:
-    """README.md, the examples' own and the pages on results, with their generated blocks as they should be."""
+    """README.md, the examples' own, the reference of sessions and the pages on results, with their generated blocks as
+    they should be."""
     examples = {}
     for name in EXAMPLES:
         examples[name] = example_table(root / "examples" / name)
@@ -243,6 +254,7 @@ def generate(root: Path) -> dict[Path, str]:
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
     own["score"] = score_table(root)
     blocks = {root / "README.md": own | examples}
+    blocks[root / "data" / "raw" / "README.md"] = {"experiments": experiment_table()}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
     for page in sorted((root / "docs").rglob("*.md")):
         names = re.findall(r"^<!-- (results/\w+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)

@@ -7,18 +7,22 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.trials.experiments import EXPERIMENTS, Kind
 from trunkline.trials.splits import TEST, VALIDATE
 
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 TRUTH = Path("data/raw/demo.truth.json")
+
+
+def judge(kind: Kind) -> str:
+    """The stage whose model is judged by trials of this kind: the first to know all that acts in them."""
+    if kind.needs_motors:
+        return "identify_control"
+    return "identify_stiffness" if kind.static else "identify_damping"
+
+
 # kind of experiment: what its trials are called, and the stage whose model is scored on them
-KINDS = {
-    "static_tilt": ("static tilts", "identify_stiffness"),
-    "release": ("releases", "identify_damping"),
-    "curl": ("curls", "identify_control"),
-    "static_pull": ("static pulls", "identify_control"),
-    "motion": ("motions", "identify_control"),
-}
+KINDS = {name: (kind.plural, judge(kind)) for name, kind in EXPERIMENTS.items()}
 # whose errors: of the identified model, and of what it stands beside
 BESIDE = {"identified": "", "cad": ": CAD", "null": ": null model", "noise_floor": ": noise floor"}
 
@@ -182,11 +186,12 @@ def _start_rows(root: Path, filtered: dict) -> list[str]:
     """Detected starts and the clock's offset against the truth."""
     truth, moving, rows = _json(root / TRUTH), filtered.get("moving", {}), []
     starts = truth.get("starts_s", {})
-    for kind in ("release", "curl", "motion"):
+    for kind in EXPERIMENTS:  # of one at rest no trial is moving; the lab names its trials by their kind
         late = [1e3 * (moving[name]["start_s"] - start) for name, start in starts.items()
                 if name.startswith(kind) and name in moving]  # fmt: skip
-        cells = [f"{np.mean(late):+.2f} ms", f"{max(late, key=abs):+.2f} ms"] if late else ["–", "–"]
-        rows.append(f"| detected start of a {kind}, late | {cells[0]} | {cells[1]} | {len(late)} trials, all splits |")
+        if late:
+            cells = f"{np.mean(late):+.2f} ms | {max(late, key=abs):+.2f} ms | {len(late)} trials, all splits"
+            rows.append(f"| detected start of a {kind}, late | {cells} |")
     found = _json(root / "artifacts/ingest/metrics.json").get("clock_offset_ms")
     error = None if found is None or "clock_offset_s" not in truth else abs(found + 1e3 * truth["clock_offset_s"])
     return [*rows, f"| clock of the motors against the cameras' | | {_number(error)} ms | the session |"]

@@ -1,7 +1,8 @@
 """The kinds of experiment: what each is, in one table that every room reads.
 
 A new kind is one entry here, and a detector in `start` if none there tells when it begins. Then sessions may name
-it, `ingest` and `filter` know what to do with it, and an identification stage can list it in its configuration.
+it, `ingest` and `filter` know what to do with it, an identification stage can list it in its configuration, and the
+reference of sessions and the tables of results have its words.
 """
 
 from collections.abc import Callable
@@ -31,6 +32,7 @@ LOAD = Level("kg at the tip", "kg", 0.0, 5.0)  # above, grams were meant; of a t
 class Kind:
     """level: of a trial, None where it has none.
 
+    what: is done in a trial, in a few words. plural: what several trials are called.
     static: the arm rests throughout; a trial is averaged over time to one frame, and its model settles to rest.
     needs_motors: refused without commands or tendon positions.
     words: in the name of a log that is proposed to be one.
@@ -38,8 +40,11 @@ class Kind:
         the module `start`.
     free: when the last hand is off, s, where that may be later than `start` says.
     hangs: at its end, the arm hangs at rest with nothing that pulls it.
+    without: what to set for a session without it, where a stage identifies from it; "" where nothing helps.
     """
 
+    what: str
+    plural: str
     level: Level | None
     static: bool
     needs_motors: bool
@@ -47,16 +52,22 @@ class Kind:
     start: Callable[[Recording, Smooth], Start] | None = None
     free: Callable[[Recording, float], float] | None = None
     hangs: bool = False
+    without: str = ""
 
 
 EXPERIMENTS: dict[str, Kind] = {
     "static_tilt": Kind(
+        what="at rest, the mount tilted",
+        plural="static tilts",
         level=TILT,
         static=True,
         needs_motors=False,
         words=("static", "tilt"),
+        without="`source: releases` under identify_stiffness, with `stiffness` and `damping` alone to identify",
     ),
     "release": Kind(
+        what="held bent, then let go, no pull",
+        plural="releases",
         level=None,
         static=False,
         needs_motors=False,
@@ -66,6 +77,8 @@ EXPERIMENTS: dict[str, Kind] = {
         hangs=True,
     ),
     "curl": Kind(
+        what="tendons drawn in and paid out",
+        plural="curls",
         level=PULL,
         static=False,
         needs_motors=True,
@@ -73,17 +86,23 @@ EXPERIMENTS: dict[str, Kind] = {
         start=lambda trial, smooth: cycle_time(trial.time, trial.commands),
     ),
     "static_pull": Kind(
+        what="at rest, tendons held at their commands",
+        plural="static pulls",
         level=None,
         static=True,
         needs_motors=True,
         words=("pull",),
+        without="`source: tilts` under identify_stiffness, and no `kp` there",
     ),
     "motion": Kind(
+        what="anything else that is commanded, from rest",
+        plural="motions",
         level=None,
         static=False,
         needs_motors=True,
         words=("motion",),
         start=lambda trial, smooth: cycle_time(trial.time, trial.commands),
+        without="`experiments: [curl]` under identify_control",
     ),
 }
 
