@@ -4,7 +4,8 @@
 tendons that tie them, which end in `_tie`, Jenkins elements, tendons named `<hinge>_slider_<number>`, and the
 diagonals of a round joint, tendons named `<hinge>_diagonal_<number>` after its first hinge.
 `trunkline/arm/holes.py` gives a cable tendons by which it rubs on its holes, named `<cable>_hole_<number>`, and the
-model a number `capstan_friction`, their coefficient.
+model a number `capstan_friction`, their coefficient. Numbers `rate_limit` and `backlash` are those of the motors'
+winches (`trunkline/simulation/winch.py`); 0 stands for none.
 """
 
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ BRANCH, SLIDER, DIAGONAL, HOLE = "branch", "slider", "diagonal", "hole"
 TIE = "_tie"  # ends the name of a branch's tendon: in a Unity scene it may not be called as the hinge
 CAPSTAN_FRICTION = "capstan_friction"
 HINGE_SHARE, DIAGONAL_SHARE = 2 / 3, 1 / 6  # of the hardening K c of a round joint, see `trunkline/arm/joints.py`
+RATE_LIMIT, BACKLASH = "rate_limit", "backlash"  # of winches, m/s and m of cable
 
 
 @dataclass(frozen=True)
@@ -125,23 +127,34 @@ def actuators(model: mujoco.MjModel) -> np.ndarray:
     return np.array([np.flatnonzero(model.actuator_trnid[:, 0] == cable)[0] for cable in cables(model)], dtype=int)
 
 
-def friction_place(model: mujoco.MjModel) -> int | None:
-    """Where among the model's `numeric_data` the coefficient μ is with which its cables rub; None if it has none."""
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, CAPSTAN_FRICTION)
+def numeric_place(model: mujoco.MjModel, name: str) -> int | None:
+    """Where among the model's `numeric_data` the number of this name is; None if it has none."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
     return int(model.numeric_adr[number]) if number >= 0 else None
+
+
+def numeric(model: mujoco.MjModel, name: str) -> float:
+    """The model's number of this name, 0 if it has none."""
+    place = numeric_place(model, name)
+    return 0.0 if place is None else float(model.numeric_data[place])
 
 
 def capstan_friction(model: mujoco.MjModel) -> float:
     """The coefficient μ with which its cables rub, 0 where nothing rubs."""
-    place = friction_place(model)
-    return 0.0 if place is None else float(model.numeric_data[place])
+    return numeric(model, CAPSTAN_FRICTION)
+
+
+def switch_off(model: mujoco.MjModel, *names: str) -> None:
+    """Set the model's numbers of these names to 0, in place."""
+    for name in names:
+        place = numeric_place(model, name)
+        if place is not None:
+            model.numeric_data[place] = 0
 
 
 def let_slide(model: mujoco.MjModel) -> None:
     """Take the friction of cables on their holes from a model, in place."""
-    place = friction_place(model)
-    if place is not None:
-        model.numeric_data[place] = 0
+    switch_off(model, CAPSTAN_FRICTION)
 
 
 def let_hang(model: mujoco.MjModel) -> None:

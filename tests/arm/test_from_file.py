@@ -15,7 +15,7 @@ from tests.support.workbench import ROOT
 from trunkline.arm.from_file import FromFile
 from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
-from trunkline.elements import BRANCH, elements, holes
+from trunkline.elements import BACKLASH, BRANCH, RATE_LIMIT, elements, holes
 from trunkline.errors import InputError
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import Bounds
@@ -68,8 +68,10 @@ def test_the_stage_builds_it_and_the_statics_read_it(project, tmp_path):
 def test_it_can_be_identified(name):
     """Every parameter can be set in it and saved."""
     spec = mujoco.MjSpec.from_string(FromFile("mjcf", FILE).build(None, None, MODELS).spec.to_xml())
-    add_elements(spec, Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)]), 1e-5)
+    add_elements(spec, Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)] * 3), 1e-5)
     add_holes(spec, Holes(0.1, 2))
+    for number in (RATE_LIMIT, BACKLASH):
+        spec.add_numeric(name=number, data=[0.01], size=1)
     for actuator in spec.actuators:
         actuator.nsample = 100
     model = spec.compile()

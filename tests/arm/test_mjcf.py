@@ -9,6 +9,7 @@ from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
 from trunkline.arm.mjcf import Solver, Tendons, build_spec, unit_name
 from trunkline.arm.spiral import spiral_chain
+from trunkline.elements import BACKLASH, RATE_LIMIT, numeric, numeric_place
 from trunkline.frames import STANDARD_GRAVITY, gravity_in_base, rotation_from_wxyz
 
 UNITS = 24
@@ -54,6 +55,15 @@ def test_masses_stiffness_and_damping_arrive(model):
     np.testing.assert_allclose(model.jnt_range[:, 1], np.repeat(CHAIN.joint_range, 2))
     np.testing.assert_allclose(model.jnt_range[:, 0], -model.jnt_range[:, 1])
     assert model.jnt_limited.all()
+
+
+def test_numbers_of_winches_are_in_the_file_where_they_have_any():
+    spec = small_spec(rate_limit=0.3)
+    spec.compile()
+    model = mujoco.MjModel.from_xml_string(spec.to_xml())
+    assert numeric(model, RATE_LIMIT) == 0.3
+    assert numeric_place(model, BACKLASH) is None
+    assert numeric(model, BACKLASH) == 0.0
 
 
 def test_tendon_lengths_at_rest_are_the_sum_of_straight_pieces(model):

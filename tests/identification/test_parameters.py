@@ -24,7 +24,8 @@ VALUES = {
     "relaxation": 0.5, "relaxation_time": 0.7, "relaxation_2": 0.1, "relaxation_time_2": 3.0, "hysteresis": 0.4,
     "yield_bend": 0.01, "hysteresis_2": 0.15, "yield_bend_2": 0.06, "hysteresis_3": 0.08, "yield_bend_3": 0.2,
     "rest_bend_x": 0.01, "rest_bend_y": -0.02, "rest_gradient_x": -0.01, "rest_gradient_y": 0.03,
-    "dead_time": 0.04, "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
+    "dead_time": 0.04, "rate_limit": 0.3, "backlash": 0.002,
+    "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
 }  # fmt: skip
 
 
@@ -34,11 +35,9 @@ ELEMENTS = Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], SLIDERS)
 
 def full_spec() -> mujoco.MjSpec:
     """A small arm that has every part that a parameter may belong to."""
-    spec = small_spec()
+    spec = small_spec(dead_time=0.02, rate_limit=0.1, backlash=0.001)
     add_elements(spec, ELEMENTS, 1e-5)
     add_holes(spec, Holes(0.1, 2))
-    for actuator in spec.actuators:
-        actuator.delay, actuator.nsample = 0.02, 100
     return spec
 
 
@@ -158,6 +157,22 @@ def test_units_without_a_line_have_no_joint_place(old, new, message):
     config = SimpleNamespace(parameters=["joint_place"])
     with pytest.raises(InputError, match=f"params.yaml: identify_stiffness.parameters.joint_place: model: .*{message}"):
         check_parameters("identify_stiffness", config, mujoco.MjModel.from_xml_string(changed))
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("yield_bend_2", "joints without slider 2, expected build_mjcf.joints with one"),
+        ("capstan_friction", "cables that do not rub, expected build_mjcf.holes: rubbing"),
+        ("dead_time", "motors without, expected build_mjcf.actuation.dead_time of more than 0"),
+        ("rate_limit", "winches without, expected build_mjcf.actuation.rate_limit of more than 0"),
+        ("backlash", "winches without, expected build_mjcf.actuation.backlash of more than 0"),
+    ],
+)
+def test_a_parameter_of_what_the_arm_lacks_is_refused(name, message):
+    config = SimpleNamespace(parameters=[name])
+    with pytest.raises(InputError, match=f"identify_control.parameters.{name}: found it for {message}"):
+        check_parameters("identify_control", config, small_spec().compile())
 
 
 def test_candidates_do_not_mix():

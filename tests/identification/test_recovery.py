@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
+from tests.support.matched_plant import curl, motion, release, segments_of, small_model, tilt
 from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.identification.experiment import prepare
 from trunkline.identification.fit import Fit, Method, Polish, Rough
@@ -85,6 +85,17 @@ def test_damping_and_tendon_friction_and_its_creep_come_back():
     found = identified(trials, model, ranges)
     for name, tolerance in (("damping", 0.05), ("tendon_friction", 0.2), ("friction_time", 0.2)):
         assert found.values[name] == pytest.approx(true[name], rel=tolerance), name
+
+
+def test_the_winches_rate_limit_and_backlash_come_back():
+    """From curls faster than the limit, and from motions that turn round."""
+    model = small_model(4, rate_limit=0.5, backlash=1e-3)
+    true = {"rate_limit": 0.12, "backlash": 4e-3}
+    truth = changed(model, **true)
+    trials = [curl(truth, 50, frames=110), motion(truth, 30, frames=120), motion(truth, 30, frames=120, seed=1)]
+    found = identified(trials, model, {"rate_limit": (0.02, 2.0), "backlash": (2e-4, 0.02)})
+    for name, value in true.items():
+        assert found.values[name] == pytest.approx(value, rel=0.02), name
 
 
 def test_validate_trials_are_never_fitted():

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
+from tests.support.matched_plant import curl, motion, release, segments_of, small_model, tilt
 from tests.support.small_arm import small_spec
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.elements import BRANCH, SLIDER, elements
@@ -178,6 +178,18 @@ def test_a_simulation_that_made_mujoco_warn_counts_as_diverged(monkeypatch, tmp_
     assert simulated.diverged.all()
     assert not np.isfinite(simulated.positions[0]).any()
     assert np.isfinite(simulated.positions[1]).all()
+
+
+def test_winches_wind_a_trial_s_commands_as_step_by_step():
+    """Each candidate with its own, in a curl that is too fast for them and turns round."""
+    model = small_model(4, rate_limit=0.15, backlash=3e-3)
+    experiments = [prepare(t, model, 437) for t in (curl(model, 40, frames=100), motion(model, 20, frames=60))]
+    fields = candidate_fields(model, {"rate_limit": np.array([0.15, 0.3]), "backlash": np.array([3e-3, 1e-3])})
+    simulated = Population(model, experiments, segments_of(model)).simulate(fields)
+    for positions, experiment in zip(simulated.positions, experiments, strict=True):
+        truth, other = (position_error(p, experiment.positions, experiment.measured) for p in positions)
+        assert truth < 1e-6
+        assert other > 3e-4
 
 
 @pytest.mark.parametrize("lag", [0, 3])

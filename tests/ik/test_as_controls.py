@@ -137,7 +137,9 @@ def test_a_model_without_friction_is_driven_once_and_damped_at_last(model, chain
     assert friction["rested"] == 1.0
     assert friction["position_error_mm"]["max"] < 0.02
     assert friction["seconds_to_rest"] == found["frictionless"]["seconds_to_rest"]
-    assert friction["dry_friction"] == {"tendons_n": 0.0, "joints_nm": 0.0, "sliders": 0, "capstan": 0.0}
+    assert friction["dry_friction"] == {
+        "tendons_n": 0.0, "joints_nm": 0.0, "sliders": 0, "capstan": 0.0, "backlash_m": 0.0,
+    }  # fmt: skip
 
 
 def test_tips_of_a_drive_are_in_the_base_frame(model, chain, targets):

@@ -9,7 +9,17 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.small_arm import small_spec
 from trunkline.arm.joints import Joints, add_elements
-from trunkline.elements import BRANCH, SLIDER, all_elements, arm_hinges, cables, give_way
+from trunkline.elements import (
+    BACKLASH,
+    BRANCH,
+    RATE_LIMIT,
+    SLIDER,
+    all_elements,
+    arm_hinges,
+    cables,
+    give_way,
+    numeric,
+)
 from trunkline.frames import gravity_in_base, wxyz_from_rotation
 from trunkline.identification.experiment import SLACK
 from trunkline.trials.trial import Trial
@@ -17,8 +27,9 @@ from trunkline.trials.trial import Trial
 FRAME = 1 / 120
 
 
-def small_model(units: int = 6, joints: Joints | None = None) -> mujoco.MjModel:
-    spec = small_spec(units)
+def small_model(units: int = 6, joints: Joints | None = None, **motors: float) -> mujoco.MjModel:
+    """`motors`: as `small_spec` has them."""
+    spec = small_spec(units, **motors)
     add_elements(spec, joints or Joints(), 1e-5)
     spec.option.timestep = FRAME / 8
     model = spec.compile()
@@ -57,6 +68,8 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
         bend, give = data.qpos[slider.hinge], model.tendon_springyield[slider.tendon]
         for end in (0, 1):
             data.plastic[model.tendon_plasticadr[slider.tendon] + end] = bend - np.clip(bend, -give, give)
+    furthest = (numeric(model, RATE_LIMIT) or np.inf) * model.opt.timestep  # of a winch in a step
+    slack, drum, cable = numeric(model, BACKLASH) / 2, lengths[0], lengths[0]
     segments = segments_of(model)
     sites = [model.site(f"{s}_center").id for s in segments]
     positions, quaternions = np.empty((frames, len(sites), 3)), np.empty((frames, len(sites), 4))
@@ -69,8 +82,11 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
         mujoco.mj_forward(model, data)
         positions[frame] = data.site_xpos[sites]
         quaternions[frame] = wxyz_from_rotation(Rotation.from_matrix(data.site_xmat[sites].reshape(-1, 3, 3)))
-        data.ctrl[:] = 0.5 * (lengths[frame] + lengths[min(frame + 1, frames - 1)])
-        mujoco.mj_step(model, data, round(FRAME / model.opt.timestep))
+        sent = 0.5 * (lengths[frame] + lengths[min(frame + 1, frames - 1)])
+        for _ in range(round(FRAME / model.opt.timestep)):
+            drum = drum + np.clip(sent - drum, -furthest, furthest)
+            data.ctrl[:] = cable = np.clip(cable, drum - slack, drum + slack)
+            mujoco.mj_step(model, data)
     positions = positions + rng.normal(0, noise, positions.shape)
     return Trial(
         name=name, experiment=experiment, split=split, level=level, gravity=gravity, time=np.arange(frames) * FRAME,

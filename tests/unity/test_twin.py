@@ -233,6 +233,19 @@ def test_a_linear_model_is_packed_as_it_is(files, sources):
     assert files[MODEL].decode() == sources.mjcf
 
 
+def test_what_a_file_cannot_say_of_winches_is_stated_and_left_out(sources):
+    spec = mujoco.MjSpec.from_string(sources.mjcf)
+    for name, value in (("rate_limit", 0.25), ("backlash", 3e-4)):
+        spec.add_numeric(name=name, data=[value], size=1)
+    files, violations = assemble(LABEL, replace(sources, mjcf=spec.to_xml()), TRAJECTORY)
+    assert violations == []
+    described = Manifest.model_validate_json(files[MANIFEST]).model
+    assert (described.rate_limit, described.backlash) == (0.25, 3e-4)
+    assert b"numeric" not in files[MODEL]
+    plain = Manifest.model_validate_json(assemble(LABEL, sources, TRAJECTORY)[0][MANIFEST]).model
+    assert (plain.rate_limit, plain.backlash) == (0, 0)
+
+
 def test_branches_of_joints_are_packed_under_names_that_unity_can_hold(sources):
     """A branch's hinge and the tendon that ties it have names of their own."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)

@@ -14,6 +14,7 @@ from pydantic import Field
 
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import UnitProperties
+from trunkline.elements import BACKLASH, RATE_LIMIT
 from trunkline.frames import STANDARD_GRAVITY
 
 TENDON_RGBA = (0.15, 0.15, 0.15, 1)
@@ -37,6 +38,7 @@ class Actuation:
         max_force: largest pull F, N; a tendon cannot push.
         time_constant: of the first-order filter on the commanded length, s.
         dead_time: from a command to the motor's first answer, s; 0 for motors without.
+        rate_limit: of the winch, m/s of cable; 0 for none. backlash: of the winch, m of cable.
     """
 
     friction: Annotated[float, Field(ge=0, le=1000)]
@@ -44,6 +46,8 @@ class Actuation:
     max_force: Annotated[float, Field(gt=0, le=1e5)]
     time_constant: Annotated[float, Field(gt=0, le=10)]
     dead_time: Annotated[float, Field(ge=0, le=LONGEST_DEAD_TIME)] = 0.0
+    rate_limit: Annotated[float, Field(ge=0, le=100)] = 0.0
+    backlash: Annotated[float, Field(ge=0, le=1)] = 0.0
 
 
 @dataclass(kw_only=True)
@@ -109,6 +113,9 @@ def build_spec(
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, -STANDARD_GRAVITY]
     cables = [_add_cable(spec, index, tendons, solver) for index in range(tendons.count)]
+    for name in (RATE_LIMIT, BACKLASH):  # MJCF has no such thing: the stepper reads it
+        if cables and getattr(tendons, name):
+            spec.add_numeric(name=name, data=[getattr(tendons, name)], size=1)
     hole_radii = tendons.radius_ratio * chain.widths / 2
 
     body = spec.worldbody.add_body(name="base")

@@ -10,19 +10,22 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunkline.elements import (
+    BACKLASH,
     BRANCH,
+    CAPSTAN_FRICTION,
     DIAGONAL,
     DIAGONAL_SHARE,
     HINGE_SHARE,
+    RATE_LIMIT,
     SLIDER,
     all_elements,
     arm_hinges,
     cables,
-    capstan_friction,
     diagonal_lengths,
     elements,
-    friction_place,
     holes,
+    numeric,
+    numeric_place,
 )
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
@@ -42,8 +45,8 @@ class Parameter:
         read: its value in a model.
         write: (fields, values (candidates,), model) sets it in every candidate.
         signed: whether it may be 0 or less. Only others are searched on a logarithmic scale.
-        part: what of an arm it belongs to, if not every arm has it: "tendons", their motors' "dead time", or a joint's
-            "branch 1", "slider 1", …, or "holes" on which cables rub.
+        part: what of an arm it belongs to, if not every arm has it: "tendons", their motors' "dead time", RATE_LIMIT or
+            BACKLASH, or a joint's "branch 1", "slider 1", …, or "holes" on which cables rub.
         told_by: whether trials of a kind of experiment tell it: from others alone it comes out wrong, or anyhow.
     """
 
@@ -61,6 +64,8 @@ class Parameter:
             return bool(model.nhistory)
         if self.part == "holes":
             return holes(model).size > 0
+        if self.part in (RATE_LIMIT, BACKLASH):
+            return numeric_place(model, self.part) is not None
         kind, _, number = self.part.partition(" ")
         if number:
             return len(elements(model, kind, int(number)).tendon) > 0
@@ -297,8 +302,14 @@ def _rest_bend(axis: int, power: int) -> Parameter:
     return Parameter("rad", ("qpos_spring",), read, write, signed=True)
 
 
-def _write_capstan(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
-    fields["numeric_data"][:, friction_place(model)] = values
+def _number(name: str, unit: str, part: str) -> Parameter:
+    """One that is no field of MuJoCo's but a number of that name, which the stepper reads."""
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        fields["numeric_data"][:, numeric_place(model, name)] = values
+
+    read = partial(numeric, name=name)
+    return Parameter(unit, ("numeric_data",), read, write, part=part, told_by=_pulled_and_moving)
 
 
 STIFFNESS_FIELDS = ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "tendon_stiffnesspoly", "dof_damping")
@@ -351,9 +362,7 @@ PARAMETERS: dict[str, Parameter] = {
         _write_tendons("tendon_solref_fri", (0,)), part="tendons", told_by=_moving,
     ),
     # μ of cables on the holes that they pass, in the capstan equation
-    "capstan_friction": Parameter(
-        "", ("numeric_data",), capstan_friction, _write_capstan, part="holes", told_by=_pulled_and_moving,
-    ),
+    "capstan_friction": _number(CAPSTAN_FRICTION, "", "holes"),
     "kp": Parameter(
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
         part="tendons", told_by=_pulled,
@@ -374,6 +383,8 @@ PARAMETERS: dict[str, Parameter] = {
         "s", ("actuator_delay",), lambda m: float(m.actuator_delay[0]), _set("actuator_delay", ()),
         part="dead time", told_by=_pulled_and_moving,
     ),
+    "rate_limit": _number(RATE_LIMIT, "m/s", RATE_LIMIT),
+    "backlash": _number(BACKLASH, "m", BACKLASH),
     "mount_tilt_x": _mount(0),
     "mount_tilt_y": _mount(1),
     "mount_twist": _mount(2),

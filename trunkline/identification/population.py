@@ -15,6 +15,7 @@ from trunkline.identification.parameters import Fields
 from trunkline.simulation.load import hang
 from trunkline.simulation.motion import batch_of, hold, move
 from trunkline.simulation.rest import come_to_rest, lead_to_rest, relax
+from trunkline.simulation.winch import Winches
 from trunkline.trials.experiments import is_static
 
 SETTLE_TIME = 30.0  # s, the most; a shape that does not rest by then counts as diverged
@@ -97,7 +98,7 @@ class Population:
         if batch is None or batch.nsim != count * len(experiments):
             model = _without_idle(self._model, group, fields)
             batch = self._batches[group] = batch_of(model, count * len(experiments))
-        if group.static or group.slack:  # cables do not rub
+        if group.static or group.slack:  # cables do not rub, winches do not wind
             fields = {name: values for name, values in fields.items() if name != "numeric_data"}
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         for name, values in fields.items():
@@ -158,6 +159,7 @@ class Population:
         timestep = batch.expand("opt.timestep")
         timestep[:] = np.repeat([e.lead / substeps for e in experiments], count)
         first = np.repeat([e.controls[0] for e in experiments], count, axis=0)
+        winches = Winches(batch, first)
         move(batch, np.repeat(first[:, None], substeps, axis=1), ())
         timestep[:] = frame_step / substeps
         lengths = [e.frames for e in experiments]
@@ -166,8 +168,9 @@ class Population:
             running = [e for e in experiments if e.frames >= end]
             controls = np.repeat([e.controls[start:end] for e in running], count, axis=0)
             ids = np.arange(len(controls), dtype=np.int32)
+            rows = winches.deliver(np.repeat(controls, substeps, axis=1), ids)
             # a step sees the sites where they are before it: the first of a frame, where the last frame ended
-            seen = move(batch, np.repeat(controls, substeps, axis=1), ("site_xpos",), every=substeps, ids=ids)
+            seen = move(batch, rows, ("site_xpos",), every=substeps, ids=ids)
             positions = seen["site_xpos"][:, :, sites].reshape(len(running), count, end - start, len(sites), 3)
             for result, found in zip(results, positions, strict=False):
                 result[:, start - 1 : end - 1] = found

@@ -3,6 +3,7 @@
 
 import mujoco
 
+from trunkline.elements import BACKLASH, RATE_LIMIT
 from trunkline.errors import InputError
 from trunkline.identification.experiment import Experiment, prepare
 from trunkline.identification.fit import Fit
@@ -55,6 +56,8 @@ def _lacking(part: str) -> str:
     if part == "dead time":
         found = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0"
         return f"{found}; of an arm that comes as MJCF, expected `delay` and `nsample` of its actuators in that file"
+    if part in (RATE_LIMIT, BACKLASH):
+        return f"found it for winches without, expected build_mjcf.actuation.{part} of more than 0"
     if part == "holes":
         return "found it for cables that do not rub, expected build_mjcf.holes: rubbing"
     return f"found it for joints without {part}, expected build_mjcf.joints with one"

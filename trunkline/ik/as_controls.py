@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from trunkline.dataset.sampling import around_the_arm
-from trunkline.elements import SLIDER, actuators, all_elements, capstan_friction
+from trunkline.elements import BACKLASH, SLIDER, actuators, all_elements, capstan_friction, numeric
 from trunkline.frames import gravity_in_base
 from trunkline.simulation.drive import drive, has_friction
 from trunkline.simulation.rest import base_frame, settle
@@ -185,7 +185,7 @@ def score(
         seconds = timed.time_to_rest()
     tendons, joints = model_friction(model)
     dry = {"tendons_n": tendons.max(), "joints_nm": joints.max(), "sliders": len(all_elements(model, SLIDER))}
-    dry["capstan"] = capstan_friction(model)
+    dry |= {"capstan": capstan_friction(model), "backlash_m": numeric(model, BACKLASH)}
     on_model = {
         **drawn.counts(),
         "frictionless": settled(model, ask, targets).metrics(chain.length) | {"seconds_to_rest": timed.time_to_rest()},

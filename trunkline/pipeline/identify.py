@@ -6,7 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from trunkline.elements import capstan_friction, let_slide
+from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, numeric, switch_off
 from trunkline.errors import InputError, existing
 from trunkline.identification.checks import check_trials
 from trunkline.identification.cross_validation import cross_validate
@@ -69,9 +69,11 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         # rest shape and markers are no matter of scalars
         for field in ("qpos_spring", "tendon_lengthspring", "site_pos", "site_sameframe"):
             getattr(models["coarse"], field)[:] = getattr(model, field)
-    if capstan_friction(models["identified"]):  # as it moves where cables cannot rub, in Unity for one
-        models["smooth"] = mujoco.MjModel.from_xml_string(identified)
-        let_slide(models["smooth"])
+    # as it moves where nobody but MuJoCo steps it, in Unity for one: cables do not rub, winches wind as they are told
+    for name, numbers in {"smooth": (CAPSTAN_FRICTION,), "prompt": (RATE_LIMIT, BACKLASH)}.items():
+        if any(numeric(models["identified"], number) for number in numbers):
+            models[name] = mujoco.MjModel.from_xml_string(identified)
+            switch_off(models[name], *numbers)
     predictions = predict(models, reported, experiments, model)
     metrics: dict = {"diverged_trials": {name: prediction.replay.diverged for name, prediction in predictions.items()}}
     like = predictions["identified"].replay

@@ -38,6 +38,7 @@ MODELS = {
     "cad": "CAD",
     "coarse": "coarse: one scalar each",
     "smooth": "identified, its cables not rubbing",
+    "prompt": "identified, its winches without rate limit and backlash",
     "identified": "identified",
     "noise_floor": "noise floor",
 }

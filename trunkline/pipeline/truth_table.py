@@ -57,7 +57,7 @@ RELAXING = ("relaxation", "relaxation_time", "relaxation_2", "relaxation_time_2"
 MEMORY = ("hysteresis", "yield_bend", "hysteresis_2", "yield_bend_2", "hysteresis_3", "yield_bend_3")
 CURLED = ("kp", "capstan_friction")
 RUBBING = ("tendon_friction", "friction_time")
-MOTORS = (*CURLED, "kv", "time_constant", "dead_time")
+MOTORS = (*CURLED, "kv", "time_constant", "dead_time", "rate_limit", "backlash")
 LACKING = {
     "cousin": (
         Effect("a motor with a limited rate and a delay", ("kp", "kv")),
@@ -69,7 +69,9 @@ LACKING = {
         Effect("another integrator", ("damping",)),
     ),
     "stranger": (
-        Effect("a limited rate and backlash of the motors, cables that differ", MOTORS),
+        Effect("a limited rate of the motors", MOTORS, unless="rate_limit"),
+        Effect("backlash of the motors", MOTORS, unless="backlash"),
+        Effect("cables that differ", MOTORS),
         Effect("dead time of the motors", MOTORS, unless="dead_time"),
         Effect("friction on its holes", (*SPRINGS, *RUBBING, "kp", "kv", "force_range"), "capstan_friction"),
         Effect("Maxwell branches", ("damping", *RELAXING, *MEMORY, *RUBBING, "kp", "kv"), "relaxation", "branches"),

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.elements import SLIDER, all_elements, capstan_friction, let_slide
+from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, SLIDER, all_elements, numeric, switch_off
 from trunkline.simulation.motion import batch_of, hold, move
 from trunkline.simulation.rest import base_frame, come_to_rest, longest_step, relax
+from trunkline.simulation.winch import Winches
 
 LOOK = 0.25  # s between looks at the tips
 WINDOW = 4  # looks in which a tip has moved no more than STILL: a swing of up to 2 s shows in them
@@ -47,9 +48,11 @@ class Driven:
 
 
 def has_friction(model: mujoco.MjModel) -> bool:
-    """Whether where the model rests depends on how it came there: friction of tendons or hinges, sliders, holes."""
+    """Whether where the model rests depends on how it came there: friction of tendons or hinges, sliders, holes,
+    backlash of winches."""
     sliding = any(model.tendon_stiffness[slider.tendon].any() for slider in all_elements(model, SLIDER))
-    return bool(sliding or capstan_friction(model) or model.tendon_frictionloss.any() or model.dof_frictionloss.any())
+    sliding = sliding or numeric(model, CAPSTAN_FRICTION) or numeric(model, BACKLASH)
+    return bool(sliding or model.tendon_frictionloss.any() or model.dof_frictionloss.any())
 
 
 def drive(
@@ -71,7 +74,8 @@ def drive(
             trajectories, a row every ROW s and the last one held. Shape (B, T, K).
         gravity: in the base frame, m/s². Shape (3,) or (B, 3).
         seconds: longest time to simulate.
-        friction: whether tendons and joints have the model's dry friction, and its sliders, and cables rub.
+        friction: whether tendons and joints have the model's dry friction, and its sliders, and cables rub, and winches
+            have backlash.
         calm: whether arms are damped after these `seconds` until they rest. That does not change where, if there is no
             friction.
 
@@ -83,7 +87,7 @@ def drive(
     model.opt.timestep = longest_step(model)
     if not friction:
         model.tendon_frictionloss[:], model.dof_frictionloss[:] = 0, 0
-        let_slide(model)
+        switch_off(model, CAPSTAN_FRICTION, BACKLASH)
         for slider in all_elements(model, SLIDER):
             model.tendon_stiffness[slider.tendon] = 0
     if calm and has_friction(model):
@@ -108,18 +112,22 @@ def _drive(
     trajectories = commands if commands.ndim == 3 else commands[:, None]
     last = (trajectories.shape[1] - 1) * ROW
     batch.expand("opt.gravity")[:] = gravity @ to_world.T
-    hold(batch, model, model.tendon_length0[model.actuator_trnid[:, 0]])
+    straight = np.tile(model.tendon_length0[model.actuator_trnid[:, 0]], (len(commands), 1))
+    hold(batch, model, straight)
+    winches = Winches(batch, straight)
     site = model.site(tip_site).id
     tips = np.full((len(commands), looks + calm, 3), np.nan)
     moving = np.arange(len(commands), dtype=np.int32)
     for look in range(looks):
-        controls = _sent(trajectories[moving], (look * every + np.arange(every)) * model.opt.timestep)
+        sent = _sent(trajectories[moving], (look * every + np.arange(every)) * model.opt.timestep)
+        controls = winches.deliver(sent, moving)
         found = move(batch, controls, ("site_xpos",), every, every - 1, ids=moving)["site_xpos"][:, 0, site]
         tips[moving, look] = (found - origin) @ to_world
-        moving = moving[~batch.warning[moving].any(axis=(1, 2))]
+        sound = ~batch.warning[moving].any(axis=(1, 2))
+        moving, wound = moving[sound], np.ptp(controls[sound], axis=1).max(axis=1)
         if (look - WINDOW) * LOOK >= last:
             spread = np.ptp(tips[moving, look - WINDOW : look + 1], axis=1)
-            still = np.linalg.norm(spread, axis=1) <= STILL
+            still = (np.linalg.norm(spread, axis=1) <= STILL) & (wound <= STILL)
             tips[moving[still], look + 1 :] = tips[moving[still], look, None]
             moving = moving[~still]
         if not len(moving):
@@ -127,6 +135,8 @@ def _drive(
     if calm:
         timestep, places = relax(batch, model), batch.bind("site_xpos")
         batch.bind("qvel")[:] = 0
+        if not winches.idle:
+            batch.bind("ctrl")[:] = trajectories[:, -1]
         sound = np.flatnonzero(~batch.warning.any(axis=(1, 2)))
         moving, _ = come_to_rest(batch, timestep, CALM, sound)
         batch.forward()

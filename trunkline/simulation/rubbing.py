@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.elements import actuators, cables, capstan_friction, friction_place, holes, stretch_edges
+from trunkline.elements import CAPSTAN_FRICTION, actuators, cables, holes, numeric_place, stretch_edges
 
 REFRESH = 1 / 120  # s between new limits: the motors' tensions and the bends change little within
 CREEP = 1e-3  # m/s of sliding below which s is less than ±1
@@ -29,7 +29,7 @@ class Rubbing:
         self._actuators = actuators(model)
         self._hinges = _hinges(model)
         self._begins = stretch_edges(self._hinges.shape[1], self._tendons.shape[1])[:-1]
-        self._place = friction_place(model)
+        self._place = numeric_place(model, CAPSTAN_FRICTION)
         timestep = batch.expanded("opt.timestep")
         longest = float(np.max(model.opt.timestep if timestep is None else timestep))
         self.steps = max(1, round(REFRESH / longest))
@@ -65,9 +65,11 @@ class Rubbing:
 
 def rubbing(batch: Batch) -> Rubbing | None:
     """What sets the limits of a batch, None if nothing in it rubs."""
-    friction = batch.expanded("numeric_data")
-    rubs = capstan_friction(batch.model) > 0 if friction is None else bool(np.any(friction))
-    return Rubbing(batch) if rubs and holes(batch.model).size else None
+    if not holes(batch.model).size:
+        return None
+    values = batch.expanded("numeric_data")
+    values = batch.model.numeric_data[None] if values is None else values
+    return Rubbing(batch) if values[:, numeric_place(batch.model, CAPSTAN_FRICTION)].any() else None
 
 
 def _hinges(model: mujoco.MjModel) -> np.ndarray:

@@ -10,7 +10,7 @@ from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import Laws, compile_with
 from trunkline.unity.manifest import Manifest
 from trunkline.unity.roundtrip import curl, deviation, simulate
-from trunkline.unity.twin import MANIFEST, MODEL, Trajectory, without_dead_time, without_rubbing
+from trunkline.unity.twin import MANIFEST, MODEL, Trajectory, without_dead_time, without_rubbing, without_winches
 
 
 @dataclass
@@ -42,6 +42,7 @@ def read_models(calibrated: str, packed: dict[str, bytes]) -> dict[str, mujoco.M
     mjcf, spec = packed[MODEL].decode(), mujoco.MjSpec.from_string(calibrated)
     without_dead_time(spec)
     without_rubbing(spec)
+    without_winches(spec)
     described = Manifest.model_validate_json(packed[MANIFEST]).model
     laws = Laws(described.springs, described.dampers, described.diagonals)
     return {

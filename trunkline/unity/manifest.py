@@ -72,6 +72,10 @@ class Model(_Block):
     dead_time: float = Field(
         ge=0, description="s from a command to the motor's first answer, which the file has not: send commands so late"
     )
+    rate_limit: float = Field(
+        ge=0, description="m/s of cable that a motor winds at most, 0 for no limit; which the file has not: send slower"
+    )
+    backlash: float = Field(ge=0, description="m of cable, of the motors' winches, which the file has not")
     capstan_friction: float = Field(
         ge=0,
         description="μ of the cables on their holes, which the file has not; metrics.identify_control has errors with "

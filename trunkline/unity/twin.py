@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.elements import CAPSTAN_FRICTION, capstan_friction, is_hole
+from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, capstan_friction, is_hole, numeric
 from trunkline.errors import InputError
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize
@@ -75,7 +75,7 @@ def assemble(
 ) -> tuple[dict[str, bytes], list[Violation]]:
     """All files of the package by path, and the rules that it breaks."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)
-    dead_time, friction = without_dead_time(spec), without_rubbing(spec)
+    dead_time, friction, winches = without_dead_time(spec), without_rubbing(spec), without_winches(spec)
     calibrated = spec.compile()
     laws = linearize(spec, *movement(calibrated, trajectory))
     spec.compile()
@@ -121,6 +121,7 @@ def assemble(
             import_max_deviation_mm=import_deviation_mm,
             dead_time=dead_time,
             capstan_friction=friction,
+            **winches,
         ),
         network=network_block,
         meshes=mesh_blocks,
@@ -150,6 +151,15 @@ def without_rubbing(spec: mujoco.MjSpec) -> float:
     for number in [number for number in spec.numerics if number.name == CAPSTAN_FRICTION]:
         spec.delete(number)
     return friction
+
+
+def without_winches(spec: mujoco.MjSpec) -> dict[str, float]:
+    """Take rate limit and backlash of the motors' winches from a model in place, as commands have to be shaped with
+    them before they are sent; what they were by name, 0 for none."""
+    model, names = spec.compile(), (RATE_LIMIT, BACKLASH)
+    for number in [number for number in spec.numerics if number.name in names]:
+        spec.delete(number)
+    return {name: numeric(model, name) for name in names}
 
 
 def movement(model: mujoco.MjModel, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
