@@ -1,6 +1,10 @@
-"""(5) What each term of the model costs a simulation step, and what half the step changes with it."""
+"""(5) What each term of the model costs a simulation step, and what half the step changes with it.
 
-from dataclasses import replace
+Terms of the joints are timed on releases, in which all cables hang slack and cost nothing; those of cables and motors
+on curls, as they do nothing in a release.
+"""
+
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import mujoco
@@ -16,35 +20,62 @@ from trunkline.identification.population import Population
 from trunkline.pipeline.config import load_config
 
 CANDIDATES = 4
-BRANCHES, SLIDERS = [Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)]
-TERMS = {
-    "springs and dampers": Joints(),
-    "a Maxwell branch": Joints(BRANCHES[:1]),
-    "two Maxwell branches": Joints(BRANCHES),
-    "a Jenkins element": Joints(sliders=SLIDERS),
-    "all of these": Joints(BRANCHES, SLIDERS),
+BRANCHES = [Branch(0.3, 0.5), Branch(0.2, 2.0)]
+SLIDERS = [Slider(0.2, 0.02), Slider(0.1, 0.05), Slider(0.1, 0.1)]
+HOLES = Holes(0.2, 8)
+DEAD_TIME, RATE_LIMIT, BACKLASH = 0.02, 0.25, 3e-4  # s, m/s, m
+
+
+@dataclass
+class Terms:
+    """What a row's model has beside springs, dampers and motors with a lag; s, m/s and m."""
+
+    joints: Joints = field(default_factory=Joints)
+    holes: Holes = field(default_factory=Holes)
+    dead_time: float = 0.0
+    rate_limit: float = 0.0
+    backlash: float = 0.0
+
+
+NONE = "springs, dampers, lag"
+OF_JOINTS = {
+    NONE: Terms(),
+    "a Maxwell branch": Terms(Joints(BRANCHES[:1])),
+    "two Maxwell branches": Terms(Joints(BRANCHES)),
+    "a Jenkins element": Terms(Joints(sliders=SLIDERS[:1])),
+    "three Jenkins elements": Terms(Joints(sliders=SLIDERS)),
+    "all of these": Terms(Joints(BRANCHES, SLIDERS)),
 }
-DEAD_TIME = 0.02  # s
+OF_CABLES = {
+    NONE: Terms(),
+    "motors with a dead time": Terms(dead_time=DEAD_TIME),
+    "winches: rate and backlash": Terms(rate_limit=RATE_LIMIT, backlash=BACKLASH),
+    "capstan friction": Terms(holes=HOLES),
+    "all, those of joints too": Terms(Joints(BRANCHES, SLIDERS), HOLES, DEAD_TIME, RATE_LIMIT, BACKLASH),
+}
+ON = {"release": ("identify_damping", OF_JOINTS), "curl": ("identify_control", OF_CABLES)}  # by kind of trial
 
 
 def report(read_case: ReadCase, size: Size) -> None:
-    case = read_case("identify_damping", replace(size, trials=99, frames=size.rate_frames))
-    models = {name: model_with(joints) for name, joints in TERMS.items()}
-    models["motors with a dead time"] = model_with(Joints(), DEAD_TIME)
-    rivals = {name: partial(steps, model, case.experiments, case.fit.segments) for name, model in models.items()}
-    times = alternate(rivals, size.repeats)
-    print(f"(5) terms: {CANDIDATES} candidates x {len(case.experiments)} releases of {size.rate_frames} frames")
-    print("                                CPU us/step   of the first   largest change by half the step (mm)")
-    first = next(iter(times.values()))
-    for name, spent in times.items():
-        change = halved(models[name], case.experiments, case.fit.segments)
-        print(f"    {name:25s} {1e6 * spent.cpu:13.1f} {spent.cpu / first.cpu:14.2f} {1e3 * change:20.2f}")
+    print(f"(5) {'terms':26s} {'on':8s} CPU us/step   of the first   largest change by half the step (mm)")
+    for kind, (stage, terms) in ON.items():
+        case = read_case(stage, replace(size, trials=99, frames=size.rate_frames))
+        experiments = [e for e in case.experiments if e.kind == kind]
+        models = {name: model_with(own) for name, own in terms.items()}
+        rivals = {name: partial(steps, model, experiments, case.fit.segments) for name, model in models.items()}
+        times = alternate(rivals, size.repeats)
+        for name, spent in times.items():
+            change, ratio = halved(models[name], experiments, case.fit.segments), spent.cpu / times[NONE].cpu
+            print(f"    {name:26s} {kind:8s} {1e6 * spent.cpu:11.1f} {ratio:14.2f} {1e3 * change:20.2f}")
+        print(f"    {kind}: {CANDIDATES} candidates x {len(experiments)} trials of {size.rate_frames} frames")
 
 
-def model_with(joints: Joints, dead_time: float = 0.0) -> mujoco.MjModel:
-    """The CAD model of the pipeline's settings, with these joints."""
+def model_with(terms: Terms) -> mujoco.MjModel:
+    """The CAD model of the pipeline's settings, with these terms and no others."""
     config = load_config(Config, "build_mjcf")
-    config.joints, config.holes, config.actuation.dead_time = joints, Holes(), dead_time
+    config.joints, config.holes = terms.joints, terms.holes
+    motors = {name: getattr(terms, name) for name in ("dead_time", "rate_limit", "backlash")}
+    config.actuation = replace(config.actuation, **motors)
     return cad_arm(config).spec.compile()
 
 

@@ -1,15 +1,28 @@
 """The rivals of the benchmark do what identification does, on a tiny arm."""
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 
 from benchmarks.identification import __main__ as benchmark
 from benchmarks.identification.case import Case, Size, identified
+from benchmarks.identification.physics import (
+    BACKLASH,
+    DEAD_TIME,
+    HOLES,
+    NONE,
+    OF_CABLES,
+    OF_JOINTS,
+    RATE_LIMIT,
+    model_with,
+)
 from benchmarks.identification.rate import bare_batch
 from benchmarks.identification.recipe import as_first_written, by_recipe
 from benchmarks.identification.sysid import by_sysid, stalled
-from tests.support.matched_plant import release, segments_of, small_model
+from tests.support.matched_plant import curl, release, segments_of, small_model
+from trunkline.elements import BRANCH, SLIDER, all_elements, capstan_friction, holes, numeric
 from trunkline.identification.experiment import prepare
 from trunkline.identification.fit import Fit, Method, Polish, Rough
 from trunkline.identification.loss import LossWeights
@@ -86,11 +99,25 @@ def test_what_a_search_left_where_it_was_is_named(case):
 
 
 def test_every_part_prints_its_rivals(case, capsys):
+    curled = replace(case, experiments=[*case.experiments, prepare(curl(case.model, 30, frames=20), case.model, 20)])
     for part in benchmark.PARTS.values():
-        part(lambda stage, size: case, SIZE)
+        part(lambda stage, size: curled if stage == "identify_control" else case, SIZE)
     lines = capsys.readouterr().out
     for words in ("bare Batch.step", "first written", "sysid, as it comes", "units      3: "):
         assert words in lines
+    rows = [line.split()[-4] for line in lines.splitlines() if line.strip().startswith(tuple(OF_JOINTS | OF_CABLES))]
+    assert rows == ["release"] * len(OF_JOINTS) + ["curl"] * len(OF_CABLES)
+
+
+def test_the_row_of_all_terms_has_all_of_them():
+    model = model_with(OF_CABLES["all, those of joints too"])
+    assert (len(all_elements(model, BRANCH)), len(all_elements(model, SLIDER))) == (2, 3)
+    assert capstan_friction(model) == HOLES.friction
+    assert holes(model).shape == (3, HOLES.stretches)
+    assert (model.actuator_delay == DEAD_TIME).all()
+    assert (numeric(model, "rate_limit"), numeric(model, "backlash")) == (RATE_LIMIT, BACKLASH)
+    plain = model_with(OF_CABLES[NONE])
+    assert (plain.ntendon, plain.nhistory, plain.nnumeric) == (3, 0, 0)
 
 
 def test_without_the_demo_it_says_what_to_run(monkeypatch, tmp_path, capsys):
