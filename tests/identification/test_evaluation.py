@@ -3,8 +3,19 @@
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import release, segments_of, small_model, tilt
-from trunkline.identification.evaluation import period_error, replay, scores, segment_positions
+from tests.support.matched_plant import FRAME, curl, release, segments_of, small_model, tilt
+from tests.support.small_arm import small_spec
+from trunkline.arm.holes import Holes, add_holes
+from trunkline.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.elements import arm_hinges, cables
+from trunkline.identification.evaluation import (
+    Prediction,
+    halved_step,
+    period_error,
+    replay,
+    scores,
+    segment_positions,
+)
 from trunkline.identification.experiment import own_starts, prepare
 from trunkline.identification.loss import LossWeights
 from trunkline.identification.parameters import candidate_fields, set_fields
@@ -20,6 +31,24 @@ def test_only_trials_in_motion_have_a_velocity():
         kinds = found["by_experiment"]
         assert "e_velocity_mm_s" not in kinds["static_tilt"]
         assert found["e_velocity_mm_s"] == kinds["release"]["e_velocity_mm_s"]
+
+
+def test_half_the_step_moves_little_with_every_option_on():
+    """Branches, sliders, holes, dead time, lag, rate limit and backlash, on a curl of an arm that has none of them but
+    the lag: with an error like that of an identified arm, at the pipeline's step."""
+    spec, plant = small_spec(6, dead_time=0.02, rate_limit=0.25, backlash=3e-4), small_model(6)
+    add_elements(spec, Joints([Branch(0.3, 0.1), Branch(0.2, 1.0)], [Slider(0.2, 0.02), Slider(0.1, 0.05)]), 1e-5)
+    add_holes(spec, Holes(0.2, 4))
+    spec.option.timestep = FRAME / 4
+    model = spec.compile()
+    model.dof_damping[: arm_hinges(model)] *= 4  # as the plant's
+    model.tendon_frictionloss[cables(model)] = plant.tendon_frictionloss[:] = 0
+    experiments = [prepare(curl(plant, 30, frames=90), model, 90)]
+    found, halved = (Prediction(replay(model, experiments, segments_of(model), f), experiments) for f in (1.0, 0.5))
+    assert 0.3 < found.scores()["identify"]["e_internal_mm"] < 1.0  # 1 mm is 0.2 % of the arm's length
+    change = halved_step(found, halved)
+    assert 0 < change["identify"] < 0.05
+    assert 0 < change["tip"]["identify"] < 0.05
 
 
 def test_trials_that_a_model_does_not_survive_are_counted():
