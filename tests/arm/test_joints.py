@@ -46,15 +46,21 @@ def test_a_held_joint_relaxes_as_a_standard_linear_solid():
 
 
 def test_a_loaded_joint_creeps_as_a_standard_linear_solid():
-    model, torque = one_joint(Joints([Branch(SHARE, TIME)]), inertia=1e-5, damping=2e-4 * STIFFNESS), 0.1
+    """From 20 ms on. The solid has no inertia; the hinge has some, and swings at first about where it belongs. That
+    dies away with 2 I / D = 2 ms, so after 10 of these to e^-10. A stronger damper would end it sooner, and hold the
+    creep back by about D / K, 0.1 % of the relaxation time."""
+    inertia, damping, step, torque = 1e-6, 1e-3, 2e-4, 0.1
+    model = one_joint(Joints([Branch(SHARE, TIME)]), inertia, damping)
+    model.opt.timestep = step
     data, found = mujoco.MjData(model), []
     data.qfrc_applied[0] = torque
-    for _ in range(2000):
+    for _ in range(round(2 / step)):
         mujoco.mj_step(model, data)
         found.append(data.qpos[0])
-    time = np.arange(1, 2001) * 1e-3
+    time = step * np.arange(1, len(found) + 1)
     expected = torque / STIFFNESS * (1 - SHARE / (1 + SHARE) * np.exp(-time / TIME / (1 + SHARE)))
-    assert np.abs(np.array(found)[500:] / expected[500:] - 1).max() < 1e-3
+    settled = time >= 10 * 2 * inertia / damping
+    assert np.abs(np.array(found) / expected - 1)[settled].max() < 1e-3
 
 
 def test_two_branches_relax_as_the_sum_of_their_terms():
