@@ -18,8 +18,7 @@ model, network = sys.argv[1:]
 chain = read_chain(mujoco.MjModel.from_xml_path(model)).smooth  # the network's arm, its tendons without friction
 tilt = np.array([0.3])  # rad, between the straight arm and gravity
 gravity = gravity_in_base(tilt)
-tensions = np.zeros((1, chain.tendons))
-tensions[0, 0] = 5.0  # N, on the first tendon alone
+tensions = 5.0 * np.eye(1, chain.tendons)  # N, on the first tendon alone
 rest = equilibrium(chain, tensions, gravity)
 pose = np.concatenate([tilt[:, None], rest.position, rest.quaternion], axis=1)  # (1, 8), base frame, w first
 commands = ask(onnxruntime.InferenceSession(network), pose)["commands"]  # a pose that is none is an InputError

@@ -81,6 +81,11 @@ def test_the_example_runs_outside_of_a_checkout(python, tmp_path):
     assert 0 < float(missed[0]) < 1e3 * chain.length
 
 
+def test_the_example_is_twenty_lines():
+    _, _, code = (ROOT / "examples" / "library.py").read_text().split('"""')
+    assert len([line for line in code.splitlines() if line.strip()]) <= 20
+
+
 def test_its_version_is_the_one_written_once(python, tmp_path):
     code = "from importlib.metadata import version as v; from trunkline import version as own; import trunkline as t; "
     done = run(tmp_path, python, "-c", code + "print(own.__version__, v('trunkline'), t.__file__)")

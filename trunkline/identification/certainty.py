@@ -84,7 +84,8 @@ def bootstrap(linear: Linearisation, seed: int, moves: Moves | None = None) -> n
 
     It cross-checks `certainty`: it takes no symmetry for granted, and no formula for what a trial's weight does.
     scipy's `bootstrap` (BCa) draws whole trials; with a handful of them it holds the truth too seldom
-    (`python -m studies.intervals`).
+    (`python -m studies.intervals`). What the fits to so many weights cost with `Surrogate.moves`, and would by scipy:
+    `python -m benchmarks.surrogate`.
     Draws scatter too little, by √((T - 1)/(T + 1)), and their percentiles know of no degrees of freedom. So these are
     taken further out, as Hesterberg (2015, expanded percentiles) does, where a mean of T numbers would get Student's
     interval: Φ(-√((T + 1)/(T - 1)) t). Below five trials that is further out than any draw, and too narrow.

@@ -64,8 +64,8 @@ class Surrogate:
     def minima(self, weights: np.ndarray) -> np.ndarray:
         """Where the loss is least. Damped Newton steps from d = 0, for all weights (B, T) at once. Shape (B, P).
 
-        A bootstrap asks for thousands of these small fits: scipy's trust-exact, one by one, takes far longer to the
-        same answers (`python -m benchmarks.surrogate`).
+        A bootstrap asks for thousands of these small fits: scipy's trust-exact takes them one by one, to the same
+        answers. How many times as long: `python -m benchmarks.surrogate`.
         """
         grams = np.einsum("bt,tfg->bfg", weights, self.grams)
         squares = np.diag(self.grams.sum(axis=0))[1 : self.count + 1]

@@ -15,11 +15,14 @@ from dvc.repo import Repo
 
 from trunkline.errors import in_one_line
 from trunkline.identification.error_tables import LABELS
+from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.baseline import baseline_file, read_baseline
 from trunkline.pipeline.checkout import require_checkout
+from trunkline.pipeline.config import load_config
 from trunkline.pipeline.limits import Limit, lookup, metrics_folder, read_limits
 from trunkline.pipeline.results import block
-from trunkline.pipeline.truth_table import KINDS, error_table, truth_table
+from trunkline.pipeline.truth_table import KINDS, STAGES, error_table, truth_table
 from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.splits import DECIDING, TEST
 
@@ -135,6 +138,17 @@ def identification_table(root: Path) -> str:
             cells.append(f"{_number(millimetres)} mm ({_number(share)} %)")
         cells += [_pair(metrics, f"{model}.{split}.", share=True) for split in DECIDING]
         lines.append(f"| {words} | {' | '.join(cells)} | {PAPER.get(model, '')} |")
+    return "\n".join(lines)
+
+
+def parameter_table(root: Path) -> str:
+    """What each stage of identification identifies, and from what, by the settings."""
+    lines = ["| stage | experiments | parameters |", "|---|---|---|"]
+    for stage in STAGES:
+        config = load_config(IdentificationSettings, stage, root)
+        kinds = ", ".join(EXPERIMENTS[kind].plural for kind in config.experiments)
+        names = [name for name in PARAMETERS if name in config.parameters]
+        lines.append(f"| `{stage}` | {kinds} | {', '.join(f'`{name}`' for name in names)} |")
     return "\n".join(lines)
 
 
@@ -261,6 +275,7 @@ def generate(root: Path) -> dict[Path, str]:
         names = re.findall(r"^<!-- (results/\w+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
         if names:
             blocks[page] = {name: block(root / "docs" / f"{name}.json") for name in names}
+    blocks.setdefault(root / "docs" / "identification.md", {})["parameters"] = parameter_table(root)
     truth = {"truth": truth_table(root), "errors": error_table(root)}
     blocks.setdefault(root / "docs" / "results" / "intervals.md", {}).update(truth)
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}

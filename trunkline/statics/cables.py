@@ -36,8 +36,8 @@ def _cable_columns(pull, hessian, work):
 def solve_small(matrix, x):
     """Solve matrix x' = x in place by elimination with pivoting; `matrix` is overwritten.
 
-    5.5 times as fast as np.linalg.solve at 3 unknowns (python -m benchmarks.small_linear_algebra), which also would end
-    a whole batch with an error where one matrix is singular.
+    For its speed at 3 unknowns (`python -m benchmarks.small_linear_algebra`); and np.linalg.solve would end a whole
+    batch with an error where one matrix is singular.
     """
     n = x.shape[0]
     for k in range(n):

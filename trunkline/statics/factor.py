@@ -6,8 +6,8 @@ products. So above its 2 x 2 blocks the Hessian is the upper part of a matrix of
     H_jk = left_j · right_k,   U_jk = row_j · right_k   for k in a unit after that of j,
 
 with row from left by the same steps as in a dense factor (Vandebril, Van Barel, Mastronardi 2008, "Matrix
-Computations and Semiseparable Matrices", chapter 4). At 48 unknowns 8.8 times as fast as np.linalg.cholesky and
-np.linalg.solve in the same compiler (`python -m benchmarks.small_linear_algebra`).
+Computations and Semiseparable Matrices", chapter 4). How many times as fast it is as np.linalg.cholesky and
+np.linalg.solve in the same compiler: `python -m benchmarks.small_linear_algebra`.
 """
 
 from typing import NamedTuple

@@ -1,7 +1,7 @@
 """Vectors in space as tuples of three numbers, matrices as tuples of three rows: both stay in registers.
 
-Numba's np.cross and @ make an array for each result: 41 and 89 times as slow
-(`python -m benchmarks.small_linear_algebra`).
+Numba's np.cross and @ make an array for each result. How many times as slow that is:
+`python -m benchmarks.small_linear_algebra`.
 """
 
 import numpy as np
