@@ -2,11 +2,12 @@
 
     python -m studies.effects [--folds N] [--only NAME ...]
 
-Needs the filtered trials of a session. The simplest model has springs and dampers alone. Effects are tried one after
-the other, each in the stage that identifies it: the stage is fitted with and without it, trials of the split identify
-are left out in turn, and the effect is kept if it lowers the position error of the trials left out by more than the
-standard error of that difference over trials. `test` is never read. Then the simplest model and the chosen one are
-identified by all stages and scored on `validate`, beside the null models. Progress goes to stderr.
+Needs the filtered trials of a session. The simplest model has springs, dampers and prompt motors alone. Effects are
+tried one after the other, each in the stage that identifies it: the stage is fitted with and without it, trials of the
+split identify are left out in turn, and the effect is kept if it lowers the position error of the trials left out by
+more than the standard error of that difference over trials. `test` is never read. Then the simplest model and the
+chosen one are identified by all stages and scored on `validate`, beside a null model, the model without data and the
+noise floor. Progress goes to stderr.
 """
 
 import argparse
@@ -28,20 +29,22 @@ from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.errors import in_one_line
 from trunkline.identification.cross_validation import errors_left_out
 from trunkline.identification.evaluation import Prediction, replay
-from trunkline.identification.null_model import hanging_still
+from trunkline.identification.experiment import own_starts
+from trunkline.identification.null_model import hanging_still, noise_floor
 from trunkline.identification.problem import Bounds
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import read_reported
 from trunkline.pipeline.results import recorded
 from trunkline.trials.splits import VALIDATE
+from trunkline.trials.trial import Trial
 
 
 @dataclass(frozen=True)
 class Effect:
     """A term of the model, the stage that identifies it, and its parameters with their ranges.
 
-    joints, holes: what it adds to them. dead_time: guess of the motors', s.
+    joints, holes: what it adds to them. dead_time, lag: guesses of the motors', s.
     """
 
     title: str
@@ -50,6 +53,7 @@ class Effect:
     joints: Joints = field(default_factory=Joints)
     dead_time: float = 0.0
     holes: Holes = field(default_factory=Holes)
+    lag: float = 0.0
 
 
 def ranges(low: float, high: float, *names: str) -> dict[str, Bounds]:
@@ -86,7 +90,9 @@ EFFECTS: dict[str, Effect] = {
         "capstan friction", "identify_control", ranges(0.005, 2.0, "capstan_friction"), holes=Holes(0.2, 8)
     ),
     "dead_time": Effect("dead time", "identify_control", ranges(0.001, 0.2, "dead_time"), dead_time=0.02),
+    "lag": Effect("lag of the motors", "identify_control", ranges(0.002, 0.3, "time_constant"), lag=0.02),
 }  # fmt: skip
+NO_LAG = 1e-6  # s; MuJoCo's filter wants some
 OPTIONAL = {name for effect in EFFECTS.values() for name in effect.parameters}
 
 
@@ -100,6 +106,7 @@ def cad_model(effects: list[Effect]) -> mujoco.MjModel:
     )
     config.holes = next((effect.holes for effect in effects if effect.holes.stretches), Holes())
     config.actuation.dead_time = max((effect.dead_time for effect in effects), default=0.0)
+    config.actuation.time_constant = max((effect.lag for effect in effects), default=0.0) or NO_LAG
     model = cad_arm(config).spec.compile()
     if not any("tendon_friction" in effect.parameters for effect in effects):
         model.tendon_frictionloss[:] = 0
@@ -129,7 +136,8 @@ def chain(effects: list[Effect], last: str, known: dict[str, Chain]) -> Chain:
     found, key = Chain(cad_model(effects), [], None, []), ""
     for stage in STAGES:
         config = settings_of(stage, effects)
-        key += f"{stage} {config} {found.model.nq} {found.model.ntendon} {found.model.nhistory}\n"
+        lag = found.model.actuator_dynprm[:1, 0]
+        key += f"{stage} {config} {found.model.nq} {found.model.ntendon} {found.model.nhistory} {lag}\n"
         if key not in known:
             with contextlib.redirect_stdout(sys.stderr):
                 known[key] = next_link(found, stage, config, read_reported(config), is_quick=False)
@@ -139,15 +147,25 @@ def chain(effects: list[Effect], last: str, known: dict[str, Chain]) -> Chain:
     return found
 
 
-def validated(title: str, link: Chain) -> list[str]:
-    """Rows of the last table: errors on `validate` by kind."""
-    unseen = [e for e in link.experiments if e.split == VALIDATE]
-    replayed = replay(link.model, unseen, link.fit.segments)
-    still = Prediction(hanging_still(unseen, replayed, link.experiments), unseen).scores()[VALIDATE]["by_experiment"]
+def validated(title: str, link: Chain, trials: list[Trial], cad: mujoco.MjModel) -> list[str]:
+    """Rows of the last table: errors on `validate` by kind, beside those of what knows less, and the noise floor.
+
+    Args:
+        trials: those of the link's experiments, in the same order. cad: the model without data.
+    """
+    pairs = [(trial, e) for trial, e in zip(trials, link.experiments, strict=True) if e.split == VALIDATE]
+    seen, unseen = [trial for trial, _ in pairs], [e for _, e in pairs]
+    replayed, own = replay(link.model, unseen, link.fit.segments), own_starts(unseen, seen, link.model, cad)
+    beside = (
+        Prediction(hanging_still(unseen, replayed, link.experiments), unseen),
+        Prediction(replay(cad, own, link.fit.segments), own),
+        noise_floor(seen, unseen, link.model, replayed),
+    )
+    others = [prediction.scores()[VALIDATE]["by_experiment"] for prediction in beside]
     rows = []
     for kind, row in Prediction(replayed, unseen).scores()[VALIDATE]["by_experiment"].items():
         errors = [f"{row[f'{name}_mm']:.2f}" for name in ("e_internal", "e_position", "e_tip")]
-        errors += [f"{row['e_tip_pct']:.2f}", f"{still[kind]['e_tip_mm']:.1f}"]
+        errors += [f"{row['e_tip_pct']:.2f}", *(f"{other[kind]['e_tip_mm']:.2f}" for other in others)]
         rows.append(f"| {title} | {kind} | {' | '.join(errors)} |")
     return rows
 
@@ -176,12 +194,15 @@ def main() -> int:
             means = f"{errors[0].mean():.3f} | {errors[1].mean():.3f} | {gain.mean():.3f} ± {standard_error:.3f}"
             seconds = time.perf_counter() - begun
             print(f"| {effect.title} | {means} | {'yes' if pays else 'no'} | {seconds:.0f} |", flush=True)
-        print("\nErrors on `validate`, the tip's also in % of length; null: the mean shape at rest.\n")
-        print("| model | experiment | E_internal (mm) | position (mm) | tip (mm) | tip (%) | null, tip (mm) |")
-        print("|---|---|---:|---:|---:|---:|---:|", flush=True)
+        words = "the tip's also in % of length; null: the mean shape at rest; CAD: the model without data"
+        print(f"\nErrors on `validate`, {words}.\n")
+        errors = "E_internal (mm) | position (mm) | tip (mm) | tip (%)"
+        print(f"| model | experiment | {errors} | null, tip (mm) | CAD, tip (mm) | noise floor, tip (mm) |")
+        print("|---|---|---:|---:|---:|---:|---:|---:|---:|", flush=True)
         for title, effects in (("simplest", []), ("chosen", kept)):
             for stage in STAGES:
-                print("\n".join(validated(f"{title}, {stage}", chain(effects, stage, known))), flush=True)
+                link, trials = chain(effects, stage, known), read_reported(settings_of(stage, effects))
+                print("\n".join(validated(f"{title}, {stage}", link, trials, cad_model(effects))), flush=True)
     return 0
 
 

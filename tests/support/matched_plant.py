@@ -63,6 +63,9 @@ def _trial(model, name, experiment, split, level, gravity, frames, start, pulls,
     data = mujoco.MjData(model)
     lengths = model.tendon_length0[cables(model)] - pulls
     data.qpos[: len(start)], data.act[:] = start, lengths[0]
+    for motor in np.flatnonzero(model.actuator_history[:, 0]):
+        sent = np.full((model.actuator_history[motor, 0], 1), lengths[0, motor])
+        mujoco.mj_initCtrlHistory(model, data, motor, None, sent)
     give_way(model, data.qpos)  # held for long before
     for slider in all_elements(model, SLIDER):  # slipped on the way from the straight arm
         bend, give = data.qpos[slider.hinge], model.tendon_springyield[slider.tendon]

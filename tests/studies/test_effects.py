@@ -1,0 +1,40 @@
+"""The study of effects: what a model without an effect has, and what the errors of the chosen one stand beside."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from studies.choices import Chain
+from studies.effects import EFFECTS, NO_LAG, cad_model, settings_of, validated
+from tests.support.matched_plant import curl, segments_of, small_model
+from trunkline.identification.experiment import prepare
+
+
+def test_the_lag_of_the_motors_is_tried_after_their_dead_time():
+    names = list(EFFECTS)
+    assert names.index("lag") == names.index("dead_time") + 1
+    assert EFFECTS["lag"].stage == "identify_control"
+    assert "time_constant" not in settings_of("identify_control", []).parameters
+    assert "time_constant" in settings_of("identify_control", [EFFECTS["lag"]]).parameters
+
+
+@pytest.mark.parametrize(("names", "lag"), [([], NO_LAG), (["dead_time"], NO_LAG), (["dead_time", "lag"], 0.02)])
+def test_without_the_effect_motors_follow_at_once(names, lag):
+    model = cad_model([EFFECTS[name] for name in names])
+    assert (model.actuator_dynprm[:, 0] == lag).all()
+    assert bool(model.nhistory) == ("dead_time" in names)
+
+
+def test_errors_stand_beside_null_model_cad_model_and_noise_floor():
+    plant, model, cad = small_model(4), small_model(4), small_model(4)
+    model.jnt_stiffness[:] *= 1.1
+    cad.jnt_stiffness[:] *= 3
+    trials = [curl(plant, 20, split, frames=60, noise=1e-4) for split in ("identify", "validate")]
+    experiments = [prepare(trial, model, 60) for trial in trials]
+    link = Chain(model, experiments, SimpleNamespace(segments=segments_of(model)), [])
+    (row,) = validated("this", link, trials, cad)
+    title, kind, _, position, tip, percent, null, guess, floor = row.strip("| ").split(" | ")
+    assert (title, kind) == ("this", "curl")
+    assert 0 < float(floor) < float(tip) < float(guess)
+    assert 0 < float(position) < float(tip) < float(null)
+    assert float(percent) == pytest.approx(float(tip) / 5.07, abs=0.01)  # of 507 mm
