@@ -29,8 +29,8 @@ class Chain(NamedTuple):
         mass: kg. Shape (n,).
         center: centre of mass from the unit's joint, m. Shape (n, 3).
         stiffness: a, b, c of the elastic torque -(a x + b x² + c x³), x the angle from `rest`. Shape (n, 2, 3).
-        diagonal: c of the torque -c x³ on the sum of both angles from `rest`, and on their difference, of joints that
-            are round. Shape (n, 2).
+        diagonal, slack: c and l of the torque -c (x - l)³ on the sum x of both angles, and on their difference, of
+            joints that are round. Shape (n, 2).
         rest: spring references, rad. Shape (n, 2).
         limit: lower and upper angle at which a limit starts to push, rad (infinite if none). Shape (n, 2, 2).
         limit_gain: k / dof_invweight0, N m/rad: see `limits.limit_torque`. Shape (n, 2).
@@ -54,6 +54,7 @@ class Chain(NamedTuple):
     center: np.ndarray
     stiffness: np.ndarray
     diagonal: np.ndarray
+    slack: np.ndarray
     rest: np.ndarray
     limit: np.ndarray
     limit_gain: np.ndarray
@@ -121,6 +122,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
     gains, impedances = limit_gains(model, joints), limit_impedances(model, joints)
     order = actuators(model)
     tip, tip_quaternion = _tip(model, data, tip_site, units, base, to_base)
+    diagonal, slack = _diagonals(model, joints)
     return Chain(
         offset=np.diff(anchors, axis=0, prepend=0.0),
         axes=data.xaxis[joints] @ to_base.T,
@@ -128,7 +130,8 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         mass=mass,
         center=(center - data.xpos[base]) @ to_base.T - anchors,
         stiffness=np.concatenate([model.jnt_stiffness[joints][..., None], model.jnt_stiffnesspoly[joints]], axis=2),
-        diagonal=_diagonals(model, joints),
+        diagonal=diagonal,
+        slack=slack,
         rest=model.qpos_spring[joints],
         limit=limit_angles(model, joints),
         limit_gain=gains,
@@ -157,12 +160,14 @@ def _unit_inertials(model: mujoco.MjModel, data: mujoco.MjData, units: np.ndarra
     return mass, center
 
 
-def _diagonals(model: mujoco.MjModel, joints: np.ndarray) -> np.ndarray:
-    """Of units with the hinges `joints` (n, 2), see `Chain`."""
-    found = np.zeros(joints.shape)
+def _diagonals(model: mujoco.MjModel, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`diagonal` and `slack` of units with the hinges `joints` (n, 2), see `Chain`."""
+    stiffness, slack = np.zeros(joints.shape), np.zeros(joints.shape)
     for column, one in enumerate(all_elements(model, DIAGONAL)):
-        found[np.searchsorted(joints[:, 0], one.hinge), column] = model.tendon_stiffnesspoly[one.tendon, 1]
-    return found
+        units = np.searchsorted(joints[:, 0], one.hinge)
+        stiffness[units, column] = model.tendon_stiffnesspoly[one.tendon, 1]
+        slack[units, column] = model.tendon_lengthspring[one.tendon, 0]
+    return stiffness, slack
 
 
 def _max_tensions(model: mujoco.MjModel, order: np.ndarray) -> np.ndarray:

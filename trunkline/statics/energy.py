@@ -97,10 +97,9 @@ def evaluate(chain, q, gravity, pull, state):
 @kernel
 def _add_diagonals(chain, q, state):
     """Add the torques of round joints' diagonals to the gradient, and how they change; return their energy, J."""
-    energy, diagonal, rest, gradient = 0.0, chain.diagonal, chain.rest, state.gradient
+    energy, diagonal, slack, gradient = 0.0, chain.diagonal, chain.slack, state.gradient
     for i in range(diagonal.shape[0]):
-        x, y = q[2 * i] - rest[i, 0], q[2 * i + 1] - rest[i, 1]
-        both, apart = x + y, x - y
+        both, apart = q[2 * i] + q[2 * i + 1] - slack[i, 0], q[2 * i] - q[2 * i + 1] - slack[i, 1]
         one, other = diagonal[i, 0] * both * both, diagonal[i, 1] * apart * apart
         energy += 0.25 * (one * both * both + other * apart * apart)
         gradient[2 * i] += one * both + other * apart
