@@ -101,7 +101,7 @@ def test_scores_are_told_by_kind_and_together(tmp_path):
     (tmp_path / "artifacts/score").mkdir(parents=True)
     (tmp_path / "artifacts/score/metrics.json").write_text(json.dumps({"identify_control": {"identified": table}}))
     rows = [line.split(" | ")[0] for line in score_table(tmp_path).splitlines()[2:]]
-    assert rows == ["| curls", "| motions", "| releases, curls and motions, `identify_control`"]
+    assert rows == ["| goal", "| curls", "| motions", "| releases, curls and motions, `identify_control`"]
 
 
 def test_errors_of_starts_and_of_the_clock_are_against_the_truth(judged):
@@ -118,9 +118,9 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
     assert found == {
         "stiffness": False,
         "hardening": True,
-        "joint_place": True,
+        "joint_place": False,
         "mount_tilt_x": True,
-        "mount_tilt_y": False,
+        "mount_tilt_y": True,
         "rest_bend_x": False,
         "rest_bend_y": False,
         "damping": False,
@@ -129,9 +129,9 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "kp": True,
         "kv": False,
         "time_constant": True,
-        "dead_time": False,
+        "dead_time": True,
         "force_range": False,
-        "capstan_friction": False,
+        "capstan_friction": True,
     }
 
 
