@@ -34,6 +34,7 @@ MAY_NAME = {
     "stages/score.py": {"TEST"},  # reads it
     "trunkline/evaluate/session.py": {"SPLITS"},  # the whole of any session, for a user who asks for it
     "trunkline/identification/evaluation.py": {"SPLITS"},  # sorts what it is given
+    "trunkline/takes/gathering.py": {"SPLITS", "TEST"},  # says which of them a session lacks
     "trunkline/identification/scoring.py": {"TEST"},  # what the stage `score` calls
     "trunkline/pipeline/readme.py": {"TEST"},  # shows it
     "trunkline/pipeline/truth_table.py": {"TEST"},  # shows it
