@@ -5,6 +5,8 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
+import mujoco
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -12,7 +14,9 @@ from tests.identification.test_stage import settings
 from tests.support.matched_plant import curl, release, small_model, tilt
 from tests.support.small_arm import small_spec
 from tests.support.workbench import workbench
+from trunkline.errors import InputError
 from trunkline.evaluate.__main__ import main
+from trunkline.evaluate.model import read_arm
 from trunkline.evaluate.session import trials_of
 from trunkline.identification.saving import save_model
 from trunkline.pipeline.identify import run
@@ -185,6 +189,19 @@ def test_a_mistake_is_one_line_and_nothing_is_written(lab, capsys, words, messag
     assert message in error
     assert error.strip().count("\n") == 0
     assert not (root / "evaluation").exists()
+
+
+def test_a_mount_may_be_tilted_as_it_is_identified_but_not_be_another_frame(lab, tmp_path):
+    _, right, _ = lab
+    for degrees, message in ((5, None), (90, "turned by 90.0°, expected it in the world's origin")):
+        spec = mujoco.MjSpec.from_file(str(right))
+        spec.body("base").quat = [np.cos(np.radians(degrees) / 2), np.sin(np.radians(degrees) / 2), 0, 0]
+        (tmp_path / "arm.xml").write_text(spec.to_xml())
+        if message is None:
+            assert read_arm(tmp_path / "arm.xml").nq
+        else:
+            with pytest.raises(InputError, match=message):
+                read_arm(tmp_path / "arm.xml")
 
 
 @pytest.mark.usefixtures("figures_not_laid_out")
