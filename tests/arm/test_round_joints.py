@@ -63,6 +63,7 @@ def test_hardening_is_read_as_it_was_written_and_scales_with_stiffness(model):
 def test_the_file_has_them(model):
     spec = small_spec(UNITS)
     add_elements(spec, Joints(round=True), 1e-5)
+    spec = mujoco.MjSpec.from_string(spec.to_xml())  # as a later stage reads it, with all lengths typed out
     saved = mujoco.MjModel.from_xml_string(save_model(spec, model))
     np.testing.assert_allclose(torques(saved, [0.2, 0.1]), torques(model, [0.2, 0.1]), rtol=1e-5)
     tendons, _ = diagonal_lengths(model, model.qpos_spring)

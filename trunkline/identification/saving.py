@@ -5,7 +5,8 @@ import numpy as np
 
 from trunkline.identification.parameters import PARAMETERS, PER_JOINT
 
-STRUCTURE = ("qpos_spring", "site_pos")  # shape at rest and markers, which are measured rather than searched for
+# shape at rest, where diagonals are slack in it, and markers: measured rather than searched for
+STRUCTURE = ("qpos_spring", "tendon_lengthspring", "site_pos")
 
 # prefix of an MjModel field → what it belongs to in MJCF, and the field's row for the element of that number
 ELEMENTS = {
@@ -34,6 +35,7 @@ PLACES = {
     "tendon_stiffness": ("stiffness", 0),
     "tendon_stiffnesspoly": ("stiffness", slice(1, None)),
     "tendon_damping": ("damping", 0),
+    "tendon_lengthspring": ("springlength", slice(None)),
     "tendon_solref_fri": ("solref_friction", slice(None)),
     "tendon_solimp_fri": ("solimp_friction", slice(None)),
 }
