@@ -12,8 +12,10 @@ trials and models of the session.
 
 import argparse
 import sys
+from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import product
+from functools import cache
+from itertools import combinations_with_replacement, product
 from pathlib import Path
 
 import numpy as np
@@ -38,6 +40,8 @@ RANKS = (4, 6, 8, 12, 20)
 CUBIC_RANKS = (2, 4, 6, 8)  # a cubic of more coordinates has more terms than there are frames
 RIDGE = (1e-8, 1e-4, 1e-2, 1.0)  # of a term's sum of squares
 BESIDE_CUBES = 1e-6  # at most, of linear terms beside others
+
+Size = tuple[int, int, float]  # delays, coordinates, ridge
 
 
 @dataclass
@@ -66,12 +70,20 @@ class Learnt:
         return np.array(found)
 
 
-def learn(shapes: list[np.ndarray], rest: np.ndarray, delays: int, rank: int, cubic: bool, ridge: float) -> Learnt:
-    """From trials of shapes (T, 3S), m, around the shape `rest` (3S,)."""
-    rows = [windows(trial - rest, delays) for trial in shapes]
-    basis = np.linalg.svd(np.concatenate(rows), full_matrices=False)[2][:rank].T
-    scale = np.linalg.norm(np.concatenate(rows) @ basis, axis=0) / np.sqrt(sum(len(row) for row in rows))
-    z = [row @ basis / scale for row in rows]
+def coordinates(shapes: list[np.ndarray], rest: np.ndarray, delays: int) -> np.ndarray:
+    """Principal directions of `delays` shapes in a row, less `rest` (3S,), m, the leading ones. Shape (D * 3S, r)."""
+    rows = np.concatenate([windows(trial - rest, delays) for trial in shapes])
+    return np.linalg.eigh(rows.T @ rows)[1][:, : -max(RANKS) - 1 : -1]
+
+
+def learn(
+    shapes: list[np.ndarray], rest: np.ndarray, basis: np.ndarray, delays: int, cubic: bool, ridge: float
+) -> Learnt:
+    """From trials of shapes (T, 3S), m, around the shape `rest` (3S,), in coordinates `basis` (D * 3S, r)."""
+    rank = basis.shape[1]
+    z = [windows(trial - rest, delays) @ basis for trial in shapes]
+    scale = np.sqrt(np.mean(np.square(np.concatenate(z)), axis=0))
+    z = [one / scale for one in z]
     before = terms(np.concatenate([one[:-1] for one in z]), cubic)
     after = np.concatenate([one[1:] for one in z])
     normal = before.T @ before
@@ -91,12 +103,15 @@ def terms(z: np.ndarray, cubic: bool) -> np.ndarray:
     """z itself, or all its monomials of degree 1 to 3. Shape (n, terms)."""
     if not cubic:
         return z
-    r = z.shape[1]
-    pairs = [(i, j) for i in range(r) for j in range(i, r)]
-    triples = [(i, j, k) for i, j in pairs for k in range(j, r)]
-    second = np.stack([z[:, i] * z[:, j] for i, j in pairs], axis=1)
-    third = np.stack([z[:, i] * z[:, j] * z[:, k] for i, j, k in triples], axis=1)
-    return np.concatenate([z, second, third], axis=1)
+    second, third = monomials(z.shape[1])
+    return np.concatenate([z, z[:, second].prod(axis=2), z[:, third].prod(axis=2)], axis=1)
+
+
+@cache
+def monomials(rank: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which coordinates the products of two and of three take. Shapes (n, 2), (m, 3)."""
+    every = range(rank)
+    return tuple(np.array(list(combinations_with_replacement(every, degree))) for degree in (2, 3))
 
 
 def shapes_of(experiment: Experiment, stride: int) -> np.ndarray:
@@ -121,24 +136,27 @@ def errors(found: np.ndarray, experiment: Experiment, stride: int, length: float
 
 def chosen(
     own: list[Experiment], stride: int, delays: tuple[int, ...], cubic: bool, length: float, tip: int
-) -> tuple[tuple, Learnt]:
+) -> tuple[Size, Learnt]:
     """The size whose models err least on the release that each did not see, and the model of all of them."""
     shapes = [shapes_of(e, stride) for e in own]
     ends = np.array([trial[-1] for trial in shapes])
 
-    def left_out(size: tuple) -> float:
-        missed = []
-        for i, experiment in enumerate(own):
-            others = [trial for j, trial in enumerate(shapes) if j != i]
-            model = learn(others, np.delete(ends, i, axis=0).mean(axis=0), *size)
-            found = model.predict(shapes[i][: size[0]], len(shapes[i]))
-            missed.append(errors(found, experiment, stride, length, tip)[0])
-        return float(np.mean(missed))
+    def learnt(trials: list[np.ndarray], rest: np.ndarray) -> Iterator[tuple[Size, Learnt]]:
+        for count in delays:
+            basis = coordinates(trials, rest, count)
+            for rank, ridge in product(ranks, RIDGE):
+                if rank <= basis.shape[1]:
+                    yield (count, rank, ridge), learn(trials, rest, basis[:, :rank], count, cubic, ridge)
 
     ranks = CUBIC_RANKS if cubic else RANKS
-    sizes = [(d, r, cubic, ridge) for d, r, ridge in product(delays, ranks, RIDGE) if r <= d * shapes[0].shape[1]]
-    best = min(sizes, key=left_out)
-    return best, learn(shapes, ends.mean(axis=0), *best)
+    missed: dict[Size, list[float]] = {}
+    for i, experiment in enumerate(own):
+        others = [trial for j, trial in enumerate(shapes) if j != i]
+        for size, model in learnt(others, np.delete(ends, i, axis=0).mean(axis=0)):
+            found = model.predict(shapes[i][: size[0]], len(shapes[i]))
+            missed.setdefault(size, []).append(errors(found, experiment, stride, length, tip)[0])
+    best = min(missed, key=lambda size: np.mean(missed[size]))
+    return best, dict(learnt(shapes, ends.mean(axis=0)))[best]
 
 
 def rows(session: str) -> list[str]:

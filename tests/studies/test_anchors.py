@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from studies.anchors import learn, terms
+from studies.anchors import coordinates, learn, terms
 
 STEP, FRAMES = 1 / 30, 90
 
@@ -22,18 +22,23 @@ def swings(hardening):
     return found
 
 
+def predicted(shown, unseen, cubic):
+    rest = np.array([0.0, 1.0])
+    model = learn(shown, rest, coordinates(shown, rest, 2)[:, :2], 2, cubic, 1e-8)
+    return model.predict(unseen[:2], FRAMES)
+
+
 @pytest.mark.parametrize(("hardening", "cubic"), [(0.0, False), (0.0, True), (0.5, True)])
 def test_an_oscillator_is_predicted(hardening, cubic):
     *seen, unseen = swings(hardening)
-    model = learn([*seen[:2], unseen], np.array([0.0, 1.0]), 2, 2, cubic, 1e-8)
-    found = model.predict(seen[2][:2], FRAMES)
+    found = predicted([*seen[:2], unseen], seen[2], cubic)
     assert np.abs(found - seen[2]).max() < 0.02
 
 
 def test_a_linear_model_does_not_predict_one_that_hardens():
     *seen, unseen = swings(0.5)
-    model = learn([*seen[:2], unseen], np.array([0.0, 1.0]), 2, 2, False, 1e-8)
-    assert np.abs(model.predict(seen[2][:2], FRAMES) - seen[2]).max() > 0.1
+    found = predicted([*seen[:2], unseen], seen[2], cubic=False)
+    assert np.abs(found - seen[2]).max() > 0.1
 
 
 def test_terms_of_a_cubic():
