@@ -22,6 +22,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from benchmarks.identification.case import STAGES, require_demo, spread
+from stages import filter
 from trunkline.elements import give_way
 from trunkline.errors import in_one_line
 from trunkline.filtering.filter import start_of
@@ -43,13 +44,13 @@ from trunkline.trials.splits import IDENTIFY, VALIDATE
 from trunkline.trials.trial import Trial
 
 SESSIONS = 20
-TRIALS, FRAMES = {"identify_stiffness": 8, "identify_damping": 6}, 120  # of a session, of a trial
+TRIALS, FRAMES = {"identify_stiffness": 20, "identify_damping": 6}, 120  # of a session, of a trial
 OPTIMIZER = LeastSquares(starts=5, descents=1, iterations=6, tolerance=1e-2)
 PLANT = Path("artifacts/identify_control/arm.xml")
 EARLY = 0.08, 0.2  # s
 TURNED = np.radians([15, 30])
 SWUNG, SWING_FREQUENCY = (0.05, 0.15), (0.5, 1.5)  # m/s of the tip, Hz
-NOISE, CUTOFF = 3e-4, 20.0  # m, white, per axis, and Hz of the low-pass
+NOISE = 3e-4  # m, white, per axis
 WITHIN = 1.1  # times the clean session's error
 NEVER = 1e9  # times the usual loss, from which on a trial counts less
 
@@ -85,6 +86,7 @@ def swung(trial: Trial, rng: np.random.Generator) -> Trial:
     mujoco.mj_forward(model, data)
     mujoco.mj_jacSite(model, data, jacobian, None, sites[-1])
     along *= speed / np.linalg.norm(jacobian[:, :arm] @ along)
+    settings = load_config(filter.Config, "filter")
     released = int(np.ceil(trial.start / step))
     positions, quaternions = np.empty(trial.positions.shape), np.empty(trial.quaternions.shape)
     for frame, time in enumerate(trial.time):
@@ -101,10 +103,10 @@ def swung(trial: Trial, rng: np.random.Generator) -> Trial:
         for index, site in enumerate(sites):
             mujoco.mju_mat2Quat(quaternions[frame, index], data.site_xmat[site])
     positions += rng.normal(scale=NOISE, size=positions.shape)
-    flat = low_pass(positions.reshape(len(positions), -1), 1 / step, CUTOFF, 4)
+    flat = low_pass(positions.reshape(len(positions), -1), 1 / step, settings.cutoff, settings.order)
     quaternions = np.stack([make_continuous(column) for column in quaternions.transpose(1, 0, 2)], axis=1)
     found = replace(trial, positions=flat.reshape(positions.shape), quaternions=quaternions)
-    return replace(found, **start_of(found, EXPERIMENTS["release"], CUTOFF, "onset"))
+    return replace(found, **start_of(found, EXPERIMENTS["release"], settings))
 
 
 @dataclass
