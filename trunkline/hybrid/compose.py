@@ -13,8 +13,6 @@ The turn of the arm's body `base` in its file is that of the tracked marker agai
 """
 
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import mujoco
@@ -28,6 +26,9 @@ from trunkline.hybrid.robots import Robot
 from trunkline.hybrid.touch import add_touch
 from trunkline.hybrid.worlds import World
 from trunkline.panda.shipped import JOINTS
+
+# It comes as often as such a spec is compiled or saved; nothing else in the parts is called as anything in the arm.
+warnings.filterwarnings("ignore", message="Attaching a spec with an empty prefix", category=UserWarning)
 
 ARM_MATERIAL = "plastic"  # what the arm's own friction is for: contacts with floor, tables and itself
 
@@ -72,8 +73,12 @@ def compose(
     arm.body("base").quat = [1, 0, 0, 0]
     if touch:
         add_touch(arm, coefficients(ARM_MATERIAL), SOLREF)
-    with _without_warnings():
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(lambda message: None)  # else it says so in MUJOCO_LOG.TXT as well
+    try:
         spec.attach(arm, prefix="", frame=robot.mount(spec))
+    finally:
+        mujoco.set_mju_user_warning(before)
     if spec.body("link_7") is not None:  # the first unit bends beside the flange, closer than its hull
         for unit in ("unit_01", "unit_02"):
             spec.add_exclude(name=f"link_7_{unit}", bodyname1="link_7", bodyname2=unit)
@@ -92,16 +97,3 @@ def panda_joints(model: mujoco.MjModel) -> np.ndarray:
     numbers = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in JOINTS]
     return np.array([number for number in numbers if number >= 0], dtype=int)
 
-
-@contextmanager
-def _without_warnings() -> Iterator[None]:
-    """Leave out what MuJoCo says of a prefix that is empty, in its log and as Python's warnings, which come late."""
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-            mujoco.MjSpec().compile()  # the next call that compiles is the one that warns
-    finally:
-        mujoco.set_mju_user_warning(before)

@@ -14,13 +14,14 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.hybrid.touch import ARM, ROBOT, WORLD
-from trunkline.panda.kinematics import Q_MAX, Q_MIN
+from trunkline.panda.collision import MOUNT_RADIUS
+from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN
 from trunkline.panda.limits import TORQUE_MAX
 from trunkline.panda.shipped import JOINTS, shipped_panda
 
 Metres = Annotated[float, Field(ge=-10, le=10)]
 Turn = Annotated[float, Field(ge=-7, le=7)]  # rad
-Gain = Annotated[float, Field(gt=0, le=1e5)]
+THINNEST = 0.01  # m, of the cylinder that stands for the motors
 
 # Servos of MuJoCo Menagerie's `franka_emika_panda`, tuned by Google DeepMind on that model: stand-ins for the maker's
 # joint controller, which is not published. N m/rad and N m s/rad.
@@ -34,12 +35,14 @@ class PandaRobot:
 
     Attributes:
         mount_offset: from the flange to the mount along the flange's z, m.
+        mount_mass: of motors, winches and adapter, kg, spread over a cylinder between flange and mount.
         azimuth: of the arm about its axis, rad.
         ready: joint angles to begin with, rad. Shape (7,).
     """
 
     kind: Literal["panda"]
     mount_offset: Annotated[float, Field(ge=0, le=1)]
+    mount_mass: Annotated[float, Field(gt=0, le=20)]
     azimuth: Turn
     ready: Annotated[list[Turn], Field(min_length=7, max_length=7)]
 
@@ -58,7 +61,17 @@ class PandaRobot:
             servo = spec.add_actuator(name=f"{name}_position", target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             servo.set_to_position(kp=kp, kv=kv)
             servo.forcelimited, servo.forcerange = True, [-torque, torque]
+        self._add_motors(spec)
         return spec
+
+    def _add_motors(self, spec: mujoco.MjSpec) -> None:
+        half = max(self.mount_offset, THINNEST) / 2
+        block = spec.body("link_7").add_body(name="motors", pos=[0, 0, FLANGE + self.mount_offset - half])
+        across, along = MOUNT_RADIUS**2 / 4 + half**2 / 3, MOUNT_RADIUS**2 / 2  # m², of a cylinder
+        block.explicitinertial, block.mass, block.ipos = True, self.mount_mass, [0, 0, 0]
+        block.inertia = self.mount_mass * np.array([across, across, along])
+        block.add_geom(name="motors_geom", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[MOUNT_RADIUS, half, 0], mass=0,
+                       contype=ROBOT, conaffinity=WORLD, group=2, rgba=(0.25, 0.26, 0.28, 1))
 
     def mount(self, spec: mujoco.MjSpec) -> mujoco.MjsFrame:
         """The frame, on the flange, that the arm's base is put into."""
@@ -93,4 +106,4 @@ class FixedMount:
         )
 
 
-Robot = PandaRobot | FixedMount
+Robot = Annotated[PandaRobot | FixedMount, Field(discriminator="kind")]
