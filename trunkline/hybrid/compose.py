@@ -87,8 +87,9 @@ def compose(
     if placed is not None:
         if placed.hanging and (world is None or world.hook is None):
             raise InputError("world.hook: found none, expected one for an object that hangs")
-        placed.thing.add_to(spec, np.asarray(placed.position, dtype=float), placed.quaternion,
-                            "hook_end" if placed.hanging else None)
+        placed.thing.add_to(
+            spec, np.asarray(placed.position, dtype=float), placed.quaternion, "hook_end" if placed.hanging else None
+        )
     return spec
 
 
@@ -96,4 +97,3 @@ def panda_joints(model: mujoco.MjModel) -> np.ndarray:
     """Numbers of the Panda's joints in a composed model. Shape (7,), or (0,) on a fixed mount."""
     numbers = [mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name) for name in JOINTS]
     return np.array([number for number in numbers if number >= 0], dtype=int)
-

@@ -12,7 +12,7 @@ import mujoco
 
 # sliding coefficient, without unit
 TPU_ON = {"wood": 0.50, "plastic": 0.45, "paper": 0.40, "fabric": 0.50, "slippery": 0.30}
-TORSION = 0.005  # m, torsional coefficient over the sliding one: two thirds of a contact patch of 7.5 mm radius (Coulomb)
+TORSION = 0.005  # m, torsional coefficient over sliding one: 2/3 of the radius of a contact patch, here 7.5 mm
 ROLLING = 1e-4  # m, idle with condim 4
 SOLREF = (0.01, 1.0)  # s and damping ratio of contacts: as stiff as the arm's longest stable step allows (refsafe)
 IMPRATIO = 10.0  # friction over normal impedance: at 1, what is held creeps through MuJoCo's soft friction

@@ -41,7 +41,9 @@ class Thing:
         """From its centre to what it stands on, m."""
         return self.diameter / 2 if self.shape == "sphere" else self.height / 2
 
-    def add_to(self, spec: mujoco.MjSpec, position: np.ndarray, quaternion=(1, 0, 0, 0), hook: str | None = None) -> None:
+    def add_to(
+        self, spec: mujoco.MjSpec, position: np.ndarray, quaternion=(1, 0, 0, 0), hook: str | None = None
+    ) -> None:
         """Add the free body `object`, in place, its centre at `position`, m.
 
         Args:
@@ -66,11 +68,18 @@ class Thing:
             geom.type, geom.size = mujoco.mjtGeom.mjGEOM_SPHERE, [radius, 0, 0]
         else:
             mesh = spec.add_mesh(name="toy")
-            mesh.uservert = rounded_box([self.diameter, self.diameter, self.height], TOY_ROUNDING * self.diameter).ravel()
+            mesh.uservert = rounded_box(
+                [self.diameter, self.diameter, self.height], TOY_ROUNDING * self.diameter
+            ).ravel()
             geom.type, geom.meshname = mujoco.mjtGeom.mjGEOM_MESH, mesh.name
         if hook is not None:
-            tie = spec.add_equality(name="hanging", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_BODY,
-                                    name1="object", name2="world")
+            tie = spec.add_equality(
+                name="hanging",
+                type=mujoco.mjtEq.mjEQ_CONNECT,
+                objtype=mujoco.mjtObj.mjOBJ_BODY,
+                name1="object",
+                name2="world",
+            )
             tie.data[:3] = _into(quaternion, np.array(spec.site(hook).pos) - position)
 
     def unit_inertia(self) -> np.ndarray:

@@ -71,7 +71,7 @@ class PandaRobot:
         block.explicitinertial, block.mass, block.ipos = True, self.mount_mass, [0, 0, 0]
         block.inertia = self.mount_mass * np.array([across, across, along])
         block.add_geom(name="motors_geom", type=mujoco.mjtGeom.mjGEOM_CYLINDER, size=[MOUNT_RADIUS, half, 0], mass=0,
-                       contype=ROBOT, conaffinity=WORLD, group=2, rgba=(0.25, 0.26, 0.28, 1))
+                       contype=ROBOT, conaffinity=WORLD, group=2, rgba=(0.25, 0.26, 0.28, 1))  # fmt: skip
 
     def mount(self, spec: mujoco.MjSpec) -> mujoco.MjsFrame:
         """The frame, on the flange, that the arm's base is put into."""
@@ -91,9 +91,7 @@ class FixedMount:
 
     kind: Literal["fixed"]
     position: Annotated[list[Metres], Field(min_length=3, max_length=3)] = field(default_factory=lambda: [0, 0, 0])
-    quaternion: Annotated[list[Metres], Field(min_length=4, max_length=4)] = field(
-        default_factory=lambda: [1, 0, 0, 0]
-    )
+    quaternion: Annotated[list[Metres], Field(min_length=4, max_length=4)] = field(default_factory=lambda: [1, 0, 0, 0])
 
     def build(self) -> mujoco.MjSpec:
         """An empty model."""

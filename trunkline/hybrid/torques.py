@@ -72,8 +72,10 @@ def require_torques(torques: np.ndarray, limits: np.ndarray = TORQUE_MAX) -> Non
     share = np.where(np.isfinite(torques), np.abs(torques), np.inf) / limits
     row, joint = np.unravel_index(np.argmax(share), share.shape)
     if share[row, joint] > 1:
-        raise InputError(f"{JOINTS[joint]}: found {torques[row, joint]:.1f} N m at row {row}, expected at most "
-                         f"{limits[joint]:g} N m either way")
+        raise InputError(
+            f"{JOINTS[joint]}: found {torques[row, joint]:.1f} N m at row {row}, expected at most "
+            f"{limits[joint]:g} N m either way"
+        )
 
 
 def servo_commands(model: mujoco.MjModel, angles: np.ndarray, torques: np.ndarray) -> np.ndarray:

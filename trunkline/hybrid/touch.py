@@ -1,8 +1,8 @@
 """A body for the arm to touch with: one convex geom a unit, that changes nothing of how the arm moves by itself.
 
-A unit of the spiral is a double cone: between two units the gap at distance r from the axis is r Δθ wide, so that they
-close on each other at the joint's limit Δθ, and each unit gives half of it. With upper and lower widths W and W' and
-length l, its outline in (r, z) is (0, 0), (W/2, -W Δθ/4), (W'/2, -l + W' Δθ/4), (0, -l), which is convex.
+A unit of the spiral is a double cone: the gap between two units is a wedge of the angle Δθ, so that they close on each
+other at the joint's limit Δθ, and each unit gives half of it. With upper and lower widths W and W', length l and
+k = tan(Δθ/2), its outline in (r, z) is (0, 0), (W/2, -k W/2), (W'/2, -l + k W'/2), (0, -l), which is convex.
 
 A geom is the hull of two rings and two points on the axis. The rings' corners lie outside of the circle by as much as
 the middles of their sides inside. Everything is read from the arm's MJCF, so another chain may take the spiral's place.
@@ -36,8 +36,10 @@ def read_geometry(spec: mujoco.MjSpec) -> ChainGeometry:
         ranges.append(float(body.joints[0].range[1]))
     tip = spec.site("tip")
     if not tops or tip is None:
-        raise InputError(f"arm.xml: found {len(tops)} bodies unit_01, … and {'a' if tip else 'no'} site 'tip', "
-                         "expected a chain of units that ends in one")
+        raise InputError(
+            f"arm.xml: found {len(tops)} bodies unit_01, … and {'a' if tip else 'no'} site 'tip', "
+            "expected a chain of units that ends in one"
+        )
     lengths = -np.array([*tops[1:], float(tip.pos[2])])
     ratio = radii[1] / radii[0] if len(radii) > 1 else 1.0
     return ChainGeometry(lengths, 2 * np.array(radii), np.array(ranges), ratio)
@@ -46,9 +48,9 @@ def read_geometry(spec: mujoco.MjSpec) -> ChainGeometry:
 def outline(geometry: ChainGeometry, unit: int) -> np.ndarray:
     """Rows (r, z) of a unit's outline, m, from its upper end in the joint's plane to its lower end. Shape (4, 2)."""
     upper, lower = geometry.widths[unit] / 2, geometry.ratio * geometry.widths[unit] / 2
-    length, bend = geometry.lengths[unit], geometry.joint_range[unit]
-    cut = min(1.0, 0.8 * length / ((upper + lower) * bend / 2))  # a rim of no height would be no rim
-    return np.array([(0, 0), (upper, -cut * upper * bend / 2), (lower, cut * lower * bend / 2 - length), (0, -length)])
+    length, slope = geometry.lengths[unit], np.tan(geometry.joint_range[unit] / 2)
+    slope = min(slope, 0.8 * length / (upper + lower))  # a rim of no height would be no rim
+    return np.array([(0, 0), (upper, -slope * upper), (lower, slope * lower - length), (0, -length)])
 
 
 def unit_corners(geometry: ChainGeometry, unit: int) -> np.ndarray:

@@ -41,14 +41,15 @@ class World:
         world = spec.worldbody
         if self.floor is not None:
             world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, self.floor],
-                           friction=coefficients("wood"), rgba=(0.9, 0.9, 0.88, 1), **touch)
+                           friction=coefficients("wood"), rgba=(0.9, 0.9, 0.88, 1), **touch)  # fmt: skip
         for name, surface in self.surfaces.items():
             half = np.array(surface.size) / 2
             world.add_geom(name=name, type=mujoco.mjtGeom.mjGEOM_BOX, size=half, rgba=RGBA[surface.material],
-                           pos=np.array(surface.top) - [0, 0, half[2]], friction=coefficients(surface.material), **touch)
+                           pos=np.array(surface.top) - [0, 0, half[2]],
+                           friction=coefficients(surface.material), **touch)  # fmt: skip
         if self.hook is not None:
             end = np.array(self.hook, dtype=float)
             world.add_geom(name="hook", type=mujoco.mjtGeom.mjGEOM_CAPSULE, size=[HOOK_RADIUS, 0, 0],
                            fromto=[*end, *(end + [0, 0, HOOK_LENGTH])], friction=coefficients("plastic"),
-                           rgba=(0.3, 0.3, 0.32, 1), **touch)
+                           rgba=(0.3, 0.3, 0.32, 1), **touch)  # fmt: skip
             world.add_site(name="hook_end", pos=end)

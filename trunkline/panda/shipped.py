@@ -33,8 +33,10 @@ def shipped_panda(mount_offset: float) -> mujoco.MjSpec:
     try:
         path = import_module("dm_robotics.panda.arm_constants").XML_PATH
     except ModuleNotFoundError as error:
-        raise InputError(f"found no module {error.name}, expected that of `pip install --no-deps dm-robotics-panda`, "
-                         "which has the Panda's shapes") from error
+        raise InputError(
+            f"found no module {error.name}, expected that of `pip install --no-deps dm-robotics-panda`, "
+            "which has the Panda's shapes"
+        ) from error
     spec = mujoco.MjSpec.from_file(path)
     for sensor in list(spec.sensors):
         spec.delete(sensor)
