@@ -21,6 +21,7 @@ from pydantic import TypeAdapter, ValidationError
 from trunkline.errors import InputError, in_one_line
 from trunkline.figures.payload import payload_figure
 from trunkline.figures.style import save_figure
+from trunkline.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
 from trunkline.hybrid.payload import Cell, PayloadSettings, cells, chart_rows
 from trunkline.pipeline.inputs import read_spec
 from trunkline.progress import progress
@@ -68,7 +69,14 @@ def main() -> int:
     parser.add_argument("--cells", type=int, default=sys.maxsize)
     options = parser.parse_args()
     chart, arm = read_settings(options.quick), read_spec(MODEL)
-    told = json.dumps({**asdict(chart), "arm": hashlib.sha256(MODEL.read_bytes()).hexdigest()}, sort_keys=True)
+    told = json.dumps(
+        {
+            **asdict(chart),
+            "contacts": [IMPRATIO, SOLREF, SOLIMP],
+            "arm": hashlib.sha256(MODEL.read_bytes()).hexdigest(),
+        },
+        sort_keys=True,
+    )
     digest, path = hashlib.sha256(told.encode()).hexdigest()[:12], QUICK_TABLE if options.quick else TABLE
     if options.anew:
         path.unlink(missing_ok=True)

@@ -9,6 +9,7 @@ from trunkline.arm.mjcf import unit_name
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.hybrid.compose import compose
+from trunkline.hybrid.friction import SOLIMP, SOLREF
 from trunkline.hybrid.robots import FixedMount
 from trunkline.hybrid.touch import TOUCH, add_touch, outline, read_geometry, unit_corners
 
@@ -81,7 +82,7 @@ def test_an_arm_without_visible_units_is_refused():
     spec = mujoco.MjSpec()
     spec.worldbody.add_body(name="unit_01")
     with pytest.raises(InputError, match="unit_01_geom"):
-        add_touch(spec, (0.4, 0.002, 1e-4), (0.01, 1.0))
+        add_touch(spec, (0.4, 0.002, 1e-4), SOLREF, SOLIMP)
 
 
 def test_gravity_is_the_standard(arm):

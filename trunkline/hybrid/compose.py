@@ -1,8 +1,8 @@
 """One model made of parts: a robot, the calibrated arm on its mount, a world and an object.
 
 The arm is attached as identified: its bodies, hinges, springs, tendons, motors and numbers keep their names, so that
-what steps it (`trunkline/simulation/`) finds its capstan friction, winches and branches. Joints' branches, which hang on
-the world in the arm's own file, hang on the mount here; they weigh nothing.
+what steps it (`trunkline/simulation/`) finds its capstan friction, winches and branches. Joints' branches, which hang
+on the world in the arm's own file, hang on the mount here; they weigh nothing.
 
 MuJoCo keeps the options of what is attached to, so they are set to the arm's before: time step, integrator and gravity,
 which points down in the world here however the arm's file had it. Cones and `impratio` are those of
@@ -20,7 +20,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.hybrid.friction import SOLREF, coefficients, make_holding
+from trunkline.hybrid.friction import SOLIMP, SOLREF, coefficients, make_holding
 from trunkline.hybrid.objects import Thing
 from trunkline.hybrid.robots import Robot
 from trunkline.hybrid.touch import add_touch
@@ -72,7 +72,7 @@ def compose(
     make_holding(arm)
     arm.body("base").quat = [1, 0, 0, 0]
     if touch:
-        add_touch(arm, coefficients(ARM_MATERIAL), SOLREF)
+        add_touch(arm, coefficients(ARM_MATERIAL), SOLREF, SOLIMP)
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(lambda message: None)  # else it says so in MUJOCO_LOG.TXT as well
     try:

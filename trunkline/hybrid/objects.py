@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.hybrid.friction import CONDIM, SOLREF, coefficients
+from trunkline.hybrid.friction import CONDIM, SOLIMP, SOLREF, coefficients
 from trunkline.hybrid.touch import ARM, OBJECT, ROBOT, WORLD
 from trunkline.hybrid.worlds import RGBA, Material
 
@@ -57,7 +57,7 @@ class Thing:
         soft = TOY_SOFTNESS if self.shape == "toy" else 1.0
         geom = body.add_geom(
             name="object_geom", contype=OBJECT, conaffinity=WORLD | ARM | ROBOT, condim=CONDIM, priority=HOLDS, mass=0,
-            friction=coefficients(self.material), solref=[soft * time, ratio], rgba=RGBA[self.material],
+            friction=coefficients(self.material), solref=[soft * time, ratio], solimp=SOLIMP, rgba=RGBA[self.material],
         )  # fmt: skip
         radius, half = self.diameter / 2, self.height / 2
         if self.shape == "cylinder":

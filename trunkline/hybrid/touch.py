@@ -64,11 +64,14 @@ def unit_corners(geometry: ChainGeometry, unit: int) -> np.ndarray:
     return np.concatenate([[(0, 0, top)], *rings, [(0, 0, bottom)]])
 
 
-def add_touch(spec: mujoco.MjSpec, friction: tuple[float, float, float], solref: tuple[float, float]) -> None:
+def add_touch(
+    spec: mujoco.MjSpec, friction: tuple[float, float, float], solref: tuple[float, float], solimp: tuple[float, ...]
+) -> None:
     """Give every unit of an arm its geom, in place: weightless, and without contact between neighbours.
 
     Args:
-        friction: sliding, torsional (m) and rolling (m) coefficients. solref: MuJoCo's, of the contact.
+        friction: sliding, torsional (m) and rolling (m) coefficients. solref, solimp: MuJoCo's, of the
+            contact.
     """
     geometry = read_geometry(spec)
     for unit in range(geometry.units):
@@ -78,6 +81,7 @@ def add_touch(spec: mujoco.MjSpec, friction: tuple[float, float, float], solref:
         spec.body(name).add_geom(
             name=f"{name}{TOUCH}", type=mujoco.mjtGeom.mjGEOM_MESH, meshname=mesh.name, mass=0, group=3,
             contype=ARM, conaffinity=WORLD | ARM, condim=4, friction=friction, solref=solref,
+            solimp=solimp,
         )  # fmt: skip
         if unit:
             spec.add_exclude(name=f"{name}_neighbour", bodyname1=unit_name(unit - 1), bodyname2=name)

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.hybrid.friction import CONDIM, SOLREF, coefficients
+from trunkline.hybrid.friction import CONDIM, SOLIMP, SOLREF, coefficients
 from trunkline.hybrid.touch import WORLD
 
 Metres = Annotated[float, Field(ge=-10, le=10)]
@@ -37,7 +37,7 @@ class World:
 
     def add_to(self, spec: mujoco.MjSpec) -> None:
         """Add geoms `floor`, `<surface>`, `hook` and the site `hook_end`, in place; none of them moves."""
-        touch = {"contype": WORLD, "conaffinity": 0, "condim": CONDIM, "solref": SOLREF}
+        touch = {"contype": WORLD, "conaffinity": 0, "condim": CONDIM, "solref": SOLREF, "solimp": SOLIMP}
         world = spec.worldbody
         if self.floor is not None:
             world.add_geom(name="floor", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[3, 3, 0.1], pos=[0, 0, self.floor],
