@@ -17,7 +17,7 @@ ROLLING = 1e-4  # m, idle with condim 4
 SOLREF = (0.01, 1.0)  # s and damping ratio of contacts: as stiff as the arm's longest stable step allows (refsafe)
 # MuJoCo's friction is a soft constraint: what is held creeps at a rate in proportion to the load on it and to
 # (1 - d) / IMPRATIO, d the impedance that SOLIMP ends with. With 10 and MuJoCo's own d of 0.95 an object at 60 % of
-# what friction carries creeps by centimetres in 10 s; with these by less than a millimetre (tests/hybrid/test_holding.py).
+# what friction carries creeps by centimetres in 10 s; with these by less than a millimetre. A test holds one.
 IMPRATIO = 100.0  # friction over normal impedance
 SOLIMP = (0.99, 0.999, 0.001, 0.5, 2.0)
 CONDIM = 4  # sliding and torsional friction
