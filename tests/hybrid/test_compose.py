@@ -47,8 +47,9 @@ def test_a_tilted_mount_is_tilted_gravity(arm):
     turn = Rotation.from_euler("y", 1.0)
     tilted = FixedMount("fixed", [0.3, 0.1, 0.9], list(wxyz_from_rotation(turn)))
     np.testing.assert_allclose(turn.inv().apply([0, 0, -9.80665]), gravity_in_base(1.0), atol=1e-12)
-    np.testing.assert_allclose(moved(compose(arm, tilted).compile()), moved(arm.compile(), gravity_in_base(1.0)),
-                               atol=1e-9)  # fmt: skip
+    found, expected = moved(compose(arm, tilted).compile()), moved(arm.compile(), gravity_in_base(1.0))
+    assert np.ptp(expected, axis=0).max() > 0.2
+    np.testing.assert_allclose(found, expected, atol=1e-4)  # where cables turn round, friction magnifies rounding
 
 
 def test_the_arm_hangs_from_the_flange(arm):
@@ -81,6 +82,7 @@ def test_the_saved_model_is_the_model(arm, tmp_path):
     (tmp_path / "hybrid.xml").write_text(spec.to_xml())
     read = mujoco.MjModel.from_xml_path(str(tmp_path / "hybrid.xml"))
     np.testing.assert_allclose(read.body_mass, model.body_mass, rtol=1e-5)
+    np.testing.assert_allclose(read.eq_data, model.eq_data, atol=1e-5)
     np.testing.assert_allclose(moved(read), moved(model), atol=1e-3)  # of its six digits
 
 

@@ -70,7 +70,9 @@ def compose(
     spec.option.gravity = arm.option.gravity = [0, 0, -STANDARD_GRAVITY]
     make_holding(spec)
     make_holding(arm)
-    arm.body("base").quat = [1, 0, 0, 0]
+    base = arm.body("base")
+    base.quat = [1, 0, 0, 0]
+    base.mass, base.inertia = 0.0, [0, 0, 0]  # in its own file it stands still; `mount_mass` is what the Panda bears
     if touch:
         add_touch(arm, coefficients(ARM_MATERIAL), SOLREF, SOLIMP)
     before = mujoco.get_mju_user_warning()

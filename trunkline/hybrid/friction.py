@@ -14,10 +14,10 @@ import mujoco
 TPU_ON = {"wood": 0.50, "plastic": 0.45, "paper": 0.40, "fabric": 0.50, "slippery": 0.30}
 TORSION = 0.005  # m, torsional coefficient over sliding one: 2/3 of the radius of a contact patch, here 7.5 mm
 ROLLING = 1e-4  # m, idle with condim 4
-SOLREF = (0.01, 1.0)  # s and damping ratio of contacts: as stiff as the arm's longest stable step allows (refsafe)
+SOLREF = (0.01, 1.0)  # s and damping ratio of contacts: as those of the arm's joint limits
 # MuJoCo's friction is a soft constraint: what is held creeps at a rate in proportion to the load on it and to
-# (1 - d) / IMPRATIO, d the impedance that SOLIMP ends with. With 10 and MuJoCo's own d of 0.95 an object at 60 % of
-# what friction carries creeps by centimetres in 10 s; with these by less than a millimetre. A test holds one.
+# (1 - d) / IMPRATIO, d the impedance that SOLIMP ends with. With MuJoCo's own values what is held slides
+# away within seconds; tests/hybrid/test_holding.py says how far it may creep with these.
 IMPRATIO = 100.0  # friction over normal impedance
 SOLIMP = (0.99, 0.999, 0.001, 0.5, 2.0)
 CONDIM = 4  # sliding and torsional friction
