@@ -1,0 +1,43 @@
+"""Parts that the tests of this room share. The arm is a spiral of the default size, built from CAD."""
+
+import json
+from pathlib import Path
+
+import mujoco
+import pytest
+from pydantic import TypeAdapter
+
+from trunkline.arm.holes import Holes, add_holes
+from trunkline.arm.joints import Branch, Joints, add_elements
+from trunkline.arm.material import unit_properties
+from trunkline.arm.mjcf import Solver, Tendons, build_spec
+from trunkline.arm.spiral import spiral_chain
+from trunkline.hybrid.settings import HybridSettings
+from trunkline.pipeline.config import compose_settings
+
+CONF = Path(__file__).parents[2] / "conf" / "hybrid"
+SIZE = {"length": 0.507, "base_width": 0.080, "tip_width": 0.012, "units": 24}
+STIFFER = (0.01, 1.0), (0.9, 0.95, 0.001, 0.5, 2.0)
+
+
+def hybrid_settings(**groups: str) -> HybridSettings:
+    """conf/hybrid with these choices."""
+    composed = json.dumps(compose_settings(CONF, groups, "conf/hybrid"))
+    return TypeAdapter(HybridSettings).validate_json(composed, strict=True)
+
+
+@pytest.fixture(scope="session")
+def chain():
+    return spiral_chain(**SIZE)
+
+
+@pytest.fixture(scope="session")
+def arm(chain) -> mujoco.MjSpec:
+    """With what the identified arm has: creeping joints, cables that rub, motors with a dead time."""
+    properties = unit_properties(chain, 26e6, 1210.0, 0.24, 0.1)
+    tendons = Tendons(friction=0.0, kp=2000.0, max_force=18.0, time_constant=0.02, dead_time=0.02, count=3,
+                      radius_ratio=0.85, kv=7.0)  # fmt: skip
+    spec = build_spec(chain, properties, tendons, Solver(1 / 480, 1e-5, *STIFFER, *STIFFER))
+    add_elements(spec, Joints(branches=[Branch(0.2, 0.3)]), 1e-5)
+    add_holes(spec, Holes(0.12, 8))
+    return spec

@@ -1,0 +1,162 @@
+"""The payload chart: the heaviest mass held through lift and shake, by object, friction, pull and support.
+
+A cell is one row of the chart. Its mass is looked for on a ladder of masses by bisection: a mass is held if at least
+`share` of its placements are, each off the grasp frame by its own draw. What is held is `Tried.held`.
+
+An object hangs from a hook above it, its axis level and across the bending plane, or stands on a table, its axis
+upright; the arm hangs straight down beside it and bends in a vertical plane.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import product
+from typing import Annotated, Literal
+
+import mujoco
+import numpy as np
+from pydantic import Field
+
+from trunkline.errors import InputError
+from trunkline.hybrid.compose import Placed, compose
+from trunkline.hybrid.grasps import Grasp, object_in_base, pulls_of
+from trunkline.hybrid.objects import Thing
+from trunkline.hybrid.robots import FixedMount
+from trunkline.hybrid.touch import read_geometry
+from trunkline.hybrid.trials import Schedule, Tried, try_grasps
+from trunkline.hybrid.worlds import Surface, World
+from trunkline.settings import Seed, settings
+
+LEVEL = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)  # turns an object's z to base y
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+HOOK_ABOVE = 0.15  # m, of an object's upper side: the length of what it hangs by
+BEGIN = 0.1  # kg, of the object as it is compiled; each trial has its own
+TABLE, TABLE_SIZE = "table", (1.0, 1.0, 0.03)  # m
+
+Positive = Annotated[float, Field(gt=0, le=20)]
+Metres = Annotated[float, Field(gt=0, le=0.5)]
+
+
+@settings
+class PayloadSettings:
+    """What the chart goes over, and how each cell is tried.
+
+    Attributes:
+        supports, shapes, diameters (m), frictions (sliding coefficients), pulls (dorsal or ventral), shortening (m of
+            cable, as commanded): every combination is a cell.
+        height: of objects, m, if they are not wider.
+        masses: the ladder, kg, rising.
+        placements: of each mass. spread: standard deviation of placements, m, across and along the arm.
+        share: of placements that must hold.
+        sag, slip: m, what counts as held, see `Tried.held`.
+        grasp: where the object is. schedule: what is done.
+    """
+
+    supports: Annotated[list[Literal["hanging", "standing"]], Field(min_length=1)]
+    shapes: Annotated[list[Literal["cylinder", "box", "sphere", "toy"]], Field(min_length=1)]
+    diameters: Annotated[list[Metres], Field(min_length=1)]
+    frictions: Annotated[list[Annotated[float, Field(gt=0, le=3)]], Field(min_length=1)]
+    pulls: Annotated[list[Literal["dorsal", "ventral"]], Field(min_length=1)]
+    shortenings: Annotated[list[Metres], Field(min_length=1)]
+    height: Metres
+    masses: Annotated[list[Positive], Field(min_length=1)]
+    placements: Annotated[int, Field(ge=1, le=1000)]
+    spread: Annotated[float, Field(ge=0, le=0.1)]
+    share: Annotated[float, Field(gt=0, le=1)]
+    sag: Metres
+    slip: Metres
+    seed: Seed
+    grasp: Grasp
+    schedule: Schedule
+
+    def __post_init__(self):
+        if self.masses != sorted(set(self.masses)):
+            raise ValueError(f"masses: found {self.masses}, expected each once, the lightest first")
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One row of the chart; units as in `PayloadSettings`."""
+
+    support: str
+    shape: str
+    diameter: float
+    friction: float
+    pull: str
+    shortening: float
+
+
+@dataclass
+class Outcome:
+    """mass: kg, the heaviest held, 0 if none is. share: of placements that hold it, NaN for none. grasps: tried."""
+
+    mass: float
+    share: float
+    grasps: int
+
+
+def cells(chart: PayloadSettings) -> list[Cell]:
+    """Every cell, in the order in which they are tried."""
+    axes = (chart.supports, chart.shapes, chart.diameters, chart.frictions, chart.pulls, chart.shortenings)
+    return [Cell(*values) for values in product(*axes)]
+
+
+def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, masses: np.ndarray, timestep: float | None = None
+               ) -> Tried:  # fmt: skip
+    """Try each of `masses` (M,), kg, at every placement. Rows of the result: M times `placements`.
+
+    Args:
+        timestep: s, in place of the arm's own.
+
+    Raises:
+        InputError: the object does not fit between table and mount.
+    """
+    geometry = read_geometry(arm)
+    height = max(chart.height, cell.diameter)
+    thing = Thing(cell.shape, cell.diameter, height, BEGIN, "plastic")
+    middle = object_in_base(geometry, cell.diameter, chart.grasp, cell.pull)
+    hanging = cell.support == "hanging"
+    quaternion, surfaces, hook = (LEVEL if hanging else UPRIGHT), {}, None
+    if hanging:
+        hook = [float(value) for value in middle + [0, 0, cell.diameter / 2 + HOOK_ABOVE]]
+    else:  # the tip just above the table, the object beside it
+        top = -geometry.length - chart.spread
+        middle[2] = top + thing.half_height
+        if middle[2] + thing.half_height > 0:
+            raise InputError(f"height: found {height} m, expected an object below the mount")
+        surfaces = {TABLE: Surface([0.0, 0.0, top], list(TABLE_SIZE), "wood")}
+    spec = compose(arm, FixedMount("fixed"), World(None, surfaces, hook), Placed(thing, middle, quaternion, hanging))
+    model = spec.compile()
+    if timestep is not None:
+        model.opt.timestep = timestep
+    draws = np.random.default_rng(chart.seed).normal(size=(chart.placements, 2)) * chart.spread
+    poses = np.tile([*middle, *quaternion], (chart.placements, 1))
+    poses[:, 0] += draws[:, 0]
+    if hanging:
+        poses[:, 2] += draws[:, 1]
+    count = len(masses) * chart.placements
+    return try_grasps(
+        model, np.tile(poses, (len(masses), 1)), np.repeat(masses, chart.placements),
+        np.tile(pulls_of(cell.pull, cell.shortening), (count, 1)), chart.schedule, tuple(surfaces),
+        np.full(count, cell.friction),
+    )  # fmt: skip
+
+
+def heaviest(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell) -> Outcome:
+    """The heaviest mass of the ladder that is held: bisection, as a lighter object is held where a heavier one is."""
+    held, lost, grasps, best = -1, len(chart.masses), 0, np.nan
+    while lost - held > 1:
+        rung = (held + lost) // 2
+        tried = try_masses(arm, chart, cell, np.array([chart.masses[rung]]))
+        share, grasps = float(np.mean(tried.held(chart.sag, chart.slip))), grasps + chart.placements
+        if share >= chart.share:
+            held, best = rung, share
+        else:
+            lost = rung
+    return Outcome(chart.masses[held] if held >= 0 else 0.0, best, grasps)
+
+
+def chart_rows(arm: mujoco.MjSpec, chart: PayloadSettings, done: set[Cell]) -> Iterator[tuple[Cell, Outcome]]:
+    """Every cell that is not `done`, with what came of it."""
+    for cell in cells(chart):
+        if cell not in done:
+            yield cell, heaviest(arm, chart, cell)

@@ -1,0 +1,15 @@
+"""What a hybrid robot is set by: the groups of `conf/hybrid/`."""
+
+from trunkline.hybrid.objects import Thing
+from trunkline.hybrid.robots import Robot
+from trunkline.hybrid.worlds import World
+from trunkline.settings import settings
+
+
+@settings
+class HybridSettings:
+    """robot: what holds the arm. world: where it works. object: what it grasps."""
+
+    robot: Robot
+    world: World
+    object: Thing
