@@ -39,7 +39,7 @@ class Everywhere:
         length = float(np.linalg.norm(mount))
         if length <= self.most:
             return Reading("inside")
-        return Reading("outside", length - self.most, tuple(float(x) * self.most / length for x in mount))
+        return Reading("outside", length - self.most, tuple(float(x) * (1 - 1e-9) * self.most / length for x in mount))
 
     def soft(self, tip, gravity):
         return Reading("inside")

@@ -65,12 +65,13 @@ def test_turning_joint_7_by_the_turn_gives_the_heading():
         wrist = wrist_of(tuple(q), 0.05)
         mount = np.array(wrist.position)
         tip = mount + [*rng.uniform(-0.3, 0.3, 2), -0.3]
-        found = align(tuple(tip), wrist.position, DOWN, wrist, FIRST, SETTINGS)
+        settings = type(SETTINGS)(SETTINGS.half_planes_deg, 10.0, 0.0)
+        found = align(tuple(tip), wrist.position, DOWN, wrist, FIRST, settings)
         assert found.turned is not None
         q[6] -= found.turned
         assert Q_MIN[6] <= q[6] <= Q_MAX[6]
         off = Rotation.from_rotvec([0, 0, wrist_of(tuple(q), 0.05).heading - found.heading])
-        assert off.magnitude() < 1e-6  # the pose of the test points down to 1e-16 only where its angles sum up so
+        assert off.magnitude() < 1e-6
 
 
 def test_the_turn_is_the_least_of_all_that_align_and_are_within_limits():
@@ -121,14 +122,14 @@ def test_half_plane_does_not_flip_at_the_border():
 def test_another_half_plane_is_taken_once_it_is_nearer_by_the_hysteresis():
     wrist = wrist_of(READY_JOINTS, 0.05)
     last, taken = FIRST, {}
-    for degrees in [*range(80, 101), *range(100, 79, -1)]:
+    for degrees in [*np.arange(80.5, 100), *np.arange(99.5, 80, -1)]:
         away = wrist.heading + np.radians(degrees)
         tip = np.array(wrist.position) + [0.2 * np.cos(away), 0.2 * np.sin(away), -0.3]
         found = align(tuple(tip), wrist.position, DOWN, wrist, last, SETTINGS)
         if found.half_plane != last.half_plane:
             taken[found.half_plane] = degrees
         last = found
-    assert taken == {1: 96, 0: 84}  # the other asks for 2 · (degrees - 90) less
+    assert taken == {1: 95.5, 0: 84.5}  # the other asks for 2 · (degrees - 90) less
 
 
 def test_a_tip_target_on_the_axis_turns_nothing():

@@ -27,7 +27,11 @@ def cause(operator: Operator, event: str, mode: str):
     if event == "refused":
         return operator.step(plan=PlanReport(operator.state.serial, refused="joint limit"))
     if event == "settled":
-        return operator.wait(0.5, left={"tracked": True, "grip": False}, right={"grip": False, "trigger": False})
+        return operator.wait(
+            0.5 if mode == "hold" else 0.0,
+            left={"tracked": True, "grip": False},
+            right={"grip": False, "trigger": False},
+        )
     if event == "reset":
         return operator.step(right={"primary": True})
     if event in ("ask", "confirm") and mode == "aim":

@@ -2,11 +2,12 @@
 
 The signal s at a point is the maps' signed distance (m, negative inside), trilinear between lattice points; of the
 soft arm, linear between the two gravity angles beside the present one, as `trunkline/reachability/reach_signal.py`
-defines it. Outside, the nearest lattice point that is inside both of these maps is looked up, and the way from there
-to the target followed to where s = 0.
+defines it. Outside, the nearest point is looked for down the signal's gradient; from there, the way to the nearest
+lattice point that is inside both of these maps is halved until the point that is offered is inside.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
 
@@ -14,9 +15,11 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from trunkline.errors import InputError
-from trunkline.teleop.vectors import DOWN, Vector, dot
+from trunkline.teleop.vectors import DOWN, Vector, add, distance, dot, scale, subtract
 
-HALVINGS = 7  # of the way from the nearest lattice point: to 1/128 of it, below a tenth of a millimetre
+HALVINGS = 7  # of the way to a point inside: to 1/128 of it, below a tenth of a millimetre
+PROJECTIONS = 2  # steps down the gradient; of a distance, one is enough
+ASIDE = 4e-3  # m, of the differences that are the gradient
 SYMMETRY = 2 * math.pi / 3  # three tendons alike: the maps turned by it are the maps
 SHELL = 1.5  # lattice steps below the surface within which the points nearest to anything outside lie
 
@@ -153,22 +156,44 @@ class MapReach:
         return found if found.offer is None else found._replace(offer=_about_z(found.offer, turn))
 
 
-def _reading(signal, points: tuple[cKDTree | None, np.ndarray], point: Vector) -> Reading:
+def _reading(signal: Callable[[Vector], float], points: tuple[cKDTree | None, np.ndarray], point: Vector) -> Reading:
     outside = signal(point)
     if outside <= 0:
         return Reading("inside")
     tree, places = points
     if tree is None:
         return Reading("outside", outside)
-    near = [float(x) for x in places[tree.query(point)[1]]]
-    inside, beyond = 0.0, 1.0  # shares of the way from `near` to `point`
-    for _ in range(HALVINGS):
+    near = places[tree.query(point)[1]]
+    near = (float(near[0]), float(near[1]), float(near[2]))
+    aim = _projected(signal, point, outside)
+    if distance(aim, point) > distance(near, point):
+        aim = point
+    inside, beyond = 0.0, 1.0  # shares of the way from `near` to `aim`
+    if signal(aim) <= 0:
+        inside = 1.0
+    for _ in range(HALVINGS if inside < 1 else 0):
         half = (inside + beyond) / 2
-        if signal(_between(near, point, half)) <= 0:
+        if signal(_between(near, aim, half)) <= 0:
             inside = half
         else:
             beyond = half
-    return Reading("outside", outside, _between(near, point, inside))
+    return Reading("outside", outside, _between(near, aim, inside))
+
+
+def _projected(signal: Callable[[Vector], float], point: Vector, value: float) -> Vector:
+    """Where the way down the signal's gradient from `point` meets s = 0: of a distance, the nearest point of its
+    surface."""
+    for _ in range(PROJECTIONS):
+        slope = []
+        for axis in range(3):
+            aside = [(0.0, 0.0, 0.0)[:axis] + (sign * ASIDE,) + (0.0, 0.0, 0.0)[axis + 1 :] for sign in (1, -1)]
+            slope.append((signal(add(point, aside[0])) - signal(add(point, aside[1]))) / (2 * ASIDE))
+        steep = slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2
+        if steep < 0.1:  # no distance: near the middle of what is around
+            return point
+        point = subtract(point, scale((slope[0], slope[1], slope[2]), value / steep))
+        value = signal(point)
+    return point
 
 
 def _between(a, b, share: float) -> Vector:

@@ -1,0 +1,88 @@
+"""The arm's own swings: the model linearised about a pose in which it rests, and how much a command excites each.
+
+With q the joint angles, v their rates and u the commands of the motors, about rest
+
+    d/dt [δq, δv] = A [δq, δv] + B δu,    A = [[0, 1], [∂v̇/∂q, ∂v̇/∂v]],    B = [0, ∂v̇/∂u],
+
+by central differences of MuJoCo's accelerations. An eigenvalue λ of A, with right and left vectors r and l (l r = 1),
+is a swing of period 2π / |Im λ| and damping ratio -Re λ / |λ|; a step δu at once makes the tip swing by |C r (l B δu)
+/ λ|, C the tip's Jacobian. The motors' lag is not in it: it delays all swings alike. MuJoCo's own `mjd_transitionFD`
+refuses models with delays.
+"""
+
+import copy
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from trunkline.elements import give_way
+from trunkline.simulation.rest import base_frame, settle
+
+STEP = 1e-5  # rad, rad/s and m, of the differences
+STILL = 0.1  # rad/s, swings slower than that are creep
+SHARE = 0.1  # of the largest swing of the tip; smaller ones are not worth a longer way
+HEAVY = 0.2  # damping ratio from which on a swing dies within a period
+
+
+class Swings(NamedTuple):
+    """Of n swings, the one that moves the tip most first: `periods` (n,), s, damped; `dampings` (n,), ratios; `sizes`
+    (n,), m, by which the tip swings after the step of command. `tip` (3,): where it rests in the base frame, m."""
+
+    periods: np.ndarray
+    dampings: np.ndarray
+    sizes: np.ndarray
+    tip: np.ndarray
+
+
+def swings(
+    model: mujoco.MjModel, command: np.ndarray, step: np.ndarray, gravity: np.ndarray, tip_site: str = "tip"
+) -> Swings:
+    """Of the arm at rest under `command` (nu,), m, after it has come by `step` (nu,), m, all at once.
+
+    Args:
+        gravity: in the base frame, m/s². Shape (3,).
+    """
+    rest = settle(model, command[None], gravity[None])
+    model = copy.copy(model)
+    model.opt.gravity[:] = base_frame(model)[1] @ gravity
+    data = mujoco.MjData(model)
+    pose = rest.qpos[0]
+    give_way(model, pose)
+    data.qpos[:] = pose
+    inputs = data.act if model.na else data.ctrl
+    held = model.actuator_actadr >= 0 if model.na else np.ones(model.nu, dtype=bool)
+    inputs[:] = command[held]
+    data.ctrl[:] = command
+    count = model.nv
+
+    def slopes(values: np.ndarray) -> np.ndarray:
+        """∂v̇/∂values, (nv, len(values)); `values` is a field of `data`."""
+        found = np.empty((count, len(values)))
+        for index, here in enumerate(values.copy()):
+            for sign in (1, -1):
+                values[index] = here + sign * STEP
+                mujoco.mj_forward(model, data)
+                found[:, index] = data.qacc if sign == 1 else (found[:, index] - data.qacc) / (2 * STEP)
+            values[index] = here
+        return found
+
+    a = np.block([[np.zeros((count, count)), np.eye(count)], [slopes(data.qpos), slopes(data.qvel)]])
+    b = np.concatenate([np.zeros((count, len(inputs))), slopes(inputs)])
+    mujoco.mj_forward(model, data)
+    site, jacobian = model.site(tip_site).id, np.zeros((3, count))
+    mujoco.mj_jacSite(model, data, jacobian, None, site)
+    values, right = np.linalg.eig(a)
+    weights = np.linalg.solve(right, b @ step[held])
+    sizes = 2 * np.linalg.norm((jacobian @ right[:count]) * (weights / values), axis=0)  # with the conjugate
+    chosen = np.flatnonzero(values.imag > STILL)
+    chosen = chosen[np.argsort(-sizes[chosen], kind="stable")]
+    values, sizes = values[chosen], sizes[chosen]
+    return Swings(2 * np.pi / values.imag, -values.real / np.abs(values), sizes, rest.position[0])
+
+
+def slowest(found: Swings, count: int) -> Swings:
+    """The `count` slowest of those that move the tip by at least SHARE of what the largest does, slowest first."""
+    able = np.flatnonzero((found.sizes >= SHARE * found.sizes.max()) & (found.dampings < HEAVY))
+    able = able[np.argsort(-found.periods[able], kind="stable")][:count]
+    return Swings(found.periods[able], found.dampings[able], found.sizes[able], found.tip)
