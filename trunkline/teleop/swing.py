@@ -17,10 +17,14 @@ import mujoco
 import numpy as np
 
 from trunkline.elements import give_way
+from trunkline.frames import STANDARD_GRAVITY
 from trunkline.simulation.rest import base_frame, settle
+from trunkline.teleop.planner import ShaperOf
+from trunkline.teleop.shaping import Shaper, Shaping, shaper_of
 
 STEP = 1e-5  # rad, rad/s and m, of the differences
 STILL = 0.1  # rad/s, swings slower than that are creep
+FIRM = 0.01  # m of pull at one tendon
 SHARE = 0.1  # of the largest swing of the tip; smaller ones are not worth a longer way
 HEAVY = 0.2  # damping ratio from which on a swing dies within a period
 
@@ -72,7 +76,7 @@ def swings(
     mujoco.mj_forward(model, data)
     site, jacobian = model.site(tip_site).id, np.zeros((3, count))
     mujoco.mj_jacSite(model, data, jacobian, None, site)
-    values, right = np.linalg.eig(a)
+    values, right = (np.asarray(found, dtype=complex) for found in np.linalg.eig(a))
     weights = np.linalg.solve(right, b @ step[held])
     sizes = 2 * np.linalg.norm((jacobian @ right[:count]) * (weights / values), axis=0)  # with the conjugate
     chosen = np.flatnonzero(values.imag > STILL)
@@ -86,3 +90,17 @@ def slowest(found: Swings, count: int) -> Swings:
     able = np.flatnonzero((found.sizes >= SHARE * found.sizes.max()) & (found.dampings < HEAVY))
     able = able[np.argsort(-found.periods[able], kind="stable")][:count]
     return Swings(found.periods[able], found.dampings[able], found.sizes[able], found.tip)
+
+
+def shaper_for(model: mujoco.MjModel, settings: Shaping) -> ShaperOf:
+    """What a `Planner` shapes with: the swings of `model` under the gravity, and where the commands end."""
+
+    def shaper(gravity: np.ndarray, command: np.ndarray, change: np.ndarray) -> Shaper:
+        if settings.kind == "none":
+            return Shaper(np.zeros(1), np.ones(1))
+        # Where the commands stay, the mount's way makes the arm swing: in the swings that a pull at all tendons excites.
+        step = change if np.abs(change).max() > 0 else np.full(len(change), -FIRM)
+        found = slowest(swings(model, command, step, STANDARD_GRAVITY * gravity), settings.modes)
+        return shaper_of(found.periods, found.dampings, settings.kind)
+
+    return shaper
