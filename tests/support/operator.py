@@ -4,11 +4,10 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from pydantic import TypeAdapter
 from scipy.spatial.transform import Rotation
 
 from trunkline.frames import wxyz_from_rotation
-from trunkline.pipeline.config import PROJECT, compose_settings
+from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.config import Config
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.messages import Box, Controller, ExecutorReport, Input, PlanReport, Pose, World
@@ -25,8 +24,7 @@ REFERENCE = Pose(
 
 @cache
 def config() -> Config:
-    composed = compose_settings(PROJECT / "conf/teleop", {}, "tests")
-    return TypeAdapter(Config).validate_python(composed, strict=False)
+    return load_folder(Config, PROJECT / "conf/teleop")
 
 
 class Everywhere:

@@ -2,8 +2,9 @@
 
 The signal s at a point is the maps' signed distance (m, negative inside), trilinear between lattice points; of the
 soft arm, linear between the two gravity angles beside the present one, as `trunkline/reachability/reach_signal.py`
-defines it. Outside, the nearest point is looked for down the signal's gradient; from there, the way to the nearest
-lattice point that is inside both of these maps is halved until the point that is offered is inside.
+defines it. Outside, the nearest point is looked for down the signal's gradient. Where that leads further
+away than the nearest lattice point that is inside both of these maps, that is taken, and as much of the way from there
+as is inside.
 """
 
 import math
@@ -17,11 +18,15 @@ from scipy.spatial import cKDTree
 from trunkline.errors import InputError
 from trunkline.teleop.vectors import DOWN, Vector, add, distance, dot, scale, subtract
 
-HALVINGS = 7  # of the way to a point inside: to 1/128 of it, below a tenth of a millimetre
-PROJECTIONS = 2  # steps down the gradient; of a distance, one is enough
-ASIDE = 4e-3  # m, of the differences that are the gradient
+DEPTH = 5e-4  # m inside of the surface to which steps down the gradient go, so that they come inside
+PROJECTIONS = 5  # most of them; of a distance, one is enough
+HALVINGS = 7  # of the way from the nearest lattice point that is inside: to 1/128 of it
+FLAT = 0.1  # square of a slope that is no distance's: midway between parts of a map
 SYMMETRY = 2 * math.pi / 3  # three tendons alike: the maps turned by it are the maps
 SHELL = 1.5  # lattice steps below the surface within which the points nearest to anything outside lie
+
+
+Signal = Callable[[Vector], tuple[float, Vector]]  # s and its gradient at a point
 
 
 class Reading(NamedTuple):
@@ -55,21 +60,33 @@ class SignedMap:
 
     def at(self, point: Vector) -> float:
         """s at `point`; off the lattice, the value at its border and the distance to that."""
-        low, share, beyond = [], [], 0.0
+        return self.slope(point)[0]
+
+    def slope(self, point: Vector) -> tuple[float, Vector]:
+        """s at `point`, and its gradient there."""
+        low, share, off = [], [], []
         for x, first, count in zip(point, self.origin, self.values.shape, strict=True):
             place = (x - first) / self.spacing
             inside = min(max(place, 0.0), count - 1.0)
-            beyond += (place - inside) ** 2
             cell = min(int(inside), count - 2)
             low.append(cell)
             share.append(inside - cell)
+            off.append(place - inside)
         (i, j, k), (u, v, w) = low, share
         item = self.values.item
-        a = item(i, j, k) * (1 - w) + item(i, j, k + 1) * w
-        b = item(i, j + 1, k) * (1 - w) + item(i, j + 1, k + 1) * w
-        c = item(i + 1, j, k) * (1 - w) + item(i + 1, j, k + 1) * w
-        d = item(i + 1, j + 1, k) * (1 - w) + item(i + 1, j + 1, k + 1) * w
-        return (a * (1 - v) + b * v) * (1 - u) + (c * (1 - v) + d * v) * u + self.spacing * math.sqrt(beyond)
+        a, b, c, d = item(i, j, k), item(i, j + 1, k), item(i + 1, j, k), item(i + 1, j + 1, k)
+        da, db = item(i, j, k + 1) - a, item(i, j + 1, k + 1) - b
+        dc, dd = item(i + 1, j, k + 1) - c, item(i + 1, j + 1, k + 1) - d
+        a, b, c, d = a + w * da, b + w * db, c + w * dc, d + w * dd  # along z; then along y, then x
+        e, f = a + v * (b - a), c + v * (d - c)
+        up = (da + v * (db - da)) + u * ((dc + v * (dd - dc)) - (da + v * (db - da)))
+        value = e + u * (f - e)
+        if not (off[0] or off[1] or off[2]):
+            return value, scale((f - e, (b - a) + u * ((d - c) - (b - a)), up), 1 / self.spacing)
+        beyond = math.sqrt(off[0] ** 2 + off[1] ** 2 + off[2] ** 2)
+        along = ((f - e) / self.spacing, ((b - a) + u * ((d - c) - (b - a))) / self.spacing, up / self.spacing)
+        x, y, z = (o / beyond if o else g for o, g in zip(off, along, strict=True))
+        return value + self.spacing * beyond, (x, y, z)
 
     def points(self, cells: np.ndarray) -> np.ndarray:
         """Lattice points of `cells`, bool of the shape of `values`. Shape (N, 3), m."""
@@ -130,7 +147,7 @@ class MapReach:
     def rigid(self, mount: Vector, pointing: Vector) -> Reading:
         if dot(pointing, DOWN) < math.cos(self._tilt):
             return Reading("unknown")
-        return _reading(self._rigid.at, self._rigid_points, mount)
+        return _reading(self._rigid.slope, self._rigid_points, mount)
 
     def soft(self, tip: Vector, gravity: Vector) -> Reading:
         level = math.hypot(gravity[0], gravity[1])
@@ -148,52 +165,48 @@ class MapReach:
         low, high = self._soft[upper - 1], self._soft[upper]
         share = (angle - self._angles[upper - 1]) / (self._angles[upper] - self._angles[upper - 1])
         share = min(max(share, 0.0), 1.0)
-        found = _reading(
-            lambda point: (1 - share) * low.at(point) + share * high.at(point),
-            self._soft_points[upper - 1],
-            _about_z(tip, -turn),
-        )
+
+        def signal(point: Vector) -> tuple[float, Vector]:
+            (below, down), (above, up) = low.slope(point), high.slope(point)
+            return below + share * (above - below), add(scale(down, 1 - share), scale(up, share))
+
+        found = _reading(signal, self._soft_points[upper - 1], _about_z(tip, -turn))
         return found if found.offer is None else found._replace(offer=_about_z(found.offer, turn))
 
 
-def _reading(signal: Callable[[Vector], float], points: tuple[cKDTree | None, np.ndarray], point: Vector) -> Reading:
-    outside = signal(point)
+def _reading(signal: Signal, points: tuple[cKDTree | None, np.ndarray], point: Vector) -> Reading:
+    outside, slope = signal(point)
     if outside <= 0:
         return Reading("inside")
     tree, places = points
     if tree is None:
         return Reading("outside", outside)
-    near = places[tree.query(point)[1]]
-    near = (float(near[0]), float(near[1]), float(near[2]))
-    aim = _projected(signal, point, outside)
-    if distance(aim, point) > distance(near, point):
-        aim = point
-    inside, beyond = 0.0, 1.0  # shares of the way from `near` to `aim`
-    if signal(aim) <= 0:
-        inside = 1.0
-    for _ in range(HALVINGS if inside < 1 else 0):
+    x, y, z = places[tree.query(point)[1]]
+    near = (float(x), float(y), float(z))
+    aim = _projected(signal, point, outside, slope)
+    if aim is not None and distance(aim, point) <= distance(near, point):
+        return Reading("outside", outside, aim)
+    inside, beyond = 0.0, 1.0  # shares of the way from `near` to `point`
+    for _ in range(HALVINGS):
         half = (inside + beyond) / 2
-        if signal(_between(near, aim, half)) <= 0:
+        if signal(_between(near, point, half))[0] <= 0:
             inside = half
         else:
             beyond = half
-    return Reading("outside", outside, _between(near, aim, inside))
+    return Reading("outside", outside, _between(near, point, inside))
 
 
-def _projected(signal: Callable[[Vector], float], point: Vector, value: float) -> Vector:
-    """Where the way down the signal's gradient from `point` meets s = 0: of a distance, the nearest point of its
-    surface."""
+def _projected(signal: Signal, point: Vector, value: float, slope: Vector) -> Vector | None:
+    """Where the way down the signal's gradient from `point` comes inside; None where it does not."""
     for _ in range(PROJECTIONS):
-        slope = []
-        for axis in range(3):
-            aside = [(0.0, 0.0, 0.0)[:axis] + (sign * ASIDE,) + (0.0, 0.0, 0.0)[axis + 1 :] for sign in (1, -1)]
-            slope.append((signal(add(point, aside[0])) - signal(add(point, aside[1]))) / (2 * ASIDE))
-        steep = slope[0] ** 2 + slope[1] ** 2 + slope[2] ** 2
-        if steep < 0.1:  # no distance: near the middle of what is around
+        steep = dot(slope, slope)
+        if steep < FLAT:
+            return None
+        point = subtract(point, scale(slope, (value + DEPTH) / steep))
+        value, slope = signal(point)
+        if value <= 0:
             return point
-        point = subtract(point, scale((slope[0], slope[1], slope[2]), value / steep))
-        value = signal(point)
-    return point
+    return None
 
 
 def _between(a, b, share: float) -> Vector:

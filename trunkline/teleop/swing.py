@@ -24,7 +24,6 @@ from trunkline.teleop.shaping import Shaper, Shaping, shaper_of
 
 STEP = 1e-5  # rad, rad/s and m, of the differences
 STILL = 0.1  # rad/s, swings slower than that are creep
-FIRM = 0.01  # m of pull at one tendon
 SHARE = 0.1  # of the largest swing of the tip; smaller ones are not worth a longer way
 HEAVY = 0.2  # damping ratio from which on a swing dies within a period
 
@@ -40,11 +39,14 @@ class Swings(NamedTuple):
 
 
 def swings(
-    model: mujoco.MjModel, command: np.ndarray, step: np.ndarray, gravity: np.ndarray, tip_site: str = "tip"
+    model: mujoco.MjModel, command: np.ndarray, step: np.ndarray | None, gravity: np.ndarray, tip_site: str = "tip"
 ) -> Swings:
-    """Of the arm at rest under `command` (nu,), m, after it has come by `step` (nu,), m, all at once.
+    """Of the arm at rest under `command` (nu,), m.
 
     Args:
+        step: by which the command has come there all at once, m. Shape (nu,). None: the mount has begun to accelerate
+        by
+            1 m/s² instead, along each axis; sizes are the root of the sum of squares of the three.
         gravity: in the base frame, m/s². Shape (3,).
     """
     rest = settle(model, command[None], gravity[None])
@@ -72,17 +74,19 @@ def swings(
         return found
 
     a = np.block([[np.zeros((count, count)), np.eye(count)], [slopes(data.qpos), slopes(data.qvel)]])
-    b = np.concatenate([np.zeros((count, len(inputs))), slopes(inputs)])
+    push = slopes(model.opt.gravity) if step is None else (slopes(inputs) @ step[held])[:, None]
     mujoco.mj_forward(model, data)
     site, jacobian = model.site(tip_site).id, np.zeros((3, count))
     mujoco.mj_jacSite(model, data, jacobian, None, site)
-    values, right = (np.asarray(found, dtype=complex) for found in np.linalg.eig(a))
-    weights = np.linalg.solve(right, b @ step[held])
-    sizes = 2 * np.linalg.norm((jacobian @ right[:count]) * (weights / values), axis=0)  # with the conjugate
-    chosen = np.flatnonzero(values.imag > STILL)
+    values, right = np.linalg.eig(a)
+    pace, fall = np.imag(values), -np.real(values)
+    weights = np.linalg.solve(right, np.concatenate([np.zeros_like(push), push]))
+    tips = (jacobian @ right[:count])[:, :, None] * (weights / values[:, None])  # (3, modes, pushes)
+    sizes = 2 * np.sqrt((np.abs(tips) ** 2).sum(axis=(0, 2)))  # each with its conjugate
+    chosen = np.flatnonzero(pace > STILL)
     chosen = chosen[np.argsort(-sizes[chosen], kind="stable")]
-    values, sizes = values[chosen], sizes[chosen]
-    return Swings(2 * np.pi / values.imag, -values.real / np.abs(values), sizes, rest.position[0])
+    dampings = fall[chosen] / np.hypot(fall[chosen], pace[chosen])
+    return Swings(2 * np.pi / pace[chosen], dampings, sizes[chosen], rest.position[0])
 
 
 def slowest(found: Swings, count: int) -> Swings:
@@ -98,8 +102,7 @@ def shaper_for(model: mujoco.MjModel, settings: Shaping) -> ShaperOf:
     def shaper(gravity: np.ndarray, command: np.ndarray, change: np.ndarray) -> Shaper:
         if settings.kind == "none":
             return Shaper(np.zeros(1), np.ones(1))
-        # Where the commands stay, the mount's way makes the arm swing: in the swings that a pull at all tendons excites.
-        step = change if np.abs(change).max() > 0 else np.full(len(change), -FIRM)
+        step = change if np.abs(change).max() > 0 else None
         found = slowest(swings(model, command, step, STANDARD_GRAVITY * gravity), settings.modes)
         return shaper_of(found.periods, found.dampings, settings.kind)
 
