@@ -181,11 +181,13 @@ def _reading(signal: Signal, points: tuple[cKDTree | None, np.ndarray], point: V
     tree, places = points
     if tree is None:
         return Reading("outside", outside)
-    x, y, z = places[tree.query(point)[1]]
-    near = (float(x), float(y), float(z))
     aim = _projected(signal, point, outside, slope)
-    if aim is not None and distance(aim, point) <= distance(near, point):
+    # Whether any lattice point is nearer; with a bound, the tree is soon asked.
+    _, index = tree.query(point, distance_upper_bound=math.inf if aim is None else distance(aim, point))
+    if aim is not None and index == len(places):
         return Reading("outside", outside, aim)
+    x, y, z = places[index]
+    near = (float(x), float(y), float(z))
     inside, beyond = 0.0, 1.0  # shares of the way from `near` to `point`
     for _ in range(HALVINGS):
         half = (inside + beyond) / 2
