@@ -122,3 +122,9 @@ def test_the_slowest_are_chosen_among_those_that_matter():
     )
     np.testing.assert_array_equal(slowest(found, 3).periods, [0.6, 0.1])
     np.testing.assert_array_equal(slowest(found, 1).periods, [0.6])
+
+
+def test_swings_alike_count_once():
+    periods = np.array([0.60, 0.59, 0.56, 0.2])
+    found = Swings(periods, np.full(4, 0.03), np.ones(4), np.zeros(3))
+    np.testing.assert_array_equal(slowest(found, 4).periods, [0.60, 0.56, 0.2])

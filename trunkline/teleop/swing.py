@@ -25,6 +25,7 @@ from trunkline.teleop.shaping import Shaper, Shaping, shaper_of
 STEP = 1e-5  # rad, rad/s and m, of the differences
 STILL = 0.1  # rad/s, swings slower than that are creep
 SHARE = 0.1  # of the largest swing of the tip; smaller ones are not worth a longer way
+ALIKE = 0.05  # share by which periods differ that one shaper suits: ZVD leaves 0.6 % of such a swing
 HEAVY = 0.2  # damping ratio from which on a swing dies within a period
 
 
@@ -90,9 +91,15 @@ def swings(
 
 
 def slowest(found: Swings, count: int) -> Swings:
-    """The `count` slowest of those that move the tip by at least SHARE of what the largest does, slowest first."""
-    able = np.flatnonzero((found.sizes >= SHARE * found.sizes.max()) & (found.dampings < HEAVY))
-    able = able[np.argsort(-found.periods[able], kind="stable")][:count]
+    """The `count` slowest of those that move the tip by at least SHARE of what the largest does, slowest first. Of
+    swings that are ALIKE, as those of a straight arm in two directions, one stands for all: a shaper ends them
+    together."""
+    chosen: list[int] = []
+    for index in np.argsort(-found.periods, kind="stable"):
+        matters = found.sizes[index] >= SHARE * found.sizes.max() and found.dampings[index] < HEAVY
+        if matters and all(found.periods[index] < (1 - ALIKE) * found.periods[other] for other in chosen):
+            chosen.append(int(index))
+    able = chosen[:count]
     return Swings(found.periods[able], found.dampings[able], found.sizes[able], found.tip)
 
 
