@@ -55,15 +55,14 @@ class Planner:
             InputError: beginning with what forbids it: limit, self-collision, out of reach, gravity or world.
         """
         targets = request.targets
-        mount, curled = self._curled(targets)
-        there = self.rigid.solve(joints, mount, targets.pointing, targets.heading)
+        mount, _ = self._curled(targets)
+        there, curled = self.goal(targets, joints)
         goals = [("approach", there, self.straight), ("curl", there, curled)]
         if lift > 0:
             above = self.rigid.solve(there, add(mount, scale(UP, lift)), targets.pointing, targets.heading)
             goals.append(("lift", above, curled))
         if place is not None:
-            there = self.rigid.solve(goals[-1][1], self._curled(place)[0], place.pointing, place.heading)
-            goals.append(("transfer", there, curled))
+            goals.append(("transfer", self.goal(place, goals[-1][1])[0], curled))
             goals.append(("release", goals[-1][1], self.straight))
         here = np.append(joints, commands)
         rows, phases = [here[None]], []
@@ -81,6 +80,15 @@ class Planner:
         found = Plan(self.step, every[:, :JOINTS], every[:, JOINTS:], tuple(phases), request.package, request.world)
         refuse(found, world, self.mount_offset)
         return found
+
+    def goal(self, targets: Targets, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Joints (7,), rad, the nearest to `joints`, and commands (K,), m, that bring mount and tip to their targets.
+
+        Raises:
+            InputError: beginning with what forbids it, as `plan`.
+        """
+        mount, curled = self._curled(targets)
+        return self.rigid.solve(joints, mount, targets.pointing, targets.heading), curled
 
     def _curled(self, targets: Targets) -> tuple[Vector, np.ndarray]:
         """Where the mount goes, m, and the commands (K,) that then bring the tip to its target.
