@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.pipeline.results import recorded
 from trunkline.teleop.config import Config
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.messages import Controller, Input, Pose, World, to_json
@@ -25,6 +26,7 @@ PLACES = {"within reach": ((0.0, -0.4, 0.0), (0.1, -0.75, -0.1)), "out of reach"
 
 
 # REC
+@recorded("teleop_step")
 def main(path: Path) -> None:
     config = load_folder(Config, PROJECT / "conf/teleop")
     started = time.perf_counter()

@@ -18,6 +18,7 @@ from mujoco.batch import Batch
 from trunkline.elements import BACKLASH, RATE_LIMIT, give_way, numeric
 from trunkline.frames import gravity_in_base
 from trunkline.pipeline.inputs import read_model
+from trunkline.pipeline.results import recorded
 from trunkline.simulation.motion import batch_of, hold, move
 from trunkline.simulation.rest import base_frame, settle
 from trunkline.teleop.shaping import Kind, shaped, shaper_of
@@ -26,15 +27,17 @@ from trunkline.teleop.trajectory import Limits, point_to_point
 
 PULLS_MM = (30.0, 60.0, 90.0)
 TILTS_DEG = (0.0, 30.0)
-SECONDS = 10.0  # after which the tip counts as at rest
+SECONDS = 10.0  # s for which the tip is looked at
+SETTLED = 2.0  # s of its end, some swings, whose mean is where the tip rests
 NEAR = 3e-3  # m
 WAY = 0.5  # s, of the unshaped way
 MOVED = 0.2  # m, of the mount
 FRESH = 4  # steps
-SHAPERS: tuple[tuple[Kind, int], ...] = (("none", 1), ("zv", 1), ("zv", 2), ("zvd", 1), ("zvd", 2), ("zvd", 3))
+SHAPERS: tuple[tuple[Kind, int], ...] = (("none", 1), ("zv", 2), ("zvd", 1), ("zvd", 2))
 
 
 # REC
+@recorded("shaping")
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--mjcf", type=Path, default=Path("artifacts/identify_control/arm.xml"))
@@ -70,7 +73,8 @@ def shaped_ways(model: mujoco.MjModel, way: np.ndarray, found: Swings) -> list[n
 
 def tell(name: str, ways: list[np.ndarray], tips: list[np.ndarray], step: float) -> None:
     for (kind, count), rows, path in zip(SHAPERS, ways, tips, strict=True):
-        off = np.linalg.norm(path - path[-1], axis=1)[len(rows) :]
+        rest = path[-round(SETTLED / step) :].mean(axis=0)
+        off = np.linalg.norm(path - rest, axis=1)[len(rows) :]
         outside = np.flatnonzero(off > NEAR)
         last = (outside[-1] + 1 if len(outside) else 0) * step
         looks = ", ".join(f"{1e3 * off[round(t / step)]:.1f}" for t in (0.0, 0.5, 1.5))
