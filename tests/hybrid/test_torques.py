@@ -9,7 +9,7 @@ from trunkline.errors import InputError
 from trunkline.hybrid.compose import compose
 from trunkline.hybrid.robots import FixedMount
 from trunkline.hybrid.torques import joint_torques, require_torques, servo_commands
-from trunkline.panda.limits import TORQUE_MAX
+from trunkline.panda.limits import TORQUE
 
 Q = np.array([0.3, 0.5, -0.2, -1.6, 0.4, 1.9, 0.1])
 LOAD = 0.5  # kg
@@ -96,4 +96,4 @@ def test_a_fixed_mount_bears_nothing(arm):
 
 
 def test_the_limits_are_the_makers():
-    np.testing.assert_array_equal(TORQUE_MAX, [87] * 4 + [12] * 3)
+    np.testing.assert_array_equal(TORQUE, [87] * 4 + [12] * 3)

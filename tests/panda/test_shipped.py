@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from trunkline.panda.kinematics import Q_MAX, Q_MIN, mount_pose
-from trunkline.panda.limits import TORQUE_MAX
+from trunkline.panda.limits import TORQUE
 from trunkline.panda.shipped import shipped_panda
 
 OFFSET = 0.05  # m
@@ -30,7 +30,7 @@ def test_kinematics_agree(model):
 def test_limits_are_this_rooms_and_nearly_the_wheels(model):
     np.testing.assert_array_equal(model.jnt_range, np.column_stack([Q_MIN, Q_MAX]))
     constants = import_module("dm_robotics.panda.arm_constants")
-    np.testing.assert_array_equal(constants.EFFORT_LIMITS["max"], TORQUE_MAX)
+    np.testing.assert_array_equal(constants.EFFORT_LIMITS["max"], TORQUE)
     np.testing.assert_array_equal(constants.JOINT_LIMITS["max"], Q_MAX)
     wheel = mujoco.MjModel.from_xml_path(constants.XML_PATH)
     np.testing.assert_allclose(wheel.jnt_range, model.jnt_range, atol=3.1e-4)

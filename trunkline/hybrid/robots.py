@@ -16,7 +16,7 @@ from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.hybrid.touch import ARM, ROBOT, WORLD
 from trunkline.panda.collision import MOUNT_RADIUS
 from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN
-from trunkline.panda.limits import TORQUE_MAX
+from trunkline.panda.limits import TORQUE
 from trunkline.panda.shipped import JOINTS, shipped_panda
 
 Metres = Annotated[float, Field(ge=-10, le=10)]
@@ -57,7 +57,7 @@ class PandaRobot:
         for number in range(8):
             geom = spec.geom(f"link_{number}_geom")
             geom.contype, geom.conaffinity, geom.group = ROBOT, WORLD | ARM if number < 7 else WORLD, 2
-        for name, kp, kv, torque in zip(JOINTS, KP, KV, TORQUE_MAX, strict=True):
+        for name, kp, kv, torque in zip(JOINTS, KP, KV, TORQUE, strict=True):
             servo = spec.add_actuator(name=f"{name}_position", target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
             servo.set_to_position(kp=kp, kv=kv)
             servo.forcelimited, servo.forcerange = True, [-torque, torque]

@@ -14,7 +14,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.hybrid.compose import panda_joints
-from trunkline.panda.limits import TORQUE_MAX
+from trunkline.panda.limits import TORQUE
 from trunkline.panda.shipped import JOINTS
 
 
@@ -63,7 +63,7 @@ def _of_load(model: mujoco.MjModel, data: mujoco.MjData, site: int, qacc: np.nda
     return linear.T @ (linear @ qacc + slope @ data.qvel - model.opt.gravity)
 
 
-def require_torques(torques: np.ndarray, limits: np.ndarray = TORQUE_MAX) -> None:
+def require_torques(torques: np.ndarray, limits: np.ndarray = TORQUE) -> None:
     """Refuse torques (T, 7), N m, beyond the limits (7,), by the joint that exceeds its own by most.
 
     Raises:

@@ -61,6 +61,21 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
         raise InputError(f"{where}: {described}" + (f" (and {more} more)" if more else "")) from error
 
 
+def load_folder(schema: type[Schema], folder: Path) -> Schema:
+    """The settings of what is no stage, such as teleoperation: `folder / "config.yaml"` alone, which tunes nothing.
+
+    Raises:
+        InputError: one line that names the folder and key, what was found and what was expected.
+    """
+    composed, adapter = compose_settings(folder, {}, str(folder)), TypeAdapter(schema)
+    try:
+        return adapter.validate_json(json.dumps(composed), strict=True)
+    except ValidationError as error:
+        first = min(error.errors(), key=rank)
+        where = ".".join([str(folder), *map(str, path_of(first, composed))])
+        raise InputError(f"{where}: {describe(first, adapter)}") from error
+
+
 def check_settings(root: str | Path = ".") -> list[str]:
     """Validate the settings of every stage in `root / "dvc.yaml"`, and return their names.
 
@@ -186,5 +201,3 @@ def _without_missing(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _without_missing(item) for key, item in value.items() if item != "???"}
     return value
-
-

@@ -1,0 +1,136 @@
+"""Bad input: each kind has its one line, and the robot holds, in whatever mode it comes."""
+
+from dataclasses import replace
+
+import pytest
+
+from tests.support.operator import TABLE, Operator
+from trunkline.teleop.messages import Pose, World
+from trunkline.teleop.transitions import MODES
+
+NAN = float("nan")
+
+
+def swap(operator):
+    left, right = operator.given.left, operator.given.right
+    return operator.step(left={"position": right.position}, right={"position": left.position})
+
+
+# what goes wrong, and the line that says so
+BAD = {
+    "nan position": (
+        lambda o: o.wait(0.2, left={"position": (NAN, 0.0, 0.0)}),
+        "left controller: pose is not a number; holding",
+    ),
+    "infinite quaternion": (
+        lambda o: o.wait(0.2, right={"quaternion": (1.0, 0.0, 0.0, float("inf"))}),
+        "right controller: pose is not a number; holding",
+    ),
+    "nan stick": (
+        lambda o: o.wait(0.2, right={"stick": (0.0, NAN)}),
+        "right controller: pose is not a number; holding",
+    ),
+    "quaternion of length 2": (
+        lambda o: o.wait(0.2, right={"quaternion": (2.0, 0.0, 0.0, 0.0)}),
+        "right controller: quaternion is not of unit length; holding",
+    ),
+    "controller gone": (lambda o: o.wait(0.2, right={"tracked": False}), "right controller: not tracked; holding"),
+    "time goes back": (lambda o: o.step(seconds=-0.5), "clock went back by 0.5 s; holding"),
+    "nan stamp": (lambda o: o.step(seconds=NAN), "stamp is not a number; holding"),
+    "gap": (lambda o: o.step(seconds=0.4), "client silent for 0.40 s; holding"),
+    "silent": (lambda o: o.wait(0.3, seconds=0.0), "client silent for 0.27 s; holding"),
+    "no step": (lambda o: o.step(dt=0.0), "step of 0 s: expected a positive time; holding"),
+    "nan step": (lambda o: o.step(dt=NAN), "step of nan s: expected a positive time; holding"),
+    "swapped": (swap, "controllers have changed places; holding until both grips are let go"),
+    "other package": (
+        lambda o: o.step(package="b" * 64),
+        "package: found digest bbbbbbbbbbbb, expected aaaaaaaaaaaa; holding",
+    ),
+    "no package": (lambda o: o.step(package=""), "package: found digest none, expected aaaaaaaaaaaa; holding"),
+    "no alignment": (lambda o: o.step(alignment=None), "base is not aligned; holding"),
+    "alignment is no pose": (
+        lambda o: o.step(alignment=Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))),
+        "base alignment is not a pose; holding",
+    ),
+    "nan joints": (lambda o: o.step(joints=(NAN,) * 7), "robot's joints are not numbers; holding"),
+}
+
+
+@pytest.mark.parametrize("bad", BAD)
+@pytest.mark.parametrize("mode", MODES)
+def test_robot_holds_and_says_why(mode, bad):
+    operator = Operator()
+    operator.to(mode)
+    if mode == "hold":
+        operator.step(left={"tracked": True, "grip": True})
+    spoil, line = BAD[bad]
+    start = len(operator.intents)
+    intent = spoil(operator)
+    assert intent.motion == "hold"
+    assert intent.mode == ("stopped" if mode == "stopped" else "hold")
+    if bad == "silent":  # said as soon as it is known
+        intent = next(intent for intent in operator.intents[start:] if intent.notice.startswith("client"))
+    assert intent.notice == line
+    assert "\n" not in line
+
+
+@pytest.mark.parametrize("bad", BAD)
+def test_robot_may_be_moved_again_only_by_a_new_plan_and_a_new_confirmation(bad):
+    operator = Operator()
+    operator.to("execute")
+    good = operator.given
+    BAD[bad][0](operator)
+    operator.given = replace(good, stamp=operator.given.stamp if operator.given.stamp > 0 else good.stamp)
+    for _ in range(120):
+        assert operator.step().motion == "hold"
+    assert operator.wait(1.0, left={"grip": False}, right={"grip": False}).mode == "aim"
+
+
+def test_a_controller_lost_for_a_moment_changes_nothing():
+    operator = Operator()
+    operator.to("execute")
+    assert operator.wait(0.08, right={"tracked": False}).motion == "execute"
+    assert operator.wait(0.1, right={"tracked": True}).motion == "execute"
+
+
+def test_motion_stops_within_150_ms_of_the_last_pose():
+    operator = Operator()
+    operator.to("execute")
+    lost = operator.given.stamp
+    while operator.step(right={"tracked": False}).motion == "execute":
+        assert operator.given.stamp - lost < 0.15
+
+
+def test_motion_stops_within_400_ms_of_the_last_word_of_a_client():
+    operator = Operator()
+    operator.to("execute")
+    steps = 1
+    while operator.step(seconds=0.0).motion == "execute":
+        steps += 1
+    assert steps / 60 < 0.4
+
+
+def test_targets_in_a_table_are_named_and_no_plan_is_asked_for():
+    operator = Operator()
+    operator.wait(0.5, world=World("table", (TABLE,)))
+    intent = operator.wait(0.3, left={"grip": True}, right={"grip": True, "position": (0.3, -1.05, 0.0)})
+    assert (intent.targets.tip.reach, intent.targets.tip.solid) == ("blocked", "the table")
+    intent = operator.step(right={"trigger": True})
+    assert (intent.mode, intent.request) == ("aim", None)
+    assert intent.notice == "tip target is inside the table"
+
+
+def test_no_plan_before_both_targets_are_set():
+    operator = Operator()
+    operator.wait(0.5)
+    operator.wait(0.3, left={"grip": True})
+    assert operator.step(right={"trigger": True}).notice == "both targets are needed: hold a grip to set each"
+
+
+def test_buttons_held_when_a_controller_appears_are_no_presses():
+    operator = Operator()
+    operator.to("stopped")
+    operator.step(seconds=0.2, right={"tracked": False})
+    assert operator.wait(0.2, right={"tracked": True, "primary": True}).mode == "stopped"
+    operator.step(right={"primary": False})
+    assert operator.step(right={"primary": True}).mode == "hold"

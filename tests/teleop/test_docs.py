@@ -1,0 +1,29 @@
+"""docs/teleoperation.md: its diagram is the table, and its settings compose."""
+
+from pathlib import Path
+
+import pytest
+
+from trunkline.errors import InputError
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.teleop.config import Config
+from trunkline.teleop.transitions import TRANSITIONS, diagram
+
+PAGE = (Path(__file__).parents[2] / "docs/teleoperation.md").read_text(encoding="utf-8")
+
+
+def test_diagram_is_that_of_the_table():
+    assert f"```mermaid\n{diagram()}\n```" in PAGE
+    for (mode, event), after in TRANSITIONS.items():
+        assert f"{mode} --> {after}: {event}" in PAGE or event in ("stop", "lost")
+
+
+def test_settings_compose_and_a_typo_is_one_line(tmp_path):
+    assert load_folder(Config, PROJECT / "conf/teleop").core.rigid_hand in ("left", "right")
+    text = (PROJECT / "conf/teleop/config.yaml").read_text()
+    (tmp_path / "config.yaml").write_text(text.replace("look_back: 0.1", "look_back: 9.0"))
+    with pytest.raises(InputError, match=r"core\.look_back: found 9"):
+        load_folder(Config, tmp_path)
+    (tmp_path / "config.yaml").write_text(text.replace("start: 0.6 ", "start: 9.0 "))
+    with pytest.raises(InputError, match=r"rays\.start: found 9"):
+        load_folder(Config, tmp_path)

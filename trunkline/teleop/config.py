@@ -1,0 +1,20 @@
+"""All settings of conf/teleop/config.yaml: of the core, of the motors, of what shapes a plan."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from trunkline.settings import settings
+from trunkline.teleop.settings import Teleop
+from trunkline.teleop.shaping import Shaping
+from trunkline.teleop.trajectory import MotorLimits
+
+
+@settings
+class Config:
+    """`mount_offset`: m, from the Panda's flange to the soft arm's mount."""
+
+    core: Teleop
+    motors: MotorLimits
+    shaping: Shaping
+    mount_offset: Annotated[float, Field(ge=0, le=0.5)]

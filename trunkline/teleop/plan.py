@@ -1,0 +1,43 @@
+"""A plan: what all ten axes do from when to when, and the digest that names it and nothing else."""
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+
+PHASES = ("approach", "curl", "lift", "transfer", "release")
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Rows every `step` s: `joints` (T, 7), rad, and the motors' `commands` (T, K), m.
+
+    `phases`: name and number of the first row of each. `package`, `world`: digests of those for which it was made.
+    """
+
+    step: float
+    joints: np.ndarray
+    commands: np.ndarray
+    phases: tuple[tuple[str, int], ...]
+    package: str
+    world: str
+
+    @property
+    def duration(self) -> float:
+        """s."""
+        return self.step * (len(self.joints) - 1)
+
+    def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Joints (7,) and commands (K,) at `time`, s, linear between rows; the ends are held."""
+        place = min(max(time / self.step, 0.0), len(self.joints) - 1.0)
+        row = min(int(place), max(len(self.joints) - 2, 0))
+        after, share = min(row + 1, len(self.joints) - 1), place - row
+        return tuple((1 - share) * rows[row] + share * rows[after] for rows in (self.joints, self.commands))  # type: ignore[return-value]
+
+    def digest(self) -> str:
+        """SHA-256 of everything in it, in hexadecimal digits: another bit, another digest."""
+        found = hashlib.sha256()
+        for rows in (self.joints, self.commands):
+            found.update(repr(rows.shape).encode() + np.ascontiguousarray(rows, dtype="<f8").tobytes())
+        found.update(repr((self.step, self.phases, self.package, self.world)).encode())
+        return found.hexdigest()

@@ -1,0 +1,82 @@
+"""Targets: where both rays want the robot, tested against what it can reach and what stands in the way."""
+
+import math
+
+from trunkline.teleop.alignment import Aligned, Wrist, align, base_quaternion
+from trunkline.teleop.messages import Target, Targets, World
+from trunkline.teleop.reach import Reach, Reading
+from trunkline.teleop.settings import Orientation, Teleop
+from trunkline.teleop.vectors import DOWN, Vector, add, conjugate, cross, dot, norm, rotate, scale, subtract
+
+
+def place(
+    rigid: Vector,
+    tip: Vector,
+    pointing: Vector,
+    limited: bool,
+    wrist: Wrist,
+    last: Aligned,
+    world: World,
+    reach: Reach,
+    settings: Teleop,
+) -> Targets:
+    """Both targets (base frame, m) with their reach under the gravity that the arm will have there."""
+    aligned = align(tip, rigid, pointing, wrist, last, settings.bending_plane)
+    turn = base_quaternion(pointing, aligned.heading)
+    back = conjugate(turn)
+    found = reach.soft(rotate(back, subtract(tip, rigid)), rotate(back, DOWN))
+    offer = None if found.offer is None else add(rigid, rotate(turn, found.offer))
+    return Targets(
+        _target(rigid, reach.rigid(rigid, pointing), world),
+        _target(tip, found._replace(offer=offer), world),
+        pointing,
+        aligned.heading,
+        aligned.half_plane,
+        aligned.turned,
+        limited,
+    )
+
+
+def _target(position: Vector, reading: Reading, world: World) -> Target:
+    for box in world.boxes:
+        if all(low <= x <= high for low, x, high in zip(box.low, position, box.high, strict=True)):
+            return Target(position, "blocked", solid=box.name)
+    return Target(position, *reading)
+
+
+def tilted(pointing: Vector, toward: Vector, dt: float, settings: Orientation) -> tuple[Vector, bool]:
+    """Where the end effector points after `dt` s of following the direction `toward`, and whether that is tilted
+    further than it may be: then it stays at the largest tilt in that direction."""
+    tilt = math.acos(min(max(dot(toward, DOWN), -1.0), 1.0))
+    limited = tilt > settings.most_tilt
+    if limited:
+        toward = _turned(DOWN, toward, settings.most_tilt)
+    angle = math.acos(min(max(dot(pointing, toward), -1.0), 1.0))
+    step = settings.rate * dt
+    return (toward if angle <= step else _turned(pointing, toward, step)), limited
+
+
+def _turned(a: Vector, b: Vector, angle: float) -> Vector:
+    """`a` turned by `angle`, rad, towards `b`, both of unit length."""
+    axis = cross(a, b)
+    length = norm(axis)
+    if length < 1e-12:  # opposite: any way is as short
+        axis, length = (1.0, 0.0, 0.0), 1.0
+    side = cross(scale(axis, 1 / length), a)
+    found = add(scale(a, math.cos(angle)), scale(side, math.sin(angle)))
+    return scale(found, 1 / norm(found))
+
+
+def why_not(targets: Targets | None) -> str:
+    """Why no plan can be asked for, in one line; "" where one can."""
+    if targets is None:
+        return "both targets are needed: hold a grip to set each"
+    for name, target in (("rigid", targets.rigid), ("tip", targets.tip)):
+        if target.reach == "blocked":
+            return f"{name} target is inside {target.solid}"
+        if target.reach == "outside":
+            offered = "; primary button takes the nearest point that is within" if target.offer else ""
+            return f"{name} target is {1e3 * target.outside_by:.0f} mm out of reach{offered}"
+    if targets.turned is None:
+        return "wrist cannot turn the arm's bending plane to the tip target"
+    return ""
