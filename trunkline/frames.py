@@ -27,6 +27,20 @@ def tilt_of_gravity(gravity: np.ndarray) -> float:
     return float(np.arctan2(np.hypot(gravity[0], gravity[1]), -gravity[2]))
 
 
+def downwards(angle: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
+    """The direction of gravity in the base frame.
+
+    Args:
+        angle: between the straight arm (base -z) and gravity, rad, any shape (...).
+        azimuth: of gravity around the arm, from base +x towards +y, rad, likewise; 0 is a mount tilted about base +y.
+
+    Returns:
+        Unit vectors. Shape (..., 3).
+    """
+    side = np.sin(angle)
+    return np.stack([side * np.cos(azimuth), side * np.sin(azimuth), -np.cos(angle) + 0.0 * azimuth], axis=-1)
+
+
 def rotation_from_wxyz(quaternion: np.ndarray) -> Rotation:
     """Quaternions (..., 4), w first, as a scipy Rotation."""
     return Rotation.from_quat(quaternion, scalar_first=True)

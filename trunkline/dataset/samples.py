@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from trunkline.dataset.columns import POSE, command_columns, length_columns
+from trunkline.dataset.columns import DOWN, POSE, command_columns, length_columns
 from trunkline.errors import InputError
 
 
@@ -12,7 +12,7 @@ def read_samples(path: Path, tendons: int, *columns: str) -> pd.DataFrame:
     """The table at `path`, of an arm of `tendons`, at two gravity angles or more.
 
     Args:
-        columns: that must be there, beside the gravity angle, the tip's pose, the tendons' lengths and commands.
+        columns: that must be there, beside gravity, the tip's pose, the tendons' lengths and commands.
 
     Raises:
         InputError: there is no such file, or it lacks a column or a second gravity angle.
@@ -20,7 +20,7 @@ def read_samples(path: Path, tendons: int, *columns: str) -> pd.DataFrame:
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected the samples of the fk_dataset stage (run `dvc repro`)")
     table = pd.read_parquet(path)
-    for name in ("theta_g", *POSE, *length_columns(tendons), *command_columns(tendons), *columns):
+    for name in ("theta_g", *DOWN, *POSE, *length_columns(tendons), *command_columns(tendons), *columns):
         if name not in table:
             raise InputError(f"{path}: found no column {name!r}, expected samples of an arm of {tendons} tendons")
     angles = table["theta_g"].nunique()

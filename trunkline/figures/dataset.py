@@ -19,7 +19,8 @@ def density_figure(densities: list[Density]) -> Figure:
     grid = figure.add_gridspec(4, len(shown))
     axes = np.array([[figure.add_subplot(grid[row, column]) for column in range(len(shown))] for row in range(3)])
     every = figure.add_subplot(grid[3, :])
-    angles = [np.degrees(d.tilt) for d in densities]
+    densities = sorted(densities, key=lambda density: density.angle)
+    angles = [np.degrees(d.angle) for d in densities]
     for values, color, label in zip(
         np.array([d.unevenness() for d in densities]).T, (INITIAL, IDENTIFIED), ("before", "after"), strict=True
     ):
@@ -37,7 +38,7 @@ def density_figure(densities: list[Density]) -> Figure:
             ax.scatter(near[:, 0], near[:, 2], s=2, color=color, linewidths=0)
             ax.plot(0, 0, "^", color=BASE, markersize=5)
             ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x (mm)")
-            ax.set_title(f"θ_G = {np.degrees(density.tilt):.0f}°, {label}\n{len(tips)} tips", fontsize=9)
+            ax.set_title(f"θ_G = {np.degrees(density.angle):.0f}°, {label}\n{len(tips)} tips", fontsize=9)
         for tips, color, label in ((density.before, INITIAL, "before"), (density.after, IDENTIFIED, "after")):
             counts = np.sort(_per_cell(tips))
             column[2].plot(np.linspace(0, 100, len(counts)), counts / counts.mean(), color=color, label=label)
