@@ -8,8 +8,8 @@ import torch
 from trunkline.dataset.samples import read_samples
 from trunkline.figures.network import error_map_figure, learning_figure, tip_error_figure
 from trunkline.figures.style import save_figure
-from trunkline.ik.learn import Learning, learn
 from trunkline.ik.inputs import inputs_of
+from trunkline.ik.learn import Learning, learn
 from trunkline.ik.report import histogram, summary
 from trunkline.pipeline.inputs import load_rig, read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json

@@ -20,7 +20,7 @@ from onnx import TensorProto, helper
 from tests.support.small_arm import small_mjcf
 from trunkline.arm.joints import Branch, Joints, add_elements
 from trunkline.errors import InputError
-from trunkline.ik.network import INPUTS
+from trunkline.ik.inputs import TILT
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, Laws, compile_with
 from trunkline.unity.manifest import Manifest, Model
@@ -42,7 +42,7 @@ def network(inputs: int = 8, opset: int = 15, outputs: list[str] | None = None) 
     graph = helper.make_graph(nodes, "ik", ends[:1], ends[1:], [weights])
     opsets = [helper.make_opsetid("", opset)]
     model = helper.make_model(graph, opset_imports=opsets, ir_version=8)
-    names = {"inputs": INPUTS, "outputs": outputs or ["tendon_1", "tendon_2", "tendon_3"]}
+    names = {"inputs": TILT, "outputs": outputs or ["tendon_1", "tendon_2", "tendon_3"]}
     meaning = {name: f"{name} in m" for name in ("commands", "lengths", "tip")} | {"doubt_beyond_m": "0.005"}
     helper.set_model_props(model, {key: json.dumps(value) for key, value in names.items()} | meaning)
     return model.SerializeToString()

@@ -32,7 +32,8 @@ class Sampling:
 
 @dataclass
 class Gathered:
-    """The table of samples with its column "split"; how dense tips are under each gravity; the check, a row a sample."""
+    """The table of samples with its column "split"; how dense tips are under each gravity; the check, a row a
+    sample."""
 
     table: pd.DataFrame
     densities: list[Density]

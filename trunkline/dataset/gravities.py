@@ -54,14 +54,17 @@ class Directions(Rays):
 Gravities = Annotated[Tilts | Directions, Field(discriminator="kind")]
 
 
-def spread(count: int, largest: float) -> np.ndarray:
+def spread(count: int, largest: float, crowd: bool = False) -> np.ndarray:
     """`count` directions evenly over the cap of those up to `largest` rad from the straight arm: a Fibonacci lattice.
 
-    The first is that of the hanging arm.
+    The first is that of the hanging arm. With `crowd`, they lie the nearer together the nearer to the border, where
+    interpolation has neighbours on one side alone: shares a of the cap's area become sin(π a / 2), as Chebyshev's
+    nodes.
 
     Returns:
         Unit vectors in the base frame. Shape (count, 3).
     """
     index = np.arange(count)
-    share = (1 - np.cos(largest)) * index / max(1, count - 1)
+    area = index / max(1, count - 1)
+    share = (1 - np.cos(largest)) * (np.sin(np.pi / 2 * area) if crowd else area)
     return downwards(np.arccos(1 - share), GOLDEN_ANGLE * index)

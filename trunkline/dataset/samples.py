@@ -2,10 +2,14 @@
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from trunkline.dataset.columns import DOWN, POSE, command_columns, length_columns
 from trunkline.errors import InputError
+from trunkline.frames import downwards
+
+ALIKE = 1e-9  # by which directions of gravity may differ and be the same
 
 
 def read_samples(path: Path, tendons: int, *columns: str) -> pd.DataFrame:
@@ -27,3 +31,9 @@ def read_samples(path: Path, tendons: int, *columns: str) -> pd.DataFrame:
     if angles < 2:
         raise InputError(f"{path}: found {angles} gravity angle, expected at least 2: others lie between them")
     return table
+
+
+def from_any_side(table: pd.DataFrame) -> bool:
+    """Whether gravity leaves the plane of tilt in these samples, so that no angle about base +y tells of it."""
+    tilts = downwards(table["theta_g"].to_numpy(), np.zeros(len(table)))
+    return bool(np.abs(table[DOWN].to_numpy() - tilts).max() > ALIKE)

@@ -3,8 +3,8 @@
 Reachable means: at rest, with at least one tendon of every three slack. Pulling all of them at once bends nothing but
 presses the units together, and above a few newtons a straight arm buckles under it: then the same lengths have many
 equilibria, which one depends on history, and no function gives lengths from poses. With one tendon slack the
-equilibrium was found to be unique. So, per direction of gravity, two neighbouring tendons pull, in any proportion, up to
-their largest force: tips form a surface, each point of which has one set of path lengths.
+equilibrium was found to be unique. So, per direction of gravity, two neighbouring tendons pull, in any proportion, up
+to their largest force: tips form a surface, each point of which has one set of path lengths.
 """
 
 from dataclasses import dataclass

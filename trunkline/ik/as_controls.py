@@ -14,7 +14,7 @@ from pydantic import Field, PositiveFloat
 
 from trunkline.dataset.sampling import around_the_arm
 from trunkline.elements import BACKLASH, SLIDER, actuators, all_elements, capstan_friction, numeric
-from trunkline.ik.inputs import draw_gravity, gravity_of, position_of, told_of_gravity
+from trunkline.ik.inputs import draw_gravity, gravity_of, position_of
 from trunkline.simulation.drive import drive, has_friction
 from trunkline.simulation.rest import base_frame, settle
 from trunkline.statics.chain import Chain
@@ -78,7 +78,8 @@ def draw_targets(
     """Poses in which MuJoCo rests without friction under one or two neighbouring motors, none near its limit.
 
     Args:
-        known: what samples tell of gravity; others are drawn between them, see `inputs.draw_gravity`. Shape (G, 1 or 3).
+        known: what samples tell of gravity; others are drawn between them, see `inputs.draw_gravity`. Shape (G, 1 or
+            3).
         deepest: of each tendon, how far it is drawn in at most, m. Shape (K,).
         others_pay_out: whether motors that do not pull give way; else they stay where the straight arm has them, and
             pull against the others as the arm bends: shapes that the data set has none of.

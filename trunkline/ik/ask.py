@@ -18,12 +18,12 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
     foreseen so far from its target that the arm cannot take the pose.
 
     Args:
-        poses: gravity (angle in rad, or a unit vector), tip position (m) and unit quaternion (w first, either sign) in the base frame, as
-            the file's `inputs` name them. Shape (N, 8 or 10).
+        poses: gravity (angle in rad, or a unit vector), tip position (m) and unit quaternion (w first, either sign) in
+            the base frame, as the file's `inputs` name them. Shape (N, 8 or 10).
 
     Raises:
-        InputError: the shape is another, a number is not finite, a quaternion or direction is not of unit length, or the network
-            has no finite answer.
+        InputError: the shape is another, a number is not finite, a quaternion or direction is not of unit length, or
+            the network has no finite answer.
     """
     (taken,), meaning = runtime.get_inputs(), runtime.get_modelmeta().custom_metadata_map
     for key in ("inputs", "doubt_beyond_m"):

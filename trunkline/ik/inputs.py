@@ -9,18 +9,17 @@ import numpy as np
 import pandas as pd
 
 from trunkline.dataset.columns import DOWN, POSE
+from trunkline.dataset.samples import from_any_side
 from trunkline.frames import STANDARD_GRAVITY, downwards, gravity_in_base
 
 TILT = ["theta_g", *POSE]  # rad, m, and a quaternion, w first
 DIRECTION = [*DOWN, *POSE]
 UNITS = {"theta_g": "rad"} | dict.fromkeys(POSE[:3], "m")  # of others, "1"
-ALIKE = 1e-9  # by which directions of gravity may differ and be the same
 
 
 def inputs_of(table: pd.DataFrame) -> list[str]:
     """The columns that a network of these samples takes: the angle where gravity never leaves the plane of tilt."""
-    tilts = downwards(table["theta_g"].to_numpy(), np.zeros(len(table)))
-    return TILT if np.abs(table[DOWN].to_numpy() - tilts).max() < ALIKE else DIRECTION
+    return DIRECTION if from_any_side(table) else TILT
 
 
 def gravity_of(targets: np.ndarray) -> np.ndarray:

@@ -37,7 +37,8 @@ from trunkline.statics.chain import Chain
 
 @dataclass
 class Unseen:
-    """Targets between the gravities of the data set: of how many, where there is more than a tilt; pulls around the arm, tips along each, how many in all."""
+    """Targets between the gravities of the data set: of how many, where there is more than a tilt; pulls around the
+    arm, tips along each, how many in all."""
 
     gravities: Annotated[int, Field(ge=1, le=10_000)]
     directions: Annotated[int, Field(ge=8, le=10000)]
@@ -74,8 +75,9 @@ class Learned:
     """A network, also as ONNX, and its learning curve: epoch, train_mm, validate_mm.
 
     held_out: the samples that no training saw. errors: of the exported network's commands, for them ("held out") and
-    for targets under "unseen angles". as_lengths: of its lengths, for the latter, held by cables. as_controls: what comes
-    of its commands in MuJoCo, on_plant: on the arm itself. polished: of some held-out targets after Gauss-Newton steps.
+    for targets under "unseen angles". as_lengths: of its lengths, for the latter, held by cables. as_controls: what
+    comes of its commands in MuJoCo, on_plant: on the arm itself. polished: of some held-out targets after Gauss-Newton
+    steps.
     outside: how many targets far off there are, beyond_range: how far (m) any answer to them leaves the tendons' range.
     difference: between the network and what was exported, m, at most.
     """

@@ -34,8 +34,9 @@ class InverseKinematics(nn.Module):
     """(θ_G or g_x, g_y, g_z, x, y, z, q_w, q_x, q_y, q_z) to an `Answer`: features, normalisation, three hidden layers,
     ReLU.
 
-    SI units; gravity is told as in `inputs`; the quaternion is of unit length, of either sign. Commands stay within those of the training set. The tip
-    is foreseen by layers of half the width from gravity and the commands alone: they do not know the pose that was asked.
+    SI units; gravity is told as in `inputs`; the quaternion is of unit length, of either sign. Commands stay within
+    those of the training set. The tip is foreseen by layers of half the width from gravity and the commands alone: they
+    do not know the pose that was asked.
     """
 
     mean: torch.Tensor  # of the features over the training set, as is 1 / scale their standard deviation

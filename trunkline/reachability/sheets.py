@@ -1,8 +1,8 @@
 """Sheets: the surface of the tips that the soft arm reaches, at any direction of gravity.
 
 Under one gravity the tips form a surface, with two coordinates: which way the tendons pull, around the arm, and how
-far along the tip's way. So a sheet is a lattice of points, the same lattice under every gravity, and a point of it moves
-smoothly as gravity turns. What is interpolated over directions of gravity is where the points are: few directions
+far along the tip's way. So a sheet is a lattice of points, the same lattice under every gravity, and a point of it
+moves smoothly as gravity turns. What is interpolated over directions of gravity is where the points are: few directions
 suffice, and kilobytes for each, where grids of distances would have to lie a few degrees apart.
 """
 
@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from trunkline.dataset.sampling import sheet_at
 from trunkline.frames import STANDARD_GRAVITY
@@ -48,12 +49,9 @@ class Sheets:
         """The reachable point nearest to each of `points` (N, 3), m (N, 3), and how far it is, m (N,); `sheet` as
         `at` gives it."""
         corners = sheet.reshape(-1, 3)
-        found, distance = np.empty((len(points), 3)), np.empty(len(points))
-        for row, point in enumerate(points):
-            apart = np.square(corners - point).sum(axis=1)
-            beside = np.unique(self._triangles_of[np.argpartition(apart, NEAREST)[:NEAREST]])
-            found[row], distance[row] = nearest_on_triangles(point, corners[self.triangles[beside]])
-        return found, distance
+        beside = np.argpartition(cdist(points, corners, "sqeuclidean"), NEAREST, axis=1)[:, :NEAREST]
+        triangles = self.triangles[self._triangles_of[beside].reshape(len(points), -1)]
+        return nearest_on_triangles(points, corners[triangles])
 
     def signal(self, sheet: np.ndarray, points: np.ndarray) -> np.ndarray:
         """Above 0 where `points` (N, 3) are out of reach, about how far, m. Shape (N,)."""
@@ -67,10 +65,11 @@ class Sheets:
     @cached_property
     def _triangles_of(self) -> np.ndarray:
         """Six triangles that have each point, some twice at the edges. Shape (R S, 6)."""
-        order = np.argsort(self.triangles, axis=None, kind="stable")
-        count = np.bincount(self.triangles.reshape(-1), minlength=self.points[0].size // 3)
+        corners = self.triangles.T.reshape(-1)
+        order = np.argsort(corners, kind="stable")
+        count = np.bincount(corners, minlength=self.points[0].size // 3)
         first = np.concatenate([[0], np.cumsum(count)[:-1]])
-        return order[first[:, None] + np.minimum(np.arange(6), count[:, None] - 1)] // 3
+        return order[first[:, None] + np.minimum(np.arange(6), count[:, None] - 1)] % len(self.triangles)
 
 
 def sheet_triangles(around: int, along: int) -> np.ndarray:

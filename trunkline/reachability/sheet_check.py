@@ -1,0 +1,52 @@
+"""How good the sheets are: at directions of gravity that have none, against equilibria that are found there."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from trunkline.dataset.sampling import sample_at
+from trunkline.fields.grid import overlap
+from trunkline.frames import STANDARD_GRAVITY, downwards
+from trunkline.reachability.reach_signal import THRESHOLD, HeldOut, points_beyond
+from trunkline.reachability.sheets import Sheets, finer
+from trunkline.reachability.soft import SoftSettings, soft_field, soft_lattice
+from trunkline.reachability.tips import LOOK_EVERY
+from trunkline.statics.chain import Chain
+
+DENSER = 4  # times, of a sheet whose set is compared: as near together as the tips that it is compared with
+
+
+def check_sheets(
+    sheets: Sheets,
+    chain: Chain,
+    soft: SoftSettings,
+    *,
+    beyond: float,
+    count: int,
+    seed: int,
+    done: Callable[[str], None],
+) -> list[HeldOut]:
+    """Sheets at `soft.sheets.heldout` directions of gravity, at random, that no sheet was made for.
+
+    The sets within reach, as `soft.soft_field` makes them of points, are compared; so is what the signal says.
+
+    Args:
+        beyond: m, how far from every tip are the points that shall be out of reach.
+        count: how many of them, and of tips, to draw at each. seed: of the draws.
+    """
+    rng = np.random.default_rng(seed)
+    largest = np.arccos(np.clip(-sheets.downs[:, 2].max(), -1, 1))
+    angles, azimuths = rng.uniform(0, largest, soft.sheets.heldout), rng.uniform(0, 2 * np.pi, soft.sheets.heldout)
+    results = []
+    for angle, azimuth in zip(angles, azimuths, strict=True):
+        down = downwards(angle, azimuth)
+        own = sample_at(chain, STANDARD_GRAVITY * down, soft.directions, soft.steps, rng, LOOK_EVERY)
+        tips, sheet = own.equilibrium.position, sheets.at(down)
+        blended = finer(sheet, DENSER)
+        lattice = soft_lattice([tips, blended], soft, soft.voxel)
+        iou = overlap(soft_field(blended, lattice, soft), soft_field(tips, lattice, soft))
+        sets = tips[rng.permutation(len(tips))[:count]], points_beyond(tips, beyond, count, rng)
+        reachable, called = ((sheets.signal(sheet, points) <= THRESHOLD).mean() for points in sets)
+        results.append(HeldOut(angle, iou, float(reachable), float(called), azimuth))
+        done(f"held-out {np.degrees(angle):.0f}°, {np.degrees(azimuth):.0f}°")
+    return results
