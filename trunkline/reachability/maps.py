@@ -78,7 +78,7 @@ class Maps:
         arrays |= {"soft_angles": self.soft.angles, "soft_threshold": np.asarray(THRESHOLD)}
         arrays |= {"soft_tolerance": np.asarray(self.soft.shape.tolerance)}
         if self.sheets:
-            arrays |= {"sheets_points": self.sheets.points, "sheets_downs": self.sheets.downs}
+            arrays |= self.sheets.arrays()
         return arrays | _placement("soft", self.soft.lattice)
 
     def meshes(self) -> dict[str, Surface]:

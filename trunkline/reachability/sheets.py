@@ -40,6 +40,10 @@ class Sheets:
     def _flat(self) -> np.ndarray:
         return self.points.reshape(len(self.points), -1).astype(np.float32)
 
+    def arrays(self) -> dict[str, np.ndarray]:
+        """All that it takes to use them, by name."""
+        return {"sheets_points": self.points, "sheets_downs": self.downs, "sheets_matrix": self.matrix}
+
     def at(self, down: np.ndarray) -> np.ndarray:
         """The sheet under gravity `down`, a unit vector (3,): m. Shape (R, S, 3)."""
         weights = spline_weights(self.matrix, self.downs, np.asarray(down, float)).astype(np.float32)

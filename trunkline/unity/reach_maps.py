@@ -6,7 +6,6 @@ import numpy as np
 import trimesh
 
 from trunkline.errors import InputError
-from trunkline.reachability.weights import spline_matrix
 from trunkline.unity.frame import unity_obj, unity_position, unity_volume
 from trunkline.unity.manifest import Grid, Mesh, Reach, Sheets
 
@@ -71,16 +70,20 @@ def convert_sheets(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str
     """The surface of tips under any gravity, for Unity; nothing where the maps are of one tilt.
 
     Args:
-        arrays: `sheets_points` (D, R, S, 3), m, under gravity `sheets_downs` (D, 3), see `reachability.sheets`.
+        arrays: `sheets_points` (D, R, S, 3), m, under gravity `sheets_downs` (D, 3), and
+            `sheets_matrix` (D, D + 4), see `reachability.sheets`.
         source: the file they are from, for messages.
     """
     if "sheets_points" not in arrays:
         return {}, None
-    points, downs = (np.asarray(arrays[name], float) for name in ("sheets_points", "sheets_downs"))
-    if points.ndim != 4 or points.shape[3] != 3 or downs.shape != (len(points), 3):
+    points, downs, matrix = (
+        np.asarray(arrays[name], float) for name in ("sheets_points", "sheets_downs", "sheets_matrix")
+    )
+    count = len(points)
+    if points.ndim != 4 or points.shape[3] != 3 or (downs.shape, matrix.shape) != ((count, 3), (count, count + 4)):
         raise InputError(
-            f"{source}: found sheets_points of shape {points.shape} and sheets_downs of shape {downs.shape}, expected"
-            " (D, R, S, 3) and (D, 3)"
+            f"{source}: found sheets_points of shape {points.shape}, sheets_downs of shape {downs.shape} and"
+            f" sheets_matrix of shape {matrix.shape}, expected (D, R, S, 3), (D, 3) and (D, D + 4)"
         )
     file, weights = f"{FOLDER}/sheets.bytes", f"{FOLDER}/sheet_weights.bytes"
     directions = unity_position(downs)
@@ -91,7 +94,7 @@ def convert_sheets(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str
         around=points.shape[1],
         along=points.shape[2],
     )
-    matrix = spline_matrix(directions)
+    matrix = np.column_stack([matrix[:, :-3], unity_position(matrix[:, -3:])])  # its last columns are of g itself
     return {file: unity_position(points).astype("<f2").tobytes(), weights: matrix.astype("<f8").tobytes()}, block
 
 
