@@ -48,7 +48,7 @@ def test_directions_spread_evenly_over_the_cap_and_begin_with_that_of_the_hangin
 
 def test_both_forms_give_unit_vectors_and_tilts_stay_in_their_plane():
     tilts = Tilts(8, 8, "tilt", [0.0, 30.0, 90.0]).downs
-    np.testing.assert_allclose(tilts @ STANDARD_GRAVITY, gravity_in_base(np.radians([0, 30, 90])), atol=1e-12)
+    np.testing.assert_allclose(STANDARD_GRAVITY * tilts, gravity_in_base(np.radians([0, 30, 90])), atol=1e-12)
     directions = Directions(8, 8, "direction", 50, 90.0).downs
     assert directions.shape == (50, 3)
     assert np.abs(directions[:, 1]).max() > 0.9

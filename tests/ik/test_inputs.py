@@ -52,8 +52,9 @@ def table(chain):
 
 @pytest.fixture(scope="module")
 def network(chain, table):
-    loss = tip_loss(table[tension_columns(3)].to_numpy(), tip_by_tension(table, 3),
-                    command_by_tension(table, chain.gain))
+    loss = tip_loss(
+        table[tension_columns(3)].to_numpy(), tip_by_tension(table, 3), command_by_tension(table, chain.gain)
+    )
     data = [table[columns].to_numpy() for columns in (DIRECTION, command_columns(3), length_columns(3))]
     return train(*data, loss, np.arange(len(table)) % 5 > 0, Training(48, 40, 64, 5e-3, 1), lambda *_: None)
 

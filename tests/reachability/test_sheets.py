@@ -1,14 +1,17 @@
 """Sheets: what is interpolated over directions of gravity is where the arm's tips are."""
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from tests.support.bent_chain import hardening_stump
 from trunkline.dataset.gravities import spread
 from trunkline.dataset.sampling import sheet_at
+from trunkline.dataset.table import sample_table
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.reachability import sheet_check
+from trunkline.reachability.sampled import read_tips
 from trunkline.reachability.sheets import Sheets, build_sheets, finer, sheet_triangles
 from trunkline.reachability.soft import SheetSettings, SoftSettings
 from trunkline.reachability.triangles import nearest_on_triangles
@@ -16,8 +19,18 @@ from trunkline.reachability.weights import spline_matrix, spline_weights
 from trunkline.statics.chain import read_chain
 
 LARGEST = np.radians(100)
-SOFT = SoftSettings(tolerance=0.02, closing=0.02, smoothing=0.7, smallest=60, voxel=0.01, angle_step_deg=5.0,
-                    directions=60, steps=16, shown_deg=[0.0, 60.0], sheets=SheetSettings(50, 24, 12, 2))
+SOFT = SoftSettings(
+    tolerance=0.02,
+    closing=0.02,
+    smoothing=0.7,
+    smallest=60,
+    voxel=0.01,
+    angle_step_deg=5.0,
+    directions=60,
+    steps=16,
+    shown_deg=[0.0, 60.0],
+    sheets=SheetSettings(50, 24, 12, 2),
+)
 
 
 @pytest.fixture(scope="module")
@@ -134,3 +147,20 @@ def test_a_surface_that_is_torn_is_refused_by_its_gravity(chain, monkeypatch):
     monkeypatch.setattr(sampling, "_along", torn)
     with pytest.raises(InputError, match=r"gravity \[.*\]: found 1 of 32 tips by no steady way, expected a surface"):
         sheet_at(chain, np.array([0.0, 0.0, -9.8]), 8, 4)
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 1.0])
+def test_samples_say_whether_maps_are_of_one_tilt_or_of_gravity_from_any_side(chain, tmp_path, azimuth):
+    rng = np.random.default_rng(0)
+    downs = [downwards(angle, azimuth) for angle in (0.0, np.radians(70))]
+    samples = pd.concat([sample_table(chain, down, 30, 8, 8, rng)[0] for down in downs])
+    samples.to_parquet(tmp_path / "samples.parquet")
+    tips_at = read_tips(tmp_path / "samples.parquet", chain, SOFT, 0)
+    if azimuth:
+        assert tips_at.largest == pytest.approx(np.radians(70))
+        np.testing.assert_allclose(np.degrees(tips_at.angles), [0, 60])  # of those shown, as far as the samples go
+        np.testing.assert_array_equal(tips_at(0.0).positions, tips_at.fresh(0.0).positions)
+    else:
+        assert tips_at.largest is None
+        np.testing.assert_allclose(np.degrees(tips_at.angles), [0, 70])
+        assert len(tips_at(0.0).positions) == len(samples) // 2

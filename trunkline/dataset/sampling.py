@@ -16,6 +16,7 @@ from trunkline.statics.chain import Chain
 from trunkline.statics.equilibria import Equilibrium, equilibrium_paths
 
 COARSE_STEPS = 48  # of the first look at a path, to space the second one evenly along the tip's way
+SHEET_LOOK = 2  # rays of a sheet, of which one is looked at: places are along neighbouring rays as good as the same
 COARSE_POWER = 3.0  # tension ~ (step / steps)^power there: the tip's soft units bend under the first newton
 
 
@@ -77,7 +78,7 @@ def sheet_at(chain: Chain, gravity: np.ndarray, around: int, along: int) -> np.n
     """
     rays = pull_directions(chain, np.arange(around) / around * 2 * np.pi)
     places = np.broadcast_to(np.linspace(0, 1, along), (around, along))
-    found = _along(chain, gravity, rays, places, 1)
+    found = _along(chain, gravity, rays, places, SHEET_LOOK)
     bad = int((~found.converged | found.snapped).sum())
     if bad:
         raise InputError(

@@ -101,9 +101,14 @@ def _range(values: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def features(inputs: torch.Tensor) -> torch.Tensor:
-    """Gravity, position, products of quaternion components. Shape (B, 15 or 16) from (B, 8 or 10)."""
-    products = inputs[:, FIRST] * inputs[:, SECOND]
-    return torch.cat([gravity_features(inputs), inputs[:, -7:-4], products], dim=1)
+    """Gravity, position, products of quaternion components, and of a direction of gravity with these: where gravity
+    pulls as the tip sees it is linear in them. Shape (B, 15 or 55) from (B, 8 or 10)."""
+    gravity = gravity_features(inputs)
+    pose = torch.cat([inputs[:, -7:-4], inputs[:, FIRST] * inputs[:, SECOND]], dim=1)
+    parts = [gravity, pose]
+    if gravity.shape[1] == 3:
+        parts.append((gravity[:, :, None] * pose[:, None, :]).flatten(1))
+    return torch.cat(parts, dim=1)
 
 
 def gravity_features(inputs: torch.Tensor) -> torch.Tensor:

@@ -35,7 +35,7 @@ def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float)
         nodes.append(helper.make_node(kind, inputs, [output], name=output, **attributes))
         return output
 
-    def gather(columns: list[int], output: str) -> str:
+    def gather(columns: list[int] | np.ndarray, output: str) -> str:
         places = np.array(columns, np.int64) % len(inputs)  # not from the end: not every engine counts so
         return node("Gather", ["pose", constant(f"{output}_columns", places)], output, axis=1)
 
@@ -47,7 +47,13 @@ def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float)
         pulling = [node("Sin", [angle], "sin_theta_g"), node("Cos", [angle], "cos_theta_g")]
     else:
         pulling = [gather([0, 1, 2], "gravity")]
-    x = node("Concat", [*pulling, position, products], "features", axis=1)
+    seen = [*pulling, position, products]
+    if inputs == DIRECTION:
+        pose, size = node("Concat", [position, products], "pose_features", axis=1), 3 + len(FIRST)
+        columns = constant("mixed_columns", np.tile(np.arange(size), 3))
+        tiled = node("Gather", [pose, columns], "mixed_pose", axis=1)
+        seen.append(node("Mul", [gather(np.repeat([0, 1, 2], size), "mixed_gravity"), tiled], "mixed"))
+    x = node("Concat", seen, "features", axis=1)
     x = node("Sub", [x, constant("mean", network.mean.numpy())], "centred")
     x = node("Mul", [x, constant("scale", network.scale.numpy())], "normalised")
 

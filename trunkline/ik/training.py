@@ -43,7 +43,7 @@ class Training:
 class Samples(NamedTuple):
     """What training reads of N samples.
 
-    x: normalised features (N, 15 or 16). pulling: what `network.gravity_features` says (N, 2 or 3). tip: m (N, 3).
+    x: normalised features (N, 15 or 55). pulling: what `network.gravity_features` says (N, 2 or 3). tip: m (N, 3).
     command: m (N, K). stretch: length over command, m (N, K). pulls: commands as shares of their range (N, K). spare:
     most by which slack tendons are paid out where the tip is foreseen, likewise (N, K).
     """
