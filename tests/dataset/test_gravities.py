@@ -66,8 +66,8 @@ def test_only_a_perfect_arm_turns_with_gravity_and_its_tendons(make, symmetric):
     here = equilibrium(chain, pulls, STANDARD_GRAVITY * downwards(0.9, 0.2)).position
     there = equilibrium(chain, np.roll(pulls, 1, axis=1), STANDARD_GRAVITY * downwards(0.9, 0.2 + THIRD)).position
     apart = np.linalg.norm(there - turned_about_the_arm(here), axis=1)
-    # two hinges at right angles are not quite the same after a third of a turn
-    assert apart.max() < 0.01 * chain.length if symmetric else apart.max() > 0.02 * chain.length
+    # two hinges at right angles are not quite the same after a third of a turn, even so
+    assert apart.max() < 0.02 * chain.length if symmetric else apart.min() > 0.08 * chain.length
 
 
 def test_samples_under_gravity_from_the_side_rest_where_mujoco_does(model, chain):
