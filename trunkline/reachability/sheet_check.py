@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from trunkline.dataset.sampling import sample_at
+from trunkline.dataset.sampling import sample_at, sheet_at
 from trunkline.fields.grid import overlap
 from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.reachability.reach_signal import THRESHOLD, HeldOut, points_beyond
@@ -13,7 +13,7 @@ from trunkline.reachability.soft import SoftSettings, soft_field, soft_lattice
 from trunkline.reachability.tips import LOOK_EVERY
 from trunkline.statics.chain import Chain
 
-DENSER = 4  # times, of a sheet whose set is compared: as near together as the tips that it is compared with
+DENSER = 4  # times, of sheets whose sets are compared
 
 
 def check_sheets(
@@ -28,7 +28,8 @@ def check_sheets(
 ) -> list[HeldOut]:
     """Sheets at `soft.sheets.heldout` directions of gravity, at random, that no sheet was made for.
 
-    The sets within reach, as `soft.soft_field` makes them of points, are compared; so is what the signal says.
+    Compared are the sets within reach, as `soft.soft_field` makes them of points: of the sheet in between, and of one
+    that is found there. What the signal says is checked with tips that lie on no lattice.
 
     Args:
         beyond: m, how far from every tip are the points that shall be out of reach.
@@ -37,14 +38,15 @@ def check_sheets(
     rng = np.random.default_rng(seed)
     largest = np.arccos(np.clip(-sheets.downs[:, 2].max(), -1, 1))
     angles, azimuths = rng.uniform(0, largest, soft.sheets.heldout), rng.uniform(0, 2 * np.pi, soft.sheets.heldout)
+    around, along = sheets.points.shape[1:3]
     results = []
     for angle, azimuth in zip(angles, azimuths, strict=True):
         down = downwards(angle, azimuth)
-        own = sample_at(chain, STANDARD_GRAVITY * down, soft.directions, soft.steps, rng, LOOK_EVERY)
-        tips, sheet = own.equilibrium.position, sheets.at(down)
-        blended = finer(sheet, DENSER)
-        lattice = soft_lattice([tips, blended], soft, soft.voxel)
-        iou = overlap(soft_field(blended, lattice, soft), soft_field(tips, lattice, soft))
+        gravity, sheet = STANDARD_GRAVITY * down, sheets.at(down)
+        sets = [finer(one, DENSER) for one in (sheet, sheet_at(chain, gravity, around, along))]
+        lattice = soft_lattice(sets, soft, soft.voxel)
+        iou = overlap(*(soft_field(points, lattice, soft) for points in sets))
+        tips = sample_at(chain, gravity, around, along, rng, LOOK_EVERY).equilibrium.position
         sets = tips[rng.permutation(len(tips))[:count]], points_beyond(tips, beyond, count, rng)
         reachable, called = ((sheets.signal(sheet, points) <= THRESHOLD).mean() for points in sets)
         results.append(HeldOut(angle, iou, float(reachable), float(called), azimuth))

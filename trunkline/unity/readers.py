@@ -108,7 +108,7 @@ ENGINES: dict[str, Callable[[bytes, np.ndarray], list[np.ndarray]]] = {
 
 def _grid(path: str, data: bytes, files: dict[str, bytes]) -> None:
     manifest = json.loads(files[MANIFEST])
-    sheets = manifest["reach"]["sheets"]
+    sheets = manifest["reach"].get("sheets")  # packages of one tilt have none
     if sheets and path in (sheets["file"], sheets["weights"]):
         _sheets(sheets, files)
         return
