@@ -92,7 +92,7 @@ def test_gravities_are_drawn_within_those_known_and_all_around():
 
 
 def test_training_brings_the_tip_home_under_gravity_from_any_side(chain, table, network):
-    inputs = table[DIRECTION].to_numpy()[::5]
+    inputs = table[DIRECTION].to_numpy()[::5].copy()
     with torch.no_grad():
         commands = network(torch.tensor(inputs, dtype=torch.float32)).commands.double().numpy()
     home = tip_errors(chain, inputs, commands).position
@@ -106,7 +106,7 @@ def test_the_file_takes_a_direction_and_refuses_one_that_is_none(table, network)
     model = to_onnx(network, ["a", "b", "c"], 0.005)
     assert {node.op_type for node in model.graph.node} <= UNITY_OPS
     session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
-    poses = table[DIRECTION].to_numpy()[:9]
+    poses = table[DIRECTION].to_numpy()[:9].copy()
     with torch.no_grad():
         expected = network(torch.tensor(poses, dtype=torch.float32))._asdict()
     for name, values in ask(session, poses).items():
