@@ -32,7 +32,7 @@ def check_sheets(
     that is found there. What the signal says is checked with tips that lie on no lattice.
 
     Args:
-        beyond: m, how far from every tip are the points that shall be out of reach.
+        beyond: m, how far from the surface found there are the points that shall be out of reach.
         count: how many of them, and of tips, to draw at each. seed: of the draws.
     """
     rng = np.random.default_rng(seed)
@@ -43,12 +43,12 @@ def check_sheets(
     for angle, azimuth in zip(angles, azimuths, strict=True):
         down = downwards(angle, azimuth)
         gravity, sheet = STANDARD_GRAVITY * down, sheets.at(down)
-        sets = [finer(one, DENSER) for one in (sheet, sheet_at(chain, gravity, around, along))]
-        lattice = soft_lattice(sets, soft, soft.voxel)
-        iou = overlap(*(soft_field(points, lattice, soft) for points in sets))
+        between, own = (finer(one, DENSER) for one in (sheet, sheet_at(chain, gravity, around, along)))
+        lattice = soft_lattice([between, own], soft, soft.voxel)
+        iou = overlap(*(soft_field(points, lattice, soft) for points in (between, own)))
         tips = sample_at(chain, gravity, around, along, rng, LOOK_EVERY).equilibrium.position
-        sets = tips[rng.permutation(len(tips))[:count]], points_beyond(tips, beyond, count, rng)
-        reachable, called = ((sheets.signal(sheet, points) <= THRESHOLD).mean() for points in sets)
+        asked = tips[rng.permutation(len(tips))[:count]], points_beyond(own, beyond, count, rng)
+        reachable, called = ((sheets.signal(sheet, points) <= THRESHOLD).mean() for points in asked)
         results.append(HeldOut(angle, iou, float(reachable), float(called), azimuth))
         done(f"held-out {np.degrees(angle):.0f}°, {np.degrees(azimuth):.0f}°")
     return results
