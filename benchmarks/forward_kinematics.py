@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from trunkline.dataset.sampling import pull_directions, sample_angle
+from trunkline.dataset.sampling import pull_directions, sample_at
 from trunkline.frames import gravity_in_base
 from trunkline.ik.polish import polish
 from trunkline.pipeline.inputs import read_model
@@ -33,7 +33,7 @@ def main(path: Path) -> None:
     gravity = gravity_in_base(rng.uniform(0, np.radians(120), SOLVED))
     rest = equilibrium(chain, tensions, gravity)
     forward(chain, rest.lengths[:2], gravity[:2])  # compiles
-    sample_angle(chain, 0.5, 8, 8, rng)
+    sample_at(chain, gravity_in_base(0.5), 8, 8, rng)
     polish(chain, np.column_stack([np.zeros(2), rest.position[:2], rest.quaternion[:2]]), rest.lengths[:2])
 
     print(f"{path}: {chain.units} units, {chain.tendons} tendons, {thread_count()} threads")
@@ -42,8 +42,8 @@ def main(path: Path) -> None:
     settled = timed("MuJoCo stepped until it rests", SETTLED, lambda: settle(model, commands, gravity[few]))
     timed("statics, tensions given, from rest", SOLVED, lambda: equilibrium(chain, tensions, gravity))
     found = timed("statics, lengths given, from rest", SOLVED, lambda: forward(chain, rest.lengths, gravity))
-    count = DIRECTIONS * STEPS + 8 * STEPS
-    timed("statics, along paths (as fk_dataset)", count, lambda: sample_angle(chain, 0.5, DIRECTIONS, STEPS, rng))
+    count, tilted = DIRECTIONS * STEPS + 8 * STEPS, gravity_in_base(0.5)
+    timed("statics, along paths (as fk_dataset)", count, lambda: sample_at(chain, tilted, DIRECTIONS, STEPS, rng))
     around = rest.lengths + 1e-3 * rng.uniform(-1, 1, rest.lengths.shape)
     targets = np.column_stack([np.arctan2(gravity[:, 0], -gravity[:, 2]), rest.position, rest.quaternion])
     exact = timed("Gauss-Newton polish of lengths 1 mm off", SOLVED, lambda: polish(chain, targets, around))

@@ -1,4 +1,4 @@
-"""Sample static equilibria of the calibrated arm over gravity angles, uniform in the workspace."""
+"""Sample static equilibria of the calibrated arm over directions of gravity, uniform in the workspace."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ Config = settings(Sampling)
 def main(config: Sampling) -> None:
     model = read_model(MODEL)
     chain = read_chain(model).smooth
-    with progress(len(config.angles_deg), "fk_dataset", "angles") as bar:
+    with progress(len(config.gravity.downs), "fk_dataset", "gravities") as bar:
         found = gather(model, chain, config, lambda **counts: bar.update(1, **counts))
 
     with output_folder(DATA) as folder:

@@ -8,8 +8,8 @@ import torch
 from trunkline.dataset.samples import read_samples
 from trunkline.figures.network import error_map_figure, learning_figure, tip_error_figure
 from trunkline.figures.style import save_figure
+from trunkline.ik.inputs import inputs_of
 from trunkline.ik.learn import Learning, learn
-from trunkline.ik.network import INPUTS
 from trunkline.ik.report import histogram, summary
 from trunkline.pipeline.inputs import load_rig, read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
@@ -28,18 +28,19 @@ def main(config: Learning) -> None:
     chain = read_chain(model).smooth
     table = read_samples(SAMPLES, chain.tendons, "split")
     rig = None if config.rig is None else load_rig("train_ik.rig", config.rig)
+    inputs = inputs_of(table)
     learned = learn(model, chain, table, config, rig)
 
     with output_folder(ARTIFACTS) as folder:
         onnx.save(learned.exported, str(folder / "ik.onnx"))
-        state = {"state": learned.network.state_dict(), "width": config.width, "inputs": INPUTS}
+        state = {"state": learned.network.state_dict(), "width": config.width, "inputs": inputs}
         torch.save(state, folder / "checkpoint.pt")
         learned.curve.to_csv(folder / "learning_curve.csv", index=False, float_format="%.6g")
         histogram(learned.errors).to_csv(folder / "tip_error.csv", index=False, float_format="%.6g")
         save_figure(learning_figure(learned.curve), folder / "learning_curve.png")
         positions = {name: error.position for name, error in learned.errors.items()}
         save_figure(tip_error_figure(positions, chain.length), folder / "tip_error.png")
-        located = learned.held_out[INPUTS].assign(error_mm=positions["held out"] * 1e3)
+        located = learned.held_out.assign(error_mm=positions["held out"] * 1e3)
         save_figure(error_map_figure(located), folder / "error_map.png")
         write_json(folder / "metrics.json", summary(learned, chain.length))
 

@@ -72,8 +72,9 @@ def targets(chain: Chain, count: int, rng: np.random.Generator) -> tuple[Equilib
     """Equilibria without friction, no motor near its limit, and their gravity (N, 3), m/s²."""
     samples = read_samples(SAMPLES, chain.tendons)
     deepest = chain.straight_lengths - samples[command_columns(chain.tendons)].to_numpy().min(axis=0)
-    angles, commands = draw_commands(chain, samples["theta_g"].to_numpy(), PULL_SHARE * deepest, count, rng, True)
-    gravity = gravity_in_base(angles)
+    known = samples[["theta_g"]].to_numpy()
+    angles, commands = draw_commands(chain, known, PULL_SHARE * deepest, count, rng, True)
+    gravity = gravity_in_base(angles[:, 0])
     found = actuated(chain, commands, gravity)
     good = found.converged & (found.tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
     return found[good], gravity[good]

@@ -3,7 +3,7 @@
     python -m studies.training [--targets N] WIDTH,EPOCHS,BATCH,LEARNING_RATE ...
 
 for instance `256,100,512,2e-3 256,45,512,5e-3`. Needs the samples and the calibrated arm (`make demo`). Tip errors are
-those after forward kinematics, of held-out samples and of targets between the gravity angles of the data set. Times
+those after forward kinematics, of held-out samples and of targets under gravities that the data set has none of. Times
 are of the training alone: CPU time of all threads, and wall time, which tells something on an idle machine only.
 Progress goes to stderr.
 """
@@ -11,16 +11,18 @@ Progress goes to stderr.
 import argparse
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import torch
 
-from trunkline.dataset.columns import length_columns, tension_columns
-from trunkline.dataset.table import length_by_tension, sample_table, tip_by_tension, turn_by_tension
+from trunkline.dataset.columns import command_columns, length_columns, tension_columns
+from trunkline.dataset.table import command_by_tension, tip_by_tension, turn_by_tension
 from trunkline.errors import in_one_line
-from trunkline.ik.network import INPUTS
+from trunkline.ik.inputs import inputs_of, told_of_gravity
+from trunkline.ik.learn import Unseen, unseen_targets
 from trunkline.ik.score import tip_errors
 from trunkline.ik.tip_loss import tip_loss
 from trunkline.ik.training import Training, train
@@ -31,9 +33,9 @@ from trunkline.statics.chain import read_chain
 MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
 LEVER = 0.02  # m, as conf/train_ik/config.yaml has it
-UNSEEN = {"directions": 24, "steps": 12}  # as well
+UNSEEN = Unseen(gravities=100, directions=24, steps=12, samples=2000)  # as well
 TITLES = ["width", "epochs", "batch", "learning rate", "CPU (s)", "wall (s)"]
-TITLES += [f"{name}, {what} (mm)" for name in ("held out", "unseen angles") for what in ("median", "95 % below")]
+TITLES += [f"{name}, {what} (mm)" for name in ("held out", "unseen gravity") for what in ("median", "95 % below")]
 TITLES += ["turn, median (°)"]
 
 
@@ -52,16 +54,16 @@ def main() -> int:
     arguments = parser.parse_args()
     chain = read_chain(read_model(MODEL)).smooth
     table = pd.read_parquet(existing(SAMPLES))
-    tendons, rng = chain.tendons, np.random.default_rng(1)
+    tendons = chain.tendons
     pose = np.concatenate([tip_by_tension(table, tendons), LEVER * turn_by_tension(table, tendons)], axis=1)
-    loss = tip_loss(table[tension_columns(tendons)].to_numpy(), pose, length_by_tension(table, tendons))
-    angles = np.unique(table["theta_g"])
-    between = (angles[1:] + angles[:-1]) / 2
-    each = arguments.targets // len(between)
-    unseen = [sample_table(chain, tilt, each, rng=rng, **UNSEEN)[0] for tilt in between]
+    loss = tip_loss(table[tension_columns(tendons)].to_numpy(), pose, command_by_tension(table, chain.gain))
+    inputs_read = inputs_of(table)
+    known = told_of_gravity(table[inputs_read].drop_duplicates(inputs_read[:-7]).to_numpy())
+    unseen = unseen_targets(chain, known, replace(UNSEEN, samples=arguments.targets), 1)
     held_out = table[table["split"] == "validate"]
-    targets = [held_out.sample(min(arguments.targets, len(held_out)), random_state=1), pd.concat(unseen)]
-    data = (table[INPUTS].to_numpy(), table[length_columns(tendons)].to_numpy(), loss, table["split"] == "train")
+    targets = [held_out.sample(min(arguments.targets, len(held_out)), random_state=1), unseen]
+    sets = (inputs_read, command_columns(tendons), length_columns(tendons))
+    data = (*(table[columns].to_numpy() for columns in sets), loss, (table["split"] == "train").to_numpy())
 
     print("| " + " | ".join(TITLES) + " |\n" + "|---" * len(TITLES) + "|")
     for training in arguments.settings:
@@ -71,10 +73,10 @@ def main() -> int:
         cells = [training.width, training.epochs, training.batch, f"{training.learning_rate:g}"]
         cells += [f"{time.process_time() - cpu:.0f}", f"{time.perf_counter() - wall:.0f}"]
         for rows in targets:
-            inputs = rows[INPUTS].to_numpy()
+            inputs = rows[inputs_read].to_numpy()
             with torch.no_grad():
-                lengths = network(torch.tensor(inputs, dtype=torch.float32)).double().numpy()
-            errors = tip_errors(chain, inputs, lengths).metrics(chain.length)
+                commands = network(torch.tensor(inputs, dtype=torch.float32)).commands.double().numpy()
+            errors = tip_errors(chain, inputs, commands).metrics(chain.length)
             cells += [f"{errors['position_error_mm'][key]:.3f}" for key in ("median", "p95")]
         cells.append(f"{errors['orientation_error_deg']['median']:.2f}")
         print("| " + " | ".join(map(str, cells)) + " |", flush=True)

@@ -27,6 +27,34 @@ def tilt_of_gravity(gravity: np.ndarray) -> float:
     return float(np.arctan2(np.hypot(gravity[0], gravity[1]), -gravity[2]))
 
 
+def downwards(angle: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
+    """The direction of gravity in the base frame.
+
+    Args:
+        angle: between the straight arm (base -z) and gravity, rad, any shape (...).
+        azimuth: of gravity around the arm, from base +x towards +y, rad, likewise; 0 is a mount tilted about base +y.
+
+    Returns:
+        Unit vectors. Shape (..., 3).
+    """
+    side = np.sin(angle)
+    return np.stack([side * np.cos(azimuth), side * np.sin(azimuth), -np.cos(angle) + 0.0 * azimuth], axis=-1)
+
+
+def in_plane_of_tilt(side: np.ndarray, gravity: np.ndarray) -> np.ndarray:
+    """Positions across the arm, base x and y (N, 2), as those along gravity's part across it, and beside that.
+
+    Args:
+        gravity: its x and y in the base frame, of any size, zero for that along +x. Shape (2,) or (N, 2).
+
+    Returns:
+        Shape (2, N).
+    """
+    azimuth = np.arctan2(gravity[..., 1], gravity[..., 0])
+    x, y = side.T
+    return np.stack([np.cos(azimuth) * x + np.sin(azimuth) * y, np.cos(azimuth) * y - np.sin(azimuth) * x])
+
+
 def rotation_from_wxyz(quaternion: np.ndarray) -> Rotation:
     """Quaternions (..., 4), w first, as a scipy Rotation."""
     return Rotation.from_quat(quaternion, scalar_first=True)

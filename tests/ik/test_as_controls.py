@@ -13,7 +13,7 @@ from trunkline.ik.polish import polish
 from trunkline.simulation.drive import drive
 from trunkline.statics.chain import read_chain
 
-ANGLES = np.radians([0.0, 60.0])
+ANGLES = np.radians([[0.0], [60.0]])
 
 
 @pytest.fixture(scope="module")

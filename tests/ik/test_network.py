@@ -11,13 +11,14 @@ import torch
 
 from tests.support.bent_chain import stump
 from trunkline.dataset import sampling
-from trunkline.dataset.columns import command_columns, length_columns, tension_columns
+from trunkline.dataset.columns import DOWN, command_columns, length_columns, tension_columns
 from trunkline.dataset.deviation import mujoco_deviation
 from trunkline.dataset.samples import read_samples
 from trunkline.dataset.table import command_by_tension, sample_table, tip_by_tension
 from trunkline.errors import InputError
-from trunkline.frames import gravity_in_base
-from trunkline.ik.network import INPUTS, InverseKinematics
+from trunkline.frames import downwards, gravity_in_base
+from trunkline.ik.inputs import TILT, inputs_of
+from trunkline.ik.network import InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.score import length_errors, tip_errors
 from trunkline.ik.tip_loss import tip_loss
@@ -43,7 +44,7 @@ def chain(model):
 def samples(chain):
     rng = np.random.default_rng(0)
     return pd.concat(
-        [sample_table(chain, tilt, 500, 24, 60, rng)[0] for tilt in (0.0, 0.8)], ignore_index=True
+        [sample_table(chain, downwards(tilt, 0.0), 500, 24, 60, rng)[0] for tilt in (0.0, 0.8)], ignore_index=True
     )
 
 
@@ -53,7 +54,7 @@ def loss_of(chain, samples):
 
 
 def data_of(samples):
-    return [samples[columns].to_numpy() for columns in (INPUTS, command_columns(3), length_columns(3))]
+    return [samples[columns].to_numpy() for columns in (inputs_of(samples), command_columns(3), length_columns(3))]
 
 
 def test_samples_rest_with_a_slack_tendon_and_name_the_planar_sets(chain, samples):
@@ -84,7 +85,7 @@ def test_failed_samples_are_counted_and_left_out(chain, monkeypatch):
         return found
 
     monkeypatch.setattr(sampling, "_follow", failing)
-    found = sampling.sample_angle(chain, 0.0, 8, 8, np.random.default_rng(0))
+    found = sampling.sample_at(chain, gravity_in_base(0.0), 8, 8, np.random.default_rng(0))
     assert (found.failed, found.snapped) == (14, 6)  # of the general and the planar rays
     assert len(found.kind) == 8 * 8 + 2 * 4 * 8 - 20
     assert found.equilibrium.converged.all()
@@ -122,7 +123,7 @@ def test_extra_length_of_a_slack_tendon_costs_nothing(chain, samples):
 
 @pytest.fixture(scope="module")
 def trained(chain, samples):
-    inputs = samples[INPUTS].to_numpy()
+    inputs = samples[TILT].to_numpy()
     is_train = np.arange(len(samples)) % 5 > 0
     errors = []
     network = train(
@@ -168,7 +169,7 @@ def test_onnx_file_is_the_network_and_says_what_it_takes(trained, samples):
     assert not any(onnx.external_data_helper.uses_external_data(t) for t in model.graph.initializer)
     assert sum(node.op_type == "Relu" for node in model.graph.node) == 6
     meaning = {entry.key: entry.value for entry in model.metadata_props}
-    assert json.loads(meaning["inputs"]) == INPUTS
+    assert json.loads(meaning["inputs"]) == TILT
     assert json.loads(meaning["output_units"]) == ["m", "m", "m"]
     session = onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
     far = np.concatenate([held_out, held_out + np.random.default_rng(0).normal(0, 1, held_out.shape)])
@@ -205,7 +206,7 @@ def test_a_learning_rate_that_diverges_is_an_error_of_one_line(chain, samples):
 
 
 def test_a_single_gravity_angle_is_refused_before_anything_is_trained(tmp_path):
-    samples = pd.DataFrame(np.zeros((3, len(INPUTS) + 5)), columns=[*INPUTS, "l1", "l2", "c1", "c2", "split"])
+    samples = pd.DataFrame(np.zeros((3, 16)), columns=[*TILT, *DOWN, "l1", "l2", "c1", "c2", "split"])
     samples.to_parquet(tmp_path / "samples.parquet")
     with pytest.raises(InputError, match="samples.parquet: found 1 gravity angle, expected at least 2"):
         read_samples(tmp_path / "samples.parquet", 2)

@@ -9,8 +9,8 @@ from trunkline.dataset.columns import length_columns
 from trunkline.dataset.sampling import pull_directions
 from trunkline.dataset.table import sample_table
 from trunkline.errors import InputError
-from trunkline.frames import gravity_in_base
-from trunkline.ik.network import INPUTS
+from trunkline.frames import downwards, gravity_in_base
+from trunkline.ik.inputs import TILT
 from trunkline.ik.polish import polish
 from trunkline.ik.score import beyond_range, largest_difference, outside_targets
 from trunkline.statics.chain import read_chain
@@ -26,12 +26,12 @@ def chain():
 @pytest.fixture(scope="module")
 def samples(chain):
     rng = np.random.default_rng(0)
-    tables = [sample_table(chain, tilt, 100, 16, 16, rng)[0] for tilt in (0.0, 1.2)]
+    tables = [sample_table(chain, downwards(tilt, 0.0), 100, 16, 16, rng)[0] for tilt in (0.0, 1.2)]
     return pd.concat(tables, ignore_index=True).sample(60, random_state=0)
 
 
 def test_three_steps_undo_an_error_of_millimetres(chain, samples):
-    targets, lengths = samples[INPUTS].to_numpy(), samples[length_columns(3)].to_numpy()
+    targets, lengths = samples[TILT].to_numpy(), samples[length_columns(3)].to_numpy()
     wrong = lengths + np.random.default_rng(1).uniform(-2e-3, 2e-3, lengths.shape)
     before, after = (polish(chain, targets, wrong, steps) for steps in (0, 3))
     assert before.position_error.max() > 0.005 * chain.length
@@ -42,7 +42,7 @@ def test_three_steps_undo_an_error_of_millimetres(chain, samples):
 
 
 def test_polished_lengths_lead_to_the_error_stated(chain, samples):
-    targets = samples[INPUTS].to_numpy()[:20] + [0, 0.002, 0, 0.004, 0, 0, 0, 0]  # a little off the surface of tips
+    targets = samples[TILT].to_numpy()[:20] + [0, 0.002, 0, 0.004, 0, 0, 0, 0]  # a little off the surface of tips
     found = polish(chain, targets, samples[length_columns(3)].to_numpy()[:20])
     tip = forward(chain, found.lengths, gravity_in_base(targets[:, 0]))
     np.testing.assert_allclose(np.linalg.norm(tip.position - targets[:, 1:4], axis=1), found.position_error, atol=1e-7)
@@ -51,7 +51,7 @@ def test_polished_lengths_lead_to_the_error_stated(chain, samples):
 
 
 def test_exact_lengths_need_no_step(chain, samples):
-    found = polish(chain, samples[INPUTS].to_numpy(), samples[length_columns(3)].to_numpy())
+    found = polish(chain, samples[TILT].to_numpy(), samples[length_columns(3)].to_numpy())
     assert (found.steps == 0).all()
     assert found.position_error.max() < 1e-6
 
@@ -69,7 +69,7 @@ def test_restart_finds_the_equilibrium_that_the_loads_lead_to(chain):
 
 
 def test_far_targets_are_far_and_what_is_beyond_the_range_is_seen():
-    targets = outside_targets(2000, 0.5, np.random.default_rng(0))
+    targets = outside_targets(2000, 0.5, np.random.default_rng(0), directed=False)
     assert (np.linalg.norm(targets[:, 1:4], axis=1) > 0.5).mean() > 0.9
     np.testing.assert_allclose(np.linalg.norm(targets[:, 4:], axis=1), 1)
     known = np.array([[0.3, 0.4], [0.5, 0.6]])

@@ -367,9 +367,8 @@ def test_a_rule_between_fields_names_the_key_and_the_file_that_set_it(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("samples: 120000", "samples: 1000000000000", "samples: found 1000000000000, expected 1000 to 10000000"),
-        ("- 10\n", "- 190\n", "fk_dataset.angles_deg.1: found 190, expected 0 to 180"),
-        ("- 10\n", "- 90\n", "angles_deg: found [0.0, 90.0, 20.0"),
+        ("samples: 200000", "samples: 1000000000000", "samples: found 1000000000000, expected 1000 to 10000000"),
+        ("gravity: direction ", "gravity: sideways ", "gravity: found 'sideways', expected one of direction, tilt"),
         ("seed: 1\n\ntrain_ik", "seed: 9223372036854775808\n\ntrain_ik", "expected 0 to 4294967295"),
     ],
 )

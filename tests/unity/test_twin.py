@@ -19,12 +19,16 @@ from onnx import TensorProto, helper
 
 from tests.support.small_arm import small_mjcf
 from trunkline.arm.joints import Branch, Joints, add_elements
+from trunkline.dataset.gravities import spread
 from trunkline.errors import InputError
-from trunkline.ik.network import INPUTS
+from trunkline.frames import downwards
+from trunkline.ik.inputs import TILT
+from trunkline.reachability.sheets import Sheets
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, Laws, compile_with
 from trunkline.unity.manifest import Manifest, Model
 from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.readers import refusals
 from trunkline.unity.roundtrip import curl, simulate
 from trunkline.unity.twin import MANIFEST, MODEL, NETWORK, Label, Sources, Trajectory, assemble, compare
 
@@ -42,7 +46,7 @@ def network(inputs: int = 8, opset: int = 15, outputs: list[str] | None = None) 
     graph = helper.make_graph(nodes, "ik", ends[:1], ends[1:], [weights])
     opsets = [helper.make_opsetid("", opset)]
     model = helper.make_model(graph, opset_imports=opsets, ir_version=8)
-    names = {"inputs": INPUTS, "outputs": outputs or ["tendon_1", "tendon_2", "tendon_3"]}
+    names = {"inputs": TILT, "outputs": outputs or ["tendon_1", "tendon_2", "tendon_3"]}
     meaning = {name: f"{name} in m" for name in ("commands", "lengths", "tip")} | {"doubt_beyond_m": "0.005"}
     helper.set_model_props(model, {key: json.dumps(value) for key, value in names.items()} | meaning)
     return model.SerializeToString()
@@ -400,3 +404,56 @@ def test_a_missing_input_is_one_line_and_leaves_nothing(project, missing):
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
     assert done.stderr.startswith(f"error: artifacts/{missing}: no such file")
     assert not (project / "artifacts/package_unity").exists()
+
+
+def sheets_of_a_ball() -> Sheets:
+    """A hanging ball's lower half, swinging with gravity: linear in its direction."""
+    downs = spread(20, 2.0, crowd=True)
+    way, place = np.meshgrid(2 * np.pi * np.arange(12) / 12, np.linspace(0, np.pi / 2, 8), indexing="ij")
+    half = 0.2 * np.stack([np.sin(place) * np.cos(way), np.sin(place) * np.sin(way), -np.cos(place)], axis=-1)
+    return Sheets(downs, (half + 0.3 * downs[:, None, None]).astype(np.float16), 0.02)
+
+
+@pytest.fixture
+def files_with_sheets(sources) -> dict[str, bytes]:
+    sheets = sheets_of_a_ball()
+    np.savez(sources.grids, **grids(), **sheets.arrays())
+    files, violations = assemble(LABEL, sources, TRAJECTORY)
+    assert violations == []
+    return files
+
+
+def headset_surface(files: dict[str, bytes], down: np.ndarray) -> np.ndarray:
+    """The surface of tips in Unity's axes, (around, along, 3) m, under gravity in Unity's direction `down`, from the
+    package's files and the manifest's words alone."""
+    sheets = json.loads(files[MANIFEST])["reach"]["sheets"]
+    known = np.array(sheets["directions"]).reshape(-1, 3)
+    points = np.frombuffer(files[sheets["file"]], "<f2").reshape(len(known), sheets["around"], sheets["along"], 3)
+    matrix = np.frombuffer(files[sheets["weights"]], "<f8").reshape(len(known), -1)
+    weights = matrix @ [*(np.linalg.norm(down - known, axis=1) ** 3), 1, *down]
+    return np.einsum("d,drsk->rsk", weights, points.astype(float))
+
+
+def test_the_headset_blends_the_surface_of_tips_under_gravity_from_any_side(files_with_sheets):
+    sheets, down = sheets_of_a_ball(), downwards(0.9, 2.0)
+    surface = headset_surface(files_with_sheets, down[[0, 2, 1]])
+    np.testing.assert_allclose(surface[..., [0, 2, 1]], sheets.at(down), atol=1e-6)
+    radius = np.linalg.norm(surface - 0.3 * down[[0, 2, 1]], axis=2)
+    np.testing.assert_allclose(radius, 0.2, atol=2e-3)
+    reach = Manifest.model_validate_json(files_with_sheets[MANIFEST]).reach
+    assert "triangles" in reach.signal
+    assert reach.sheets.directions[1] < -0.99  # the hanging arm's gravity, along Unity's -y
+
+
+def test_sheets_are_read_by_the_manifest_and_damaged_ones_refused(files_with_sheets):
+    assert refusals(files_with_sheets) == {}
+    weights = json.loads(files_with_sheets[MANIFEST])["reach"]["sheets"]["weights"]
+    other = np.frombuffer(files_with_sheets[weights]) * 1.01
+    refused = set(refusals(files_with_sheets | {weights: other.tobytes()}))
+    assert refused == {weights, weights.replace("sheet_weights", "sheets")}
+
+
+def test_sheets_of_other_shapes_are_one_line(sources):
+    np.savez(sources.grids, **grids(), **sheets_of_a_ball().arrays() | {"sheets_downs": np.zeros((3, 3))})
+    with pytest.raises(InputError, match=r"sheets_points of shape \(20, 12, 8, 3\), sheets_downs of shape \(3, 3\)"):
+        assemble(LABEL, sources, TRAJECTORY)

@@ -1,6 +1,7 @@
 """Names of the columns of the table of samples."""
 
 AXES = "xyz"
+DOWN = ["gx", "gy", "gz"]  # the direction of gravity in the base frame, of unit length
 POSE = [*AXES, "qw", "qx", "qy", "qz"]  # of the tip: m, and a quaternion
 
 

@@ -4,10 +4,10 @@ import mujoco
 import numpy as np
 import pandas as pd
 
-from trunkline.dataset.columns import command_columns, tension_columns
+from trunkline.dataset.columns import DOWN, command_columns, tension_columns
 from trunkline.elements import capstan_friction
 from trunkline.errors import InputError
-from trunkline.frames import gravity_in_base
+from trunkline.frames import STANDARD_GRAVITY
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain
 from trunkline.statics.hysteresis import friction_band, model_friction
@@ -31,7 +31,7 @@ def mujoco_deviation(
     tensions = rows[tension_columns(chain.tendons)].to_numpy()
     commands = rows[command_columns(chain.tendons)].to_numpy()
     by_actuator = model.actuator_trnid[:, 0]
-    gravity = gravity_in_base(rows["theta_g"].to_numpy())
+    gravity = STANDARD_GRAVITY * rows[DOWN].to_numpy()
     settled = settle(model, commands[:, by_actuator], gravity)
     position = rows[["x", "y", "z"]].to_numpy()
     band = friction_band(chain, tensions, gravity, *model_friction(model), capstan=capstan_friction(model))

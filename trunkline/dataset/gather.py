@@ -1,8 +1,7 @@
-"""The whole data set: samples at all gravity angles, which of them validate, and the check against MuJoCo."""
+"""The whole data set: samples under all gravities, which of them validate, and the check against MuJoCo."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Annotated
 
 import mujoco
@@ -11,6 +10,7 @@ import pandas as pd
 from pydantic import Field
 
 from trunkline.dataset.deviation import mujoco_deviation
+from trunkline.dataset.gravities import Gravities
 from trunkline.dataset.table import Density, sample_table, split
 from trunkline.settings import Seed
 from trunkline.statics.chain import Chain
@@ -20,26 +20,20 @@ from trunkline.statics.chain import Chain
 class Sampling:
     """See conf/fk_dataset/config.yaml.
 
-    samples: in all, about. directions, steps: of the candidates at each angle, see `sampling.sample_angle`.
-    check: samples that are compared with MuJoCo.
+    samples: in all, about. gravity: from where it pulls. check: samples that are compared with MuJoCo.
     """
 
     samples: Annotated[int, Field(ge=1000, le=10_000_000)]
-    angles_deg: Annotated[list[Annotated[float, Field(ge=0, le=180)]], Field(min_length=2)]
+    gravity: Gravities
     seed: Seed
-    directions: Annotated[int, Field(ge=8, le=10000)]
-    steps: Annotated[int, Field(ge=8, le=10000)]
     validate_share: Annotated[float, Field(gt=0, lt=1)]
     check: Annotated[int, Field(ge=1, le=100000)]
-
-    def __post_init__(self) -> None:
-        if any(after <= before for before, after in pairwise(self.angles_deg)):
-            raise ValueError(f"angles_deg: found {self.angles_deg}, expected rising angles from 0 to 180")
 
 
 @dataclass
 class Gathered:
-    """The table of samples with its column "split"; how dense tips are at each angle; the check, a row a sample."""
+    """The table of samples with its column "split"; how dense tips are under each gravity; the check, a row a
+    sample."""
 
     table: pd.DataFrame
     densities: list[Density]
@@ -50,17 +44,17 @@ def gather(model: mujoco.MjModel, chain: Chain, sampling: Sampling, done: Callab
     """Samples of equilibria of a model and its `chain`.
 
     Args:
-        done: hears of each gravity angle how many samples there are by then, and how many it dropped.
+        done: hears of each gravity how many samples there are by then, and how many it dropped.
 
     Raises:
         InputError: if too few samples are left for the check.
     """
     rng = np.random.default_rng(sampling.seed)
-    angles = np.radians(sorted(sampling.angles_deg))
+    gravity, downs = sampling.gravity, sampling.gravity.downs
     tables, densities = [], []
-    for angle in angles:
-        count = sampling.samples // len(angles)
-        table, density = sample_table(chain, angle, count, sampling.directions, sampling.steps, rng)
+    for down in downs:
+        count = sampling.samples // len(downs)
+        table, density = sample_table(chain, down, count, gravity.directions, gravity.steps, rng)
         tables.append(table)
         densities.append(density)
         done(kept=sum(map(len, tables)), dropped=density.failed + density.snapped)

@@ -8,11 +8,11 @@ from trunkline.dataset.table import Density
 
 
 def unevenness_table(densities: list[Density]) -> pd.DataFrame:
-    """Per gravity angle and stage of thinning, the spread of the tip density."""
+    """Per gravity and stage of thinning, the spread of the tip density."""
     rows = []
-    for density in densities:
+    for density in sorted(densities, key=lambda density: density.angle):
         for name, value in zip(("before", "after"), density.unevenness(), strict=True):
-            rows.append({"angle_deg": np.degrees(density.tilt).round(6), "unevenness": value, "thinning": name})
+            rows.append({"angle_deg": np.degrees(density.angle).round(6), "unevenness": value, "thinning": name})
     return pd.DataFrame(rows)
 
 

@@ -1,10 +1,10 @@
-"""Samples of the reachable set: equilibria over gravity angles and tensions, uniform in the space of tips.
+"""Samples of the reachable set: equilibria over directions of gravity and tensions, uniform in the space of tips.
 
 Reachable means: at rest, with at least one tendon of every three slack. Pulling all of them at once bends nothing but
 presses the units together, and above a few newtons a straight arm buckles under it: then the same lengths have many
 equilibria, which one depends on history, and no function gives lengths from poses. With one tendon slack the
-equilibrium was found to be unique. So, per gravity angle, two neighbouring tendons pull, in any proportion, up to
-their largest force: tips form a surface, each point of which has one set of path lengths.
+equilibrium was found to be unique. So, per direction of gravity, two neighbouring tendons pull, in any proportion, up
+to their largest force: tips form a surface, each point of which has one set of path lengths.
 """
 
 from dataclasses import dataclass
@@ -12,17 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.frames import gravity_in_base
 from trunkline.statics.chain import Chain
 from trunkline.statics.equilibria import Equilibrium, equilibrium_paths
 
 COARSE_STEPS = 48  # of the first look at a path, to space the second one evenly along the tip's way
+SHEET_LOOK = 2  # rays of a sheet, of which one is looked at: places are along neighbouring rays as good as the same
 COARSE_POWER = 3.0  # tension ~ (step / steps)^power there: the tip's soft units bend under the first newton
 
 
 @dataclass
 class Candidates:
-    """All samples at one gravity angle before thinning: N of them, dropped ones left out.
+    """All samples under one gravity before thinning: N of them, dropped ones left out.
 
     Attributes:
         gravity: in the base frame, m/s². Shape (3,).
@@ -39,18 +39,17 @@ class Candidates:
     snapped: int
 
 
-def sample_angle(
-    chain: Chain, tilt: float, directions: int, steps: int, rng: np.random.Generator, look_every: int = 1
+def sample_at(
+    chain: Chain, gravity: np.ndarray, directions: int, steps: int, rng: np.random.Generator, look_every: int = 1
 ) -> Candidates:
     """Follow the arm along rays of growing tension, samples evenly spaced along the tip's way on each.
 
     Args:
-        tilt: gravity angle θ_G, rad.
+        gravity: in the base frame, m/s². Shape (3,).
         directions: rays, their bending moments evenly spread around the arm.
         steps: samples on each ray, at random in equal shares of its length; four times as many on the planar rays.
         look_every: the first look goes along one ray in so many; between them, the tip's way is interpolated.
     """
-    gravity = gravity_in_base(tilt)
     rays = pull_directions(chain, (np.arange(directions) + rng.random()) / directions * 2 * np.pi)
     planar, kinds = planar_directions(chain)
     parts = [_follow(chain, gravity, rays, steps, rng, look_every), _follow(chain, gravity, planar, 4 * steps, rng)]
@@ -61,6 +60,31 @@ def sample_angle(
     good = whole.converged & ~whole.snapped
     failed = int(np.sum(~whole.converged))
     return Candidates(gravity, whole[good], kind[good], failed, int(np.sum(~good)) - failed)
+
+
+def sheet_at(chain: Chain, gravity: np.ndarray, around: int, along: int) -> np.ndarray:
+    """The surface of tips as a lattice: even ways to pull around the arm, even places along the tip's way on each.
+
+    The first place of every way is where the arm hangs, the last where its motors pull with all their force.
+
+    Args:
+        gravity: in the base frame, m/s². Shape (3,).
+
+    Returns:
+        m. Shape (around, along, 3).
+
+    Raises:
+        InputError: some equilibrium was not found, or was reached by a jump, so that there is no surface.
+    """
+    rays = pull_directions(chain, np.arange(around) / around * 2 * np.pi)
+    places = np.broadcast_to(np.linspace(0, 1, along), (around, along))
+    found = _along(chain, gravity, rays, places, SHEET_LOOK)
+    bad = int((~found.converged | found.snapped).sum())
+    if bad:
+        raise InputError(
+            f"gravity {np.round(gravity, 3)}: found {bad} of {around * along} tips by no steady way, expected a surface"
+        )
+    return found.position.reshape(around, along, 3)
 
 
 def pull_directions(chain: Chain, angles: np.ndarray) -> np.ndarray:
@@ -113,6 +137,12 @@ def _follow(
     chain: Chain, gravity: np.ndarray, rays: np.ndarray, steps: int, rng: np.random.Generator, look_every: int = 1
 ) -> Equilibrium:
     """`steps` equilibria on each ray, from no tension to the whole of it, evenly spaced along the tip's way."""
+    places = (np.arange(steps) + rng.random((len(rays), steps))) / steps
+    return _along(chain, gravity, rays, places, look_every)
+
+
+def _along(chain: Chain, gravity: np.ndarray, rays: np.ndarray, places: np.ndarray, look_every: int) -> Equilibrium:
+    """Equilibria at `places` (rays, steps) on each ray, as shares of the tip's way."""
     shares = np.linspace(0, 1, COARSE_STEPS) ** COARSE_POWER
     looked = np.arange(0, len(rays), look_every)
     coarse = equilibrium_paths(chain, rays[looked, None, :] * shares[:, None], gravity)
@@ -122,7 +152,6 @@ def _follow(
     if look_every > 1:  # rays go around the arm: the last one is beside the first
         every = np.arange(len(rays))
         way = np.stack([np.interp(every, looked, column, period=len(rays)) for column in way.T], axis=1)
-    places = (np.arange(steps) + rng.random((len(rays), steps))) / steps
     fine = np.stack([np.interp(p * w[-1], w, shares) for p, w in zip(places, way, strict=True)])
     return equilibrium_paths(chain, rays[:, None, :] * fine[..., None], gravity)
 

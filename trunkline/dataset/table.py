@@ -1,31 +1,37 @@
-"""The table of samples: gravity angle, tip pose, path lengths, tensions, and how they answer to each other."""
+"""The table of samples: gravity, tip pose, path lengths, tensions, and how they answer to each other."""
 
 from dataclasses import dataclass
 
 import numpy as np
 import pandas as pd
 
-from trunkline.dataset.columns import AXES, POSE, command_columns, length_columns, tension_columns
-from trunkline.dataset.sampling import Candidates, crowding, sample_angle, thin
+from trunkline.dataset.columns import AXES, DOWN, POSE, command_columns, length_columns, tension_columns
+from trunkline.dataset.sampling import Candidates, crowding, sample_at, thin
+from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity
 from trunkline.statics.chain import Chain
 from trunkline.statics.sensitivity import sensitivity
 
 
 @dataclass
 class Density:
-    """Tips at one gravity angle before and after thinning.
+    """Tips under one gravity before and after thinning.
 
     Attributes:
-        tilt: θ_G, rad.
+        down: direction of gravity in the base frame. Shape (3,).
         before, after: tip positions, m. Shapes (N, 3), (M, 3).
         failed, snapped: candidates dropped, see `Candidates`.
     """
 
-    tilt: float
+    down: np.ndarray
     before: np.ndarray
     after: np.ndarray
     failed: int
     snapped: int
+
+    @property
+    def angle(self) -> float:
+        """Of gravity to the straight arm, rad."""
+        return tilt_of_gravity(self.down)
 
     def unevenness(self) -> tuple[float, float]:
         """Standard deviation over mean of the number of tips in occupied cells of 2 cm, before and after."""
@@ -34,34 +40,35 @@ class Density:
 
 
 def sample_table(
-    chain: Chain, tilt: float, count: int, directions: int, steps: int, rng: np.random.Generator
+    chain: Chain, down: np.ndarray, count: int, directions: int, steps: int, rng: np.random.Generator
 ) -> tuple[pd.DataFrame, Density]:
-    """About `count` samples at one gravity angle, thinned in the space of tips.
+    """About `count` samples under one gravity, thinned in the space of tips.
 
-    Columns: theta_g (rad), x, y, z (m), qw, qx, qy, qz, l1… (m, path lengths), f1… (N, tensions), c1… (m, commands),
-    residual (N m), iterations, set, and the derivatives by tension dx_df1… (tip, m/N), rx_df1… (turn of the tip as a
-    rotation vector in the base frame, rad/N) and dl1_df1… (path lengths, m/N).
+    Columns: theta_g (rad), gx, gy, gz (direction of gravity), x, y, z (m), qw, qx, qy, qz, l1… (m, path lengths), f1…
+    (N, tensions), c1… (m, commands), residual (N m), iterations, set, and the derivatives by tension dx_df1… (tip,
+    m/N), rx_df1… (turn of the tip as a rotation vector in the base frame, rad/N) and dl1_df1… (path lengths, m/N).
     The planar sets are kept beside the thinned samples, thinned along their own curves.
 
     Args:
-        tilt: θ_G, rad.
-        directions, steps: of the candidates, see `sample_angle`.
+        down: direction of gravity in the base frame, of unit length. Shape (3,).
+        directions, steps: of the candidates, see `sample_at`.
     """
-    candidates = sample_angle(chain, tilt, directions, steps, rng)
+    candidates = sample_at(chain, STANDARD_GRAVITY * down, directions, steps, rng)
     tips = candidates.equilibrium.position
     planar = {kind: np.flatnonzero(candidates.kind == kind) for kind in ("dorsal", "ventral")}
     on_curves = [rows[thin(tips[rows], max(1, count // 50), rng)] for rows in planar.values() if len(rows)]
     general = np.flatnonzero(candidates.kind == "general")
     share = count - sum(len(rows) for rows in on_curves)
     kept = np.sort(np.concatenate([general[thin(tips[general], share, rng)], *on_curves]))
-    density = Density(tilt, tips, tips[kept], candidates.failed, candidates.snapped)
-    return _table(chain, tilt, candidates, kept), density
+    density = Density(down, tips, tips[kept], candidates.failed, candidates.snapped)
+    return _table(chain, down, candidates, kept), density
 
 
-def _table(chain: Chain, tilt: float, candidates: Candidates, kept: np.ndarray) -> pd.DataFrame:
+def _table(chain: Chain, down: np.ndarray, candidates: Candidates, kept: np.ndarray) -> pd.DataFrame:
     rest = candidates.equilibrium[kept]
     slopes = sensitivity(chain, rest.qpos, rest.tensions, candidates.gravity)
-    columns = {"theta_g": np.full(len(kept), tilt)}
+    columns = {"theta_g": np.full(len(kept), tilt_of_gravity(down))}
+    columns |= {name: np.full(len(kept), part) for name, part in zip(DOWN, down, strict=True)}
     columns |= dict(zip(POSE, np.concatenate([rest.position, rest.quaternion], axis=1).T, strict=True))
     columns |= dict(zip(length_columns(chain.tendons), rest.lengths.T, strict=True))
     columns |= dict(zip(tension_columns(chain.tendons), rest.tensions.T, strict=True))

@@ -6,8 +6,10 @@ from matplotlib.figure import Figure
 
 from trunkline.dataset.table import Density
 from trunkline.figures.style import BASE, IDENTIFIED, INITIAL, VALIDATE, plt
+from trunkline.frames import in_plane_of_tilt
 
 SLICE = 0.008  # m, half thickness of the slices shown
+FEW = 2000  # tips under one gravity, up to which the slices are four times as thick
 GOAL_MM = 0.02  # median distance of the statics from MuJoCo at rest
 
 
@@ -19,25 +21,28 @@ def density_figure(densities: list[Density]) -> Figure:
     grid = figure.add_gridspec(4, len(shown))
     axes = np.array([[figure.add_subplot(grid[row, column]) for column in range(len(shown))] for row in range(3)])
     every = figure.add_subplot(grid[3, :])
-    angles = [np.degrees(d.tilt) for d in densities]
+    densities = sorted(densities, key=lambda density: density.angle)
+    angles = [np.degrees(d.angle) for d in densities]
     for values, color, label in zip(
         np.array([d.unevenness() for d in densities]).T, (INITIAL, IDENTIFIED), ("before", "after"), strict=True
     ):
         every.plot(angles, values, "o-", markersize=4, color=color, label=label)
     every.set(ylim=(0, None), xlabel="gravity angle θ_G (°)", ylabel="tips a cell: standard\ndeviation over mean")
     every.legend()
-    points = np.concatenate([d.before for d in shown])[:, [0, 2]] * 1e3
+    points = np.concatenate([_in_plane(d.before, d.down) for d in shown])[:, [0, 2]] * 1e3
+    thickness = SLICE if len(densities[0].after) > FEW else 4 * SLICE
     low, high = points.min(axis=0) - 15, points.max(axis=0) + 15
     for column, density in zip(axes.T, shown, strict=True):
         for ax, tips, color, label in (
             (column[0], density.before, INITIAL, "before"),
             (column[1], density.after, IDENTIFIED, "after thinning"),
         ):
-            near = tips[np.abs(tips[:, 1]) < SLICE] * 1e3
+            turned = _in_plane(tips, density.down)
+            near = turned[np.abs(turned[:, 1]) < thickness] * 1e3
             ax.scatter(near[:, 0], near[:, 2], s=2, color=color, linewidths=0)
             ax.plot(0, 0, "^", color=BASE, markersize=5)
-            ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x (mm)")
-            ax.set_title(f"θ_G = {np.degrees(density.tilt):.0f}°, {label}\n{len(tips)} tips", fontsize=9)
+            ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="towards gravity (mm)")
+            ax.set_title(f"θ_G = {np.degrees(density.angle):.0f}°, {label}\n{len(tips)} tips", fontsize=9)
         for tips, color, label in ((density.before, INITIAL, "before"), (density.after, IDENTIFIED, "after")):
             counts = np.sort(_per_cell(tips))
             column[2].plot(np.linspace(0, 100, len(counts)), counts / counts.mean(), color=color, label=label)
@@ -46,8 +51,13 @@ def density_figure(densities: list[Density]) -> Figure:
     axes[1, 0].set_ylabel("z (mm)")
     axes[2, 0].set_ylabel("tips in the cell over the mean")
     axes[2, 0].legend()
-    figure.suptitle(f"Tips within {SLICE * 1e3:.0f} mm of the plane of tilt, and how evenly they lie")
+    figure.suptitle(f"Tips within {thickness * 1e3:.0f} mm of the plane of tilt, and how evenly they lie")
     return figure
+
+
+def _in_plane(tips: np.ndarray, down: np.ndarray) -> np.ndarray:
+    """Tips (N, 3) turned about the arm's axis, so that gravity is in the plane of x and z."""
+    return np.column_stack([*in_plane_of_tilt(tips[:, :2], down[:2]), tips[:, 2]])
 
 
 def _per_cell(tips: np.ndarray, edge: float = 0.02) -> np.ndarray:

@@ -125,7 +125,7 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
 
 
 def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
-    """The soft maps at gravity angles without a grid.
+    """The soft maps under gravities without one.
 
     Args:
         heldout: columns `angle_deg`, `iou`, `reachable`, `beyond`.
@@ -134,14 +134,14 @@ def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6))
     left.plot(heldout["angle_deg"], heldout["iou"], "o-", color=IDENTIFIED, markersize=4)
     left.axhline(GOAL_IOU, color=VALIDATE, linestyle="--", label=f"goal, {GOAL_IOU:g}")
-    left.set(ylim=(0.93, 1), ylabel="IoU", title="Blended map against the angle's own")
+    left.set(ylim=(0.93, 1), ylabel="IoU", title="Map in between against gravity's own")
     for name, color, label in (
         ("reachable", IDENTIFIED, "tips"), ("beyond", INITIAL, f"points {1e3 * beyond:.0f} mm from every tip")
     ):
         right.plot(heldout["angle_deg"], 100 * heldout[name], "o-", color=color, markersize=4, label=label)
     right.set(ylim=(-3, 103), ylabel="called reachable (%)", title="The signal that a headset shows")
     for ax, place in ((left, "lower right"), (right, "center right")):
-        ax.set_xlabel("gravity angle, half-way between grids (°)")
+        ax.set_xlabel("gravity angle, between the maps (°)")
         ax.legend(loc=place)
     return figure
 

@@ -5,8 +5,10 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from trunkline.figures.style import BASE, IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt
+from trunkline.frames import in_plane_of_tilt
 
 SLICE = 0.016  # m, half thickness of the slices shown
+BAND = np.radians(4.0)  # of gravity angles shown together, to each side
 
 
 def learning_figure(curve: pd.DataFrame) -> Figure:
@@ -47,19 +49,22 @@ def error_map_figure(targets: pd.DataFrame) -> Figure:
     """Where the errors are: targets near the plane of tilt, coloured by tip error.
 
     Args:
-        targets: columns theta_g (rad), x, y, z (m), error_mm.
+        targets: columns theta_g (rad), gx, gy, x, y, z (m), error_mm.
     """
+    x, y = in_plane_of_tilt(targets[["x", "y"]].to_numpy(), targets[["gx", "gy"]].to_numpy())
+    targets = targets.assign(x=x, y=y)
     angles = np.unique(targets["theta_g"])
     shown = angles[np.unique(np.linspace(0, len(angles) - 1, 4).round().astype(int))]
     figure, axes = plt.subplots(1, len(shown), figsize=(3.1 * len(shown), 3.6), squeeze=False, sharey=True)
     extent = targets[["x", "z"]].agg(["min", "max"]) * 1e3 + np.array([[-20], [20]])
     for ax, angle in zip(axes[0], shown, strict=True):
-        rows = targets[(targets["theta_g"] == angle) & (targets["y"].abs() < SLICE)]
+        near = (targets["theta_g"] - angle).abs() < BAND
+        rows = targets[near & (targets["y"].abs() < SLICE)]
         rows = rows.sort_values("error_mm")
         dots = ax.scatter(rows["x"] * 1e3, rows["z"] * 1e3, c=np.log10(rows["error_mm"] + 1e-3), s=6, linewidths=0,
                           vmin=-1.5, vmax=1)
         ax.plot(0, 0, "^", color=BASE, markersize=5)
-        ax.set(aspect="equal", xlim=extent["x"], ylim=extent["z"], xlabel="x (mm)")
+        ax.set(aspect="equal", xlim=extent["x"], ylim=extent["z"], xlabel="towards gravity (mm)")
         ax.set_title(f"θ_G = {np.degrees(angle):.0f}°")
     axes[0, 0].set_ylabel("z (mm), base at the triangle")
     bar = figure.colorbar(dots, ax=axes[0], shrink=0.8, ticks=[-1, 0, 1])

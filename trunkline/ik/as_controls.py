@@ -1,6 +1,6 @@
 """What a user gets: the network's commands sent to MuJoCo, which is stepped until the arm rests.
 
-Targets are poses in which MuJoCo itself came to rest, at gravity angles that no sample has, one or two neighbouring
+Targets are poses in which MuJoCo itself came to rest, under gravities that no sample has, one or two neighbouring
 motors pulling by random amounts. No statics of ours is part of the score.
 """
 
@@ -14,7 +14,7 @@ from pydantic import Field, PositiveFloat
 
 from trunkline.dataset.sampling import around_the_arm
 from trunkline.elements import BACKLASH, SLIDER, actuators, all_elements, capstan_friction, numeric
-from trunkline.frames import gravity_in_base
+from trunkline.ik.inputs import draw_gravity, gravity_of, position_of
 from trunkline.simulation.drive import drive, has_friction
 from trunkline.simulation.rest import base_frame, settle
 from trunkline.statics.chain import Chain
@@ -52,7 +52,7 @@ class Drawn:
     """Poses in which an arm rests, of those that were drawn.
 
     Attributes:
-        targets: inputs of the network, rad and m. Shape (N, 8).
+        targets: inputs of the network. Shape (N, 8 or 10).
         near_limit: how many were left out in which a motor is near its limit.
         unrested: how many were left out in which the arm had not come to rest, whatever its motors then did.
     """
@@ -69,7 +69,7 @@ class Drawn:
 def draw_targets(
     model: mujoco.MjModel,
     chain: Chain,
-    angles: np.ndarray,
+    known: np.ndarray,
     deepest: np.ndarray,
     count: int,
     rng: np.random.Generator,
@@ -78,24 +78,25 @@ def draw_targets(
     """Poses in which MuJoCo rests without friction under one or two neighbouring motors, none near its limit.
 
     Args:
-        angles: rad; gravity angles are drawn between the least and the largest.
+        known: what samples tell of gravity; others are drawn between them, see `inputs.draw_gravity`. Shape (G, 1 or
+            3).
         deepest: of each tendon, how far it is drawn in at most, m. Shape (K,).
         others_pay_out: whether motors that do not pull give way; else they stay where the straight arm has them, and
             pull against the others as the arm bends: shapes that the data set has none of.
     """
-    gravity, commands = draw_commands(chain, angles, deepest, count, rng, others_pay_out)
-    rest = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity_in_base(gravity), PATIENCE)
+    told, commands = draw_commands(chain, known, deepest, count, rng, others_pay_out)
+    rest = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity_of(np.pad(told, [(0, 0), (0, 7)])), PATIENCE)
     tensions = rest.tensions[:, actuators(model)]
     near_limit = ~(tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
-    found = np.column_stack([gravity, rest.position, rest.quaternion])[rest.rested & ~near_limit]
+    found = np.column_stack([told, rest.position, rest.quaternion])[rest.rested & ~near_limit]
     return Drawn(found, int((rest.rested & near_limit).sum()), int((~rest.rested).sum()))
 
 
 def draw_commands(
-    chain: Chain, angles: np.ndarray, deepest: np.ndarray, count: int, rng: np.random.Generator, others_pay_out: bool
+    chain: Chain, known: np.ndarray, deepest: np.ndarray, count: int, rng: np.random.Generator, others_pay_out: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Gravity angles, rad (count,), and commands, m (count, K), as `draw_targets` has them; its words."""
-    gravity = rng.uniform(angles.min(), angles.max(), count)
+    """Gravities (count, 1 or 3) and commands, m (count, K), as `draw_targets` has them; its words."""
+    told = draw_gravity(known, count, rng)
     first = rng.integers(chain.tendons, size=count)
     order = around_the_arm(chain)
     place = np.argsort(order)
@@ -105,7 +106,7 @@ def draw_commands(
     pulls[np.arange(count), second] = np.where(rng.random(count) < 0.5, rng.uniform(0, 1, count), 0.0)
     idle = pulls == 0
     commands = chain.straight_lengths - pulls * deepest + idle * others_pay_out * chain.length
-    return gravity, commands
+    return told, commands
 
 
 @dataclass
@@ -151,7 +152,7 @@ def score(
     model: mujoco.MjModel,
     chain: Chain,
     ask: Ask,
-    angles: np.ndarray,
+    known: np.ndarray,
     deepest: np.ndarray,
     settings: AsControls,
     rng: np.random.Generator,
@@ -163,15 +164,15 @@ def score(
     it is damped after SWING s, all but the timed ones; "dry_friction" says what it has, at most.
 
     Args:
-        ask: the network, (N, 8) to its answer.
-        angles, deepest: as in `draw_targets`.
+        ask: the network, targets to its answer.
+        known, deepest: as in `draw_targets`.
         rig: the arm that the model is of.
 
     Returns:
         Metrics of the model, and of the rig beside the model's with friction on the same targets.
     """
-    drawn = draw_targets(model, chain, angles, PULL_SHARE * deepest, settings.targets, rng)
-    taut = draw_targets(model, chain, angles, TAUT_SHARE * deepest, settings.targets // 8, rng, others_pay_out=False)
+    drawn = draw_targets(model, chain, known, PULL_SHARE * deepest, settings.targets, rng)
+    taut = draw_targets(model, chain, known, TAUT_SHARE * deepest, settings.targets // 8, rng, others_pay_out=False)
     targets = drawn.targets
     timed = driven(model, ask, targets[: settings.timed], settings.seconds, friction=False, calm=True)
     if has_friction(model):
@@ -198,7 +199,7 @@ def score(
     answer = ask(few)
     pulls = chain.straight_lengths - answer["commands"]  # motors count from the straight arm, as in a session's logs
     origin, turn = base_frame(model)  # a rig knows the tracked base, in which the arm's mount is turned
-    tips = rig(pulls, gravity_in_base(few[:, 0]) @ turn.T)
+    tips = rig(pulls, gravity_of(few) @ turn.T)
     on_rig = _reached(few, answer, (tips - origin) @ turn)
     summary = on_rig.metrics(chain.length)
     twin = np.quantile(sent.position[: len(few)], (0.5, 0.95)) * 1e3
@@ -206,26 +207,26 @@ def score(
 
 
 def settled(model: mujoco.MjModel, ask: Ask, targets: np.ndarray) -> Reached:
-    """The commands of the network for `targets` (N, 8), each at rest without friction."""
+    """The commands of the network for `targets`, each at rest without friction."""
     answer = ask(targets)
-    rest = settle(model, answer["commands"][:, model.actuator_trnid[:, 0]], gravity_in_base(targets[:, 0]))
+    rest = settle(model, answer["commands"][:, model.actuator_trnid[:, 0]], gravity_of(targets))
     return replace(_reached(targets, answer, rest.position), rested=rest.rested)
 
 
 def driven(
     model: mujoco.MjModel, ask: Ask, targets: np.ndarray, seconds: float, friction: bool = True, calm: bool = False
 ) -> Reached:
-    """The commands of the network for `targets` (N, 8), sent at once to the straight arm, which moves as it does.
+    """The commands of the network for `targets`, sent at once to the straight arm, which moves as it does.
 
     With `calm`, what still moves after so many seconds is damped until it rests: not with friction.
     """
     answer = ask(targets)
-    commands, gravity = answer["commands"][:, model.actuator_trnid[:, 0]], gravity_in_base(targets[:, 0])
+    commands, gravity = answer["commands"][:, model.actuator_trnid[:, 0]], gravity_of(targets)
     found = drive(model, commands, gravity, seconds, friction, calm=calm)
     return replace(_reached(targets, answer, found.end), seconds=found.seconds_to_rest, rested=found.rested)
 
 
 def _reached(targets: np.ndarray, answer: dict[str, np.ndarray], tips: np.ndarray) -> Reached:
-    position = np.linalg.norm(tips - targets[:, 1:4], axis=1)
+    position = np.linalg.norm(tips - position_of(targets), axis=1)
     nothing = np.full(len(targets), np.nan)
     return Reached(position, answer["doubtful"], nothing, np.isfinite(position))

@@ -6,8 +6,9 @@ import numpy as np
 import onnxruntime
 
 from trunkline.errors import InputError
+from trunkline.ik.inputs import position_of, told_of_gravity
 
-UNIT = 1e-3  # by which a quaternion's length may differ from 1: that of one written with three digits
+UNIT = 1e-3  # by which the length of a quaternion or direction may differ from 1: that of one written with three digits
 
 
 def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, np.ndarray]:
@@ -17,12 +18,12 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
     foreseen so far from its target that the arm cannot take the pose.
 
     Args:
-        poses: gravity angle (rad), tip position (m) and unit quaternion (w first, either sign) in the base frame, as
-            the file's `inputs` name them. Shape (N, 8).
+        poses: gravity (angle in rad, or a unit vector), tip position (m) and unit quaternion (w first, either sign) in
+            the base frame, as the file's `inputs` name them. Shape (N, 8 or 10).
 
     Raises:
-        InputError: the shape is another, a number is not finite, a quaternion is not of unit length, or the network
-            has no finite answer.
+        InputError: the shape is another, a number is not finite, a quaternion or direction is not of unit length, or
+            the network has no finite answer.
     """
     (taken,), meaning = runtime.get_inputs(), runtime.get_modelmeta().custom_metadata_map
     for key in ("inputs", "doubt_beyond_m"):
@@ -35,7 +36,7 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
         if len(bad):
             raise InputError(f"pose {bad[0]}: found {name} {values[bad[0]]}, expected finite numbers")
-    missed = np.linalg.norm(answers["tip"] - given[taken.name][:, 1:4], axis=1)
+    missed = np.linalg.norm(answers["tip"] - position_of(given[taken.name]), axis=1)
     return answers | {"doubtful": missed > float(meaning["doubt_beyond_m"])}
 
 
@@ -51,7 +52,11 @@ def checked(poses: np.ndarray, inputs: list[str]) -> np.ndarray:
         single = poses.astype(np.float32)
     for row, column in np.argwhere(~np.isfinite(single)):
         raise InputError(f"pose {row}: {inputs[column]}: found {poses[row, column]:g}, expected a finite number")
-    lengths = np.linalg.norm(poses[:, -4:], axis=1)
-    for row in np.flatnonzero(np.abs(lengths - 1) > UNIT):
-        raise InputError(f"pose {row}: found a quaternion of length {lengths[row]:.4g}, expected unit length")
+    units = {"quaternion": poses[:, -4:]}
+    if len(inputs) > 8:
+        units["direction of gravity"] = told_of_gravity(poses)
+    for name, vectors in units.items():
+        lengths = np.linalg.norm(vectors, axis=1)
+        for row in np.flatnonzero(np.abs(lengths - 1) > UNIT):
+            raise InputError(f"pose {row}: found a {name} of length {lengths[row]:.4g}, expected unit length")
     return single

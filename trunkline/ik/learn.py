@@ -14,9 +14,11 @@ from pydantic import Field
 
 from trunkline.dataset.columns import command_columns, length_columns, tension_columns
 from trunkline.dataset.table import command_by_tension, sample_table, tip_by_tension, turn_by_tension
+from trunkline.frames import downwards
 from trunkline.ik.as_controls import DOUBT, AsControls, Rig, score
 from trunkline.ik.ask import ask
-from trunkline.ik.network import INPUTS, OUTPUTS, InverseKinematics
+from trunkline.ik.inputs import DIRECTION, draw_gravity, inputs_of, told_of_gravity
+from trunkline.ik.network import OUTPUTS, InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.polish import polish
 from trunkline.ik.score import (
@@ -35,8 +37,10 @@ from trunkline.statics.chain import Chain
 
 @dataclass
 class Unseen:
-    """Targets between the gravity angles of the data set: pulls around the arm, tips along each, how many in all."""
+    """Targets between the gravities of the data set: of how many, where there is more than a tilt; pulls around the
+    arm, tips along each, how many in all."""
 
+    gravities: Annotated[int, Field(ge=1, le=10_000)]
     directions: Annotated[int, Field(ge=8, le=10000)]
     steps: Annotated[int, Field(ge=8, le=10_000)]
     samples: Annotated[int, Field(ge=100, le=1_000_000)]
@@ -71,8 +75,9 @@ class Learned:
     """A network, also as ONNX, and its learning curve: epoch, train_mm, validate_mm.
 
     held_out: the samples that no training saw. errors: of the exported network's commands, for them ("held out") and
-    for targets at "unseen angles". as_lengths: of its lengths, for the latter, held by cables. as_controls: what comes
-    of its commands in MuJoCo, on_plant: on the arm itself. polished: of some held-out targets after Gauss-Newton steps.
+    for targets under "unseen angles". as_lengths: of its lengths, for the latter, held by cables. as_controls: what
+    comes of its commands in MuJoCo, on_plant: on the arm itself. polished: of some held-out targets after Gauss-Newton
+    steps.
     outside: how many targets far off there are, beyond_range: how far (m) any answer to them leaves the tendons' range.
     difference: between the network and what was exported, m, at most.
     """
@@ -100,28 +105,29 @@ def learn(
         model: whose `chain` it is. rig: what drives the arm itself.
     """
     network, curve = fit(table, chain, learning)
+    columns = inputs_of(table)
     held_out = table[table["split"] == "validate"]
-    angles = np.unique(table["theta_g"])
-    unseen = unseen_targets(chain, angles, learning.unseen, learning.seed)
+    known = told_of_gravity(table[columns].drop_duplicates(columns[:-7]).to_numpy())
+    unseen = unseen_targets(chain, known, learning.unseen, learning.seed)
     exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], DOUBT * chain.length)
     runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
     errors, difference, found = {}, 0.0, {}
     for name, targets in (("held out", held_out), ("unseen angles", unseen)):
-        inputs = targets[INPUTS].to_numpy()
+        inputs = targets[columns].to_numpy()
         found = ask(runtime, inputs)
         with torch.no_grad():
             told = network(torch.tensor(inputs, dtype=torch.float32))._asdict()
         difference = max(difference, *(largest_difference(found[key], told[key].numpy()) for key in OUTPUTS))
         print(f"train_ik: forward kinematics of {len(inputs)} answers, {name}", flush=True)
         errors[name] = tip_errors(chain, inputs, found["commands"].astype(float))
-    as_lengths = length_errors(chain, unseen[INPUTS].to_numpy(), found["lengths"].astype(float))
-    polished = polished_errors(chain, held_out, runtime, learning.polish, learning.seed)
+    as_lengths = length_errors(chain, unseen[columns].to_numpy(), found["lengths"].astype(float))
+    polished = polished_errors(chain, held_out[columns], runtime, learning.polish, learning.seed)
     rng = np.random.default_rng(learning.seed)
-    far = ask(runtime, outside_targets(learning.outside, chain.length, rng))["commands"]
-    known = table.loc[table["split"] == "train", command_columns(chain.tendons)].to_numpy()
+    far = ask(runtime, outside_targets(learning.outside, chain.length, rng, columns == DIRECTION))["commands"]
+    sent_before = table.loc[table["split"] == "train", command_columns(chain.tendons)].to_numpy()
     print("train_ik: sending commands to MuJoCo until the arm rests", flush=True)
-    deepest = chain.straight_lengths - known.min(axis=0)
-    sent, on_plant = score(model, chain, partial(ask, runtime), angles, deepest, learning.as_controls, rng, rig)
+    deepest = chain.straight_lengths - sent_before.min(axis=0)
+    sent, on_plant = score(model, chain, partial(ask, runtime), known, deepest, learning.as_controls, rng, rig)
     return Learned(
         network=network,
         exported=exported,
@@ -133,7 +139,7 @@ def learn(
         on_plant=on_plant,
         polished=polished,
         outside=len(far),
-        beyond_range=beyond_range(far, known),
+        beyond_range=beyond_range(far, sent_before),
         difference=difference,
     )
 
@@ -155,7 +161,7 @@ def fit(table: pd.DataFrame, chain: Chain, learning: Learning) -> tuple[InverseK
             bar.update(1, **{k: v for k, v in curve[-1].items() if k != "epoch"})
 
         network = train(
-            table[INPUTS].to_numpy(),
+            table[inputs_of(table)].to_numpy(),
             table[command_columns(tendons)].to_numpy(),
             table[length_columns(tendons)].to_numpy(),
             loss,
@@ -169,16 +175,21 @@ def fit(table: pd.DataFrame, chain: Chain, learning: Learning) -> tuple[InverseK
 def polished_errors(chain: Chain, held_out: pd.DataFrame, runtime, polishing: Polish, seed: int) -> TipErrors:
     """Errors of some held-out targets after Gauss-Newton steps from the network's answers."""
     count = min(polishing.targets, len(held_out))
-    inputs = held_out[INPUTS].sample(count, random_state=seed).to_numpy()
+    inputs = held_out.sample(count, random_state=seed).to_numpy()
     print(f"train_ik: up to {polishing.steps} Gauss-Newton steps for {count} answers", flush=True)
     found = polish(chain, inputs, ask(runtime, inputs)["lengths"].astype(float), polishing.steps)
     return TipErrors(found.position_error, found.orientation_error)
 
 
-def unseen_targets(chain: Chain, angles: np.ndarray, unseen: Unseen, seed: int) -> pd.DataFrame:
-    """Targets at gravity angles half way between those of the data set, `angles` (A,) in rad."""
-    between = (angles[1:] + angles[:-1]) / 2
+def unseen_targets(chain: Chain, known: np.ndarray, unseen: Unseen, seed: int) -> pd.DataFrame:
+    """Targets under gravities that the data set has none of, `known` (G, 1 or 3): half way between its angles, or at
+    random."""
     rng = np.random.default_rng(seed)
+    if known.shape[1] == 1:
+        angles = np.sort(known[:, 0])
+        between = downwards((angles[1:] + angles[:-1]) / 2, np.zeros(len(angles) - 1))
+    else:
+        between = draw_gravity(known, unseen.gravities, rng)
     count = unseen.samples // max(1, len(between))
-    tables = [sample_table(chain, tilt, count, unseen.directions, unseen.steps, rng)[0] for tilt in between]
+    tables = [sample_table(chain, down, count, unseen.directions, unseen.steps, rng)[0] for down in between]
     return pd.concat(tables, ignore_index=True)

@@ -1,4 +1,4 @@
-"""The inverse kinematics: a small network from gravity angle and tip pose to the commands of the motors."""
+"""The inverse kinematics: a small network from gravity and tip pose to the commands of the motors."""
 
 from typing import NamedTuple
 
@@ -6,12 +6,13 @@ import numpy as np
 import torch
 from torch import nn
 
-INPUTS = ["theta_g", "x", "y", "z", "qw", "qx", "qy", "qz"]
+from trunkline.ik.inputs import position_of
+
 OUTPUTS = ("commands", "lengths", "tip")
-# products of quaternion components: a rotation matrix is linear in them, and q and -q give the same ones
-FIRST = [4, 4, 4, 4, 5, 5, 5, 6, 6, 7]
-SECOND = [4, 5, 6, 7, 5, 6, 7, 6, 7, 7]
-FEATURES = 2 + 3 + len(FIRST)
+# products of quaternion components: a rotation matrix is linear in them, and q and -q give the same ones. The
+# quaternion is the last of the inputs.
+FIRST = [-4, -4, -4, -4, -3, -3, -3, -2, -2, -1]
+SECOND = [-4, -3, -2, -1, -3, -2, -1, -2, -1, -1]
 
 
 class Answer(NamedTuple):
@@ -30,10 +31,12 @@ class Answer(NamedTuple):
 
 
 class InverseKinematics(nn.Module):
-    """(θ_G, x, y, z, q_w, q_x, q_y, q_z) to an `Answer`: features, normalisation, three hidden layers, ReLU.
+    """(θ_G or g_x, g_y, g_z, x, y, z, q_w, q_x, q_y, q_z) to an `Answer`: features, normalisation, three hidden layers,
+    ReLU.
 
-    SI units; the quaternion is of unit length, of either sign. Commands stay within those of the training set. The tip
-    is foreseen by layers of half the width from θ_G and the commands alone: they do not know the pose that was asked.
+    SI units; gravity is told as in `inputs`; the quaternion is of unit length, of either sign. Commands stay within
+    those of the training set. The tip is foreseen by layers of half the width from gravity and the commands alone: they
+    do not know the pose that was asked.
     """
 
     mean: torch.Tensor  # of the features over the training set, as is 1 / scale their standard deviation
@@ -45,24 +48,25 @@ class InverseKinematics(nn.Module):
     tip_half_range: torch.Tensor
 
     def __init__(self, width: int, inputs: np.ndarray, commands: np.ndarray, lengths: np.ndarray):
-        """Args: width: of each hidden layer; inputs (N, 8), commands, lengths (N, K): the training set."""
+        """Args: width: of each hidden layer; inputs (N, 8 or 10), commands, lengths (N, K): the training set."""
         super().__init__()
         raw = features(torch.tensor(inputs, dtype=torch.float64))
         buffers = {"mean": raw.mean(dim=0), "scale": 1 / raw.std(dim=0).clamp_min(1e-6)}
         buffers["middle"], buffers["half_range"] = _range(commands)
-        buffers["tip_middle"], buffers["tip_half_range"] = _range(inputs[:, 1:4])
+        buffers["tip_middle"], buffers["tip_half_range"] = _range(position_of(inputs))
         buffers["most_stretch"] = torch.tensor((lengths - commands).max(axis=0))
         for name, values in buffers.items():
             self.register_buffer(name, values.to(torch.float32))
-        tendons = commands.shape[1]
+        tendons, told = commands.shape[1], inputs.shape[1] - 7
+        self.inputs = inputs.shape[1]
         self.layers = nn.Sequential(
-            nn.Linear(FEATURES, width), nn.ReLU(),
+            nn.Linear(raw.shape[1], width), nn.ReLU(),
             nn.Linear(width, width), nn.ReLU(),
             nn.Linear(width, width), nn.ReLU(),
             nn.Linear(width, 2 * tendons),
         )  # fmt: skip
         self.tip_layers = nn.Sequential(
-            nn.Linear(2 + tendons, width // 2), nn.ReLU(),
+            nn.Linear((2 if told == 1 else told) + tendons, width // 2), nn.ReLU(),
             nn.Linear(width // 2, width // 2), nn.ReLU(),
             nn.Linear(width // 2, width // 2), nn.ReLU(),
             nn.Linear(width // 2, 3),
@@ -76,18 +80,18 @@ class InverseKinematics(nn.Module):
         commands, stretches = self.layers(normalised).chunk(2, dim=1)
         return self.middle + self.half_range * commands, self.most_stretch * stretches
 
-    def foresee(self, angle: torch.Tensor, pulls: torch.Tensor) -> torch.Tensor:
-        """Where the tip rests, m, at gravity angles (B, 1), rad, under commands as shares of their range, (B, K)."""
-        seen = torch.cat([torch.sin(angle), torch.cos(angle), pulls], dim=1)
-        return self.tip_middle + self.tip_half_range * self.tip_layers(seen)
+    def foresee(self, pulling: torch.Tensor, pulls: torch.Tensor) -> torch.Tensor:
+        """Where the tip rests, m, under the `gravity_features` (B, 2 or 3) and commands as shares of their range,
+        (B, K)."""
+        return self.tip_middle + self.tip_half_range * self.tip_layers(torch.cat([pulling, pulls], dim=1))
 
     def forward(self, inputs: torch.Tensor) -> Answer:
-        """From inputs (B, 8)."""
+        """From inputs (B, 8 or 10)."""
         commands, stretches = self.layers(self.normalise(inputs)).chunk(2, dim=1)
         pulls = commands.clamp(-1, 1)
         commands = self.middle + self.half_range * pulls
         lengths = commands + self.most_stretch * stretches.clamp(0, 1)
-        return Answer(commands, lengths, self.foresee(inputs[:, :1], pulls))
+        return Answer(commands, lengths, self.foresee(gravity_features(inputs), pulls))
 
 
 def _range(values: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
@@ -97,7 +101,17 @@ def _range(values: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
 
 
 def features(inputs: torch.Tensor) -> torch.Tensor:
-    """sin θ_G, cos θ_G, position, products of quaternion components. Shape (B, 15) from (B, 8)."""
-    angle = inputs[:, :1]
-    products = inputs[:, FIRST] * inputs[:, SECOND]
-    return torch.cat([torch.sin(angle), torch.cos(angle), inputs[:, 1:4], products], dim=1)
+    """Gravity, position, products of quaternion components, and of a direction of gravity with these: where gravity
+    pulls as the tip sees it is linear in them. Shape (B, 15 or 55) from (B, 8 or 10)."""
+    gravity = gravity_features(inputs)
+    pose = torch.cat([inputs[:, -7:-4], inputs[:, FIRST] * inputs[:, SECOND]], dim=1)
+    parts = [gravity, pose]
+    if gravity.shape[1] == 3:
+        parts.append((gravity[:, :, None] * pose[:, None, :]).flatten(1))
+    return torch.cat(parts, dim=1)
+
+
+def gravity_features(inputs: torch.Tensor) -> torch.Tensor:
+    """sin θ_G, cos θ_G of inputs (B, 8), the direction of gravity of inputs (B, 10). Shape (B, 2 or 3)."""
+    told = inputs[:, :-7]
+    return torch.cat([torch.sin(told), torch.cos(told)], dim=1) if told.shape[1] == 1 else told

@@ -7,14 +7,19 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
-from trunkline.ik.network import FIRST, INPUTS, OUTPUTS, SECOND, InverseKinematics
+from trunkline.ik.inputs import DIRECTION, TILT, UNITS
+from trunkline.ik.network import FIRST, OUTPUTS, SECOND, InverseKinematics
 
 OPSET = 15
 IR_VERSION = 8  # of the ONNX release that brought opset 15
+GRAVITY = {
+    len(TILT): "theta_g, rad: angle between the straight arm and gravity, the mount tilting about base +y",
+    len(DIRECTION): "gx, gy, gz: direction of gravity in the base frame, of unit length",
+}
 
 
 def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> onnx.ModelProto:
-    """A model with input `pose` (N, 8) and outputs `commands` (N, K), `lengths` (N, K) and `tip` (N, 3), float32.
+    """A model with input `pose` (N, 8 or 10) and outputs `commands` (N, K), `lengths` (N, K) and `tip` (N, 3), float32.
 
     Args:
         tendons: names, in the order of the columns of commands and lengths.
@@ -30,13 +35,25 @@ def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float)
         nodes.append(helper.make_node(kind, inputs, [output], name=output, **attributes))
         return output
 
-    def gather(columns: list[int], output: str) -> str:
-        return node("Gather", ["pose", constant(f"{output}_columns", np.array(columns, np.int64))], output, axis=1)
+    def gather(columns: list[int] | np.ndarray, output: str) -> str:
+        places = np.array(columns, np.int64) % len(inputs)  # not from the end: not every engine counts so
+        return node("Gather", ["pose", constant(f"{output}_columns", places)], output, axis=1)
 
-    angle, position = gather([0], "theta_g"), gather([1, 2, 3], "position")
+    inputs = _inputs(network)
+    position = gather([-7, -6, -5], "position")
     products = node("Mul", [gather(FIRST, "first"), gather(SECOND, "second")], "quaternion_products")
-    parts = [node("Sin", [angle], "sin_theta_g"), node("Cos", [angle], "cos_theta_g"), position, products]
-    x = node("Concat", parts, "features", axis=1)
+    if inputs == TILT:
+        angle = gather([0], "theta_g")
+        pulling = [node("Sin", [angle], "sin_theta_g"), node("Cos", [angle], "cos_theta_g")]
+    else:
+        pulling = [gather([0, 1, 2], "gravity")]
+    seen = [*pulling, position, products]
+    if inputs == DIRECTION:
+        pose, size = node("Concat", [position, products], "pose_features", axis=1), 3 + len(FIRST)
+        columns = constant("mixed_columns", np.tile(np.arange(size), 3))
+        tiled = node("Gather", [pose, columns], "mixed_pose", axis=1)
+        seen.append(node("Mul", [gather(np.repeat([0, 1, 2], size), "mixed_gravity"), tiled], "mixed"))
+    x = node("Concat", seen, "features", axis=1)
     x = node("Sub", [x, constant("mean", network.mean.numpy())], "centred")
     x = node("Mul", [x, constant("scale", network.scale.numpy())], "normalised")
 
@@ -65,11 +82,11 @@ def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float)
     stretches = clip(columns_of(both, len(tendons), "raw_stretches"), 0, "stretch_shares")
     x = node("Mul", [stretches, constant("most_stretch", network.most_stretch.numpy())], "stretches")
     node("Add", [commands, x], "lengths")
-    x = perceptron(node("Concat", ["sin_theta_g", "cos_theta_g", pulls], "seen", axis=1), network.tip_layers, "tip")
+    x = perceptron(node("Concat", [*pulling, pulls], "seen", axis=1), network.tip_layers, "tip")
     x = node("Mul", [x, constant("tip_half_range", network.tip_half_range.numpy())], "tip_offset")
     node("Add", [x, constant("tip_middle", network.tip_middle.numpy())], "tip")
 
-    pose = helper.make_tensor_value_info("pose", TensorProto.FLOAT, ["batch", len(INPUTS)])
+    pose = helper.make_tensor_value_info("pose", TensorProto.FLOAT, ["batch", len(inputs)])
     widths = dict(zip(OUTPUTS, (len(tendons), len(tendons), 3), strict=True))
     outputs = [helper.make_tensor_value_info(k, TensorProto.FLOAT, ["batch", n]) for k, n in widths.items()]
     graph = helper.make_graph(nodes, "inverse_kinematics", [pose], outputs, constants)
@@ -80,13 +97,19 @@ def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float)
     return model
 
 
+def _inputs(network: InverseKinematics) -> list[str]:
+    return TILT if network.inputs == len(TILT) else DIRECTION
+
+
 def _meaning(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> dict[str, str]:
     """Metadata: names, shapes, units, frame, normalisation."""
+    inputs = _inputs(network)
     low, high = network.middle - network.half_range, network.middle + network.half_range
     return {
-        "inputs": json.dumps(INPUTS),
-        "input_units": json.dumps(["rad", "m", "m", "m", "1", "1", "1", "1"]),
-        "input_shape": json.dumps(["batch", len(INPUTS)]),
+        "inputs": json.dumps(inputs),
+        "input_units": json.dumps([UNITS.get(name, "1") for name in inputs]),
+        "input_shape": json.dumps(["batch", len(inputs)]),
+        "gravity": GRAVITY[len(inputs)],
         "outputs": json.dumps(tendons),
         "output_units": json.dumps(["m"] * len(tendons)),
         "output_shape": json.dumps(["batch", len(tendons)]),

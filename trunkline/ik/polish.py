@@ -14,8 +14,9 @@ from itertools import combinations
 
 import numpy as np
 
-from trunkline.frames import gravity_in_base, rotation_from_wxyz
+from trunkline.frames import rotation_from_wxyz
 from trunkline.ik.bounded_least_squares import bounded_least_squares
+from trunkline.ik.inputs import gravity_of, position_of, quaternion_of
 from trunkline.statics.chain import Chain
 from trunkline.statics.equilibria import Equilibrium, forward
 from trunkline.statics.restart import restart
@@ -50,12 +51,12 @@ def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 
     """Lengths that bring the tip nearer to its targets, never further from them.
 
     Args:
-        targets: θ_G in rad, tip position in m and quaternion (w first) in the base frame. Shape (N, 8).
+        targets: gravity, tip position in m and quaternion (w first) in the base frame. Shape (N, 8 or 10).
         lengths: first answers, m, for instance the network's. Shape (N, K).
         steps: most Gauss-Newton steps for each target.
         lever: m; a turn of the tip by 1 rad counts as this much distance.
     """
-    gravity = gravity_in_base(targets[:, 0])
+    gravity = gravity_of(targets)
     best = forward(chain, lengths, gravity)
     error = _missing_pose(best, targets, lever)
     size = np.where(best.converged, np.linalg.norm(error, axis=1), np.inf)
@@ -88,8 +89,8 @@ def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 
 def _missing_pose(found: Equilibrium, targets: np.ndarray, lever: float) -> np.ndarray:
     """Position and turn from the tip to its target, m. Shape (N, 6)."""
     quaternion = np.where(found.converged[:, None], found.quaternion, [1.0, 0, 0, 0])
-    turn = (rotation_from_wxyz(targets[:, 4:]) * rotation_from_wxyz(quaternion).inv()).as_rotvec()
-    return np.concatenate([targets[:, 1:4] - found.position, lever * turn], axis=1)
+    turn = (rotation_from_wxyz(quaternion_of(targets)) * rotation_from_wxyz(quaternion).inv()).as_rotvec()
+    return np.concatenate([position_of(targets) - found.position, lever * turn], axis=1)
 
 
 def _step(chain, here: Equilibrium, error, gravity, lever) -> tuple[np.ndarray, np.ndarray]:

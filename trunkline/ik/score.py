@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.frames import gravity_in_base
+from trunkline.frames import downwards
+from trunkline.ik.inputs import gravity_of, position_of, quaternion_of
 from trunkline.statics.chain import FORCE_ROUNDING, Chain
 from trunkline.statics.equilibria import Equilibrium, actuated, forward
 
@@ -52,31 +53,32 @@ class TipErrors:
 
 
 def tip_errors(chain: Chain, inputs: np.ndarray, commands: np.ndarray) -> TipErrors:
-    """Errors of predicted commands (N, K), m, for targets `inputs` (N, 8): θ_G, position, quaternion."""
-    return _errors(actuated(chain, commands, gravity_in_base(inputs[:, 0])), inputs)
+    """Errors of predicted commands (N, K), m, for targets `inputs` (N, 8 or 10)."""
+    return _errors(actuated(chain, commands, gravity_of(inputs)), inputs)
 
 
 def length_errors(chain: Chain, inputs: np.ndarray, lengths: np.ndarray) -> TipErrors:
     """Errors of predicted path lengths (N, K), m, held by cables whatever it takes, for targets as in `tip_errors`."""
-    found = forward(chain, lengths, gravity_in_base(inputs[:, 0]))
+    found = forward(chain, lengths, gravity_of(inputs))
     beyond = found.converged & (found.tensions > (1 + FORCE_ROUNDING) * chain.max_tension).any(axis=1)
     return replace(_errors(found, inputs), beyond_force=beyond)
 
 
 def _errors(found: Equilibrium, inputs: np.ndarray) -> TipErrors:
-    position = np.linalg.norm(found.position - inputs[:, 1:4], axis=1)
-    overlap = np.abs(np.einsum("ni,ni->n", found.quaternion, inputs[:, 4:]))
+    position = np.linalg.norm(found.position - position_of(inputs), axis=1)
+    overlap = np.abs(np.einsum("ni,ni->n", found.quaternion, quaternion_of(inputs)))
     orientation = 2 * np.arccos(np.clip(overlap, 0, 1))
     position[~found.converged], orientation[~found.converged] = np.nan, np.nan
     return TipErrors(position, orientation)
 
 
-def outside_targets(count: int, length: float, rng: np.random.Generator) -> np.ndarray:
+def outside_targets(count: int, length: float, rng: np.random.Generator, directed: bool) -> np.ndarray:
     """Poses that have nothing to do with the arm: any orientation, any gravity angle up to π, positions in a box
-    of four arm `length`s (m) around the base. Shape (count, 8)."""
+    of four arm `length`s (m) around the base. Shape (count, 8), or if gravity comes from any side too, (count, 10)."""
+    angles = rng.uniform(0, np.pi, count)
     quaternions = rng.normal(size=(count, 4))
     return np.column_stack([
-        rng.uniform(0, np.pi, count),
+        downwards(angles, rng.uniform(0, 2 * np.pi, count)) if directed else angles,
         rng.uniform(-2 * length, 2 * length, (count, 3)),
         quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True),
     ])

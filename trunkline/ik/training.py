@@ -11,7 +11,8 @@ from pydantic import Field
 from torch.optim.adam import adam
 
 from trunkline.errors import InputError
-from trunkline.ik.network import InverseKinematics
+from trunkline.ik.inputs import position_of
+from trunkline.ik.network import InverseKinematics, gravity_features
 from trunkline.ik.tip_loss import TipLoss
 from trunkline.settings import Seed
 from trunkline.threads import thread_count
@@ -42,13 +43,13 @@ class Training:
 class Samples(NamedTuple):
     """What training reads of N samples.
 
-    x: normalised features (N, 15). angle: rad (N, 1). tip: m (N, 3). command: m (N, K). stretch: length over command,
-    m (N, K). pulls: commands as shares of their range (N, K). spare: most by which slack tendons are paid out where the
-    tip is foreseen, likewise (N, K).
+    x: normalised features (N, 15 or 55). pulling: what `network.gravity_features` says (N, 2 or 3). tip: m (N, 3).
+    command: m (N, K). stretch: length over command, m (N, K). pulls: commands as shares of their range (N, K). spare:
+    most by which slack tendons are paid out where the tip is foreseen, likewise (N, K).
     """
 
     x: torch.Tensor
-    angle: torch.Tensor
+    pulling: torch.Tensor
     tip: torch.Tensor
     command: torch.Tensor
     stretch: torch.Tensor
@@ -68,8 +69,8 @@ def samples(
     pose, command = torch.tensor(inputs, dtype=torch.float32), torch.tensor(commands, dtype=torch.float32)
     return Samples(
         x=network.normalise(pose),
-        angle=pose[:, :1],
-        tip=pose[:, 1:4],
+        pulling=gravity_features(pose),
+        tip=torch.tensor(position_of(inputs), dtype=torch.float32),
         command=command,
         stretch=torch.tensor(lengths - commands, dtype=torch.float32),
         pulls=(command - network.middle) / network.half_range,
@@ -92,7 +93,7 @@ def train(
     One thread a part of a batch: sums in another order would give other last digits, and then other networks.
 
     Args:
-        inputs: Shape (N, 8).
+        inputs: as `inputs` has them. Shape (N, 8 or 10).
         commands, lengths: m, equal where a tendon is slack. Shape (N, K).
         report: called with epoch, mean tip error in m of the training and of the other samples.
 
@@ -118,7 +119,7 @@ def train(
         commands, stretches = network.unclipped(part.x)
         delta = commands - part.command
         moved = part.loss(delta)
-        missed = network.foresee(part.angle, part.pulls + spare * part.spare) - part.tip
+        missed = network.foresee(part.pulling, part.pulls + spare * part.spare) - part.tip
         errors = torch.cat([moved.square().sum(dim=1), missed.square().sum(dim=1)])
         plain = (TIE * delta.abs() + STRETCH * (stretches - part.stretch).abs()).sum() / delta.shape[1]
         objective = ((errors + ROUNDING**2).sqrt().sum() + plain) / training.batch

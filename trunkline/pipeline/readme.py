@@ -67,7 +67,7 @@ RESULTS = {
     ],
     "reachability": [
         ("Rigid map: share of points on which inverse kinematics of the same Panda agrees", "rigid.accuracy", ""),
-        ("Soft maps: smallest overlap half-way between their angles", "soft.heldout_iou_min", ""),
+        ("Soft maps: smallest overlap under gravities between theirs", "soft.heldout_iou_min", ""),
     ],
     "package_unity": [
         (

@@ -15,8 +15,10 @@ from trunkline.panda.labels import Agreement, agreement, draw_points, label
 from trunkline.reachability.hybrid_check import Poses, draw_inside_and_outside, find_poses, verified
 from trunkline.reachability.maps import Map, Maps, angle_name
 from trunkline.reachability.reach_signal import HeldOut, held_out, packed
+from trunkline.reachability.sheet_check import check_sheets
+from trunkline.reachability.soft import SoftSettings
 from trunkline.reachability.tilted import find_tilted
-from trunkline.reachability.tips import Tips, TipSource
+from trunkline.reachability.tips import ArmTips, Tips, TipSource
 from trunkline.statics.chain import Chain
 
 
@@ -43,7 +45,7 @@ class Check:
     """How good the maps are.
 
     `rigid`: agreement of the rigid mesh (`claimed`, (N,)) with labels (`reachable`, (N,)) at `points`
-    (N, 3). `heldout`: the soft maps half-way between their angles. `found`: by name of each hybrid map, the shares
+    (N, 3). `heldout`: the soft maps under gravities between theirs. `found`: by name of each hybrid map, the shares
     of points inside it and a little outside it for which a pose of both arms was found and verified. `moved`: by name
     of each map (the soft ones together), how far simplification moved the surface at most, in voxels.
     """
@@ -59,18 +61,18 @@ class Check:
 
 def check_maps(
     maps: Maps,
-    chain: Chain,
-    tips_at: TipSource,
+    tips_at: ArmTips,
+    soft: SoftSettings,
     labels: LabelSettings,
     spot_check: SpotCheckSettings,
     *,
     seed: int,
     done: Callable[[str], None],
 ) -> Check:
-    """Check all maps. `done` hears of each check, of the soft one once per angle.
+    """Check all maps. `done` hears of each check, of the soft one once per gravity.
 
     Args:
-        chain: of the soft arm, by which lengths lead to tips. tips_at: its tips at any gravity angle.
+        tips_at: of the soft arm. soft: how its maps were made.
     """
     corners = maps.rigid.mesh.vertices
     points = draw_points(corners.min(axis=0) - labels.margin, corners.max(axis=0) + labels.margin, labels.count, seed)
@@ -84,8 +86,12 @@ def check_maps(
         avoid_collisions=maps.self_collision,
     )
     done("labels")
-    heldout = check_soft(maps, tips_at, spot_check, seed, done)
-    found = check_hybrid(maps, chain, tips_at, spot_check, seed)
+    if maps.sheets:
+        how = {"beyond": spot_check.outside, "count": 10 * spot_check.count, "seed": seed}
+        heldout = check_sheets(maps.sheets, tips_at.chain, soft, **how, done=done)
+    else:
+        heldout = check_soft(maps, tips_at, spot_check, seed, done)
+    found = check_hybrid(maps, tips_at.chain, tips_at, spot_check, seed)
     done("spot check")
     moved = {name: moved_voxels(one.mesh, one.field, one.lattice) for name, one in maps.in_space().items()}
     moved["soft"] = float(np.max([

@@ -12,6 +12,7 @@ from trunkline.reachability.hybrid import minkowski_field, swept_cells
 from trunkline.reachability.reach_signal import THRESHOLD, packed
 from trunkline.reachability.rigid import profile, rigid_field
 from trunkline.reachability.settings import HybridSettings, RigidSettings
+from trunkline.reachability.sheets import Sheets
 from trunkline.reachability.soft import SoftShape, soft_fields
 from trunkline.reachability.tilted import Pairs, draw_pairs, tilted_field
 from trunkline.reachability.tips import TipSource
@@ -56,7 +57,8 @@ class SoftMaps:
 
 @dataclass
 class Maps:
-    """Rigid and hybrid maps in the Panda's base frame, soft maps in the soft arm's, and how they were made."""
+    """Rigid and hybrid maps in the Panda's base frame, soft maps in the soft arm's, and how they were made; `sheets`
+    where gravity comes from any side: then the soft maps are there to be shown, at some tilts."""
 
     rigid: Map
     soft: SoftMaps
@@ -64,6 +66,7 @@ class Maps:
     tilted: list[TiltedMap]
     mount_offset: float
     self_collision: bool
+    sheets: Sheets | None = None
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Grids by name (float16, m), each with `<name>_origin` and `<name>_spacing`; soft ones share theirs."""
@@ -74,6 +77,8 @@ class Maps:
         arrays |= dict(zip(names, packed(self.soft.fields), strict=True))
         arrays |= {"soft_angles": self.soft.angles, "soft_threshold": np.asarray(THRESHOLD)}
         arrays |= {"soft_tolerance": np.asarray(self.soft.shape.tolerance)}
+        if self.sheets:
+            arrays |= self.sheets.arrays()
         return arrays | _placement("soft", self.soft.lattice)
 
     def meshes(self) -> dict[str, Surface]:

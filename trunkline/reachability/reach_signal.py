@@ -22,13 +22,14 @@ THICKNESS = 0.1  # of the distance of points outside: they are drawn from as muc
 
 
 class HeldOut(NamedTuple):
-    """At a gravity `angle` (rad) that has no grid: overlap `iou` of the blended map with the angle's own, share of
-    its tips that the signal calls `reachable`, and share of points `beyond` reach that it calls so too."""
+    """At a gravity `angle` and `azimuth` (rad) that has no map: overlap `iou` of the blended map with the angle's own,
+    share of its tips that the signal calls `reachable`, and share of points `beyond` reach that it calls so too."""
 
     angle: float
     iou: float
     reachable: float
     beyond: float
+    azimuth: float = 0.0
 
 
 def packed(fields: np.ndarray) -> np.ndarray:

@@ -9,10 +9,11 @@ from trunkline.reachability.maps import Maps
 
 
 def heldout_table(check: Check) -> pd.DataFrame:
-    """A row for each gravity angle half-way between the soft maps, in degrees."""
-    table = pd.DataFrame(check.heldout).rename(columns={"angle": "angle_deg"})
-    table["angle_deg"] = np.degrees(table["angle_deg"]).round(6)
-    return table
+    """A row for each gravity between the soft maps', in degrees, by angle."""
+    table = pd.DataFrame(check.heldout).rename(columns={"angle": "angle_deg", "azimuth": "azimuth_deg"})
+    for name in ("angle_deg", "azimuth_deg"):
+        table[name] = np.degrees(table[name]).round(6)
+    return table.sort_values("angle_deg", ignore_index=True)
 
 
 def summary(maps: Maps, check: Check) -> dict:

@@ -6,6 +6,7 @@ third hardly. The map is the set of points within `tolerance` of a sampled tip, 
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
@@ -34,6 +35,16 @@ class SoftShape:
 
 
 @dataclass(frozen=True)
+class SheetSettings:
+    """See conf/reachability/config.yaml; of `sheets.Sheets`."""
+
+    directions: Annotated[int, Field(ge=8, le=10_000)]
+    around: Annotated[int, Field(ge=8, le=1000)]
+    along: Annotated[int, Field(ge=4, le=1000)]
+    heldout: Annotated[int, Field(ge=1, le=10_000)]
+
+
+@dataclass(frozen=True)
 class SoftSettings(SoftShape):
     """The shape, and for what: see conf/reachability/config.yaml; voxel in m."""
 
@@ -41,6 +52,12 @@ class SoftSettings(SoftShape):
     angle_step_deg: Annotated[float, Field(ge=0.5, le=180)]
     directions: Annotated[int, Field(ge=8, le=10000)]
     steps: Annotated[int, Field(ge=8, le=10000)]
+    shown_deg: Annotated[list[Annotated[float, Field(ge=0, le=180)]], Field(min_length=2)]
+    sheets: SheetSettings
+
+    def __post_init__(self) -> None:
+        if self.shown_deg[0] != 0 or any(after <= before for before, after in pairwise(self.shown_deg)):
+            raise ValueError(f"shown_deg: found {self.shown_deg}, expected rising angles from 0")
 
     @property
     def angle_step(self) -> float:

@@ -4,11 +4,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field
 
+from trunkline.dataset.gravities import spread
 from trunkline.reachability.checks import Check, LabelSettings, SpotCheckSettings, check_maps
 from trunkline.reachability.maps import Maps, blend_angles, build_maps
 from trunkline.reachability.settings import HybridSettings, RigidSettings
+from trunkline.reachability.sheets import build_sheets
 from trunkline.reachability.soft import SoftSettings
 from trunkline.reachability.tips import ArmTips
 from trunkline.settings import Seed
@@ -28,8 +31,16 @@ class Survey:
 
     def parts(self, tips_at: ArmTips) -> int:
         """How often `survey` calls `done`."""
-        fields = len(blend_angles(tips_at.angles, self.soft.angle_step))
-        return 2 * fields + 4 + len(self.hybrid.tilts)
+        fields = len(blend_angles(tips_at.angles, self.step(tips_at)))
+        if tips_at.largest is not None:
+            fields, checks = fields + self.soft.sheets.directions, self.soft.sheets.heldout
+        else:
+            checks = fields - 1
+        return fields + checks + 5 + len(self.hybrid.tilts)
+
+    def step(self, tips_at: ArmTips) -> float:
+        """Between soft fields, at most, rad: those between the angles that are shown are for blending alone."""
+        return self.soft.angle_step if tips_at.largest is None else np.pi
 
 
 def survey(tips_at: ArmTips, settings: Survey, done: Callable[[str], None]) -> tuple[Maps, Check]:
@@ -42,9 +53,15 @@ def survey(tips_at: ArmTips, settings: Survey, done: Callable[[str], None]) -> t
         soft,
         settings.hybrid,
         soft_voxel=soft.voxel,
-        step=soft.angle_step,
+        step=settings.step(tips_at),
         most_triangles=settings.most_triangles,
         seed=seed,
         done=done,
     )
-    return maps, check_maps(maps, tips_at.chain, tips_at, settings.labels, settings.spot_check, seed=seed, done=done)
+    if tips_at.largest is not None:
+        sheets = soft.sheets
+        downs = spread(sheets.directions, tips_at.largest, crowd=True)
+        maps.sheets = build_sheets(
+            tips_at.chain, downs, sheets.around, sheets.along, soft.tolerance, lambda: done("sheet")
+        )
+    return maps, check_maps(maps, tips_at, soft, settings.labels, settings.spot_check, seed=seed, done=done)

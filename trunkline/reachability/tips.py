@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trunkline.dataset.sampling import sample_angle
+from trunkline.dataset.sampling import sample_at
+from trunkline.frames import gravity_in_base
 from trunkline.statics.chain import Chain
 
 LOOK_EVERY = 4  # rays: along those between, a sample is at most a twentieth of the way from where it would else be
@@ -27,7 +28,8 @@ class ArmTips:
     """A `TipSource`: the samples at the sampled angles, fresh equilibria at the others.
 
     `angles` (A,) in rad, ascending, and `samples` at each; `directions` and `steps` as in
-    `dataset.sampling.sample_angle`; `seed` of the fresh ones, the same for an angle whatever others are asked.
+    `dataset.sampling.sample_at`; `seed` of the fresh ones, the same for an angle whatever others are asked. `largest`:
+    rad, of gravity from any side, if the samples have that; then `angles` are those that are shown.
     """
 
     chain: Chain
@@ -36,11 +38,17 @@ class ArmTips:
     directions: int
     steps: int
     seed: int
+    largest: float | None = None
 
     def __call__(self, angle: float) -> Tips:
         sampled = np.flatnonzero(np.abs(self.angles - angle) < 1e-6)
         if sampled.size:
             return self.samples[sampled[0]]
+        return self.fresh(angle)
+
+    def fresh(self, angle: float) -> Tips:
+        """Equilibria under gravity at `angle` (rad), the mount tilting about base +y."""
         rng = np.random.default_rng([self.seed, round(1e6 * angle)])
-        found = sample_angle(self.chain, angle, self.directions, self.steps, rng, LOOK_EVERY).equilibrium
+        gravity = gravity_in_base(angle)
+        found = sample_at(self.chain, gravity, self.directions, self.steps, rng, LOOK_EVERY).equilibrium
         return Tips(found.position, found.lengths)

@@ -96,7 +96,8 @@ class Network(_Block):
     input: str
     input_order: list[str]
     input_meaning: str = (
-        "gravity angle, rad; tip position, m, and orientation in the base frame (not Unity's)"
+        "gravity: theta_g, its angle, rad, or gx, gy, gz, its direction, of unit length; tip position, m, and"
+        " orientation; all in the base frame (not Unity's)"
     )
     outputs: dict[str, str] = Field(description="what each is; `commands` are the actuators' controls, m")
     output_order: list[str] = Field(description="the tendons, in the order of the columns of commands and lengths")
@@ -114,16 +115,31 @@ class Grid(_Block):
     meaning: str = "signed distance to the surface of the reachable set, m, negative inside"
 
 
+class Sheets(_Block):
+    file: str
+    weights: str = Field(description="another file: the matrix M of `blend`")
+    directions: list[float] = Field(min_length=3, description="of gravity, x, y, z of each, Unity's axes, unit length")
+    around: int = Field(gt=0, description="ways to pull around the arm")
+    along: int = Field(gt=0, description="places along the tip's way on each")
+    format: str = (
+        "raw little-endian float16, m: x, y, z of a point in Unity's axes, places along the tip's way one after the"
+        " other, then ways around the arm, then directions"
+    )
+    weights_format: str = "raw little-endian float64, row by row: a row a direction, 4 columns more than directions"
+    blend: str = (
+        "under gravity g, of unit length, the points are the sum over directions j of w_j times those of g_j,"
+        " w = M [|g - g_1|^3, ..., |g - g_D|^3, 1, g]"
+    )
+
+
 class Reach(_Block):
     frame: str = "base of the soft arm"
     angles: list[float] = Field(min_length=1, description="gravity angles of the soft grids, rad, ascending")
     grids: list[str] = Field(min_length=1, description="their names in `grids`, in the same order")
     threshold: float = Field(description="m; a signal above it means out of reach")
     tolerance: float = Field(gt=0, description="m; how near a reachable tip counts as within reach")
-    signal: str = (
-        "trilinear between the points of the two grids beside the gravity angle, linear between their angles; m, about"
-        " how far outside; also out of reach: points off the grid and gravity angles beyond the first and last"
-    )
+    sheets: Sheets | None = Field(description="the surface of tips, where gravity comes from any side")
+    signal: str = Field(description="m, about how far outside; how it is found")
 
 
 class Mesh(_Block):

@@ -7,9 +7,14 @@ import trimesh
 
 from trunkline.errors import InputError
 from trunkline.unity.frame import unity_obj, unity_position, unity_volume
-from trunkline.unity.manifest import Grid, Mesh, Reach
+from trunkline.unity.manifest import Grid, Mesh, Reach, Sheets
 
 FOLDER = "Runtime/Reachability"
+BETWEEN_GRIDS = (
+    "trilinear between the points of the two grids beside the gravity angle, linear between their angles; also out of"
+    " reach: points off the grid and gravity angles beyond the first and last"
+)
+TO_SHEET = "distance from the sheet's triangles under the gravity that pulls, less the tolerance"
 
 
 def frame_of(name: str) -> str:
@@ -61,11 +66,44 @@ def convert_grids(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str,
     return files, blocks
 
 
-def describe_reach(arrays: dict[str, np.ndarray], source: str) -> Reach:
-    """How a headset tells from the soft grids what is out of reach.
+def convert_sheets(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str, bytes], Sheets | None]:
+    """The surface of tips under any gravity, for Unity; nothing where the maps are of one tilt.
+
+    Args:
+        arrays: `sheets_points` (D, R, S, 3), m, under gravity `sheets_downs` (D, 3), and
+            `sheets_matrix` (D, D + 4), see `reachability.sheets`.
+        source: the file they are from, for messages.
+    """
+    if "sheets_points" not in arrays:
+        return {}, None
+    points, downs, matrix = (
+        np.asarray(arrays[name], float) for name in ("sheets_points", "sheets_downs", "sheets_matrix")
+    )
+    count = len(points)
+    if points.ndim != 4 or points.shape[3] != 3 or (downs.shape, matrix.shape) != ((count, 3), (count, count + 4)):
+        raise InputError(
+            f"{source}: found sheets_points of shape {points.shape}, sheets_downs of shape {downs.shape} and"
+            f" sheets_matrix of shape {matrix.shape}, expected (D, R, S, 3), (D, 3) and (D, D + 4)"
+        )
+    file, weights = f"{FOLDER}/sheets.bytes", f"{FOLDER}/sheet_weights.bytes"
+    directions = unity_position(downs)
+    block = Sheets(
+        file=file,
+        weights=weights,
+        directions=directions.reshape(-1).tolist(),
+        around=points.shape[1],
+        along=points.shape[2],
+    )
+    matrix = np.column_stack([matrix[:, :-3], unity_position(matrix[:, -3:])])  # its last columns are of g itself
+    return {file: unity_position(points).astype("<f2").tobytes(), weights: matrix.astype("<f8").tobytes()}, block
+
+
+def describe_reach(arrays: dict[str, np.ndarray], sheets: Sheets | None, source: str) -> Reach:
+    """How a headset tells from the soft grids or sheets what is out of reach.
 
     Args:
         arrays: maps named `soft_<angle>` in the order of `soft_angles`, rad; `soft_threshold` and `soft_tolerance`, m.
+        sheets: if gravity comes from any side.
         source: the file they are from, for messages.
     """
     for key in ("soft_angles", "soft_threshold", "soft_tolerance"):
@@ -80,6 +118,8 @@ def describe_reach(arrays: dict[str, np.ndarray], source: str) -> Reach:
         grids=names,
         threshold=float(arrays["soft_threshold"]),
         tolerance=float(arrays["soft_tolerance"]),
+        sheets=sheets,
+        signal=TO_SHEET if sheets else BETWEEN_GRIDS,
     )
 
 

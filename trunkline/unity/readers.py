@@ -25,6 +25,7 @@ from trunkline.unity.twin import MANIFEST
 
 ENGINES_APART = 1e-6  # m, of two engines' answers of the same network; its numbers are of 32 bits
 POSES = 64  # on which they are compared
+WEIGHTS_OFF = 1e-6  # of a direction's own surface, blended for it
 MESH_OFF_GRID = 1.0  # lattice steps (the largest), of any vertex from the surface of the grid of its name
 ASSET = (
     "<mujoco><asset><mesh name='m' file='{}' inertia='exact'/></asset>"
@@ -107,6 +108,10 @@ ENGINES: dict[str, Callable[[bytes, np.ndarray], list[np.ndarray]]] = {
 
 def _grid(path: str, data: bytes, files: dict[str, bytes]) -> None:
     manifest = json.loads(files[MANIFEST])
+    sheets = manifest["reach"].get("sheets")  # packages of one tilt have none
+    if sheets and path in (sheets["file"], sheets["weights"]):
+        _sheets(sheets, files)
+        return
     ((name, grid),) = [(name, grid) for name, grid in manifest["grids"].items() if grid["file"] == path]
     values = np.frombuffer(data, "<f2").reshape(grid["shape"][::-1]).astype(float)  # z, y, x
     if not np.isfinite(values).all() or not (values < 0).any() or not (values > 0).any():
@@ -121,6 +126,17 @@ def _grid(path: str, data: bytes, files: dict[str, bytes]) -> None:
         off = np.abs(values[z, y, x]) / spacing.max() - away
         if away.max() > np.sqrt(3) or off.max() > MESH_OFF_GRID:
             raise ValueError("the mesh of its name lies off its surface")
+
+
+def _sheets(sheets: dict, files: dict[str, bytes]) -> None:
+    """Under each of the directions that they were made for, the surface blended is the one that was kept."""
+    downs = np.array(sheets["directions"]).reshape(-1, 3)
+    points = np.frombuffer(files[sheets["file"]], "<f2").reshape(len(downs), sheets["around"], sheets["along"], 3)
+    matrix = np.frombuffer(files[sheets["weights"]], "<f8").reshape(len(downs), len(downs) + 4)
+    apart = np.linalg.norm(downs[:, None] - downs, axis=2)
+    weights = matrix @ np.vstack([apart**3, np.ones(len(downs)), downs.T])
+    if not np.isfinite(points).all() or not np.abs(weights - np.eye(len(downs))).max() < WEIGHTS_OFF:
+        raise ValueError("no surfaces: not finite, or blended to others than those that were kept")
 
 
 def _json(path: str, data: bytes, files: dict[str, bytes]) -> None:

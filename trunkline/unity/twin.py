@@ -15,14 +15,15 @@ from trunkline.unity.linearize import compile_with, linearize
 from trunkline.unity.manifest import Manifest, Versions, describe_model, hashes
 from trunkline.unity.network import describe_network
 from trunkline.unity.package import package_json, with_metas
-from trunkline.unity.reach_maps import convert_grids, convert_meshes, describe_reach
+from trunkline.unity.reach_maps import convert_grids, convert_meshes, convert_sheets, describe_reach
 from trunkline.unity.roundtrip import curl, deviation, simulate
 from trunkline.unity.rules import Violation, lint_mjcf
 
 MODEL = "Runtime/Model/arm.xml"
 NETWORK = "Runtime/Network/ik.onnx"
 MANIFEST = "Runtime/manifest.json"
-SCRIPTS = [Path(__file__).parent / "csharp" / name for name in ("CalibratedSprings.cs", "Trunkline.asmdef")]
+SCRIPT_NAMES = ("CalibratedSprings.cs", "SoftReach.cs", "Trunkline.asmdef")
+SCRIPTS = [Path(__file__).parent / "csharp" / name for name in SCRIPT_NAMES]
 
 
 @dataclass
@@ -95,7 +96,8 @@ def assemble(
     meshes, mesh_blocks = convert_meshes(sources.meshes)
     with np.load(sources.grids) as arrays:
         grids, grid_blocks = convert_grids(dict(arrays), str(sources.grids))
-        reach = describe_reach(dict(arrays), str(sources.grids))
+        sheets, sheet_block = convert_sheets(dict(arrays), str(sources.grids))
+        reach = describe_reach(dict(arrays), sheet_block, str(sources.grids))
 
     files = sources.texts | {
         "package.json": package_json(
@@ -105,7 +107,7 @@ def assemble(
         NETWORK: network,
     }
     files |= {f"Runtime/{path.name}": path.read_bytes() for path in SCRIPTS}
-    files = with_metas(label.name, files | meshes | grids | {MANIFEST: b""})
+    files = with_metas(label.name, files | meshes | grids | sheets | {MANIFEST: b""})
     manifest = Manifest(
         name=label.name,
         versions=Versions(
