@@ -19,6 +19,8 @@ from trunkline.hybrid.worlds import RGBA, Material
 TOY_ROUNDING, TOY_SOFTNESS = 0.25, 4.0  # radius of its edges over its width; of contacts' time constants
 HOLDS = 1  # MuJoCo's priority: the object's friction, of its material on TPU, counts for every contact that it makes
 
+Shape = Literal["cylinder", "box", "sphere", "toy"]
+
 
 @dataclass
 class Thing:
@@ -30,7 +32,7 @@ class Thing:
         mass: kg.
     """
 
-    shape: Literal["cylinder", "box", "sphere", "toy"]
+    shape: Shape
     diameter: Annotated[float, Field(ge=0.005, le=0.5)]
     height: Annotated[float, Field(ge=0.005, le=1)]
     mass: Annotated[float, Field(gt=0, le=20)]

@@ -18,8 +18,8 @@ from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.hybrid.compose import Placed, compose
-from trunkline.hybrid.grasps import Grasp, object_in_base, pulls_of
-from trunkline.hybrid.objects import Thing
+from trunkline.hybrid.grasps import Grasp, Pull, object_in_base, pulls_of
+from trunkline.hybrid.objects import Shape, Thing
 from trunkline.hybrid.robots import FixedMount
 from trunkline.hybrid.touch import read_geometry
 from trunkline.hybrid.trials import Schedule, Tried, try_grasps
@@ -32,6 +32,7 @@ HOOK_ABOVE = 0.15  # m, of an object's upper side: the length of what it hangs b
 BEGIN = 0.1  # kg, of the object as it is compiled; each trial has its own
 TABLE, TABLE_SIZE = "table", (1.0, 1.0, 0.03)  # m
 
+Support = Literal["hanging", "standing"]
 Positive = Annotated[float, Field(gt=0, le=20)]
 Metres = Annotated[float, Field(gt=0, le=0.5)]
 
@@ -51,11 +52,11 @@ class PayloadSettings:
         grasp: where the object is. schedule: what is done.
     """
 
-    supports: Annotated[list[Literal["hanging", "standing"]], Field(min_length=1)]
-    shapes: Annotated[list[Literal["cylinder", "box", "sphere", "toy"]], Field(min_length=1)]
+    supports: Annotated[list[Support], Field(min_length=1)]
+    shapes: Annotated[list[Shape], Field(min_length=1)]
     diameters: Annotated[list[Metres], Field(min_length=1)]
     frictions: Annotated[list[Annotated[float, Field(gt=0, le=3)]], Field(min_length=1)]
-    pulls: Annotated[list[Literal["dorsal", "ventral"]], Field(min_length=1)]
+    pulls: Annotated[list[Pull], Field(min_length=1)]
     shortenings: Annotated[list[Metres], Field(min_length=1)]
     height: Metres
     masses: Annotated[list[Positive], Field(min_length=1)]
@@ -77,11 +78,11 @@ class PayloadSettings:
 class Cell:
     """One row of the chart; units as in `PayloadSettings`."""
 
-    support: str
-    shape: str
+    support: Support
+    shape: Shape
     diameter: float
     friction: float
-    pull: str
+    pull: Pull
     shortening: float
 
 
