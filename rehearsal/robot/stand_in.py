@@ -165,7 +165,8 @@ class StandInRobot:
         row, c = self.rows[-1], self.contacts
         return Truth(
             time=self.time, joints=self.joints[0].copy(), tip=row[TIP].copy(),
-            tip_axes=row[TIP_AXES].reshape(3, 3).copy(), thing=row[THING][:3].copy(), quaternion=row[THING][3:].copy(), speed=self.motion.speed.copy(),
+            tip_axes=row[TIP_AXES].reshape(3, 3).copy(), thing=row[THING][:3].copy(),
+            quaternion=row[THING][3:].copy(), speed=self.motion.speed.copy(),
             arm_thing=c.arm_thing.copy(), arm_world=c.arm_world.copy(), thing_world=c.thing_world.copy(),
             hanging=bool(self.motion.hanging[0]),
         )  # fmt: skip
