@@ -1,11 +1,11 @@
-"""A first grasp on the stand-in by a motion set by hand: hook a cylinder, pull, lift, hold.
+"""A first grasp on the stand-in by a motion set by hand: beside a cylinder, pull, lift, hold.
 
     python -m rehearsal.first_grasp [PICTURES]
 
 tries placements of the arm and prints of each whether it holds, and into the folder PICTURES, if given, it draws them.
-The scene is built round the arm: it is bent to a hook, and the cylinder is put where the hook's middle will be. The arm
-comes from the side, bent already, along the cylinder's axis if that is level, then pulls, lifts and holds. There is no
-twin and no network in here: it says what the stand-in can hold.
+The scene is built round the arm: it hangs at rest, and the cylinder is put beside it. The arm comes from the side,
+waits until it is calm, pulls one tendon, lifts and holds. There is no twin and no network in here: it says what the
+stand-in can hold.
 """
 
 import sys
@@ -31,7 +31,10 @@ from trunkline.settings import read_yaml
 
 SETTINGS = Path(__file__).parent / "conf/rehearse/robot/stand_in.yaml"
 DIAMETER, HEIGHT, MASS, STRING = 0.05, 0.12, 0.1, 0.15  # m, m, kg, m
-PULL, LIFT, HOLD, ASIDE = 0.13, 0.1, 5.0, 0.13  # m, m, s, m by which the arm comes from the side
+PULL, LIFT, ASIDE = 0.18, 0.1, 0.16  # m, m, m by which the arm comes from the side
+SETTLE, CLOSE, HOLD = 3.0, 1.5, 5.0  # s
+CLEARANCE = 0.01  # m, of the arm's last unit above the table
+LOOSENED = np.array([0.0, -LOOSE, -LOOSE])  # m of pull of a straight arm that only tendon 1 will bend
 TIME_STEP = 0.02  # s, between commands
 MOUNT = np.array([0.45, 0.0, 0.35])  # m, of the arm's base while it grasps
 START = np.array([0.0, -0.2, 0.0, -1.9, 0.0, 1.7, 0.785])  # rad, where the search for joints begins
@@ -40,16 +43,15 @@ START = np.array([0.0, -0.2, 0.0, -1.9, 0.0, 1.7, 0.785])  # rad, where the sear
 @dataclass
 class Placement:
     """tilt_deg: of the straight arm from straight down, forwards. sideways: whether it bends sideways, else forwards in
-    the vertical plane. beyond: m of the arm that go round the cylinder. hook: m of pull by which the arm is bent to a
-    hook before it comes. hanging: whether the cylinder hangs from a hook, its axis level and across the bending plane;
-    else it stands on a table."""
+    the vertical plane. beyond: m of the arm beyond the middle of the cylinder. hanging: whether the cylinder hangs from
+    a hook, its axis level and across the bending plane; else it stands on a table. gap: m, between arm and cylinder."""
 
     name: str
     tilt_deg: float
     sideways: bool
     beyond: float
-    hook: float
     hanging: bool = False
+    gap: float = 0.01
 
 
 @dataclass
@@ -86,15 +88,6 @@ def joints_for(place: np.ndarray, rotation: np.ndarray, offset: float, start: np
     return least_squares(off, start, bounds=(Q_MIN, Q_MAX)).x
 
 
-def circle(points: np.ndarray) -> tuple[np.ndarray, float]:
-    """Centre and radius of the circle that is nearest to points (N, 3) in the plane nearest to them, m."""
-    mean = points.mean(axis=0)
-    plane = np.linalg.svd(points - mean)[2][:2]
-    flat = (points - mean) @ plane.T
-    x, y, power = np.linalg.lstsq(np.column_stack([2 * flat, np.ones(len(flat))]), (flat**2).sum(axis=1))[0]
-    return mean + np.array([x, y]) @ plane, float(np.sqrt(power + x * x + y * y))
-
-
 def smooth(share: float) -> float:
     """From 0 to 1 with least jerk."""
     s = min(max(share, 0.0), 1.0)
@@ -109,20 +102,22 @@ class Trial:
         self.grasp = joints_for(MOUNT, rotation, offset, START)
         self.lift = joints_for(MOUNT + [0, 0, LIFT], rotation, offset, self.grasp)
         self.aside = joints_for(MOUNT - [0, ASIDE, 0], rotation, offset, self.grasp)
-        self.hook = np.array([placement.hook, -LOOSE, -LOOSE])
         shape = ("cylinder", DIAMETER, HEIGHT, MASS)
         far = Scene(None, Object(*shape, [5.0, 5.0, 5.0]), {})
-        centres, _ = StandInRobot(arm, far, settings, self.grasp, seed, self.hook).links()
-        round_it = np.cumsum(arm.chain.lengths) > arm.chain.length - placement.beyond
-        middle, self.radius = circle(centres[round_it])
+        centres, _ = StandInRobot(arm, far, settings, self.grasp, seed, LOOSENED).links()
+        unit = int(np.searchsorted(np.cumsum(arm.chain.lengths), arm.chain.length - placement.beyond))
+        side = rotation[:, 0] * [1, 1, 0] / np.linalg.norm(rotation[:2, 0])
+        middle = centres[unit] + side * ((DIAMETER + arm.chain.widths[unit]) / 2 + placement.gap)
         if placement.hanging:
-            turn = Rotation.from_rotvec([-np.pi / 2, 0, 0])  # its axis along y
+            turn = Rotation.from_rotvec(np.pi / 2 * side)  # its axis level, across the bending plane
             thing = Object(*shape, middle.tolist(), wxyz_from_rotation(turn).tolist(), True)
             self.scene = Scene(None, thing, {}, (middle + [0, 0, DIAMETER / 2 + STRING]).tolist())
         else:
+            if not placement.sideways:
+                middle[2] = centres[-1][2] + HEIGHT / 2 - CLEARANCE
             top = [float(middle[0]), float(middle[1]), float(middle[2] - HEIGHT / 2)]
             self.scene = Scene(None, Object(*shape, middle.tolist()), {"table": Surface(top, [0.08, 0.08, 0.03])})
-        self.robot = StandInRobot(arm, self.scene, settings, self.aside, seed, self.hook)
+        self.robot = StandInRobot(arm, self.scene, settings, self.aside, seed, LOOSENED)
         self.pictures: list[tuple[str, np.ndarray, Truth]] = []
 
     def go(self, duration: float, start: np.ndarray, end: np.ndarray, pulls: tuple[np.ndarray, np.ndarray]) -> None:
@@ -135,14 +130,14 @@ class Trial:
         self.pictures.append((name, self.robot.links()[0], self.robot.truth()))
 
     def run(self) -> Held:
-        hook, drawn = self.hook, np.array([PULL, -LOOSE, -LOOSE])
+        loose, drawn = LOOSENED, np.array([PULL, -LOOSE, -LOOSE])
         begun = time.process_time()
         first = self.robot.truth().thing
         self.picture("start")
-        self.go(1.0, self.aside, self.grasp, (hook, hook))
-        self.go(1.0, self.grasp, self.grasp, (hook, hook))
-        self.picture("round it")
-        self.go(1.0, self.grasp, self.grasp, (hook, drawn))
+        self.go(1.0, self.aside, self.grasp, (loose, loose))
+        self.go(SETTLE, self.grasp, self.grasp, (loose, loose))
+        self.picture("beside it")
+        self.go(CLOSE, self.grasp, self.grasp, (loose, drawn))
         self.go(1.0, self.grasp, self.grasp, (drawn, drawn))
         self.picture("pulled")
         self.go(1.5, self.grasp, self.lift, (drawn, drawn))
@@ -162,12 +157,11 @@ class Trial:
 
 
 PLACEMENTS = [
-    Placement("hanging, arm hanging, 0.20 m round it", 0, False, 0.2, 0.06, hanging=True),
-    Placement("hanging, arm hanging, 0.25 m round it", 0, False, 0.25, 0.06, hanging=True),
-    Placement("hanging, arm hanging, 0.15 m round it", 0, False, 0.15, 0.06, hanging=True),
-    Placement("standing, arm at 120 deg, 0.20 m round it", 120, True, 0.2, 0.06),
-    Placement("standing, arm at 150 deg, 0.20 m round it", 150, True, 0.2, 0.06),
-    Placement("standing, arm at 170 deg, 0.20 m round it", 170, True, 0.2, 0.06),
+    Placement("hanging, arm straight down, 0.15 m beyond", 0, False, 0.15, hanging=True),
+    Placement("hanging, arm straight down, 0.20 m beyond", 0, False, 0.2, hanging=True),
+    Placement("hanging, arm straight down, 0.12 m beyond", 0, False, 0.12, hanging=True),
+    Placement("standing, arm straight down", 0, False, 0.1),
+    Placement("standing, arm at 120 deg, bends sideways, 0.15 m beyond", 120, True, 0.15),
 ]
 
 
@@ -187,7 +181,6 @@ def main() -> None:
             f"{PLACEMENTS[index].name}: {'held' if found.held else 'not held'}, "
             f"lifted by {1000 * found.lifted:.0f} mm, "
             f"moved by {1000 * found.slipped:.1f} mm in {HOLD:.0f} s, {1000 * found.creep:.2f} mm in the last 2 s, "
-            f"hook's radius {1000 * trial.radius:.0f} mm, "
             f"{found.units} units press with {found.force:.1f} N; {found.cpu:.2f} s of processor a second",
             flush=True,
         )

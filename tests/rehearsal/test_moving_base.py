@@ -53,7 +53,7 @@ def test_no_force_beyond_the_springs_is_needed_for_its_accelerations(plant, seed
     rng = np.random.default_rng(seed)
     state, work, h = straight_state(plant, np.full(3, -LOOSE)), work_for(plant.links, 3), 1e-9
     state.q[:], state.v[:] = 0.03 * rng.normal(size=state.q.shape), 2 * rng.normal(size=state.v.shape)
-    turn = Rotation.random(random_state=seed)
+    turn = Rotation.from_quat(rng.normal(size=4))
     spin, speed, spinning, speeding = 3 * rng.normal(size=(4, 3))
     before = state.v.copy()
     place(plant.links, state, work)

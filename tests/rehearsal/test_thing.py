@@ -51,7 +51,6 @@ def test_a_ball_rebounds_as_hunt_and_crossley_s_law_says(speed):
 
     rebound = brentq(lambda v: invariant(-v) - invariant(speed), 1e-6, speed)
     assert motion.speed[2] == pytest.approx(rebound, rel=0.01)
-    assert rebound < 0.9 * speed or speed < 0.5
 
 
 @pytest.mark.parametrize("angle_deg", [10.0, 15.0])
