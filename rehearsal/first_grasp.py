@@ -56,9 +56,9 @@ class Placement:
 
 @dataclass
 class Held:
-    """held: lifted by more than half of LIFT, and within 20 mm of there after HOLD s. lifted, slipped: m; slipped is
-    how far the object moved while it was held still. units: that touched it at last. force: N, sum of their loads.
-    cpu: s of processor for a simulated s."""
+    """held: lifted by more than half of LIFT, off the hook, and within 20 mm of there after HOLD s. lifted, slipped: m;
+    slipped is how far the object moved while it was held still, creep that of the last 2 s. units: that touched it at
+    last. force: N, sum of their loads. cpu: s of processor for a simulated s."""
 
     held: bool
     lifted: float
@@ -150,7 +150,7 @@ class Trial:
         loads = np.linalg.norm(last.arm_thing, axis=1)
         lifted, slipped = float(last.thing[2] - first[2]), float(np.linalg.norm(last.thing - after))
         return Held(
-            held=lifted > LIFT / 2 and slipped < 0.02, lifted=lifted, slipped=slipped,
+            held=lifted > LIFT / 2 and slipped < 0.02 and not last.hanging, lifted=lifted, slipped=slipped,
             creep=float(np.linalg.norm(last.thing - calm)), units=int((loads > 0).sum()), force=float(loads.sum()),
             cpu=(time.process_time() - begun) / self.robot.time,
         )  # fmt: skip
