@@ -56,9 +56,10 @@ class Placement:
 
 @dataclass
 class Held:
-    """held: lifted by more than half of LIFT, off the hook, and within 20 mm of there after HOLD s. lifted, slipped: m;
-    slipped is how far the object moved while it was held still, creep that of the last 2 s. units: that touched it at
-    last. force: N, sum of their loads. cpu: s of processor for a simulated s."""
+    """held: lifted by more than half of LIFT, off the hook, and HOLD s later within 20 mm of its place in the arm.
+    lifted, slipped: m; slipped is how far it moved in the arm while the Panda stood still, creep the same of the last
+    2 s, infinite if nothing held it. units: that touch it at last. force: N, sum of their loads. cpu: s of processor
+    for a simulated s."""
 
     held: bool
     lifted: float
@@ -129,6 +130,16 @@ class Trial:
     def picture(self, name: str) -> None:
         self.pictures.append((name, self.robot.links()[0], self.robot.truth()))
 
+    def moved(self, since: str) -> float:
+        """m by which the object has moved against the units that held it at that picture: the arm may swing."""
+        now = self.robot.links()[0], self.robot.truth()
+        then = next((centres, truth) for name, centres, truth in self.pictures if name == since)
+        holding = np.linalg.norm(then[1].arm_thing, axis=1) > 0
+        if not holding.any():
+            return float("inf")
+        before, after = (truth.thing - centres[holding].mean(axis=0) for centres, truth in (then, now))
+        return float(np.linalg.norm(after - before))
+
     def run(self) -> Held:
         loose, drawn = LOOSENED, np.array([PULL, -LOOSE, -LOOSE])
         begun = time.process_time()
@@ -143,15 +154,15 @@ class Trial:
         self.go(1.5, self.grasp, self.lift, (drawn, drawn))
         self.picture("lifted")
         self.go(HOLD - 2.0, self.lift, self.lift, (drawn, drawn))
-        calm = self.robot.truth().thing
+        self.picture("calm")
         self.go(2.0, self.lift, self.lift, (drawn, drawn))
         self.picture("held")
-        after, last = self.pictures[-2][2].thing, self.robot.truth()
+        last = self.robot.truth()
         loads = np.linalg.norm(last.arm_thing, axis=1)
-        lifted, slipped = float(last.thing[2] - first[2]), float(np.linalg.norm(last.thing - after))
+        lifted, slipped = float(last.thing[2] - first[2]), self.moved("lifted")
         return Held(
             held=lifted > LIFT / 2 and slipped < 0.02 and not last.hanging, lifted=lifted, slipped=slipped,
-            creep=float(np.linalg.norm(last.thing - calm)), units=int((loads > 0).sum()), force=float(loads.sum()),
+            creep=self.moved("calm"), units=int((loads > 0).sum()), force=float(loads.sum()),
             cpu=(time.process_time() - begun) / self.robot.time,
         )  # fmt: skip
 
