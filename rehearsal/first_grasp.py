@@ -23,7 +23,7 @@ from demo.plants.stranger import Stranger
 from demo.rig import ROOT as LAB
 from demo.rig import Config as Lab
 from rehearsal.robot.scene import Object, Scene, Surface
-from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
+from rehearsal.robot.stand_in import SUBSTEPS, StandIn, StandInRobot, Truth
 from trunkline.frames import wxyz_from_rotation
 from trunkline.panda.kinematics import Q_MAX, Q_MIN, mount_pose
 from trunkline.pipeline.config import load_config
@@ -32,6 +32,7 @@ from trunkline.settings import read_yaml
 SETTINGS = Path(__file__).parent / "conf/rehearse/robot/stand_in.yaml"
 DIAMETER, HEIGHT, MASS, STRING = 0.05, 0.12, 0.1, 0.15  # m, m, kg, m
 PULL, LIFT, ASIDE = 0.18, 0.1, 0.16  # m, m, m by which the arm comes from the side
+FLOOR = -0.75  # m; the robot stands on a stand
 SETTLE, CLOSE, HOLD = 3.0, 1.5, 5.0  # s
 CLEARANCE = 0.01  # m, of the arm's last unit above the table
 LOOSENED = np.array([0.0, -LOOSE, -LOOSE])  # m of pull of a straight arm that only tendon 1 will bend
@@ -98,7 +99,9 @@ def smooth(share: float) -> float:
 class Trial:
     """One placement: the scene, the robot in it, and pictures of the way."""
 
-    def __init__(self, arm: Stranger, settings: StandIn, placement: Placement, seed: int) -> None:
+    def __init__(
+        self, arm: Stranger, settings: StandIn, placement: Placement, seed: int, substeps: int = SUBSTEPS
+    ) -> None:
         rotation, offset = base_rotation(placement), settings.panda.mount_offset
         self.grasp = joints_for(MOUNT, rotation, offset, START)
         self.lift = joints_for(MOUNT + [0, 0, LIFT], rotation, offset, self.grasp)
@@ -112,13 +115,13 @@ class Trial:
         if placement.hanging:
             turn = Rotation.from_rotvec(np.pi / 2 * side)  # its axis level, across the bending plane
             thing = Object(*shape, middle.tolist(), wxyz_from_rotation(turn).tolist(), True)
-            self.scene = Scene(None, thing, {}, (middle + [0, 0, DIAMETER / 2 + STRING]).tolist())
+            self.scene = Scene(FLOOR, thing, {}, (middle + [0, 0, DIAMETER / 2 + STRING]).tolist())
         else:
             if not placement.sideways:
                 middle[2] = centres[-1][2] + HEIGHT / 2 - CLEARANCE
             top = [float(middle[0]), float(middle[1]), float(middle[2] - HEIGHT / 2)]
-            self.scene = Scene(None, Object(*shape, middle.tolist()), {"table": Surface(top, [0.08, 0.08, 0.03])})
-        self.robot = StandInRobot(arm, self.scene, settings, self.aside, seed, LOOSENED)
+            self.scene = Scene(FLOOR, Object(*shape, middle.tolist()), {"table": Surface(top, [0.08, 0.08, 0.03])})
+        self.robot = StandInRobot(arm, self.scene, settings, self.aside, seed, LOOSENED, substeps)
         self.pictures: list[tuple[str, np.ndarray, Truth]] = []
 
     def go(self, duration: float, start: np.ndarray, end: np.ndarray, pulls: tuple[np.ndarray, np.ndarray]) -> None:
