@@ -148,12 +148,12 @@ def touch_all(h, discs, world, thing, motion, contacts, work, turn, place):
             _write(contacts.arm_world[u, w], pushed)
             _push(work.pushed[i], at, turned(back, pushed))
 
-    lying, twisting = _lie(h, world, thing, contacts, pose, centre, speed, spin)
+    lying, twisting = lie(h, world, thing, contacts, pose, centre, speed, spin)
     return plus(force, 1.0, lying), plus(torque, 1.0, twisting)
 
 
 @kernel
-def _lie(h, world, thing, contacts, pose, centre, speed, spin):
+def lie(h, world, thing, contacts, pose, centre, speed, spin):
     """Force and torque on the thing of what it lies on or runs into."""
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     for p in range(len(thing.points)):
