@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from rehearsal.robot.scene import Object, Scene, String, make_thing
 from rehearsal.robot.thing import Motion, Thing, move_thing, pull_string, rotation, spin_of
-from rehearsal.robot.touching import Contacts, World
-from rehearsal.robot.touching import lie
+from rehearsal.robot.touching import Contacts, World, lie
 
 G = 9.80665
 H = 1 / 6000
