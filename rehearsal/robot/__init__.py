@@ -1,0 +1,1 @@
+"""The stand-in for the physical robot: the lab's stranger on a Panda that moves, and things that it can touch."""

@@ -1,0 +1,144 @@
+"""What stands around the robot, in the Panda's base frame: floor, surfaces, a hook, and one object to grasp."""
+
+from dataclasses import dataclass, field
+from itertools import product
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from rehearsal.robot.shapes import BOX, CYLINDER, distance
+from rehearsal.robot.thing import Motion, Thing
+from trunkline.errors import InputError
+from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+
+Metres = Annotated[float, Field(ge=-10, le=10)]
+Size = Annotated[float, Field(gt=0, le=10)]
+Place = Annotated[list[Metres], Field(min_length=3, max_length=3)]
+Quaternion = Annotated[list[Annotated[float, Field(ge=-1, le=1)]], Field(min_length=4, max_length=4)]
+Friction = Annotated[float, Field(ge=0, le=5)]
+
+RIM = 12  # points on each rim of a cylinder: it stands on these
+TOY_EDGE = 0.25  # radius of a toy's edges over its width
+HOOK_RADIUS, HOOK_LENGTH = 0.004, 0.3  # m, of the rod that ends in the hook
+DEEP = 1.0  # m, of the floor
+
+
+@dataclass
+class Surface:
+    """A level board. top: the middle of its upper side, m. size: along x, y and z, m."""
+
+    top: Place
+    size: Annotated[list[Size], Field(min_length=3, max_length=3)]
+
+
+@dataclass
+class Object:
+    """diameter: m; of a box or a toy, a box with round edges, its width along x and y. height: m, idle for a sphere.
+    mass: kg. position: of its centre, m. quaternion: w first; (1, 0, 0, 0) stands upright. hanging: by a string, from
+    the hook above it."""
+
+    shape: Literal["cylinder", "box", "sphere", "toy"]
+    diameter: Annotated[float, Field(ge=0.005, le=0.5)]
+    height: Annotated[float, Field(ge=0.005, le=1)]
+    mass: Annotated[float, Field(gt=0, le=20)]
+    position: Place
+    quaternion: Quaternion = field(default_factory=lambda: [1.0, 0.0, 0.0, 0.0])
+    hanging: bool = False
+
+    @property
+    def half_height(self) -> float:
+        """m, from its centre to what it stands on."""
+        return self.diameter / 2 if self.shape == "sphere" else self.height / 2
+
+
+@dataclass
+class Scene:
+    """floor: its height, m, or null. hook: its end, m, or null."""
+
+    floor: Metres | None
+    object: Object
+    surfaces: dict[str, Surface] = field(default_factory=dict)
+    hook: Place | None = None
+
+    def names(self) -> list[str]:
+        """The fixed shapes, in the order of `shapes`."""
+        floor, hook = ["floor"] * (self.floor is not None), ["hook"] * (self.hook is not None)
+        return [*floor, *self.surfaces, *hook]
+
+    def shapes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """kind (W,), half (W, 3), edge (W,), place (W, 3) of the fixed shapes."""
+        rows = []
+        if self.floor is not None:
+            rows.append(([5.0, 5.0, DEEP / 2], 0.0, [0.0, 0.0, self.floor - DEEP / 2]))
+        for surface in self.surfaces.values():
+            half = np.array(surface.size) / 2
+            rows.append((half, 0.0, np.array(surface.top) - [0, 0, half[2]]))
+        if self.hook is not None:
+            rows.append(([0.0, 0.0, HOOK_LENGTH / 2], HOOK_RADIUS, np.array(self.hook) + [0, 0, HOOK_LENGTH / 2]))
+        halves, edges, places = (np.array([row[k] for row in rows], dtype=float) for k in range(3))
+        return np.full(len(rows), BOX), halves.reshape(-1, 3), edges, places.reshape(-1, 3)
+
+
+@dataclass
+class String:
+    """By which an object hangs. tautness: N/m. loss: N s/m. lip: m by which it must be slack to come off the hook."""
+
+    tautness: Annotated[float, Field(gt=0, le=1e6)] = 2000.0
+    loss: Annotated[float, Field(ge=0, le=1e4)] = 1.0
+    lip: Annotated[float, Field(gt=0, le=1)] = 0.01
+
+
+def make_thing(object: Object, hook: list[float] | None, string: String) -> tuple[Thing, Motion]:
+    """The object as a rigid body, its mass spread evenly, and where it is at first.
+
+    Raises:
+        InputError: it hangs where there is no hook, or where the hook is not above it.
+    """
+    radius, half_height = object.diameter / 2, object.height / 2
+    if object.shape == "sphere":
+        kind, half, edge, points = BOX, np.zeros(3), radius, np.zeros((1, 3))
+    elif object.shape == "cylinder":
+        kind, half, edge = CYLINDER, np.array([radius, radius, half_height]), 0.0
+        angle = 2 * np.pi * np.arange(RIM) / RIM
+        rim = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(RIM)])
+        points = np.concatenate([rim + [0, 0, z] for z in (-half_height, half_height)])
+    else:
+        edge = TOY_EDGE * object.diameter if object.shape == "toy" else 0.0
+        kind, half = BOX, np.maximum([radius - edge, radius - edge, half_height - edge], 0.0)
+        points = np.array(list(product((-1, 1), repeat=3))) * half
+    turn = rotation_from_wxyz(np.array(object.quaternion, dtype=float))
+    eye, end, length = _above(kind, half, edge, turn.inv().apply([0.0, 0.0, 1.0])), np.zeros(3), 0.0
+    if object.hanging:
+        tied = np.array(object.position) + turn.apply(eye)
+        if hook is None or hook[2] <= tied[2]:
+            raise InputError(f"object.hanging: found a hook at {hook}, expected one above {tied.tolist()}")
+        end = np.array(hook, dtype=float)
+        length = float(np.linalg.norm(end - tied))
+    thing = Thing(
+        kind=kind, half=half.astype(float), edge=edge, mass=object.mass, inertia=object.mass * _inertia(object),
+        points=points.astype(float), radius=edge, eye=eye, hook=end, string=length, tautness=string.tautness,
+        loss=string.loss, lip=string.lip,
+    )  # fmt: skip
+    return thing, Motion(
+        np.array(object.position, dtype=float), wxyz_from_rotation(turn), np.zeros(3), np.zeros(3),
+        np.array([float(object.hanging)]),
+    )  # fmt: skip
+
+
+def _above(kind: int, half: np.ndarray, edge: float, up: np.ndarray) -> np.ndarray:
+    """Where a ray from the centre along `up` leaves the shape, m; as far each time as the surface is away."""
+    out = 0.0
+    for _ in range(200):
+        out -= distance(kind, half, edge, tuple(out * up))[0]
+    return out * up
+
+
+def _inertia(object: Object) -> np.ndarray:
+    """Moments of inertia of 1 kg about its axes, m². Shape (3,). A toy's round edges are left out."""
+    width, height = object.diameter, object.height
+    if object.shape == "sphere":
+        return np.full(3, width**2 / 10)
+    if object.shape == "cylinder":
+        return np.array([*[width**2 / 16 + height**2 / 12] * 2, width**2 / 8])
+    return np.array([*[(width**2 + height**2) / 12] * 2, width**2 / 6])

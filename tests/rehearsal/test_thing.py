@@ -1,0 +1,123 @@
+"""A free body, and one on a surface: against closed forms."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
+
+from rehearsal.robot.scene import Object, Scene, String, make_thing
+from rehearsal.robot.thing import Motion, Thing, move_thing, pull_string, rotation, spin_of
+from rehearsal.robot.touching import Contacts, World, lie
+
+G = 9.80665
+H = 1 / 6000
+DOWN = np.array([0.0, 0.0, -G])
+NONE = (0.0, 0.0, 0.0)
+
+
+def body(shape="box", diameter=0.05, height=0.12, mass=0.1, z=0.06, **more) -> tuple[Thing, Motion]:
+    return make_thing(Object(shape, diameter, height, mass, [0.0, 0.0, z], **more), [0.0, 0.0, 0.5], String())
+
+
+def floor(thing: Thing, friction=0.35, loss=3.0) -> tuple[World, Contacts]:
+    kind, half, edge, place = Scene(0.0, Object("sphere", 0.1, 0.1, 1.0, [0.0, 0.0, 1.0])).shapes()
+    world = World(kind, half, edge, place, 1e6, 2e4, 2 * 0.1 * np.sqrt(2e4 * thing.mass), loss, np.array([friction]))
+    some = [np.zeros((1, 3)), np.zeros((1, 1, 3)), np.zeros((len(thing.points), 1, 3)), np.zeros((1, 2, 3))]
+    return world, Contacts(*some, np.zeros((1, 3)), np.zeros((1, 1, 3)), np.zeros((1, 3)))
+
+
+def fall(thing, motion, world, contacts, gravity, duration, h=H):
+    for _ in range(round(duration / h)):
+        turn = rotation(motion.quaternion)
+        spin = spin_of(thing, motion, turn)
+        place, speed = tuple(motion.place), tuple(motion.speed)
+        contacts.thing_world[:] = 0
+        force, torque = lie(h, world, thing, contacts, turn, place, speed, spin)
+        move_thing(thing, motion, force, torque, gravity, h)
+
+
+@pytest.mark.parametrize("speed", [0.2, 1.0])
+def test_a_ball_rebounds_as_hunt_and_crossley_s_law_says(speed):
+    """m v dv/dδ = -k δ^1.5 (1 + c v): v/c - ln(1 + c v)/c² is alike before and after, whatever k and m are."""
+    thing, motion = body("sphere", z=0.0251)
+    loss = 0.8
+    world, contacts = floor(thing, loss=loss)
+    motion.speed[2] = -speed
+    fall(thing, motion, world, contacts, np.zeros(3), 0.03)
+
+    def invariant(v):
+        return v / loss - np.log(1 + loss * v) / loss**2
+
+    rebound = brentq(lambda v: invariant(-v) - invariant(speed), 1e-6, speed)
+    assert motion.speed[2] == pytest.approx(rebound, rel=0.01)
+
+
+@pytest.mark.parametrize("angle_deg", [10.0, 15.0])
+def test_a_block_on_an_incline_sticks_below_friction(angle_deg):
+    """tan 15° = 0.27 < 0.35: it settles, then does not creep. The incline is a level floor under leaning gravity."""
+    thing, motion = body(height=0.05, z=0.025)
+    world, contacts = floor(thing)
+    gravity = G * np.array([np.sin(np.radians(angle_deg)), 0, -np.cos(np.radians(angle_deg))])
+    fall(thing, motion, world, contacts, gravity, 1.0)
+    before = motion.place.copy()
+    fall(thing, motion, world, contacts, gravity, 2.0)
+    assert np.abs(motion.place - before)[:2].max() < 1e-6
+    assert np.abs(motion.place - before).max() < 1e-5  # it still sinks in, as its contacts lose little at low speed
+    np.testing.assert_allclose(contacts.thing_world[0], -thing.mass * gravity, atol=1e-4)
+
+
+def test_a_block_on_an_incline_slides_above_friction():
+    """a = g (sin θ - μ cos θ)."""
+    thing, motion = body(height=0.02, z=0.01)
+    friction, angle = 0.35, np.radians(30)
+    world, contacts = floor(thing, friction)
+    fall(thing, motion, world, contacts, G * np.array([np.sin(angle), 0, -np.cos(angle)]), 0.5)
+    before = motion.speed[0]
+    fall(thing, motion, world, contacts, G * np.array([np.sin(angle), 0, -np.cos(angle)]), 0.4)
+    assert (motion.speed[0] - before) / 0.4 == pytest.approx(G * (np.sin(angle) - friction * np.cos(angle)), rel=0.01)
+
+
+def test_momenta_and_energy_are_kept_in_free_flight():
+    """Momenta to rounding; energy of rotation to the second order of the step."""
+    thing, motion = body(diameter=0.04, height=0.1)
+    motion.speed[:] = [0.3, -0.2, 1.0]
+    motion.momentum[:] = thing.inertia * [20.0, 5.0, 30.0]
+    momentum = motion.momentum.copy()
+
+    def energy():
+        turn = rotation(motion.quaternion)
+        return 0.5 * np.dot(spin_of(thing, motion, turn), motion.momentum)
+
+    first = energy()
+    for _ in range(6000):
+        move_thing(thing, motion, NONE, NONE, DOWN, H)
+    np.testing.assert_array_equal(motion.momentum, momentum)
+    np.testing.assert_allclose(motion.speed, [0.3, -0.2, 1.0 - G], rtol=1e-9)
+    assert energy() == pytest.approx(first, rel=1e-4)
+
+
+def test_a_free_cylinder_precesses_at_the_rate_of_its_momentum():
+    """A symmetric top: its axis turns about the angular momentum at L / I_1."""
+    thing, motion = body("cylinder")
+    motion.momentum[:] = [0.0, 3e-4, 4e-4]
+    axis = np.array([0.0, 0.0, 1.0])
+    duration = 0.5
+    for _ in range(round(duration / H)):
+        move_thing(thing, motion, NONE, NONE, np.zeros(3), H)
+    size = np.linalg.norm(motion.momentum)
+    turn = Rotation.from_rotvec(size / thing.inertia[0] * duration * motion.momentum / size)
+    found = np.array(rotation(motion.quaternion)) @ axis
+    np.testing.assert_allclose(found, turn.apply(axis), atol=1e-3)
+
+
+def test_a_string_holds_its_weight_and_leaves_the_hook_when_it_is_slack():
+    thing, motion = body(hanging=True, z=0.3)
+    for _ in range(round(4 / H)):
+        turn = rotation(motion.quaternion)
+        force, torque = pull_string(thing, motion, turn, spin_of(thing, motion, turn))
+        move_thing(thing, motion, force, torque, DOWN, H)
+    assert motion.hanging[0] == 1
+    assert motion.place[2] == pytest.approx(0.3 - thing.mass * G / thing.tautness, abs=2e-5)
+    motion.place[2] += 0.02
+    pull_string(thing, motion, rotation(motion.quaternion), NONE)
+    assert motion.hanging[0] == 0
