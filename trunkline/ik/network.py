@@ -35,7 +35,7 @@ class InverseKinematics(nn.Module):
     ReLU.
 
     SI units; gravity is told as in `inputs`; the quaternion is of unit length, of either sign. Commands stay within
-    those of the training set. The tip is foreseen by layers of half the width from gravity and the commands alone: they
+    those of the training set. The tip is foreseen by layers of their own from gravity and the commands alone: they
     do not know the pose that was asked.
     """
 
@@ -66,10 +66,10 @@ class InverseKinematics(nn.Module):
             nn.Linear(width, 2 * tendons),
         )  # fmt: skip
         self.tip_layers = nn.Sequential(
-            nn.Linear((2 if told == 1 else told) + tendons, width // 2), nn.ReLU(),
-            nn.Linear(width // 2, width // 2), nn.ReLU(),
-            nn.Linear(width // 2, width // 2), nn.ReLU(),
-            nn.Linear(width // 2, 3),
+            nn.Linear((2 if told == 1 else told) + tendons, width), nn.ReLU(),
+            nn.Linear(width, width), nn.ReLU(),
+            nn.Linear(width, width), nn.ReLU(),
+            nn.Linear(width, 3),
         )  # fmt: skip
 
     def normalise(self, inputs: torch.Tensor) -> torch.Tensor:
