@@ -32,7 +32,7 @@ def files():
     grids, blocks = convert_grids(ARRAYS, "grids.npz")
     manifest = {
         "grids": {name: block.model_dump() for name, block in blocks.items()},
-        "reach": describe_reach(ARRAYS, "grids.npz").model_dump(),
+        "reach": describe_reach(ARRAYS, None, "grids.npz").model_dump(),
         "sha256": {path: hashlib.sha256(data).hexdigest() for path, data in grids.items()},
     }
     return grids | {MANIFEST: json.dumps(manifest).encode()}
