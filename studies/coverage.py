@@ -8,6 +8,7 @@ model: heavier, with dry friction in its joints. Takes some ten minutes of one c
 
 import argparse
 import sys
+from contextlib import redirect_stdout
 from dataclasses import dataclass, field
 
 import mujoco
@@ -82,7 +83,7 @@ def cover(name: str, is_matched: bool, repetitions: int) -> Coverage:
         key: value / MASS_FACTOR if key in FORCES and not is_matched else value for key, value in stage.true.items()
     }
     exact, found = np.log(list(expected.values())), Coverage(list(stage.true))
-    with progress(repetitions, f"coverage of {name}", "repetitions") as bar:
+    with redirect_stdout(sys.stderr), progress(repetitions, f"coverage of {name}", "repetitions") as bar:
         for repetition in range(repetitions):
             rng = np.random.default_rng([repetition, list(STAGES).index(name)])
             drawn = np.exp(exact + rng.uniform(-1, 1, len(exact)) * np.log(RANGE))
