@@ -18,6 +18,7 @@ from studies.payload import MODEL, read_settings
 from trunkline.errors import in_one_line
 from trunkline.hybrid.payload import Cell, try_masses
 from trunkline.pipeline.inputs import read_spec
+from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
 
 DIAMETERS, MASSES, FRICTIONS = (0.02, 0.08), (0.05, 0.5), (0.3, 0.6)  # m, kg
@@ -34,6 +35,7 @@ def wilson(found: int, count: int) -> tuple[float, float]:
 
 
 @in_one_line
+@recorded("halved_grasps")
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=200)

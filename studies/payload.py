@@ -24,6 +24,7 @@ from trunkline.figures.style import save_figure
 from trunkline.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
 from trunkline.hybrid.payload import Cell, PayloadSettings, cells, chart_rows
 from trunkline.pipeline.inputs import read_spec
+from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
 from trunkline.settings import read_yaml
 
@@ -93,7 +94,8 @@ def main() -> int:
             bar.update(1, last=f"{cell.support} {cell.shape} {1e3 * cell.diameter:.0f} mm: {1e3 * outcome.mass:.0f} g")
     if len(table):
         save_figure(payload_figure(table), path.with_suffix(".png"))
-        print(table[[*KEYS, "mass", "share", "grasps"]].to_string(index=False))
+        with recorded("payload", keep=not options.quick and len(table) == len(cells(chart))):
+            print(table[[*KEYS, "mass", "share", "grasps"]].to_string(index=False))
     if grasps:
         print(f"{grasps} grasps, {(time.process_time() - begun) / grasps:.2f} s of processor each")
     return 0
