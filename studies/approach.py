@@ -20,6 +20,7 @@ import numpy as np
 
 from trunkline.dataset.columns import command_columns
 from trunkline.dataset.samples import read_samples
+from trunkline.elements import capstan_friction
 from trunkline.frames import gravity_in_base
 from trunkline.ik.as_controls import NEAR_LIMIT, PULL_SHARE, draw_commands
 from trunkline.pipeline.inputs import read_model
@@ -56,15 +57,14 @@ def shaken(seconds: float) -> np.ndarray:
     return np.concatenate([ramp(seconds), 1 + OVER * (1 - time / SHAKEN) * np.sin(2 * np.pi * SHAKES * time)])
 
 
-WAYS: dict[str, tuple[np.ndarray, bool]] = {  # with shares of the way, and whether motors pull against friction, too
-    "sent at once": (np.ones(1), False),
-    "ramp of 4 s": (ramp(4), False),
-    f"{OVER:.0%} further and back, in 4 s": (over_and_back(4), False),
-    f"ramp of 2 s, shaken for {SHAKEN:g} s": (shaken(2), False),
-    "ramp of 16 s": (ramp(16), False),
-    f"{OVER:.0%} further and back, in 16 s": (over_and_back(16), False),
-    f"ramp of 16 s, shaken for {SHAKEN:g} s": (shaken(16), False),
-    "ramp of 16 s, friction pulled too": (ramp(16), True),
+WAYS: dict[str, np.ndarray] = {  # with shares of the way
+    "sent at once": np.ones(1),
+    "ramp of 4 s": ramp(4),
+    f"{OVER:.0%} further and back, in 4 s": over_and_back(4),
+    f"ramp of 2 s, shaken for {SHAKEN:g} s": shaken(2),
+    "ramp of 16 s": ramp(16),
+    f"{OVER:.0%} further and back, in 16 s": over_and_back(16),
+    f"ramp of 16 s, shaken for {SHAKEN:g} s": shaken(16),
 }
 
 
@@ -112,22 +112,20 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=30.0)
     arguments = parser.parse_args()
     model = read_model(MODEL)
-    chain = read_chain(model)
+    chain = read_chain(model).smooth
     rest, gravity = targets(chain, arguments.targets, np.random.default_rng(0))
-    friction = model_friction(model)
-    band = friction_band(chain, rest.tensions, gravity, *friction, capstan=chain.capstan)
+    band = friction_band(chain, rest.tensions, gravity, *model_friction(model), capstan=capstan_friction(model))
     known = np.isfinite(band.width)
     print(f"{len(rest.position)} targets; a tip error is its median / 95th percentile / maximum over them, in mm")
     pulling = np.linalg.norm(band.loaded - rest.position, axis=1)
-    print(f"band of Coulomb friction, found for {known.sum()}: {three(band.width[known])} wide")
+    print(f"band of friction, found for {known.sum()}: {three(band.width[known])} wide")
     print(f"its end after pulling: {three(pulling[known])} from the target")
     rows: dict[str, list[str]] = {}
     with contextlib.redirect_stdout(sys.stderr), progress(2 * len(WAYS), "approach", "ways") as bar:
         for title, driven in (("friction of the model", model), ("dry friction", dry(model))):
             rows[title] = []
-            for name, (shares, friction_too) in WAYS.items():
-                commands = rest.commands - friction_too * friction[0] / chain.gain * (rest.tensions > 0)
-                sent = chain.straight_lengths + shares[:, None] * (commands[:, None] - chain.straight_lengths)
+            for name, shares in WAYS.items():
+                sent = chain.straight_lengths + shares[:, None] * (rest.commands[:, None] - chain.straight_lengths)
                 found = drive(driven, sent[..., model.actuator_trnid[:, 0]], gravity, arguments.seconds)
                 errors = np.linalg.norm(found.tips - rest.position[:, None], axis=2)
                 rows[title].append(row(name, errors, found.rested))
