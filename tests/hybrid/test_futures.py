@@ -14,13 +14,16 @@ from trunkline.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.arm.spiral import spiral_chain
 from trunkline.elements import actuators
 from trunkline.errors import InputError
+from trunkline.frames import STANDARD_GRAVITY
 from trunkline.hybrid.compose import Placed, compose
 from trunkline.hybrid.doubts import Contact, Doubts, Draws, doubts_of, draw, nominal_draw
+from trunkline.hybrid.friction import TPU_ON
 from trunkline.hybrid.futures import Twin, Way, futures, rows_of
 from trunkline.hybrid.objects import Thing
 from trunkline.hybrid.preview import Holding, joined, nominal, preview
 from trunkline.hybrid.robots import FixedMount
-from trunkline.hybrid.worlds import World
+from trunkline.hybrid.shares import wilson
+from trunkline.hybrid.worlds import Surface, World
 from trunkline.identification.parameters import PARAMETERS, candidate_fields
 
 SIZE = {"length": 0.2, "base_width": 0.05, "tip_width": 0.02, "units": 6}
@@ -158,6 +161,44 @@ def test_the_objects_place_and_friction_are_each_futures_own(grasping):
     assert np.ptp(found.draws.friction) > 0.2
     low, high = found.interval
     assert 0 <= low <= found.probability <= high <= 1
+
+
+@pytest.fixture(scope="module")
+def incline(small) -> tuple[Twin, Way]:
+    """A box on a table, far from the arm, in a gravity so tilted that it slides if μ is less than believed."""
+    thing, top = Thing("box", 0.05, 0.03, 0.1, "plastic"), [0.0, 0.0, -0.5]
+    world = World(None, {"table": Surface(top, [2.0, 2.0, 0.03], "wood")}, None)
+    spec = compose(small, FixedMount("fixed"), world, Placed(thing, np.array(top) + [0, 0, 0.015]))
+    model, angle = spec.compile(), np.arctan(TPU_ON["plastic"])
+    model.opt.gravity[:] = STANDARD_GRAVITY * np.array([np.sin(angle), 0, -np.cos(angle)])
+    return Twin(model, small.compile()), way_of(small.compile())
+
+
+def test_a_future_slides_where_coulomb_says(incline):
+    twin, way = incline
+    holding = Holding(0.0, sag=0.005, slip=1.0)
+    found = preview(twin, way, Doubts(contact=Contact(0.2, (0.0, 0.0, 0.0))), holding, count=16, seed=3)
+    clear = np.abs(np.log(found.draws.friction)) > 0.05
+    assert clear.sum() > 8
+    np.testing.assert_array_equal(found.held[clear], found.draws.friction[clear] > 1)
+    assert 0 < found.probability < 1
+    assert found.interval == pytest.approx(wilson(int(found.held.sum()), 16))
+
+
+def test_less_sure_friction_makes_outcomes_differ_more(incline):
+    twin, way = incline
+    ends = [preview(twin, way, Doubts(contact=Contact(d, (0.0, 0.0, 0.0))), count=8).motion.object[:, -1, 0]
+            for d in (0.0, 0.1, 0.3)]  # fmt: skip
+    none, some, more = (np.ptp(end) for end in ends)
+    assert none < 1e-9
+    assert more > 2 * some > 0.01
+
+
+def test_wilsons_interval_solves_its_equation():
+    """Its ends are the shares p from which what was found is 1.96 standard errors, of p, away."""
+    for found, count in ((0, 32), (7, 32), (32, 32)):
+        for end in wilson(found, count):
+            assert (found / count - end) ** 2 == pytest.approx(1.959964**2 * end * (1 - end) / count, abs=1e-9)
 
 
 def test_pieces_come_one_by_one_and_are_the_whole(free):

@@ -4,6 +4,7 @@ The identified parameters are written into the arm's own model, which has the pl
 to the composed model by the names of joints, tendons, actuators and numbers, as there all have other places.
 """
 
+import copy
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ from trunkline.simulation.winch import Winches
 
 FRAME = 1 / 60  # s, about, between frames of a motion
 FRAMES = 15  # of a piece: 0.25 s
-KNOTS = 0.05  # s between rows at which the Panda's torques are computed
+KNOTS = 0.1  # s between rows at which the Panda's torques are computed
 UNIT_CENTER = re.compile(r"unit_\d+_center")
 RECORD = ("qpos", "site_xpos", "xpos", "xquat")
 
@@ -65,6 +66,12 @@ class Twin:
     model: mujoco.MjModel
     arm: mujoco.MjModel
     start: np.ndarray | None = None
+
+    def stepped(self, timestep: float) -> "Twin":
+        """The same with another time step, s: a coarser one costs less."""
+        model = copy.copy(self.model)
+        model.opt.timestep = timestep
+        return Twin(model, self.arm, self.start)
 
     @cached_property
     def centers(self) -> list[int]:
