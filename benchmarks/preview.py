@@ -52,13 +52,13 @@ def main(path: Path, count: int) -> None:
         found = preview(own, way, doubts, holding, count, show=pieces)
         spent = time.process_time() - began
         first = found if first is None else first
-        low, high = found.interval
+        low, high = found.interval or (0.0, 1.0)
         print(
             f"step {1e3 * step:.2f} ms: first piece after {shown[0]:.3f} s of processor, nominal {shown[-1]:.2f} s, "
             f"all {spent:.1f} s ({(spent - shown[-1]) / count:.2f} s a future); "
             f"holds with {found.probability:.2f} ({low:.2f} to {high:.2f})"
         )
-        same = int((found.held == first.held).sum())
+        same = int(np.sum(found.held == first.held))
         frames = [int(np.argmin(np.abs(motion.time - LET_GO))) for motion in (found.motion, first.motion)]
         tips = [motion.tip[:, frame] for motion, frame in zip((found.motion, first.motion), frames, strict=True)]
         apart = 1e3 * np.median(np.linalg.norm(tips[0] - tips[1], axis=1))
@@ -82,7 +82,9 @@ def grasp(path: Path) -> tuple[Twin, Way]:
     level = np.zeros(4)
     mujoco.mju_mat2Quat(level, base.ravel())
     mujoco.mju_mulQuat(level, level.copy(), np.array(LEVEL))
-    model = compose(spec, robot, World(None, {}, hook), Placed(thing, center, tuple(level), True)).compile()
+    placed = Placed(thing, center, (level[0], level[1], level[2], level[3]), True)
+    model = compose(spec, robot, World(None, {}, hook), placed).compile()
+    model.geom_contype[model.geom("hook").id] = 0  # a string: the rod above the hook's end would stand in the flange
     arm, time_step = spec.compile(), 0.002
     times = time_step * np.arange(round(LENGTH / time_step) + 1)[:, None]
     pulls = CABLES["dorsal"]
