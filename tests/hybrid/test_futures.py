@@ -21,7 +21,7 @@ from trunkline.hybrid.friction import TPU_ON
 from trunkline.hybrid.futures import Twin, Way, futures, rows_of
 from trunkline.hybrid.objects import Thing
 from trunkline.hybrid.preview import Holding, joined, nominal, preview
-from trunkline.hybrid.robots import FixedMount
+from trunkline.hybrid.robots import FixedMount, PandaRobot
 from trunkline.hybrid.shares import wilson
 from trunkline.hybrid.worlds import Surface, World
 from trunkline.identification.parameters import PARAMETERS, candidate_fields
@@ -119,6 +119,7 @@ def test_cables_motors_are_not_the_pandas(small):
 
 def test_the_panda_stands_where_the_plan_says_and_follows_it(small):
     robot = hybrid_settings(robot="panda").robot
+    assert isinstance(robot, PandaRobot)
     model, arm = compose(small, robot).compile(), small.compile()
     way = way_of(arm, np.array(robot.ready), 1.5)
     share = np.clip(np.arange(len(way.commands)) * way.step / 1.0, 0, 1)
@@ -131,7 +132,7 @@ def test_the_panda_stands_where_the_plan_says_and_follows_it(small):
 
 @pytest.fixture(scope="module")
 def grasping(small) -> tuple[Twin, Way]:
-    """A ring-less grasp: two things may happen to a cylinder beside the arm once the hook lets go, it falls or not."""
+    """A cylinder that hangs beside the arm until it is let go."""
     thing = Thing("cylinder", 0.03, 0.1, 0.02, "plastic")
     at, level = np.array([0.035, 0.0, -0.15]), (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
     world = World(None, {}, [0.035, 0.0, 0.0])
@@ -159,6 +160,8 @@ def test_the_objects_place_and_friction_are_each_futures_own(grasping):
     np.testing.assert_allclose(starts - found.nominal.object[0, 0, :3], found.draws.offsets, atol=1e-3)
     assert np.ptp(starts[:, 0]) > 5e-3
     assert np.ptp(found.draws.friction) > 0.2
+    assert found.interval is not None
+    assert found.probability is not None
     low, high = found.interval
     assert 0 <= low <= found.probability <= high <= 1
 
@@ -178,6 +181,8 @@ def test_a_future_slides_where_coulomb_says(incline):
     twin, way = incline
     holding = Holding(0.0, sag=0.005, slip=1.0)
     found = preview(twin, way, Doubts(contact=Contact(0.2, (0.0, 0.0, 0.0))), holding, count=16, seed=3)
+    assert found.held is not None
+    assert found.probability is not None
     clear = np.abs(np.log(found.draws.friction)) > 0.05
     assert clear.sum() > 8
     np.testing.assert_array_equal(found.held[clear], found.draws.friction[clear] > 1)
