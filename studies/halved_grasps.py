@@ -12,11 +12,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import norm
 
 from studies.payload import MODEL, read_settings
 from trunkline.errors import in_one_line
 from trunkline.hybrid.payload import Cell, try_masses
+from trunkline.hybrid.shares import wilson
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
@@ -25,13 +25,6 @@ DIAMETERS, MASSES, FRICTIONS = (0.02, 0.08), (0.05, 0.5), (0.3, 0.6)  # m, kg
 WRAPS, GAPS = (0.4, 0.9), (0.0, 0.03)  # turns, m
 TOGETHER = 4  # placements of each draw
 SPREAD = 0.01  # m, of them
-
-
-def wilson(found: int, count: int) -> tuple[float, float]:
-    """95 % interval of a share (E. B. Wilson, 1927)."""
-    z, share = norm.ppf(0.975), found / count
-    middle, half = share + z**2 / (2 * count), z * np.sqrt(share * (1 - share) / count + z**2 / (4 * count**2))
-    return (middle - half) / (1 + z**2 / count), (middle + half) / (1 + z**2 / count)
 
 
 @in_one_line

@@ -124,7 +124,9 @@ def stretch_edges(units: int, stretches: int) -> np.ndarray:
 
 def actuators(model: mujoco.MjModel) -> np.ndarray:
     """Number of the actuator that draws each cable in, in the order of the cables. Shape (K,)."""
-    return np.array([np.flatnonzero(model.actuator_trnid[:, 0] == cable)[0] for cable in cables(model)], dtype=int)
+    on_tendons = model.actuator_trntype == mujoco.mjtTrn.mjTRN_TENDON  # a joint's motor has the joint's number there
+    drawn = np.where(on_tendons, model.actuator_trnid[:, 0], -1)
+    return np.array([np.flatnonzero(drawn == cable)[0] for cable in cables(model)], dtype=int)
 
 
 def numeric_place(model: mujoco.MjModel, name: str) -> int | None:
