@@ -35,7 +35,7 @@ def ask(poses: np.ndarray) -> dict[str, np.ndarray]:
     """A network of that arm: it takes the bend from the orientation asked for, and knows where the tip comes."""
     angle = -2 * np.arctan2(poses[:, 6], poses[:, 4])  # about -y the tip turns towards +x
     pulls = np.outer(RADIUS * angle, np.cos(2 * np.pi / 3 * np.arange(3)))
-    return {"commands": STRAIGHT - pulls, "tip": arc(angle)}
+    return {"commands": STRAIGHT - pulls, "lengths": STRAIGHT - pulls, "tip": arc(angle)}
 
 
 NETWORK = Network(ask, 8)

@@ -10,7 +10,6 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 import onnxruntime
@@ -19,7 +18,7 @@ from trunkline.errors import InputError
 from trunkline.ik.ask import ask
 from trunkline.ik.inputs import TILT
 from trunkline.statics.chain import Chain
-from trunkline.teleop.correction import corrected
+from trunkline.teleop.correction import Bent, corrected
 from trunkline.teleop.tilt_reach import AZIMUTH, STRAIGHT_DOWN, SYMMETRY
 from trunkline.teleop.vectors import Vector
 
@@ -33,13 +32,6 @@ class Network:
 
     ask: Callable[[np.ndarray], dict[str, np.ndarray]]
     inputs: int
-
-
-class Bent(NamedTuple):
-    """`commands` of the motors (K,), m, and where the `tip` is foreseen, m, (3,), in the base frame."""
-
-    commands: np.ndarray
-    tip: np.ndarray
 
 
 def network_of(file: str | bytes) -> Network:
@@ -57,10 +49,10 @@ def bend(network: Network, tip: Vector, gravity: Vector, tolerance: float, chain
     """
     found = _at_tilt(network, tip, gravity) if network.inputs == len(TILT) else _asked(network, tip, gravity)
     if chain is not None:
-        better = corrected(chain, found.commands, tip, gravity)
+        better = corrected(chain, found, tip, gravity)
         if better is None:
             raise InputError("out of reach: the soft arm finds no rest under the commands for its target")
-        found = Bent(*better)
+        found = better
     missed = float(np.linalg.norm(found.tip - tip))
     if missed > tolerance:
         raise InputError(f"out of reach: the soft arm's tip comes no nearer to its target than {1e3 * missed:.0f} mm")
@@ -76,7 +68,7 @@ def _asked(network: Network, tip: Vector, told: tuple[float, ...]) -> Bent:
     poses[:, -4], poses[:, -3:] = np.cos(BENDS / 2), np.outer(np.sin(BENDS / 2), axis)
     answer = network.ask(poses)
     best = int(np.argmin(np.linalg.norm(answer["tip"] - np.array(tip), axis=1)))
-    return Bent(answer["commands"][best].astype(float), answer["tip"][best].astype(float))
+    return Bent(*(answer[name][best].astype(float) for name in ("commands", "lengths", "tip")))
 
 
 def _at_tilt(network: Network, tip: Vector, gravity: Vector) -> Bent:
@@ -94,4 +86,5 @@ def _at_tilt(network: Network, tip: Vector, gravity: Vector) -> Bent:
     found = _asked(network, (cos * tip[0] + sin * tip[1], -sin * tip[0] + cos * tip[1], tip[2]), (angle,))
     x, y, z = found.tip
     # A tendon that stands where another one did does what that one did.
-    return Bent(np.roll(found.commands, turns), np.array([cos * x - sin * y, sin * x + cos * y, z]))
+    commands, lengths = np.roll(found.commands, turns), np.roll(found.lengths, turns)
+    return Bent(commands, lengths, np.array([cos * x - sin * y, sin * x + cos * y, z]))
