@@ -1,79 +1,86 @@
 """Targets that the maps call reachable: how many can be planned, and how near to them the arm comes to rest.
 
-    python -m studies.teleop_targets
+    python -m studies.teleop_targets [count]
 
-Tip targets are drawn in the arm's bending plane, inside the soft map; commands are the network's, and MuJoCo settles
-the calibrated arm under them, without friction. Mount targets are drawn inside the rigid map, straight down, with
-headings that bending-plane alignment asks for; mink solves them from one pose.
+Tip targets are drawn in the arm's bending plane, within reach, under gravity from a side drawn at random. All that
+plans is read from the package alone; MuJoCo settles the calibrated arm under the commands, without friction. Mount
+targets are drawn inside the rigid map, straight down, with headings that bending-plane alignment asks for; mink solves
+them from one pose.
 """
 
+import sys
 import time
-from functools import partial
 from pathlib import Path
 
 import numpy as np
-import onnxruntime
 
 from trunkline.errors import InputError
-from trunkline.frames import gravity_in_base
-from trunkline.ik.ask import ask
+from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.pipeline.inputs import read_model
 from trunkline.pipeline.results import recorded
 from trunkline.simulation.rest import settle
+from trunkline.statics.chain import Chain, read_chain
 from trunkline.teleop.alignment import least_turn, wrist_of
 from trunkline.teleop.reach import MapReach
 from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.tendons import bend
+from trunkline.teleop.tendons import Network, bend, network_of
 from trunkline.teleop.vectors import DOWN
+from trunkline.unity.twin import NETWORK
+from trunkline.unity.unpacked import maps_of, model_of, read_package
 
 ARTIFACTS = Path("artifacts")
-COUNT, TILTS_DEG, TOLERANCE, OFFSET = 200, (0.0, 30.0, 60.0), 0.02, 0.05
+TILTS_DEG, TOLERANCE, OFFSET = (0.0, 30.0, 60.0), 0.02, 0.05
 START = (0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785)
 
 
 @recorded("teleop_targets")
-def main() -> None:
-    network = onnxruntime.InferenceSession(str(ARTIFACTS / "train_ik/ik.onnx"), providers=["CPUExecutionProvider"])
+def main(count: int) -> None:
+    (path,) = (ARTIFACTS / "package_unity").glob("*.tgz")
+    files = read_package(path)
+    network, chain = network_of(files[NETWORK]), read_chain(model_of(files))
+    reach = MapReach.from_arrays(maps_of(files))
     model = read_model(ARTIFACTS / "identify_control/arm.xml")
-    with np.load(ARTIFACTS / "reachability/grids.npz") as arrays:
-        reach = MapReach.from_arrays(dict(arrays))
-    rng = np.random.default_rng(0)
-    print("| gravity | tip targets | refused | tip foreseen from target | settled from foreseen |")
-    print("|---:|---:|---:|---:|---:|")
+    print("| gravity | answer | tip targets | refused | tip foreseen from target | settled from foreseen | each |")
+    print("|---:|---|---:|---:|---:|---:|---:|")
     for tilt in TILTS_DEG:
-        soft(reach, partial(ask, network), model, np.radians(tilt), rng)
-    rigid(reach, rng)
+        for name, statics in (("network", None), ("corrected", chain)):
+            soft(reach, network, statics, model, tilt, count, name)
+    rigid(reach, np.random.default_rng(0), count)
 
 
-def soft(reach: MapReach, network, model, tilt: float, rng: np.random.Generator) -> None:
-    gravity = gravity_in_base(tilt)
-    x, y, z = (float(value) for value in gravity / np.linalg.norm(gravity))
-    targets, commands, foreseen, refused = [], [], [], 0
-    while len(targets) + refused < COUNT:
+def soft(reach: MapReach, network: Network, chain: Chain | None, model, tilt: float, count: int, name: str) -> None:
+    rng = np.random.default_rng(round(tilt))
+    targets, commands, foreseen, gravities, seconds, refused = [], [], [], [], [], 0
+    while len(targets) + refused < count:
+        x, y, z = (float(value) for value in downwards(np.radians(tilt), rng.uniform(0, 2 * np.pi)))
         tip = (float(rng.uniform(-0.45, 0.45)), 0.0, float(rng.uniform(-0.52, 0.2)))
         if reach.soft(tip, (x, y, z)).where != "inside":
             continue
+        began = time.process_time()
         try:
-            found = bend(network, tip, (x, y, z), TOLERANCE)
+            found = bend(network, tip, (x, y, z), TOLERANCE, chain)
         except InputError:
             refused += 1
             continue
+        seconds.append(time.process_time() - began)
         targets.append(tip)
         commands.append(found.commands)
         foreseen.append(found.tip)
-    rest = settle(model, np.array(commands), gravity)
+        gravities.append((x, y, z))
+    rest = settle(model, np.array(commands), STANDARD_GRAVITY * np.array(gravities))
     off = [
         np.linalg.norm(np.array(foreseen) - targets, axis=1),
         np.linalg.norm(rest.position - foreseen, axis=1)[rest.rested],
     ]
     told = [" / ".join(f"{1e3 * q:.1f}" for q in np.quantile(one, (0.5, 0.95, 1.0))) + " mm" for one in off]
-    print(f"| {np.degrees(tilt):.0f}° | {COUNT} | {refused} | {told[0]} | {told[1]} |")
+    took = f"{1e3 * np.median(seconds):.0f} ms"
+    print(f"| {tilt:.0f}° | {name} | {count} | {refused} | {told[0]} | {told[1]} | {took} |")
 
 
-def rigid(reach: MapReach, rng: np.random.Generator) -> None:
+def rigid(reach: MapReach, rng: np.random.Generator, count: int) -> None:
     solver, wrist = RigidIK(OFFSET), wrist_of(START, OFFSET)
     done, seconds, why = 0, [], {}
-    for _ in range(COUNT):
+    for _ in range(count):
         mount, inside = (0.0, 0.0, 0.0), False
         while not inside:
             mount = tuple(float(value) for value in rng.uniform([-0.6, -0.7, 0.0], [0.8, 0.7, 0.9]))
@@ -88,9 +95,9 @@ def rigid(reach: MapReach, rng: np.random.Generator) -> None:
             reason = str(error).partition(":")[0]
             why[reason] = why.get(reason, 0) + 1
         seconds.append(time.process_time() - began)
-    print(f"mount targets: {done} of {COUNT} solved, {1e3 * np.median(seconds):.0f} ms of processor each, median; "
+    print(f"mount targets: {done} of {count} solved, {1e3 * np.median(seconds):.0f} ms of processor each, median; "
           f"refused: {', '.join(f'{name} {count}' for name, count in sorted(why.items())) or 'none'}")  # fmt: skip
 
 
 if __name__ == "__main__":
-    main()
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 200)

@@ -4,14 +4,14 @@ refused."""
 import numpy as np
 import pytest
 
-from tests.teleop.test_plan import BENT, LIMITS, OFFSET, START, STRAIGHT, ask, targets
+from tests.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT, targets
 from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.following import Follower
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
 
 DT = 1 / 60
-PLANNER = Planner(RigidIK(OFFSET), ask, STRAIGHT, LIMITS, OFFSET)
+PLANNER = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET)
 
 
 def at(y: float):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.operator import DT, PACKAGE, Operator
-from tests.teleop.test_plan import BENT, LIMITS, OFFSET, START, STRAIGHT, ask
+from tests.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from trunkline.errors import InputError
 from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.executor import SimulatedRobot
@@ -18,7 +18,7 @@ class Desk:
 
     def __init__(self):
         self.operator = Operator()
-        self.planner = Planner(RigidIK(OFFSET), ask, STRAIGHT, LIMITS, OFFSET, step=0.005)
+        self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
         self.robot = SimulatedRobot(START, STRAIGHT, LIMITS, PACKAGE)
         self.plan, self.reports = None, {}
 

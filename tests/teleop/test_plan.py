@@ -15,7 +15,7 @@ from trunkline.teleop.messages import Box, Request, Target, Targets, World
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.shaping import mode_shaper
-from trunkline.teleop.tendons import bend
+from trunkline.teleop.tendons import Network, bend
 from trunkline.teleop.trajectory import limits_of, point_to_point
 from trunkline.teleop.vectors import DOWN
 
@@ -35,7 +35,10 @@ def ask(poses: np.ndarray) -> dict[str, np.ndarray]:
     """A network of that arm: it takes the bend from the orientation asked for, and knows where the tip comes."""
     angle = -2 * np.arctan2(poses[:, 6], poses[:, 4])  # about -y the tip turns towards +x
     pulls = np.outer(RADIUS * angle, np.cos(2 * np.pi / 3 * np.arange(3)))
-    return {"commands": STRAIGHT - pulls, "tip": arc(angle)}
+    return {"commands": STRAIGHT - pulls, "lengths": STRAIGHT - pulls, "tip": arc(angle)}
+
+
+NETWORK = Network(ask, 8)
 
 
 def targets(rigid, tip, heading=0.0) -> Targets:
@@ -48,7 +51,7 @@ def request(rigid, tip, heading=0.0) -> Request:
 
 @pytest.fixture(scope="module")
 def planner():
-    return Planner(RigidIK(OFFSET), ask, STRAIGHT, LIMITS, OFFSET, step=0.005)
+    return Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
 
 
 MOUNT = (0.5, 0.1, 0.5)
@@ -146,9 +149,9 @@ def test_a_solid_in_the_way_is_named(planner):
         planner.plan(behind, wall, START, STRAIGHT)
 
 
-def test_gravity_from_a_side_that_the_package_does_not_know_is_refused():
+def test_a_network_of_one_tilt_refuses_gravity_from_a_side_that_it_does_not_know():
     with pytest.raises(InputError, match="gravity: comes 30° beside a tendon's plane"):
-        bend(ask, tuple(BENT), (0.5 * np.cos(np.pi / 6), 0.5 * np.sin(np.pi / 6), -(0.75**0.5)), 0.02)
+        bend(NETWORK, tuple(BENT), (0.5 * np.cos(np.pi / 6), 0.5 * np.sin(np.pi / 6), -(0.75**0.5)), 0.02)
 
 
 @pytest.mark.parametrize("turns", [-1, 0, 1])
@@ -156,8 +159,8 @@ def test_another_tendon_does_what_the_first_does_where_it_stands(turns):
     third = turns * 2 * np.pi / 3
     turn = np.array([[np.cos(third), -np.sin(third), 0], [np.sin(third), np.cos(third), 0], [0, 0, 1]])
     gravity = np.array([np.sin(0.5), 0.0, -np.cos(0.5)])
-    here = bend(ask, tuple(BENT), tuple(gravity), 0.02)
-    there = bend(ask, tuple(turn @ BENT), tuple(turn @ gravity), 0.02)
+    here = bend(NETWORK, tuple(BENT), tuple(gravity), 0.02)
+    there = bend(NETWORK, tuple(turn @ BENT), tuple(turn @ gravity), 0.02)
     np.testing.assert_allclose(there.tip, turn @ here.tip, atol=1e-9)
     np.testing.assert_allclose(np.roll(there.commands, -turns), here.commands, atol=1e-9)
     assert there.commands.argmin() == turns % 3  # tendon 1 over +x, tendon 2 a third of a turn on

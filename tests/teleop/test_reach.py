@@ -5,7 +5,9 @@ import pytest
 
 from trunkline.errors import InputError
 from trunkline.fields.grid import Lattice, blend
-from trunkline.teleop.reach import MapReach, SignedMap
+from trunkline.teleop.reach import MapReach
+from trunkline.teleop.signed_map import SignedMap
+from trunkline.teleop.tilt_reach import TiltReach
 
 DOWN = (0.0, 0.0, -1.0)
 SPACING = 0.01
@@ -21,7 +23,7 @@ def ball(center, radius) -> SignedMap:
 CENTER = np.array([0.05, 0.0, 0.0])
 ANGLES = np.radians([0.0, 30.0, 60.0])
 RADII = (0.10, 0.14, 0.12)
-REACH = MapReach(ball(np.zeros(3), 0.2), [ball(CENTER, radius) for radius in RADII], ANGLES)
+REACH = MapReach(ball(np.zeros(3), 0.2), TiltReach([ball(CENTER, radius) for radius in RADII], ANGLES))
 
 
 def gravity(angle, azimuth=0.0):
@@ -97,7 +99,7 @@ def test_maps_that_are_not_there_are_named():
     with pytest.raises(InputError, match="found no 'rigid', expected what the stage reachability writes"):
         MapReach.from_arrays({})
     with pytest.raises(InputError, match="found 1 maps at angles"):
-        MapReach(ball(CENTER, 0.1), [ball(CENTER, 0.1)], np.zeros(1))
+        TiltReach([ball(CENTER, 0.1)], np.zeros(1))
 
 
 def test_maps_as_the_stage_writes_them():

@@ -6,11 +6,14 @@ import json
 import numpy as np
 import pytest
 
+from trunkline.dataset.gravities import spread
 from trunkline.errors import InputError
+from trunkline.reachability.sheets import Sheets
 from trunkline.teleop.reach import MapReach
-from trunkline.unity.reach_maps import convert_grids, describe_reach
+from trunkline.unity.package import write_tarball
+from trunkline.unity.reach_maps import convert_grids, convert_sheets, describe_reach
 from trunkline.unity.twin import MANIFEST
-from trunkline.unity.unpacked import maps_of, package_digest
+from trunkline.unity.unpacked import maps_of, package_digest, read_package
 
 RNG = np.random.default_rng(0)
 ARRAYS = {
@@ -25,34 +28,55 @@ ARRAYS = {
     "soft_threshold": np.array(0.0),
     "soft_tolerance": np.array(0.02),
 }
+SHEETS = Sheets(spread(20, 2.0, crowd=True), RNG.normal(scale=0.2, size=(20, 8, 5, 3)).astype(np.float16), 0.02)
+
+
+@pytest.fixture(params=["one tilt", "any side"])
+def arrays(request):
+    return ARRAYS | (SHEETS.arrays() if request.param == "any side" else {})
 
 
 @pytest.fixture
-def files():
-    grids, blocks = convert_grids(ARRAYS, "grids.npz")
+def files(arrays):
+    grids, blocks = convert_grids(arrays, "grids.npz")
+    surface, block = convert_sheets(arrays, "grids.npz")
+    grids |= surface
     manifest = {
         "grids": {name: block.model_dump() for name, block in blocks.items()},
-        "reach": describe_reach(ARRAYS, None, "grids.npz").model_dump(),
+        "reach": describe_reach(arrays, block, "grids.npz").model_dump(),
         "sha256": {path: hashlib.sha256(data).hexdigest() for path, data in grids.items()},
     }
     return grids | {MANIFEST: json.dumps(manifest).encode()}
 
 
-def test_maps_come_back_as_they_were_in_their_own_frames(files):
+def test_maps_come_back_as_they_were_in_their_own_frames(files, arrays):
     found = maps_of(files)
-    for name in ("rigid", "soft_000", "soft_030"):
-        np.testing.assert_array_equal(found[name], ARRAYS[name].astype(np.float16))
-    for name in ("rigid_origin", "rigid_spacing", "soft_origin", "soft_spacing", "soft_angles"):
-        np.testing.assert_allclose(found[name], ARRAYS[name], atol=1e-12)
+    assert found.keys() == arrays.keys() - {"soft_threshold"}
+    for name in found:
+        expected = arrays[name].astype(np.float16) if np.ndim(arrays[name]) > 2 else arrays[name]
+        np.testing.assert_allclose(found[name], expected, atol=1e-12)
 
 
-def test_reach_by_the_package_is_that_by_the_stage(files):
-    one, other = MapReach.from_arrays(maps_of(files)), MapReach.from_arrays(ARRAYS)
+def test_reach_by_the_package_is_that_by_the_stage(files, arrays):
+    one, other = MapReach.from_arrays(maps_of(files)), MapReach.from_arrays(arrays)
+    down = (0.0, 0.0, -1.0)
     for point in RNG.uniform(-0.3, 0.3, (30, 3)):
         place = tuple(map(float, point))
-        assert one.rigid(place, (0.0, 0.0, -1.0)).outside_by == pytest.approx(
-            other.rigid(place, (0.0, 0.0, -1.0)).outside_by, abs=2e-3
-        )
+        for gravity in (down, (0.48, 0.0, -((1 - 0.48**2) ** 0.5))):
+            found, expected = one.soft(place, gravity), other.soft(place, gravity)
+            assert found.outside_by == pytest.approx(expected.outside_by, abs=2e-3)
+            assert expected.where != "unknown"
+        assert one.rigid(place, down).outside_by == pytest.approx(other.rigid(place, down).outside_by, abs=2e-3)
+
+
+def test_a_package_is_read_from_its_folder_as_from_its_tarball(files, tmp_path):
+    write_tarball(tmp_path / "twin.tgz", files)
+    for path, data in files.items():
+        (tmp_path / "folder" / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "folder" / path).write_bytes(data)
+    assert read_package(tmp_path / "folder") == read_package(tmp_path / "twin.tgz") == files
+    with pytest.raises(InputError, match=r"found no .*manifest\.json, expected a package's folder"):
+        read_package(tmp_path / "folder/Runtime")
 
 
 def test_a_file_that_is_not_the_manifests_is_named(files):

@@ -8,12 +8,13 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.panda.collision import clearance
 from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, joint_frames
+from trunkline.statics.chain import Chain
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.messages import Request, Targets, World
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.shaping import Shaper, shaped
-from trunkline.teleop.tendons import Ask, bend
+from trunkline.teleop.tendons import Network, bend
 from trunkline.teleop.trajectory import JOINTS, Limits, point_to_point
 from trunkline.teleop.vectors import DOWN, Vector, add, conjugate, rotate, scale, subtract
 
@@ -28,16 +29,18 @@ ShaperOf = Callable[[np.ndarray, np.ndarray, np.ndarray], Shaper]
 @dataclass(frozen=True)
 class Planner:
     """What plans are made with. `straight`: commands that leave the arm straight, m, (K,). `tolerance`: m, how far
-    from its target the tip may be foreseen. `step`: s, between a plan's rows."""
+    from its target the tip may be foreseen. `step`: s, between a plan's rows. `chain`: the arm's statics, by which the
+    network's answers are corrected."""
 
     rigid: RigidIK
-    ask: Ask
+    network: Network
     straight: np.ndarray
     limits: Limits
     mount_offset: float
     tolerance: float = 0.02
     step: float = 0.002
     shaper: ShaperOf | None = None
+    chain: Chain | None = None
 
     def plan(
         self,
@@ -97,7 +100,7 @@ class Planner:
         foreseen.
         """
         tip, gravity = _soft_target(targets)
-        bent = bend(self.ask, tip, gravity, self.tolerance)
+        bent = bend(self.network, tip, gravity, self.tolerance, self.chain)
         turn = base_quaternion(targets.pointing, targets.heading)
         missed = rotate(turn, subtract(tip, (float(bent.tip[0]), float(bent.tip[1]), float(bent.tip[2]))))
         return add(targets.rigid.position, missed), bent.commands

@@ -1,14 +1,32 @@
-"""A finished package, read back: its digest, and its maps in the base frames, as the stage `reachability` wrote
-them."""
+"""A finished package, read back: its digest, its model with its springs, and its maps in the base frames, as the stage
+`reachability` wrote them."""
 
 import hashlib
 import json
+from pathlib import Path
 
+import mujoco
 import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.unity.frame import unity_position
-from trunkline.unity.twin import MANIFEST
+from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
+from trunkline.unity.package import read_tarball
+from trunkline.unity.twin import MANIFEST, MODEL
+
+
+def read_package(path: Path) -> dict[str, bytes]:
+    """Contents by path in the package, of its .tgz or of the folder that it was unpacked into.
+
+    Raises:
+        InputError: if it is not a package.
+    """
+    if not path.is_dir():
+        return read_tarball(path)
+    files = {str(one.relative_to(path).as_posix()): one.read_bytes() for one in path.rglob("*") if one.is_file()}
+    if MANIFEST not in files:
+        raise InputError(f"{path}: found no {MANIFEST}, expected a package's folder")
+    return files
 
 
 def package_digest(files: dict[str, bytes]) -> str:
@@ -29,7 +47,8 @@ def package_digest(files: dict[str, bytes]) -> str:
 
 
 def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
-    """The arrays that `teleop.reach.MapReach.from_arrays` takes: `rigid`, the soft maps and their lattices."""
+    """The arrays that `teleop.reach.MapReach.from_arrays` takes: `rigid`, the soft maps and their lattices,
+    and the sheets where gravity comes from any side."""
     manifest = _manifest(files)
     arrays: dict[str, np.ndarray] = {"soft_angles": np.array(manifest["reach"]["angles"])}
     for name in ("rigid", *manifest["reach"]["grids"]):
@@ -40,7 +59,22 @@ def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
         group = name.split("_")[0]
         arrays[f"{group}_origin"] = unity_position(block["origin"])  # the change of axes is its own inverse
         arrays[f"{group}_spacing"] = np.array(block["spacing"][0])
+    arrays["soft_tolerance"] = np.array(manifest["reach"]["tolerance"])
+    if sheets := manifest["reach"].get("sheets"):
+        downs = unity_position(np.array(sheets["directions"]).reshape(-1, 3))
+        shape = (len(downs), sheets["around"], sheets["along"], 3)
+        matrix = np.frombuffer(files[sheets["weights"]], dtype="<f8").reshape(len(downs), -1)
+        arrays["sheets_points"] = unity_position(np.frombuffer(files[sheets["file"]], dtype="<f2").reshape(shape))
+        arrays["sheets_downs"] = downs
+        arrays["sheets_matrix"] = np.column_stack([matrix[:, :-3], unity_position(matrix[:, -3:])])  # of g itself
     return arrays
+
+
+def model_of(files: dict[str, bytes]) -> mujoco.MjModel:
+    """The model with the springs and dampers that the manifest lists, as *Calibrated Springs* restores them."""
+    block = _manifest(files)["model"]
+    joints = [[JointLaw(**law) for law in block[name]] for name in ("springs", "dampers")]
+    return compile_with(files[MODEL].decode(), Laws(*joints, [TendonLaw(**law) for law in block["diagonals"]]))
 
 
 def _manifest(files: dict[str, bytes]) -> dict:
