@@ -49,8 +49,8 @@ class Package:
         )
 
     def tip(self, mount: Vector, targets: Targets, commands: np.ndarray) -> np.ndarray:
-        """Where the twin's tip comes to rest, base frame, m (3,): the arm at `mount` as `targets` turn it, the motors at
-        `commands` (K,)."""
+        """Where the twin's tip comes to rest, base frame, m (3,): the arm at `mount` as `targets` turn it, its motors
+        at `commands` (K,)."""
         turn = base_quaternion(targets.pointing, targets.heading)
         gravity = STANDARD_GRAVITY * np.array(rotate(conjugate(turn), DOWN))
         x, y, z = (float(value) for value in settle(self.model, commands[None], gravity).position[0])

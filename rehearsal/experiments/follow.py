@@ -44,9 +44,7 @@ def follow(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     operator = bench.operator(rng)
     session = bench.session(operator, None, seed, path)
     delay = bench.config.core.follow_delay
-    script = operator.follow(
-        path.begin, lambda now: path.finished(now - delay), lambda now: session.seen(path(now))
-    )
+    script = operator.follow(path.begin, lambda now: path.finished(now - delay), lambda now: session.seen(path(now)))
     ending, frames, views = rehearse(session, script)
     result = Result("follow", seed, False, seconds=session.now, package=session.package.digest[:12])
     on_path = [frame for frame in frames if path.begun + delay <= frame.now <= path.begun + delay + path.seconds]
