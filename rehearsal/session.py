@@ -22,7 +22,7 @@ from trunkline.teleop.messages import ExecutorReport, Input, Intent, Joints, Pla
 from trunkline.teleop.plan import Plan
 
 RATE = 60.0  # Hz, of a headset's frames
-TICKS = 4  # in which the robot is commanded a frame
+TICKS = 2  # in which the robot is commanded a frame
 REFERENCE = Pose((1.3, 0.0, 0.6), (0.5, 0.5, 0.5, 0.5))  # where the operator stands: y up, looking along the base's -x
 
 Place = Callable[[float], np.ndarray]  # true position (3,), m, of the object in the Panda's base frame at a time, s
@@ -139,5 +139,8 @@ class Session:
             self.refusals.append((self.now, self.follower.refused))
 
     def _move(self, joints: np.ndarray, commands: np.ndarray, dt: float) -> None:
-        self.robot.send(joints, self.package.straight - commands)
+        try:
+            self.robot.send(joints, self.package.straight - commands)
+        except InputError as error:
+            self.fault = str(error)
         self.robot.advance(dt)

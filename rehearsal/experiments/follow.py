@@ -52,6 +52,12 @@ def follow(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
         off = [float(np.linalg.norm(frame.truth.tip - path(frame.now - delay))) for frame in on_path]
         result.tip_mm, result.worst_mm = (1e3 * float(value) for value in np.quantile(off, (0.5, 0.95)))
         result.nearest_mm = 1e3 * min(off)
+        wanted = [
+            float(np.linalg.norm(view.tip - view.intent.follow.tip.position))
+            for view in views
+            if view.intent.follow is not None and view.now >= path.begun + delay
+        ]
+        result.robot_mm = 1e3 * float(np.median(wanted)) if wanted else float("nan")
     if not isinstance(ending, Ending):
         result.cause = "stopped: the run did not end"
     elif not ending.done:

@@ -18,7 +18,8 @@ class Result:
 
     aimed_mm: from the tip target to the object's centre. previewed_mm: from the preview's tip to it. nearest_mm: the
     least distance of the robot's tip from it. tip_mm: median distance of the tip from the moving object as it was the
-    set delay before; worst_mm: its 95th percentile. seconds: of the whole run.
+    set delay before; worst_mm: its 95th percentile. robot_mm: median distance of the tip from where the operator's rays
+    wanted it then: what is left when the operator's own lag and aim are taken out. seconds: of the whole run.
     """
 
     experiment: str
@@ -31,6 +32,7 @@ class Result:
     nearest_mm: float = float("nan")
     tip_mm: float = float("nan")
     worst_mm: float = float("nan")
+    robot_mm: float = float("nan")
     seconds: float = 0.0
     package: str = ""
 

@@ -50,7 +50,7 @@ class RayHand:
         self.origin, self.person, self.rng, self.dead_zone = origin, person, rng, dead_zone
         self.turn = rotation_from_wxyz(np.array(alignment.quaternion))
         self.shift = np.array(alignment.position)
-        self.rates = rng.uniform(*person.tremor_hz, AXES) * 2 * np.pi
+        self.rates = rng.uniform(person.tremor_hz[0], person.tremor_hz[1], AXES) * 2 * np.pi
         self.phases = rng.uniform(0, 2 * np.pi, AXES)
         self.held: set[str] = set()
         self.start = self.goal = self.turn.apply(origin + [0.0, 0.0, -0.6]) + self.shift
@@ -75,7 +75,8 @@ class RayHand:
         """Standard deviations of an aim across the ray, twice, and along it, (3,), m."""
         p = self.person
         across = width / p.widths
-        return np.array([across, across, self.depth_spread(np.linalg.norm(self._reference(self.goal) - self.origin))])
+        distance = float(np.linalg.norm(self._reference(self.goal) - self.origin))
+        return np.array([across, across, self.depth_spread(distance)])
 
     def depth_spread(self, distance: float) -> float:
         """Δd = d² η / b, m, of a disparity η seen by eyes b apart."""
