@@ -8,12 +8,16 @@ REQUIREMENTS := requirements.lock requirements-torch.txt
 PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: demo test types gate baseline lock readme pull push setup stale requirements clean
+.PHONY: demo rehearse test types gate baseline lock readme pull push setup stale requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
 	dvc repro
 	@ls -lh artifacts/package_unity/*.tgz
+
+RUNS ?= 20
+rehearse: setup      ## rehearse the experiments on the stand-in robot: make rehearse RUNS=200; resumes where it was stopped
+	python -m rehearsal --runs $(RUNS)
 
 test: setup          ## run every test, then lint
 	python -m pytest -n auto --dist loadgroup

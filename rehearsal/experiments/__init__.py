@@ -1,0 +1,1 @@
+"""Seeded runs of the paper's experiments on the stand-in robot: one function an experiment, one result a run."""

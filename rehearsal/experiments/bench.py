@@ -1,0 +1,89 @@
+"""What both experiments begin with: robot, hands and operator, drawn by a seed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from demo.plants.stranger import Stranger
+from rehearsal.operator.hands import Person, RayHand
+from rehearsal.operator.scripts import Operator, Script, offset_of
+from rehearsal.package import Package
+from rehearsal.robot.scene import Object, Scene
+from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
+from rehearsal.session import REFERENCE, Place, Session, View
+from rehearsal.settings import Free
+from trunkline.teleop.config import Config
+from trunkline.teleop.messages import Box, World
+from trunkline.teleop.rigid_ik import RigidIK
+from trunkline.teleop.vectors import DOWN
+
+ORIGINS = np.array([[-0.2, -0.1, -0.3], [0.2, -0.1, -0.3]])  # m, of the left and right hand in the reference frame
+START = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])  # rad, where the search for the ready pose begins
+FLOOR = -0.75  # m; the robot stands on a stand
+FLOOR_BOX = Box("the floor", (-3.0, -3.0, -2.0), (3.0, 3.0, FLOOR))
+LONGEST = 300.0  # s of a run
+
+
+@dataclass(frozen=True)
+class Bench:
+    """All that runs share."""
+
+    package: Package
+    config: Config
+    arm: Stranger
+    stand_in: StandIn
+    person: Person
+    settings: Free
+
+    def place(self, rng: np.random.Generator) -> np.ndarray:
+        """A random place of the object, (3,), m: evenly over the area in front of the robot, and over the height."""
+        s = self.settings
+        radius = np.sqrt(rng.uniform(s.near**2, s.far**2))
+        azimuth = np.radians(rng.uniform(-s.side_deg, s.side_deg))
+        return np.array([radius * np.cos(azimuth), radius * np.sin(azimuth), rng.uniform(s.low, s.high)])
+
+    def operator(self, rng: np.random.Generator) -> Operator:
+        dead_zone = self.config.core.rays.dead_zone
+        left, right = (RayHand(origin, REFERENCE, self.person, dead_zone, rng) for origin in ORIGINS)
+        offset = offset_of(self.package.reach)
+        return Operator(self.person, (left, right), offset, self.settings.diameter / 2, self.settings.band, rng)
+
+    def session(self, operator: Operator, thing: np.ndarray | None, seed: int, place: Place) -> Session:
+        """The stand-in at its ready pose; a sphere hangs at `thing` (3,), m, or there is none."""
+        s = self.settings
+        x, y, z = s.mount_ready
+        ready = RigidIK(self.config.mount_offset).solve(START, (x, y, z), DOWN, 0.0)
+        far = [5.0, 5.0, 5.0]
+        where = far if thing is None else thing.tolist()
+        hook = None if thing is None else [where[0], where[1], where[2] + s.diameter / 2 + s.string]
+        hung = Object("sphere", s.diameter, s.diameter, s.mass, where, hanging=thing is not None)
+        robot = StandInRobot(self.arm, Scene(FLOOR, hung, {}, hook), self.stand_in, ready, seed)
+        world = World("floor", (FLOOR_BOX,))
+        return Session(self.package, self.config, robot, (operator.left, operator.right), world, place)
+
+
+@dataclass
+class Seen:
+    """A frame of the run as it truly was: time, s, core's mode, the robot's state, and the object's place (3,), m."""
+
+    now: float
+    mode: str
+    truth: Truth
+    thing: np.ndarray
+
+
+def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list[View]]:
+    """Run a script to its end: what it returned, and every frame in which the robot may have moved."""
+    frames, views = [], []
+    next(script)
+    while session.now < LONGEST:
+        view = session.frame()
+        views.append(view)
+        if session.moved:
+            truth = session.robot.truth()
+            frames.append(Seen(session.now, view.intent.mode, truth, session.place(session.now)))
+        try:
+            script.send(view)
+        except StopIteration as end:
+            return end.value, frames, views
+    return None, frames, views

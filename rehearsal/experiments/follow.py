@@ -1,0 +1,85 @@
+"""Follow a moving object: success is that its path is completed without interruption; the tip's error is told.
+
+The path is drawn: along each axis two sines, from rest. The object that is followed touches nothing.
+"""
+
+import numpy as np
+
+from rehearsal.experiments.bench import Bench, Seen, rehearse
+from rehearsal.experiments.result import Result
+from rehearsal.operator.scripts import Ending
+
+EASE = 2.0  # s in which the object begins to move
+
+
+class Path:
+    """Where the object is, (3,), m: at `start` until `begun`, then away and to and fro for `seconds`."""
+
+    def __init__(
+        self, start: np.ndarray, amplitude: float, fastest: float, seconds: float, rng: np.random.Generator
+    ) -> None:
+        self.start, self.seconds, self.begun = start, seconds, np.inf
+        self.rates = 2 * np.pi * rng.uniform(fastest / 3, fastest, (2, 3))
+        self.phases = rng.uniform(0, 2 * np.pi, (2, 3))
+        self.amplitude = amplitude / 2
+
+    def __call__(self, now: float) -> np.ndarray:
+        gone = min(max(now - self.begun, 0.0), self.seconds)
+        ease = min(gone / EASE, 1.0)
+        swing = np.sin(self.rates * gone + self.phases) - np.sin(self.phases)
+        return self.start + self.amplitude * ease * ease * (3 - 2 * ease) * swing.sum(axis=0)
+
+    def begin(self, now: float) -> None:
+        self.begun = now
+
+    def finished(self, now: float) -> bool:
+        return now >= self.begun + self.seconds
+
+
+def follow(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
+    """One run, and its frames from where the robot began to move."""
+    rng = np.random.default_rng([seed, 1])
+    s = bench.settings
+    path = Path(bench.place(rng), s.path, s.path_hz, s.path_seconds, rng)
+    operator = bench.operator(rng)
+    session = bench.session(operator, None, seed, path)
+    delay = bench.config.core.follow_delay
+    script = operator.follow(path.begin, lambda now: path.finished(now - delay), lambda now: session.seen(path(now)))
+    ending, frames, views = rehearse(session, script)
+    result = Result("follow", seed, False, seconds=session.now, package=session.package.digest[:12])
+    on_path = [frame for frame in frames if path.begun + delay <= frame.now <= path.begun + delay + path.seconds]
+    if on_path:
+        off = [float(np.linalg.norm(frame.truth.tip - path(frame.now - delay))) for frame in on_path]
+        result.tip_mm, result.worst_mm = (1e3 * float(value) for value in np.quantile(off, (0.5, 0.95)))
+        result.nearest_mm = 1e3 * min(off)
+        wanted = [
+            float(np.linalg.norm(view.tip - view.intent.follow.tip.position))
+            for view in views
+            if view.intent.follow is not None and view.now >= path.begun + delay
+        ]
+        result.robot_mm = 1e3 * float(np.median(wanted)) if wanted else float("nan")
+    if not isinstance(ending, Ending):
+        result.cause = "stopped: the run did not end"
+    elif not ending.done:
+        result.cause = ending.why
+    else:
+        result.cause = interruption(views, session.refusals, path, s.interruption)
+    result.success = not result.cause
+    return result, frames
+
+
+def interruption(views: list, refusals: list[tuple[float, str]], path: Path, longest: float) -> str:
+    """Why the robot stayed where it was for longer than `longest` s while the path went on; "" if it did not."""
+    why = {now: reason for now, reason in refusals}
+    since = None
+    for view in views:
+        if not path.begun <= view.now <= path.begun + path.seconds:
+            continue
+        reason = why.get(view.now) or ("out of reach" if "stays at the last" in view.intent.notice else "")
+        if not reason:
+            since = None
+            continue
+        since = view.now if since is None else since
+        if view.now - since > longest:
+            return f"interrupted: {reason}"
+    return ""

@@ -1,0 +1,146 @@
+"""One session at the stand-in robot: controllers in, the core's intents, plans, their preview, and the robot's motion.
+
+It is what a client does, without a headset: it asks for plans when the core does, shows each as where the twin's tip
+comes to rest, runs what the core says, and holds otherwise.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from rehearsal.operator.hands import RayHand
+from rehearsal.package import Package
+from rehearsal.robot.stand_in import StandInRobot
+from trunkline.errors import InputError
+from trunkline.panda.kinematics import mount_pose
+from trunkline.teleop.config import Config
+from trunkline.teleop.core import Teleoperation
+from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.following import Follower
+from trunkline.teleop.messages import ExecutorReport, Input, Intent, Joints, PlanReport, Pose, World
+from trunkline.teleop.plan import Plan
+
+RATE = 60.0  # Hz, of a headset's frames
+TICKS = 2  # in which the robot is commanded a frame
+REFERENCE = Pose((1.3, 0.0, 0.6), (0.5, 0.5, 0.5, 0.5))  # where the operator stands: y up, looking along the base's -x
+
+Place = Callable[[float], np.ndarray]  # true position (3,), m, of the object in the Panda's base frame at a time, s
+
+
+@dataclass
+class View:
+    """What the operator sees at a frame, in the frame that the client takes for the Panda's base.
+
+    thing, tip (3,): m, of the object and of the robot's tip. previewed: m, where the shown plan's tip comes to rest.
+    """
+
+    now: float
+    intent: Intent
+    thing: np.ndarray
+    tip: np.ndarray
+    previewed: np.ndarray | None
+
+
+class Session:
+    """From the robot at rest with its arm straight. `place` says where the object truly is."""
+
+    def __init__(
+        self,
+        package: Package,
+        config: Config,
+        robot: StandInRobot,
+        hands: tuple[RayHand, RayHand],
+        world: World,
+        place: Place,
+    ) -> None:
+        self.package, self.config, self.robot, self.hands = package, config, robot, hands
+        self.world, self.place = world, place
+        self.core = Teleoperation(config.core, package.reach, package.digest, config.mount_offset)
+        self.state, self.planner = self.core.start(), package.planner(config)
+        self.executor = SimulatedRobot(
+            robot.joints[0], package.straight, self.planner.limits, package.digest, self._move
+        )
+        self.follower: Follower | None = None
+        self.plan: Plan | None = None
+        self.report: PlanReport | None = None
+        self.fault, self.shown, self.showing, self.since = "", "", "", 0.0
+        self.previewed: np.ndarray | None = None
+        self.now, self.rays, self.moved = 0.0, (None, None), False
+        self.refusals: list[tuple[float, str]] = []  # times at which targets were not followed, and why
+
+    def seen(self, place: np.ndarray) -> np.ndarray:
+        """A true place (3,), m, in the frame that the client takes for the Panda's base."""
+        return self.robot.instruments.turn.apply(place) + self.robot.instruments.shift
+
+    def frame(self) -> View:
+        """Let a frame pass."""
+        self.now += 1 / RATE
+        left, right = (hand.controller(self.now, end) for hand, end in zip(self.hands, self.rays, strict=True))
+        executor = ExecutorReport("fault", "", self.fault) if self.fault else self.executor.state()
+        joints: Joints = tuple(float(q) for q in self.robot.seen().joints)  # type: ignore[assignment]
+        given = Input(
+            self.now, left, right, REFERENCE, joints, self.world, self.package.digest, self.report, self.shown, executor
+        )
+        self.state, intent = self.core.step(self.state, given, 1 / RATE)
+        self.rays = intent.rays
+        if intent.request is not None and (self.report is None or self.report.serial != intent.request.serial):
+            self._plan(intent)
+        self._show(intent)
+        self._drive(intent)
+        previewed = self.previewed if intent.mode in ("preview", "ready", "delay") else None
+        tip = self.seen(self.robot.truth().tip)
+        return View(self.now, intent, self.seen(self.place(self.now)), tip, previewed)
+
+    def _plan(self, intent: Intent) -> None:
+        request = intent.request
+        assert request is not None
+        try:
+            self.plan = self.planner.plan(request, self.world, self.executor.joints, self.executor.commands)
+        except InputError as error:
+            self.report = PlanReport(request.serial, refused=str(error))
+            return
+        plan = self.plan
+        self.report = PlanReport(request.serial, plan.digest(), "", plan.package, plan.world)
+        mount, _ = mount_pose(plan.joints[-1:], self.config.mount_offset)
+        x, y, z = (float(value) for value in mount[0])
+        self.previewed = self.package.tip((x, y, z), request.targets, plan.commands[-1])
+
+    def _show(self, intent: Intent) -> None:
+        """The preview lasts as long as what it shows."""
+        if intent.preview != self.showing:
+            self.showing, self.since, self.shown = intent.preview, self.now, ""
+        if self.showing and self.plan is not None and self.now - self.since >= self.plan.duration:
+            self.shown = self.showing
+
+    def _drive(self, intent: Intent) -> None:
+        running = self.executor.state()
+        if intent.motion == "execute" and running.digest != intent.execute and self.plan is not None:
+            self.fault = self.executor.start(self.plan, intent.execute)
+        if intent.motion == "hold" and running.mode == "running":
+            self.executor.stop()
+        if intent.motion == "follow" and self.follower is None:
+            joints, commands = self.executor.joints, self.executor.commands
+            self.follower = Follower(self.planner, joints, commands, 1 / RATE / TICKS)
+        if intent.motion != "follow":
+            self.follower = None
+        self.moved = self.moved or intent.motion != "hold"
+        if not self.moved:
+            return  # a robot at rest stays as it is
+        targets = intent.follow
+        for _ in range(TICKS):
+            if self.follower is not None:
+                try:
+                    self.executor.joints, self.executor.commands = self.follower.tick(targets)
+                except InputError as error:
+                    self.fault, self.follower = str(error), None
+            self.executor.advance(1 / RATE / TICKS)
+        if self.follower is not None and self.follower.refused:
+            self.refusals.append((self.now, self.follower.refused))
+
+    def _move(self, joints: np.ndarray, commands: np.ndarray, dt: float) -> None:
+        try:
+            self.robot.send(joints, self.package.straight - commands)
+        except InputError as error:
+            self.fault = str(error)
+        self.robot.advance(dt)

@@ -1,0 +1,86 @@
+"""Hands of the simulated operator: they tremble, miss and lengthen their rays as their sources say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rehearsal import settings
+from rehearsal.operator.hands import RayHand
+from rehearsal.session import RATE, REFERENCE
+from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz
+from trunkline.teleop.hands import ray_length
+from trunkline.teleop.vectors import add, rotate, scale
+
+PLACE = np.array([0.5, 0.1, 0.2])
+ORIGIN = np.array([0.2, -0.1, -0.3])
+
+
+def hand(seed: int = 0, **changes) -> RayHand:
+    person = replace(settings.person(), **changes)
+    return RayHand(ORIGIN, REFERENCE, person, 0.15, np.random.default_rng(seed))
+
+
+def end(one: RayHand, now: float, length: float) -> np.ndarray:
+    """Of a ray of this length, base frame, m."""
+    found = one.controller(now, None)
+    place = add(found.position, scale(rotate(found.quaternion, (0.0, 0.0, -1.0)), length))
+    return np.array(add(REFERENCE.position, rotate(REFERENCE.quaternion, place)))
+
+
+def distance() -> float:
+    return float(np.linalg.norm(rotation_from_wxyz(np.array(REFERENCE.quaternion)).inv().apply(
+        PLACE - np.array(REFERENCE.position)) - ORIGIN))  # fmt: skip
+
+
+def test_a_hand_without_faults_points_where_it_aims():
+    one = hand(tremor_g=0.0, disparity_deg=0.0)
+    one.aim(PLACE, 0.0, 0.0)
+    np.testing.assert_allclose(end(one, 1.0, distance()), PLACE, atol=1e-9)
+
+
+def test_tremor_accelerates_a_hand_by_its_share_of_gravity():
+    one = hand(disparity_deg=0.0)
+    one.aim(PLACE, 0.0, 0.0)
+    times = np.arange(2.0, 12.0, 1e-3)
+    ends = np.array([end(one, float(now), distance()) for now in times])
+    person = one.person
+    # Of the ray's end the acceleration is larger than of the hand, as the one's distance from the wrist over the other.
+    acceleration = np.gradient(np.gradient(ends, times, axis=0), times, axis=0)[5:-5]
+    away = (PLACE - ends.mean(axis=0)) / distance()
+    assert np.linalg.norm(away) < 1e-3
+    peak = person.tremor_g * STANDARD_GRAVITY * distance() / person.wrist
+    # Two sines of that peak across the ray.
+    assert np.sqrt((acceleration**2).sum(axis=1).mean()) == pytest.approx(peak, rel=0.05)
+    frequency = np.abs(np.fft.rfft(ends - ends.mean(axis=0), axis=0)).sum(axis=1).argmax() / (times[-1] - times[0])
+    assert person.tremor_hz[0] - 0.1 <= frequency <= person.tremor_hz[1] + 0.1
+
+
+def test_four_of_a_hundred_aims_miss_the_width_of_what_is_aimed_at():
+    one, width, missed = hand(tremor_g=0.0), 0.06, []
+    for _ in range(4000):
+        one.aim(PLACE, width, 0.0)
+        missed.append(one.error[0])
+    assert np.mean(np.abs(missed) > width / 2) == pytest.approx(0.0388, abs=0.01)
+
+
+def test_an_aim_begins_where_the_hand_is():
+    one = hand(tremor_g=0.0)
+    one.aim(PLACE, 0.06, 0.0)
+    before = end(one, 2.0, distance())
+    one.aim(PLACE + [0.0, 0.1, 0.0], 0.06, 2.0)
+    np.testing.assert_allclose(end(one, 2.0, distance()), before, atol=1e-9)
+
+
+def test_the_stick_brings_the_rays_end_to_the_depth_that_is_aimed_at():
+    from tests.support.operator import config
+
+    one, rays, length = hand(tremor_g=0.0, disparity_deg=0.0), config().core.rays, 0.3
+    one.aim(PLACE, 0.0, 0.0)
+    seen = None
+    for frame in range(240):
+        found = one.controller(1.0 + frame / RATE, seen)
+        length = ray_length(length, found.stick[1], 1 / RATE, rays)
+        x, y, z = (float(value) for value in end(one, 1.0, length))
+        seen = (x, y, z)
+    assert length == pytest.approx(distance(), abs=2e-3)

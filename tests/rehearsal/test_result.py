@@ -1,0 +1,58 @@
+"""Rates with their intervals, and a table that is resumed."""
+
+import numpy as np
+import pytest
+
+from rehearsal.experiments.follow import Path as Way
+from rehearsal.experiments.result import Result, append_result, causes, rate, read_results
+from trunkline.errors import InputError
+
+
+def runs(successes: int, failures: int) -> list[Result]:
+    failed = [Result("reach", 100 + seed, False, "aim: beside it") for seed in range(failures)]
+    return [Result("reach", seed, True) for seed in range(successes)] + failed
+
+
+def test_the_interval_is_wilsons():
+    share, low, high = rate(runs(18, 2))
+    z, n, p = 1.959964, 20, 0.9
+    middle, half = p + z * z / (2 * n), z * np.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+    assert share == p
+    assert (low, high) == pytest.approx(
+        ((middle - half) / (1 + z * z / n), (middle + half) / (1 + z * z / n)), abs=1e-6
+    )
+
+
+def test_causes_are_counted_by_their_kind():
+    assert causes([*runs(3, 2), Result("reach", 9, False, "missed: by little")]) == {"aim": 2, "missed": 1}
+
+
+def test_rows_are_read_back(tmp_path):
+    file, first = tmp_path / "out/runs.csv", Result("reach", 3, False, "aim: beside, it", 2, 12.25, package="abc")
+    assert read_results(file) == []
+    append_result(file, first)
+    append_result(file, Result("follow", 4, True))
+    found = read_results(file)
+    assert [(one.experiment, one.seed, one.success, one.cause, one.plans) for one in found] == [
+        ("reach", 3, False, "aim: beside, it", 2), ("follow", 4, True, "", 0)
+    ]  # fmt: skip
+    assert found[0].aimed_mm == pytest.approx(12.25, abs=0.1)
+    assert np.isnan(found[1].aimed_mm)
+
+
+def test_a_table_of_other_columns_is_refused(tmp_path):
+    file = tmp_path / "runs.csv"
+    file.write_text("seed,success\n1,True\n")
+    with pytest.raises(InputError, match="found columns"):
+        read_results(file)
+
+
+def test_the_object_rests_until_its_path_begins_and_after_it_ends():
+    way = Way(np.array([0.5, 0.0, 0.1]), 0.06, 0.12, 15.0, np.random.default_rng(0))
+    np.testing.assert_array_equal(way(7.0), way.start)
+    way.begin(8.0)
+    np.testing.assert_allclose(way(8.0 + 1e-6), way.start, atol=1e-9)
+    np.testing.assert_array_equal(way(23.0), way(30.0))
+    assert np.linalg.norm(way(15.0) - way.start) > 0.01
+    assert not way.finished(22.9)
+    assert way.finished(23.1)
