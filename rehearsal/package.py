@@ -2,17 +2,14 @@
 
 import json
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import mujoco
 import numpy as np
-import onnxruntime
 
-from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.ik.ask import ask
 from trunkline.simulation.rest import settle
+from trunkline.statics.chain import Chain, read_chain
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.config import Config
 from trunkline.teleop.messages import Targets
@@ -20,12 +17,11 @@ from trunkline.teleop.planner import Planner
 from trunkline.teleop.reach import MapReach
 from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.swing import shaper_for
-from trunkline.teleop.tendons import Ask
+from trunkline.teleop.tendons import Network, network_of
 from trunkline.teleop.trajectory import limits_of
 from trunkline.teleop.vectors import DOWN, Vector, conjugate, rotate
-from trunkline.unity.package import read_tarball
+from trunkline.unity import unpacked
 from trunkline.unity.twin import MANIFEST
-from trunkline.unity.unpacked import maps_of, package_digest
 
 
 @dataclass(frozen=True)
@@ -35,8 +31,9 @@ class Package:
 
     digest: str
     reach: MapReach
-    ask: Ask
+    network: Network
     model: mujoco.MjModel
+    chain: Chain
     straight: np.ndarray
     rate_limit: float
 
@@ -45,8 +42,9 @@ class Package:
         limits = limits_of(config.motors, self.rate_limit, len(self.straight))
         shaper = shaper_for(self.model, config.shaping)
         return Planner(
-            RigidIK(config.mount_offset), self.ask, self.straight, limits, config.mount_offset, shaper=shaper
-        )
+            RigidIK(config.mount_offset), self.network, self.straight, limits, config.mount_offset,
+            shaper=shaper, chain=self.chain,
+        )  # fmt: skip
 
     def tip(self, mount: Vector, targets: Targets, commands: np.ndarray) -> np.ndarray:
         """Where the twin's tip comes to rest, base frame, m (3,): the arm at `mount` as `targets` turn it, its motors
@@ -63,21 +61,17 @@ def read_package(path: Path) -> Package:
     Raises:
         InputError: there is none, or a file of it is not what its manifest says.
     """
-    if path.is_dir():
-        files = {file.relative_to(path).as_posix(): file.read_bytes() for file in path.rglob("*") if file.is_file()}
-    elif path.is_file():
-        files = read_tarball(path)
-    else:
-        raise InputError(f"{path}: found nothing, expected a package's folder or .tgz")
-    digest = package_digest(files)
+    files = unpacked.read_package(path)
+    digest = unpacked.package_digest(files)
     manifest = json.loads(files[MANIFEST])
     network, model = manifest["network"], manifest["model"]
-    runtime = onnxruntime.InferenceSession(files[network["file"]], providers=["CPUExecutionProvider"])
+    compiled = unpacked.model_of(files)
     return Package(
         digest,
-        MapReach.from_arrays(maps_of(files)),
-        partial(ask, runtime),
-        mujoco.MjModel.from_xml_string(files[model["file"]].decode()),
+        MapReach.from_arrays(unpacked.maps_of(files)),
+        network_of(files[network["file"]]),
+        compiled,
+        read_chain(compiled).smooth,
         np.array([model["rest_lengths"][name] for name in network["output_order"]]),
         float(model["rate_limit"]),
     )

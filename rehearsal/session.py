@@ -5,7 +5,7 @@ comes to rest, runs what the core says, and holds otherwise.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -121,7 +121,8 @@ class Session:
             self.executor.stop()
         if intent.motion == "follow" and self.follower is None:
             joints, commands = self.executor.joints, self.executor.commands
-            self.follower = Follower(self.planner, joints, commands, 1 / RATE / TICKS)
+            quick = replace(self.planner, chain=None)  # what the network says, as often as the targets move
+            self.follower = Follower(quick, joints, commands, 1 / RATE / TICKS)
         if intent.motion != "follow":
             self.follower = None
         self.moved = self.moved or intent.motion != "hold"
