@@ -1,0 +1,106 @@
+"""Operator, core, planner and a robot that goes where it is sent: from hands to a motion, only after a confirmation."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rehearsal import settings
+from rehearsal.experiments.bench import ORIGINS, rehearse
+from rehearsal.operator.hands import RayHand
+from rehearsal.operator.scripts import Operator
+from rehearsal.session import REFERENCE, Session
+from tests.support.operator import PACKAGE, Everywhere, config
+from tests.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
+from trunkline.teleop.messages import World
+from trunkline.teleop.planner import Planner
+from trunkline.teleop.rigid_ik import RigidIK
+
+THING = np.array([0.6, 0.1, 0.1])
+
+
+class Arc:
+    """A package of an arm of constant curvature. `off`: m by which its first previews are beside the aim."""
+
+    def __init__(self, off: list[float]):
+        self.digest, self.reach, self.straight, self.off = PACKAGE, Everywhere(), STRAIGHT, off
+
+    def planner(self, _):
+        return Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.01)
+
+    def tip(self, mount, targets, commands):
+        x, y, z = targets.tip.position
+        return np.array([x, y, z]) + [0.0, 0.0, self.off.pop(0) if self.off else 0.0]
+
+
+class Sent:
+    """A robot that is where it is sent."""
+
+    def __init__(self):
+        self.joints, self.sent = np.array([START]), []
+        self.instruments = SimpleNamespace(turn=Rotation.identity(), shift=np.zeros(3))
+
+    def seen(self):
+        return SimpleNamespace(joints=self.joints[0])
+
+    def truth(self):
+        return SimpleNamespace(tip=np.zeros(3))
+
+    def send(self, joints, pulls):
+        self.joints = np.array([joints])
+        self.sent.append(np.append(joints, pulls))
+
+    def advance(self, dt):
+        pass
+
+
+def session(off: list[float]) -> tuple[Session, Operator]:
+    rng = np.random.default_rng(0)
+    person = replace(settings.person(), patience=3)
+    left, right = (RayHand(origin, REFERENCE, person, 0.15, rng) for origin in ORIGINS)
+    operator = Operator(person, (left, right), BENT, 0.03, 0.03, rng)
+    found = Session(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: THING)  # type: ignore[arg-type]
+    return found, operator
+
+
+@pytest.mark.parametrize("off", [[], [0.07, 0.07]])  # m by which the arm is above its target: then aimed below it
+def test_the_robot_moves_only_after_a_preview_on_the_object_was_confirmed(off):
+    plans, beside = max(len(off), 1), sum(off[:1])
+    found, operator = session(off)
+    ending, _, views = rehearse(found, operator.reach())
+    assert ending.done
+    assert ending.plans == plans
+    modes = [view.intent.mode for view in views]
+    assert modes.count("execute") > 0
+    assert sum(a != b == "preview" for a, b in zip(modes, modes[1:], strict=False)) == plans
+    first = next(view.now for view in views if view.intent.motion != "hold")
+    assert first == next(view.now for view in views if view.intent.mode == "execute")
+    np.testing.assert_allclose(found.robot.joints[0], found.plan.joints[-1], atol=1e-9)
+    assert np.linalg.norm(np.array(views[-1].intent.targets.tip.position) + [0.0, 0.0, beside] - THING) < 0.05
+
+
+def test_an_operator_without_a_preview_on_the_object_never_moves_the_robot():
+    found, operator = session([0.2, -0.2, 0.2])
+    ending, frames, _ = rehearse(found, operator.reach())
+    assert not ending.done
+    assert ending.why.startswith("aim")
+    assert ending.plans == 3
+    assert frames == []
+    assert found.robot.sent == []
+
+
+def test_following_moves_the_robot_until_the_path_is_over():
+    found, operator = session([])
+    begun = []
+    script = operator.follow(begin=begun.append, finished=lambda now: now > begun[0] + 2.0, place=lambda now: THING)
+    found.robot.truth = lambda: SimpleNamespace(tip=THING)
+    ending, frames, views = rehearse(found, script)
+    assert ending.done
+    assert views[-1].intent.mode == "follow"
+    assert len(found.robot.sent) > 0
+    assert found.fault == ""
+    # a hand that trembles at the edge of this arm's reach is refused now and then, and the robot holds meanwhile
+    assert {why.partition(":")[0] for _, why in found.refusals} <= {"out of reach"}
+    assert len(found.refusals) < 0.1 * len(views)
