@@ -73,8 +73,9 @@ def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
 def model_of(files: dict[str, bytes]) -> mujoco.MjModel:
     """The model with the springs and dampers that the manifest lists, as *Calibrated Springs* restores them."""
     block = _manifest(files)["model"]
-    joints = [[JointLaw(**law) for law in block[name]] for name in ("springs", "dampers")]
-    return compile_with(files[MODEL].decode(), Laws(*joints, [TendonLaw(**law) for law in block["diagonals"]]))
+    springs, dampers = ([JointLaw(**law) for law in block[name]] for name in ("springs", "dampers"))
+    laws = Laws(springs, dampers, [TendonLaw(**law) for law in block["diagonals"]])
+    return compile_with(files[MODEL].decode(), laws)
 
 
 def _manifest(files: dict[str, bytes]) -> dict:
