@@ -4,7 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rehearsal.experiments.result import LEVEL, Result, causes, rate
+from rehearsal.experiments.result import Result, causes, rate
+from trunkline.hybrid.shares import LEVEL
 
 
 def table(results: list[Result]) -> str:

@@ -4,11 +4,8 @@ import csv
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
-from scipy.stats import binomtest
-
 from trunkline.errors import InputError
-
-LEVEL = 0.95
+from trunkline.hybrid.shares import wilson
 
 
 @dataclass
@@ -68,10 +65,9 @@ def append_result(path: Path, result: Result) -> None:
 
 
 def rate(results: list[Result]) -> tuple[float, float, float]:
-    """Share of successes, and its Wilson interval at LEVEL."""
-    found = binomtest(sum(result.success for result in results), len(results))
-    interval = found.proportion_ci(LEVEL, method="wilson")
-    return float(found.statistic), float(interval.low), float(interval.high)
+    """Share of successes, and its Wilson interval."""
+    found, count = sum(result.success for result in results), len(results)
+    return found / count, *wilson(found, count)
 
 
 def causes(results: list[Result]) -> dict[str, int]:
