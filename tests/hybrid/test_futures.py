@@ -6,11 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.hybrid.conftest import STIFFER, hybrid_settings
-from trunkline.arm.holes import Holes, add_holes
-from trunkline.arm.joints import Branch, Joints, add_elements
-from trunkline.arm.material import unit_properties
-from trunkline.arm.mjcf import Solver, Tendons, build_spec
+from tests.hybrid.conftest import hybrid_settings, rubbing_arm
 from trunkline.arm.spiral import spiral_chain
 from trunkline.elements import actuators
 from trunkline.errors import InputError
@@ -32,14 +28,7 @@ SECONDS, PULL = 0.6, 0.02  # s, m
 
 @pytest.fixture(scope="module")
 def small() -> mujoco.MjSpec:
-    chain = spiral_chain(**SIZE)
-    properties = unit_properties(chain, 26e6, 1210.0, 0.24, 0.1)
-    tendons = Tendons(friction=0.0, kp=2000.0, max_force=18.0, time_constant=0.02, dead_time=0.02, count=3,
-                      radius_ratio=0.85, kv=7.0)  # fmt: skip
-    spec = build_spec(chain, properties, tendons, Solver(1 / 480, 1e-5, *STIFFER, *STIFFER))
-    add_elements(spec, Joints(branches=[Branch(0.2, 0.3)]), 1e-5)
-    add_holes(spec, Holes(0.12, 3))
-    return spec
+    return rubbing_arm(spiral_chain(**SIZE), 3)
 
 
 def way_of(arm: mujoco.MjModel, joints=None, seconds=SECONDS, let_go=None) -> Way:
