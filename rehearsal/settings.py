@@ -5,10 +5,11 @@ from pathlib import Path
 from typing import Annotated, TypeVar
 
 from omegaconf import OmegaConf
-from pydantic import Field, TypeAdapter
+from pydantic import Field
 
 from rehearsal.operator.hands import Person
 from rehearsal.robot.stand_in import StandIn
+from trunkline.pipeline.config import validated
 from trunkline.settings import read_yaml
 
 CONF = Path(__file__).parent / "conf/rehearse"
@@ -51,4 +52,6 @@ def free() -> Free:
 
 
 def _read(kind: type[Kind], file: str) -> Kind:
-    return TypeAdapter(kind).validate_python(OmegaConf.to_container(read_yaml(CONF / file)))
+    values = OmegaConf.to_container(read_yaml(CONF / file))
+    assert isinstance(values, dict)
+    return validated(kind, values, CONF / file)

@@ -16,13 +16,13 @@ from pathlib import Path
 
 import pandas as pd
 from omegaconf import OmegaConf
-from pydantic import TypeAdapter, ValidationError
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.figures.payload import payload_figure
 from trunkline.figures.style import save_figure
 from trunkline.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
 from trunkline.hybrid.payload import Cell, PayloadSettings, cells, chart_rows
+from trunkline.pipeline.config import validated
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
@@ -41,12 +41,7 @@ KEYS = [field.name for field in fields(Cell)]
 def read_settings(quick: bool) -> PayloadSettings:
     values = OmegaConf.to_container(read_yaml(SETTINGS))
     assert isinstance(values, dict)
-    try:
-        return TypeAdapter(PayloadSettings).validate_json(json.dumps(values | (QUICK if quick else {})), strict=True)
-    except ValidationError as error:
-        first = error.errors()[0]
-        raise InputError(f"{SETTINGS}: {'.'.join(map(str, first['loc']))}: found {first['input']!r}: {first['msg']}"
-                         ) from error  # fmt: skip
+    return validated(PayloadSettings, values | (QUICK if quick else {}), SETTINGS)
 
 
 def read_table(path: Path, digest: str) -> pd.DataFrame:

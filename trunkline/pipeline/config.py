@@ -67,12 +67,21 @@ def load_folder(schema: type[Schema], folder: Path) -> Schema:
     Raises:
         InputError: one line that names the folder and key, what was found and what was expected.
     """
-    composed, adapter = compose_settings(folder, {}, str(folder)), TypeAdapter(schema)
+    return validated(schema, compose_settings(folder, {}, str(folder)), folder)
+
+
+def validated(schema: type[Schema], values: dict, source: Path) -> Schema:
+    """`values`, read from `source`, as settings.
+
+    Raises:
+        InputError: one line that names the source and key, what was found and what was expected.
+    """
+    adapter = TypeAdapter(schema)
     try:
-        return adapter.validate_json(json.dumps(composed), strict=True)
+        return adapter.validate_json(json.dumps(values), strict=True)
     except ValidationError as error:
         first = min(error.errors(), key=rank)
-        where = ".".join([str(folder), *map(str, path_of(first, composed))])
+        where = ".".join([str(source), *map(str, path_of(first, values))])
         raise InputError(f"{where}: {describe(first, adapter)}") from error
 
 
