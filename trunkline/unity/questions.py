@@ -13,18 +13,30 @@ from trunkline.teleop.messages import Box, Controller, Input, Joints, Pose, Worl
 from trunkline.teleop.recorder import AIMS, FAULTS, Recorder
 from trunkline.teleop.settings import Teleop
 from trunkline.teleop.transitions import TRANSITIONS
-from trunkline.teleop.vectors import DOWN, Vector, about, add, conjugate, distance, rotate, scale, subtract
+from trunkline.teleop.vectors import (
+    DOWN,
+    Vector,
+    about,
+    add,
+    conjugate,
+    distance,
+    least_rotation,
+    rotate,
+    scale,
+    subtract,
+)
 from trunkline.unity.answers import Answers, Case
 
 DT = 0.09  # s a step: few of them, and none of the settings' times is a multiple of it, which rounding might decide
 ALIGNMENT = Pose((1.3, 0.0, 0.6), (0.5, 0.5, 0.5, 0.5))  # the reference's y is up, its -z the base's -x
 AHEAD: Vector = (0.0, 0.0, -1.0)  # of a controller
-EXECUTING = ("nan position", "controller gone", "time goes back", "gap", "swapped", "other package")
-AROUND = (np.array([-0.8, -0.8, -0.4]), np.array([0.8, 0.8, 1.2]))  # m, where mounts are looked for
+EXECUTING = ("nan position", "time goes back", "swapped")  # faults, as examples
+AROUND = (np.array([0.0, -0.8, -0.4]), np.array([0.8, 0.8, 1.2]))  # m, where mounts are looked for
 BELOW = (np.array([-0.3, -0.3, -0.5]), np.array([0.3, 0.3, 0.0]))  # m, where tips are, from the mount
 TRIES = 20_000  # pairs of targets
 APART = 0.15  # m from mount to tip, so that exchanged controllers are seen as such
 FIRST = Aligned(0.0, 0, 0.0)
+BENDS = np.radians(np.arange(-300, 301, 10))  # of the tip in its plane, of which the network likes one best
 TILTS = np.radians([0.0, 30.0, 60.0, 90.0, 170.0])  # of gravity; no map knows the last
 MANY = 24  # cases of a kind, about
 
@@ -99,7 +111,7 @@ def _reach(recorder: Recorder) -> None:
     recorder.wait(AIMS, left={"grip": True}, right={"grip": True})
     for roll in (20.0, -50.0, 100.0):  # about the ray, which stays where it is
         recorder.wait(0.8, **{rigid: {"primary": True, "quaternion": about((0.0, 0.0, 1.0), math.radians(roll))}})
-    recorder.wait(2.0, **{rigid: {"quaternion": (1.0, 0.0, 0.0, 0.0)}})
+    recorder.wait(1.0, **{rigid: {"quaternion": (1.0, 0.0, 0.0, 0.0)}})
     recorder.step(**{rigid: {"primary": False}})
     recorder.wait(0.8, **{tip: {"stick": (0.0, 1.0)}})
     recorder.step(**{tip: {"stick": (0.0, 0.0), "trigger": True}})
@@ -109,7 +121,7 @@ def _reach(recorder: Recorder) -> None:
     assert targets is not None
     x, y, z = targets.tip.position
     box = Box("the table", (x - 0.1, y - 0.1, z - 0.1), (x + 0.1, y + 0.1, z + 0.1))
-    recorder.step(world=World("another", (box,)))
+    recorder.wait(0.3, world=World("another", (box,)))
     recorder.step(**{tip: {"trigger": True}})
     recorder.step(world=World("world"), **{tip: {"trigger": False}})
     recorder.step(**{tip: {"trigger": True}})
@@ -188,13 +200,15 @@ def _offered(ask: Callable[..., Case], name: str, found: list[Case]) -> list[Cas
 
 
 def _targets(joints: Joints, rigid: Vector, tip: Vector, rng: np.random.Generator) -> list[Case]:
-    """Near both targets, under several gravities, some in a solid."""
+    """The arm near both targets, turned to several sides with them, some in a solid."""
     found = []
     for number in range(MANY):
-        mount, end = (add(at, _vector(rng.normal(scale=0.05, size=3))) for at in (rigid, tip))
+        pointing = _pointing(float(TILTS[number % 4]), rng)
+        away = rotate(least_rotation(DOWN, pointing), subtract(tip, rigid))
+        mount = add(rigid, _vector(rng.normal(scale=0.05, size=3)))
+        end = add(add(mount, away), _vector(rng.normal(scale=0.02, size=3)))
         x, y, z = (mount, end, (9.0, 9.0, 9.0))[number % 3]
         box = Box("the table", (x - 0.05, y - 0.05, z - 0.05), (x + 0.05, y + 0.05, z + 0.05))
-        pointing = _pointing(float(TILTS[number % 4]), rng) if number % 4 else DOWN
         found.append({"rigid": mount, "tip": end, "pointing": pointing, "joints": joints, "last": FIRST._asdict(),
                       "boxes": [asdict(box)]})  # fmt: skip
     return found
@@ -208,9 +222,10 @@ def _poses(answers: Answers, rng: np.random.Generator) -> list[Case]:
         gravity = _pointing(tilt, rng) if answers.inputs > 8 else (math.sin(tilt), 0.0, -math.cos(tilt))
         tip = _vector(rng.uniform(*BELOW))
         tip = answers.soft_reach(tip, gravity)["offer"] or tip if number % 4 else scale(tip, 3.0)
-        plane = math.atan2(tip[1], tip[0])
-        turn = about((-math.sin(plane), math.cos(plane), 0.0), float(rng.uniform(-3.0, 3.0)))
-        found.append({"pose": [*(gravity if answers.inputs > 8 else (tilt,)), *tip, *turn]})
+        axis = (-tip[1] / math.hypot(tip[0], tip[1]), tip[0] / math.hypot(tip[0], tip[1]), 0.0)
+        told = gravity if answers.inputs > 8 else (tilt,)
+        asked = [{"pose": [*told, *tip, *about(axis, float(bend))]} for bend in BENDS]
+        found.append(min(asked, key=lambda case, tip=tip: distance(answers.network(**case)["tip"], tip)))
     return found
 
 
