@@ -390,7 +390,7 @@ def project(tmp_path, sources) -> Path:
     (root / "artifacts/reachability/meshes").mkdir()
     for path in sources.meshes:
         shutil.copy(path, root / "artifacts/reachability/meshes")
-    shutil.copy(sources.grids, root / "artifacts/reachability")
+    np.savez(root / "artifacts/reachability/grids.npz", **grids(), **sheets_of_a_ball().arrays())
     return root
 
 
@@ -418,6 +418,7 @@ def test_the_stage_writes_package_manifest_and_metrics(project, change):
     assert (out / "manifest.json").read_bytes() == files[MANIFEST]
     assert onnx.load_model_from_string(files[NETWORK]).graph.name == "ik"
     assert json.loads(files["package.json"])["version"] in tarball.name
+    assert "Tests/Vectors/steps.json" in files
 
 
 @pytest.mark.parametrize(
