@@ -4,7 +4,7 @@ from pathlib import Path
 
 from trunkline.figures.package import roundtrip_figure
 from trunkline.figures.style import save_figure
-from trunkline.hybrid.robots import PandaRobot
+from trunkline.hybrid.robots import Robot
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.settings import settings
 from trunkline.teleop.settings import Teleop
@@ -21,7 +21,7 @@ ARTIFACTS = Path("artifacts/package_unity")
 @settings
 class Config(Label):
     roundtrip: Trajectory
-    robot: PandaRobot
+    robot: Robot
     core: Teleop
 
 

@@ -16,7 +16,7 @@ from trunkline.teleop.reach import MapReach
 from trunkline.teleop.settings import Teleop
 from trunkline.teleop.targets import place
 from trunkline.unity.twin import NETWORK
-from trunkline.unity.unpacked import maps_of, robot_of
+from trunkline.unity.unpacked import maps_of
 
 PACKAGE = "a" * 64  # stands for the package's digest, which depends on the shared vectors
 DIGITS = 7  # after the point, of the network's answers: its numbers are of 32 bits
@@ -72,7 +72,7 @@ class Answers:
         return onnxruntime.InferenceSession(self.network_file, providers=["CPUExecutionProvider"])
 
 
-def answers_of(files: dict[str, bytes], core: Teleop) -> Answers:
-    """What a package's files answer with these settings of the core."""
-    reach, offset = MapReach.from_arrays(maps_of(files)), robot_of(files).mount_offset
-    return Answers(Teleoperation(core, reach, PACKAGE, offset), files[NETWORK])
+def answers_of(files: dict[str, bytes], core: Teleop, mount_offset: float) -> Answers:
+    """What a package's files answer with these settings of the core, the mount so far from the flange, m."""
+    reach = MapReach.from_arrays(maps_of(files))
+    return Answers(Teleoperation(core, reach, PACKAGE, mount_offset), files[NETWORK])

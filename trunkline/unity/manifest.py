@@ -7,7 +7,7 @@ import mujoco
 from pydantic import BaseModel, ConfigDict, Field
 
 from trunkline.elements import cables
-from trunkline.hybrid.robots import PandaRobot
+from trunkline.hybrid.robots import Robot
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw, TendonLaw
 
@@ -97,7 +97,7 @@ class Hybrid(_Block):
         description="what was identified, a stage after the other: of each parameter `value`, `unit` and"
         " `interval_95_given_model`, and how those of a stage correlate; the latest stage counts"
     )
-    robot: PandaRobot = Field(description="what holds the arm, as `trunkline/hybrid/robots.py` says")
+    robot: Robot = Field(description="what holds the arm, as `trunkline/hybrid/robots.py` says")
 
 
 class Network(_Block):

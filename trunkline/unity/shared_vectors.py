@@ -12,13 +12,15 @@ from collections.abc import Iterable
 import numpy as np
 from pydantic import TypeAdapter
 
+from trunkline.hybrid.robots import PandaRobot
 from trunkline.teleop.core import Teleoperation
-from trunkline.teleop.messages import Input, to_json
+from trunkline.teleop.messages import Input, Joints, to_json
 from trunkline.teleop.settings import Teleop
 from trunkline.unity.answers import Answers, Case, answers_of
 from trunkline.unity.manifest import Manifest
 from trunkline.unity.package import without_metas
-from trunkline.unity.questions import cases, sequences, within_reach
+from trunkline.unity.questions import cases, within_reach
+from trunkline.unity.sequences import sequences
 from trunkline.unity.twin import MANIFEST, sealed
 from trunkline.unity.unpacked import robot_of
 
@@ -29,13 +31,17 @@ SETTINGS = TypeAdapter(Teleop)
 
 
 def with_shared_vectors(files: dict[str, bytes], core: Teleop) -> dict[str, bytes]:
-    """A package with its shared vectors, made with these settings of the core.
+    """A package with its shared vectors, made with these settings of the core; without them where a mount stands still,
+    as nothing is teleoperated then.
 
     Raises:
         InputError: its maps leave nothing within reach.
     """
-    answers, rng, (*ready,) = answers_of(files, core), np.random.default_rng(SEED), robot_of(files).ready
-    joints = tuple(float(angle) for angle in ready)
+    robot = robot_of(files)
+    if not isinstance(robot, PandaRobot):
+        return files
+    answers, rng = answers_of(files, core, robot.mount_offset), np.random.default_rng(SEED)
+    joints: Joints = tuple(float(angle) for angle in robot.ready)  # type: ignore[assignment]
     rigid, tip = within_reach(answers, joints, rng)
     vectors = {STEPS: steps_file(answers.core, sequences(answers.core, joints, rigid, tip))}
     for name, questions in cases(answers, joints, rigid, tip, rng).items():
@@ -43,10 +49,10 @@ def with_shared_vectors(files: dict[str, bytes], core: Teleop) -> dict[str, byte
     return sealed(Manifest.model_validate_json(files[MANIFEST]), without_metas(files) | vectors)
 
 
-def steps_file(core: Teleoperation, sequences: dict[str, list[tuple[float, Input]]]) -> bytes:
+def steps_file(core: Teleoperation, recorded: dict[str, list[tuple[float, Input]]]) -> bytes:
     """Sequences of inputs, with the time of each step, s, and the intents that follow from the core's start."""
     told = []
-    for name, steps in sequences.items():
+    for name, steps in recorded.items():
         state, lines = core.start(), []
         for dt, given in steps:
             state, intent = core.step(state, given, dt)

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.errors import InputError
-from trunkline.hybrid.robots import PandaRobot
+from trunkline.hybrid.robots import Robot
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize
 from trunkline.unity.manifest import Hybrid, Manifest, Versions, describe_model, hashes
@@ -76,7 +76,7 @@ class Sources:
 
 
 def assemble(
-    label: Label, sources: Sources, trajectory: Trajectory, robot: PandaRobot
+    label: Label, sources: Sources, trajectory: Trajectory, robot: Robot
 ) -> tuple[dict[str, bytes], list[Violation]]:
     """All files of the package by path, and the rules that it breaks."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)

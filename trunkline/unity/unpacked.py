@@ -7,10 +7,11 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from pydantic import TypeAdapter
 
 from trunkline.errors import InputError
 from trunkline.hybrid import doubts
-from trunkline.hybrid.robots import PandaRobot
+from trunkline.hybrid.robots import Robot
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
 from trunkline.unity.package import read_tarball
@@ -94,9 +95,9 @@ def doubts_of(files: dict[str, bytes], contact: doubts.Contact | None = None) ->
     return doubts.doubts_of(json.loads(_file(files, "parameters"))["stages"], contact)
 
 
-def robot_of(files: dict[str, bytes]) -> PandaRobot:
+def robot_of(files: dict[str, bytes]) -> Robot:
     """What holds the arm."""
-    return PandaRobot(**_hybrid(files)["robot"])
+    return TypeAdapter(Robot).validate_python(_hybrid(files)["robot"])
 
 
 def _file(files: dict[str, bytes], name: str) -> bytes:
