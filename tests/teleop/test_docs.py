@@ -4,6 +4,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from omegaconf import OmegaConf
 
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, SHARED, load_folder
@@ -31,3 +32,14 @@ def test_settings_compose_and_a_typo_is_one_line(tmp_path):
     core.write_text(text.replace("start: 0.6 ", "start: 9.0 "))
     with pytest.raises(InputError, match=r"rays\.start: found 9"):
         load_folder(Config, tmp_path / "teleop")
+
+
+def test_the_mount_is_as_far_from_the_flange_everywhere():
+    """In teleoperation, in the maps and in the package: each has its own settings."""
+    read = lambda file: OmegaConf.load(PROJECT / file)  # noqa: E731
+    places = {
+        "teleop": read("conf/teleop/config.yaml").mount_offset,
+        "reachability": read("params.yaml").reachability.rigid.mount_offset,
+        "robot": read("conf/shared/robot/panda.yaml").mount_offset,
+    }
+    assert len(set(places.values())) == 1, places
