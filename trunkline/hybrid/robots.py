@@ -1,4 +1,4 @@
-"""What holds the arm: the Panda, or a mount that stands still. A config group each in `conf/hybrid/robot/`.
+"""What holds the arm: the Panda, or a mount that stands still. A config group each in `conf/shared/robot/`.
 
 The arm's base frame has the straight arm along -z and tendon 1 over +x; a mount has z out of the flange. So the base
 is the mount turned by half a turn about its x, and then by `azimuth` about the arm's axis.
