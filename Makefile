@@ -23,7 +23,7 @@ test: setup          ## run every test, then lint
 	python -m pytest -n auto --dist loadgroup
 	ruff check --output-format concise .
 
-types: setup         ## check the types of the library and the stages
+types: setup         ## check the types of all but the tests and the stand-in lab
 	pyright
 
 gate: setup          ## compare the metrics with tests/limits.yaml

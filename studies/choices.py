@@ -18,7 +18,6 @@ from importlib import import_module
 from pathlib import Path
 
 import mujoco
-from omegaconf import OmegaConf
 
 from benchmarks.identification.case import STAGES, require_demo, spread
 from benchmarks.identification.timing import Stopwatch
@@ -35,6 +34,7 @@ from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.results import recorded
+from trunkline.settings import read_yaml
 from trunkline.trials.experiments import is_static
 from trunkline.trials.splits import VALIDATE
 from trunkline.trials.trial import Trial
@@ -92,7 +92,7 @@ def with_distances(stage: str, config: IdentificationSettings) -> Identification
 
 def variant(schema: type, file: Path):
     """A file of conf/shared/ as settings of type `schema`."""
-    return schema(**OmegaConf.to_container(OmegaConf.load(file)))
+    return schema(**{str(key): value for key, value in read_yaml(file).items()})
 
 
 def with_least_squares(stage: str, config: IdentificationSettings) -> IdentificationSettings:
@@ -147,9 +147,9 @@ class Chain:
 
     model: mujoco.MjModel
     experiments: list[Experiment]
-    fit: Fit | None
+    fit: Fit
     spent: list[float]
-    result: Identification | None = None
+    result: Identification
 
 
 def chain(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> Chain:
@@ -158,7 +158,7 @@ def chain(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> Chain:
     Args:
         known: chains so far by all that they depend on; a row that changes a later stage alone begins with them.
     """
-    found, key = Chain(read_spec(CAD_MODEL).compile(), [], None, []), ""
+    model, spent, key = read_spec(CAD_MODEL).compile(), [], ""
     for stage in STAGES:
         config = choice.settings(stage, load_config(import_module(f"stages.{stage}").Config, stage))
         config = quick(stage, config) if is_quick else config
@@ -166,18 +166,21 @@ def chain(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> Chain:
         key += f"{stage} {config} {[trial.in_motion for trial in trials]}\n"
         if key not in known:
             with contextlib.redirect_stdout(sys.stderr):
-                known[key] = next_link(found, stage, config, trials, is_quick)
-        found = known[key]
-    return found
+                known[key] = next_link(model, spent, stage, config, trials, is_quick)
+        model, spent = known[key].model, known[key].spent
+    return known[key]
 
 
-def next_link(before: Chain, stage: str, config: IdentificationSettings, trials: list[Trial], is_quick: bool) -> Chain:
-    """The chain with one stage more."""
-    model, experiments, fit = set_up(config, trials, before.model)
+def next_link(
+    model: mujoco.MjModel, before: list[float], stage: str, config: IdentificationSettings, trials: list[Trial],
+    is_quick: bool,
+) -> Chain:
+    """One stage more, from `model`; `before`: CPU seconds of the stages that led to it."""
+    model, experiments, fit = set_up(config, trials, model)
     experiments = fewer(experiments, QUICK_TRIALS) if is_quick else experiments
     clock = Stopwatch()
     result = identify(stage, model, [e for e in experiments if e.kind in config.experiments], fit)
-    spent = [*before.spent, clock.read().cpu]
+    spent = [*before, clock.read().cpu]
     for line in [*doubts(result, fit.parameters), result.values]:
         print(f"{stage}: {line}")
     return Chain(result.models["identified"], experiments, fit, spent, result)
@@ -203,7 +206,7 @@ def row(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> str:
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.choices", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.choices", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="few trials, frames and iterations: only whether it runs")
     parser.add_argument("--only", nargs="+", choices=CHOICES, default=list(CHOICES), help="some of the rows")
     arguments = parser.parse_args()

@@ -103,7 +103,7 @@ def cover(name: str, is_matched: bool, repetitions: int) -> Coverage:
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.coverage", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.coverage", description=__doc__)
     parser.add_argument("--repetitions", type=int, default=REPETITIONS)
     arguments = parser.parse_args()
     with recorded("coverage", keep=arguments.repetitions >= REPETITIONS):

@@ -133,18 +133,18 @@ def left_out(link: Chain, stage: str, folds: int) -> np.ndarray:
 
 def chain(effects: list[Effect], last: str, known: dict[str, Chain]) -> Chain:
     """The stages up to `last`, each on what the one before it found."""
-    found, key = Chain(cad_model(effects), [], None, []), ""
+    model, spent, key = cad_model(effects), [], ""
     for stage in STAGES:
         config = settings_of(stage, effects)
-        lag = found.model.actuator_dynprm[:1, 0]
-        key += f"{stage} {config} {found.model.nq} {found.model.ntendon} {found.model.nhistory} {lag}\n"
+        lag = model.actuator_dynprm[:1, 0]
+        key += f"{stage} {config} {model.nq} {model.ntendon} {model.nhistory} {lag}\n"
         if key not in known:
             with contextlib.redirect_stdout(sys.stderr):
-                known[key] = next_link(found, stage, config, read_reported(config), is_quick=False)
-        found = known[key]
+                known[key] = next_link(model, spent, stage, config, read_reported(config), is_quick=False)
+        model, spent = known[key].model, known[key].spent
         if stage == last:
             break
-    return found
+    return known[key]
 
 
 def validated(title: str, link: Chain, trials: list[Trial], cad: mujoco.MjModel) -> list[str]:
@@ -172,7 +172,7 @@ def validated(title: str, link: Chain, trials: list[Trial], cad: mujoco.MjModel)
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.effects", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.effects", description=__doc__)
     parser.add_argument("--folds", type=int, default=3, help="groups of trials that are left out in turn")
     parser.add_argument("--only", nargs="+", choices=EFFECTS, default=list(EFFECTS), help="effects to try")
     arguments = parser.parse_args()

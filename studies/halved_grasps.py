@@ -10,17 +10,21 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
 from studies.payload import MODEL, read_settings
 from trunkline.errors import in_one_line
+from trunkline.hybrid.grasps import Pull
+from trunkline.hybrid.objects import Shape
 from trunkline.hybrid.payload import Cell, try_masses
 from trunkline.hybrid.shares import wilson
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
 
+SHAPES, PULLS = get_args(Shape), get_args(Pull)
 DIAMETERS, MASSES, FRICTIONS = (0.02, 0.08), (0.05, 0.5), (0.3, 0.6)  # m, kg
 WRAPS, GAPS = (0.4, 0.9), (0.0, 0.03)  # turns, m
 TOGETHER = 4  # placements of each draw
@@ -41,8 +45,8 @@ def main() -> int:
         for draw in range(draws):
             grasp = replace(chart.grasp, wrap=rng.uniform(*WRAPS), gap=rng.uniform(*GAPS))
             own = replace(chart, grasp=grasp, placements=TOGETHER, spread=SPREAD, seed=draw)
-            cell = Cell("hanging", str(rng.choice(["cylinder", "box", "sphere", "toy"])), rng.uniform(*DIAMETERS),
-                        rng.uniform(*FRICTIONS), str(rng.choice(["dorsal", "ventral"])), 0.2)  # fmt: skip
+            cell = Cell("hanging", SHAPES[rng.integers(len(SHAPES))], rng.uniform(*DIAMETERS),
+                        rng.uniform(*FRICTIONS), PULLS[rng.integers(len(PULLS))], 0.2)  # fmt: skip
             mass = np.array([rng.uniform(*MASSES)])
             whole, half = (try_masses(arm, own, cell, mass, arm.option.timestep / part) for part in (1, 2))
             held = [tried.held(chart.sag, chart.slip) for tried in (whole, half)]

@@ -98,7 +98,7 @@ def search(chain: Chain, lengths, gravity, known, guesses: int, rng: np.random.G
         counts[row] = len(different)
         if different:
             apart[row] = np.linalg.norm(np.array(different)[:, None] - different, axis=2).max()
-    return Branches(good.any(axis=0), counts, apart)
+    return Branches(np.asarray(good.any(axis=0)), counts, apart)
 
 
 def first_guesses(chain: Chain, count: int, rng: np.random.Generator, random_bend: bool) -> np.ndarray:

@@ -64,6 +64,7 @@ def exchanged(trial: Trial, rng: np.random.Generator) -> Trial:
     first = rng.integers(0, len(order) - 2)
     second = rng.integers(first + 2, len(order))
     order[[first, second]] = second, first
+    assert trial.quaternions is not None
     return replace(trial, positions=trial.positions[:, order], quaternions=trial.quaternions[:, order])
 
 
@@ -74,6 +75,7 @@ def turned(trial: Trial, rng: np.random.Generator) -> Trial:
 
 def swung(trial: Trial, rng: np.random.Generator) -> Trial:
     """The same release from a hand that swings the whole arm to and fro, one sine in all joints, and lets go."""
+    assert trial.quaternions is not None
     model = read_spec(PLANT).compile()
     start, step = prepare(trial, model, 1), float(trial.time[1] - trial.time[0])
     model.opt.gravity[:], model.opt.timestep = trial.gravity, step / 8
@@ -170,7 +172,7 @@ def sessions(count: int) -> list[tuple[Spoil, int]]:
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.spoilt", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.spoilt", description=__doc__)
     parser.add_argument("--sessions", type=int, default=SESSIONS)
     arguments = parser.parse_args()
     for model in (CAD_MODEL, *STAGES.values(), PLANT):

@@ -114,7 +114,7 @@ def session(name: str, seed: int) -> tuple[float, bool, int, int]:
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.starts", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.starts", description=__doc__)
     parser.add_argument("--sessions", type=int, default=SESSIONS)
     arguments = parser.parse_args()
     with recorded("starts", keep=arguments.sessions == SESSIONS), threadpool_limits(1):

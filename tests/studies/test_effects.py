@@ -31,7 +31,7 @@ def test_errors_stand_beside_null_model_cad_model_and_noise_floor():
     cad.jnt_stiffness[:] *= 3
     trials = [curl(plant, 20, split, frames=60, noise=1e-4) for split in ("identify", "validate")]
     experiments = [prepare(trial, model, 60) for trial in trials]
-    link = Chain(model, experiments, SimpleNamespace(segments=segments_of(model)), [])
+    link = Chain(model, experiments, SimpleNamespace(segments=segments_of(model)), [], None)
     (row,) = validated("this", link, trials, cad)
     title, kind, _, position, tip, percent, null, guess, floor = row.strip("| ").split(" | ")
     assert (title, kind) == ("this", "curl")
