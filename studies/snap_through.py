@@ -9,6 +9,8 @@ are drawn in alike, as for the paper's grasps, and equilibria are sought from sh
 """
 
 import argparse
+import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 from typing import NamedTuple
 
@@ -104,7 +106,7 @@ def search(chain: Chain, lengths, gravity, known, guesses: int, rng: np.random.G
     """Stable equilibria of `lengths` (N, K), m, under `gravity` (N, 3), from `known` (N, nq) and `guesses` shapes."""
     count = len(lengths)
     tips, good = np.empty((guesses + 1, count, 3)), np.empty((guesses + 1, count), bool)
-    with progress(guesses + 1, "snap_through", "guesses") as bar:
+    with redirect_stdout(sys.stderr), progress(guesses + 1, "snap_through", "guesses") as bar:
         for guess in range(guesses + 1):
             qpos = known if guess == 0 else first_guesses(chain, count, rng, random_bend=guess % 2 == 0)
             found = restart(chain, qpos, np.zeros_like(lengths), lengths, gravity)
