@@ -165,7 +165,7 @@ def figure(results: dict[float, Branches], ventral: dict[int, Alike]):
     for (angle, found), color in zip(ventral.items(), (IDENTIFIED, VALIDATE, INITIAL), strict=True):
         plane.scatter(1e3 * found.drawn_in, 1e3 * found.aside, s=9, color=color, linewidths=0, label=f"θ_G = {angle}°")
     plane.set(xlabel="both ventral tendons drawn in (mm)", ylabel="tip out of the plane (mm)")
-    plane.legend(loc="upper left", markerscale=2)
+    plane.legend(loc="best", markerscale=2)
     drawn = list(results)
     places = np.arange(len(drawn))
     shares = [100 * (found.count[found.solved] > 1).mean() if found.solved.any() else 0.0 for found in results.values()]

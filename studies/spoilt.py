@@ -9,7 +9,7 @@ loss without weights of trials gets: the minimum at which the same search is bef
 as named if it decides too much or is outlying, and what is said to look wrong must be what was spoilt.
 
 A session's row is kept in docs/results/spoilt.csv as soon as it is done; stopped, the study goes on from there. All
-twenty take about half an hour of two cores. Progress goes to stderr.
+twenty take some fifteen minutes of one core. Progress goes to stderr.
 """
 
 import argparse
