@@ -121,19 +121,22 @@ def swung(trial: Trial, rng: np.random.Generator) -> Trial:
 
 @dataclass
 class Spoil:
-    """says: in what is printed of the trial, if what is wrong with it was found."""
+    """says: words in what is said of the trial, any of them, if what is wrong with it was found."""
 
     title: str
     stage: str
     change: Callable[[Trial, np.random.Generator], Trial]
-    says: str
+    says: tuple[str, ...]
+
+    def is_told(self, said: str) -> bool:
+        return any(words in said for words in self.says)
 
 
 SPOILS = (
-    Spoil("start dated early", "identify_damping", early, "later fits better"),
-    Spoil("labels exchanged", "identify_stiffness", exchanged, "look exchanged"),
-    Spoil("gravity turned", "identify_stiffness", turned, "gravity"),
-    Spoil("swinging start", "identify_damping", swung, "in motion"),
+    Spoil("start dated early", "identify_damping", early, ("later fits better",)),
+    Spoil("labels exchanged", "identify_stiffness", exchanged, ("look exchanged",)),
+    Spoil("gravity turned", "identify_stiffness", turned, ("gravity turned", "gravity in its base frame")),
+    Spoil("swinging start", "identify_damping", swung, ("in motion", "when it is let go")),
 )
 
 
@@ -225,7 +228,7 @@ def clean_row(stage: str) -> dict[str, float | str]:
     """Of a session without a spoilt trial. said: of the trials that are named all the same."""
     clean = found(stage, clean_trials(stage))
     said = [f"{name}: {'; '.join(told) or 'named'}" for name, told in clean.told.items()]
-    return {"stage": stage, "spoilt": CLEAN, "trial": "", **errors_in(clean), "right": "", "others": len(said),
+    return {"stage": stage, "spoilt": CLEAN, "trial": "", **errors_in(clean), "others": len(said),
             "said": " / ".join(said)}  # fmt: skip
 
 
@@ -237,10 +240,9 @@ def spoilt_row(spoil: Spoil, seed: int) -> dict[str, float | str]:
     session[index] = spoilt = spoil.change(session[index], rng)
     result = found(spoil.stage, session)
     said = result.told.get(spoilt.name, []) + ["in motion at its start"] * spoilt.in_motion
-    right = "yes" if any(spoil.says in sentence for sentence in said) else "no"
     others = len(set(result.told) - {spoilt.name})
-    return {"stage": spoil.stage, "spoilt": spoil.title, "trial": spoilt.name, **errors_in(result), "right": right,
-            "others": others, "said": "; ".join(said)}  # fmt: skip
+    return {"stage": spoil.stage, "spoilt": spoil.title, "trial": spoilt.name, **errors_in(result), "others": others,
+            "said": "; ".join(said)}  # fmt: skip
 
 
 def errors_in(found: Found) -> dict[str, float | str]:
@@ -259,14 +261,15 @@ def report(rows: dict[str, dict], seeds: list[str]) -> None:
     shown = [rows[seed] for seed in seeds]
     ratios = np.array([[row[name] / clean[row["stage"]][name.removeprefix("plain_")] for name in ERRORS]
                        for row in shown])  # fmt: skip
-    for seed, row, ratio in zip(seeds, shown, ratios, strict=True):
-        cells = [seed, row["spoilt"], row["trial"], *(f"{value:.3f}" for value in ratio)]
-        cells += ["yes" if row["said"] else "no", row["right"], str(row["others"]), row["said"]]
-        print("| " + " | ".join(cells) + " |")
+    named = ["yes" if row["said"] else "no" for row in shown]
+    by_title = {spoil.title: spoil for spoil in SPOILS}
+    right = ["yes" if by_title[row["spoilt"]].is_told(row["said"]) else "no" for row in shown]
+    for seed, row, ratio, *told in zip(seeds, shown, ratios, named, right, strict=True):
+        cells = [seed, row["spoilt"], row["trial"], *(f"{value:.3f}" for value in ratio), *told]
+        print("| " + " | ".join([*cells, str(row["others"]), row["said"]]) + " |")
     within = (ratios[:, :2] <= WITHIN).sum(axis=0)
-    named, right = sum(row["said"] != "" for row in shown), sum(row["right"] == "yes" for row in shown)
     near = f"{within[0]} by position and {within[1]} by tip of {len(shown)}"
-    print(f"within 10 % of the clean session: {near}; named: {named}; rightly: {right}")
+    print(f"within 10 % of the clean session: {near}; named: {named.count('yes')}; rightly: {right.count('yes')}")
 
 
 @in_one_line

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from studies import spoilt
@@ -12,6 +13,7 @@ from tests.support.matched_plant import release, segments_of, small_model, tilt
 from trunkline.identification.experiment import prepare
 from trunkline.identification.identify import identify, values_of
 from trunkline.identification.problem import Bounds
+from trunkline.identification.suspicion import moving_start
 
 CLEAN = Found(position=2.0, tip=5.0, plain_position=2.0, plain_tip=5.0, told={})
 
@@ -79,3 +81,14 @@ def test_before_trials_are_weighed_the_search_is_where_one_without_weights_ends(
         ends[outlying] = identify("test", PLANT, experiments, fit).values, values_of(bounds, fit.plain.vector)
     assert ends[4.0][0] != ends[1e9][0]
     assert ends[4.0][1] == ends[1e9][1] == ends[1e9][0]
+
+
+def test_a_hand_that_swings_is_told_in_the_words_of_the_stage():
+    """Where the start moves on from a hand that swings, and where the arm is simulated from rest all the same."""
+    (swinging,) = (spoil for spoil in SPOILS if spoil.title == "swinging start")
+    trial = replace(release(PLANT, 0.3, frames=30), start=10 / 120)
+    swayed = trial.positions + 0.2 * np.arange(30)[:, None, None] / 120 * [1, 0, 0]  # m, at 0.2 m/s
+    swayed = replace(trial, positions=swayed)
+    said = moving_start(swayed, prepare(swayed, PLANT, 20))
+    assert swinging.is_told(said)
+    assert not swinging.is_told("starting it 0.10 s later fits better")
