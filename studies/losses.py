@@ -173,7 +173,7 @@ def main() -> int:
     if arguments.weight_velocity is not None:
         weights = replace(case.fit.weights, weight_velocity=arguments.weight_velocity)
         case = replace(case, fit=replace(case.fit, weights=weights))
-    with recorded("losses"):
+    with recorded("losses", keep=len(sys.argv) == 1):
         with contextlib.redirect_stdout(sys.stderr):
             results = recover(case, read_spec(PLANT).compile(), read_noise(), arguments.repetitions)
         print(table(list(case.fit.parameters), results))

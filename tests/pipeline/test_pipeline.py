@@ -296,11 +296,50 @@ def test_a_queued_sweep_runs_every_value(pipeline):
     assert (pipeline.folder / "params.yaml").read_text() == before
 
 
+def test_what_was_pushed_is_pulled_elsewhere_and_not_run_again(pipeline, tmp_path):
+    """docs/remotes.md, with a folder as the remote: the results, and then a session of one's own."""
+    store = ("-q", "-d", "store", str(tmp_path / "store"))
+    make = ("make", "--silent", "--assume-old=setup")  # the environment is there
+    pipeline.run("dvc", "remote", "add", "--local", *store)
+    pipeline.run(*make, "push")
+    there = pipeline.clone(tmp_path / "there")
+    missing = {name for name in _outputs(pipeline) if not (there.folder / name).exists()}
+    assert {"data/raw/demo", "artifacts/identify_control/arm.xml", "data/processed/fk_dataset"} <= missing
+    there.run("dvc", "remote", "add", *store)
+    there.run(*make, "pull")
+    assert all(_content(there, name) == _content(pipeline, name) for name in _outputs(pipeline))
+    assert there.ran("dvc", "repro", "-q") == []
+
+    own = "data/raw/july"
+    (there.folder / own).mkdir()
+    (there.folder / own / "release_1.mcap").write_text("poses")
+    there.run("dvc", "add", "-q", own)
+    there.run(*make, "push")
+    there.commit()
+    elsewhere = there.clone(tmp_path / "elsewhere")
+    assert not (elsewhere.folder / own).exists()
+    elsewhere.run(*make, "pull")
+    assert _content(elsewhere, own) == {f"{own}/release_1.mcap": b"poses"}
+    assert _content(elsewhere, "data/processed") == _content(pipeline, "data/processed")
+    pipeline.run("dvc", "remote", "remove", "--local", "store")
+
+
+def _outputs(pipeline: StubPipeline) -> list[str]:
+    declared = json.loads((pipeline.folder / "stub.json").read_text())
+    return [name for stage in declared.values() for name in stage["outs"] if (pipeline.folder / name).exists()]
+
+
+def _content(pipeline: StubPipeline, name: str) -> dict[str, bytes]:
+    """Of a file, or of those in a folder."""
+    path = pipeline.folder / name
+    files = [path] if path.is_file() else [file for file in path.rglob("*") if file.is_file()]
+    return {file.relative_to(pipeline.folder).as_posix(): file.read_bytes() for file in files}
+
+
 @pytest.fixture
 def clone(pipeline, tmp_path):
-    """A fresh clone of the stub pipeline: no data, no cache."""
-    subprocess.run(["git", "clone", "-q", pipeline.folder, tmp_path / "clone"], check=True)
-    return tmp_path / "clone"
+    """A fresh clone of the stub pipeline."""
+    return pipeline.clone(tmp_path / "clone").folder
 
 
 def test_lock_of_a_fresh_clone_is_in_order(clone):

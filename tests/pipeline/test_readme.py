@@ -127,9 +127,9 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "relaxation": None,  # the lab's arm has three branches, the model one
         "relaxation_time": None,
         "kp": True,
-        "kv": False,
+        "kv": True,
         "time_constant": True,
-        "dead_time": True,
+        "dead_time": False,
         "force_range": False,
         "capstan_friction": True,
     }
