@@ -32,7 +32,7 @@ def draw(results: list[Result], file: Path) -> None:
         values = values[np.isfinite(values)]
         if len(values):
             right.step(values, (np.arange(len(values)) + 1) / len(values), where="post", label=name)
-    words = [" ".join(filter(None, key)) + f" ({len(rows)} runs)" for key, rows in groups.items()]
+    words = [", ".join(filter(None, key)) + f" ({len(rows)} runs)" for key, rows in groups.items()]
     left.set_yticks(range(len(groups)), words)
     middle.set_yticks(range(len(groups)), [""] * len(groups))
     for plot in (left, middle):

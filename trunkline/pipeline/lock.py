@@ -32,7 +32,7 @@ def _unlocked(repo: Repo) -> list[str]:
     found = []
     for stage in repo.index.stages:
         entries = [*stage.deps, *stage.outs]
-        if _on_demand(stage) and not any(entry.hash_info or _in_tree(entry) for entry in stage.outs):
+        if _on_demand(stage) and not _has_results(stage):
             continue
         new = [str(_path(entry)) for entry in entries if not entry.hash_info]
         if new:
@@ -48,7 +48,7 @@ def _changed(repo: Repo) -> list[str]:
     expected = {Path(file) for file in listed.split("\0") if file}
     expected |= {folder for file in expected for folder in file.parents}
     expected |= {_path(out) for out in repo.index.outs if not out.use_cache}
-    lagging = {stage.addressing for stage in repo.index.stages if _on_demand(stage)}
+    lagging = {stage.addressing: _has_results(stage) for stage in repo.index.stages if _on_demand(stage)}
     found = []
     for address, changes in repo.status().items():
         stage = address.rpartition(":")[2]
@@ -59,7 +59,7 @@ def _changed(repo: Repo) -> list[str]:
             found += [
                 f"{stage}: {kind}: {name}: {state}"
                 for kind, states in change.items()
-                if address not in lagging or kind == "changed outs"
+                if address not in lagging or (lagging[address] and kind == "changed outs")
                 for name, state in states.items()
                 if state not in ABSENT or Path(name) in expected
             ]
@@ -81,8 +81,9 @@ def _on_demand(stage) -> bool:
     return bool((stage.meta or {}).get("on_demand"))
 
 
-def _in_tree(out) -> bool:
-    return Path(out.fs_path).exists() and not out.use_cache
+def _has_results(stage) -> bool:
+    """It ran, or somebody put results in its place."""
+    return any(out.hash_info or (Path(out.fs_path).exists() and not out.use_cache) for out in stage.outs)
 
 
 def _path(entry) -> Path:
