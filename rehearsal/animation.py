@@ -103,7 +103,7 @@ def _figure(count: int):
     keys = [Line2D([], [], color=colour, ls="--", marker="o", ms=4, label=name) for name, colour in RAYS.items()]
     keys.append(Line2D([], [], color=PREVIEWED, ls="", marker="*", ms=9, label="previewed tip"))
     keys.append(Line2D([], [], color=THING, ls="", marker="o", ms=8, alpha=0.5, label="object"))
-    figure.legend(handles=keys, loc="lower center", ncols=4, frameon=False)
+    figure.legend(handles=keys, loc="lower center", ncols=4, frameon=False, fontsize=8, columnspacing=1)
     return figure, plots
 
 
