@@ -28,8 +28,8 @@ def draw(results: list[Result], file: Path) -> None:
         if not bottom:
             middle.annotate("none", (0, place), (4, 0), textcoords="offset points", va="center", color="0.4")
     for name, column in DISTANCES.items():
-        values = np.sort([getattr(row, column) for row in groups.get((name, ""), [])])
-        values = values[np.isfinite(values)]
+        rows = groups.get((name, ""), []) if column else []
+        values = np.sort([value for row in rows if np.isfinite(value := getattr(row, column))])
         if len(values):
             right.step(values, (np.arange(len(values)) + 1) / len(values), where="post", label=name)
     words = [", ".join(filter(None, key)) + f" ({len(rows)} runs)" for key, rows in groups.items()]

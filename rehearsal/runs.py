@@ -3,6 +3,8 @@
 import hashlib
 import json
 import multiprocessing
+import os
+import threading
 import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -139,8 +141,17 @@ _bench: Bench | None = None  # of a worker
 
 def _begin(package: Path) -> None:
     global _bench
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     threadpool_limits(1)
     _bench = bench_of(package)
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent was killed would wait for ever for its next run."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
 
 
 def _next(run: Run) -> tuple[Result, float]:

@@ -121,7 +121,7 @@ def test_the_rehearsal_s_block_says_with_which_package_it_was_or_that_nothing_is
     assert row == "| reach | 200 | 97.5 % | 94.3 to 98.9 % | ≥ 98 % | 12 / 21 | aim 5 |"
     assert rehearsal_block(tmp_path, variants=True).splitlines()[3].startswith("| … no preview | 40 |")
     (tmp_path / "artifacts/package_unity/manifest.json").write_text("{ }")
-    assert f"with an earlier package, `{package}`" in rehearsal_block(tmp_path, variants=False)
+    assert f"with another package, `{package}`" in rehearsal_block(tmp_path, variants=False)
 
 
 def test_errors_of_starts_and_of_the_clock_are_against_the_truth(judged):

@@ -8,9 +8,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from matplotlib.image import imread
 
 from rehearsal import runs
 from rehearsal.experiments.result import Result, read_results, summary
+from rehearsal.report import draw
 from rehearsal.runs import Run, Source, make, make_one, only_package, source_of, wanted
 from trunkline.errors import InputError
 from trunkline.pipeline.limits import Limit
@@ -79,6 +81,14 @@ def test_rates_are_told_by_experiment_and_variant(made, tmp_path):
     assert rows[1][0] == "… off by 5 mm"
 
 
+def test_the_table_is_in_the_paper_s_order_and_names_frequent_causes_first():
+    told = {"runs": 9, "rate": 0.5, "low": 0.2, "high": 0.8, "causes": {"aim": 1, "missed": 4}}
+    table = rehearsal_table({"follow": told, "handle": told, "package": "abc", "reach": told}, {}, "of a test", True)
+    rows = table.splitlines()[2:]
+    assert [row.split(" | ")[0] for row in rows] == ["| reach", "| follow", "| handle"]
+    assert all(row.endswith("| missed 4, aim 1 |") for row in rows)
+
+
 @pytest.fixture
 def checkout(tmp_path):
     """What dvc.yaml of the rehearsal names, with a package whose manifest says nothing of other files."""
@@ -111,6 +121,15 @@ def test_the_code_of_runs_is_what_the_stage_depends_on(checkout, monkeypatch):
     settings = after("rehearsal/conf/rehearse/robot/stand_in.yaml", "azimuth: 0.0", "azimuth: 0.1")
     code = after("trunkline/teleop/core.py", "\n", "\n# edited\n")
     assert len({before.code, settings.code, code.code}) == 3
+
+
+def test_the_picture_names_who_failed_and_who_did_not(tmp_path):
+    rows = [Result("reach", seed, True, nearest_mm=9.0) for seed in range(3)]
+    rows += [Result("grasp", seed, False, "slip: out of the coil", variant="CAD") for seed in range(2)]
+    draw(rows, tmp_path / "some.png")
+    draw(rows[:3], tmp_path / "none.png")
+    some, none = (imread(tmp_path / f"{name}.png") for name in ("some", "none"))
+    assert some.shape[0] > none.shape[0], "a line each"
 
 
 def test_without_a_package_there_is_one_line(tmp_path):

@@ -190,7 +190,7 @@ def rehearsal_block(root: Path, variants: bool) -> str:
         return "(no runs are committed yet)"
     manifest = (root / "artifacts" / "package_unity" / "manifest.json").read_bytes()
     now = hashlib.sha256(manifest).hexdigest().startswith(metrics["package"])
-    package = f"with {'this' if now else 'an earlier'} package, `{metrics['package']}`"
+    package = f"with {'this' if now else 'another'} package, `{metrics['package']}`"
     return rehearsal_table(metrics, read_limits(root / "tests" / "limits.yaml")["rehearse"], package, variants)
 
 

@@ -5,7 +5,8 @@ from typing import Any
 
 from trunkline.pipeline.limits import Limit, lookup
 
-DISTANCES = {"reach": "nearest_mm", "follow": "tip_mm"}  # of the tip from the object, by which an experiment is told
+# in the paper's order, and the column of the tip's distance from the object by which an experiment is told
+DISTANCES = {"reach": "nearest_mm", "follow": "tip_mm", "grasp": "", "handle": ""}
 
 
 def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], package: str, variants: bool) -> str:
@@ -21,9 +22,9 @@ def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], pack
         "| tip's distance: median / 95th percentile of runs, mm | failures |",
         "|---|---:|---:|---:|---:|---:|---|",
     ]
-    for name, told in metrics.items():
-        if not isinstance(told, Mapping):
-            continue  # of which package they are
+    experiments = [name for name, told in metrics.items() if isinstance(told, Mapping)]  # the others: of which package
+    for name in sorted(experiments, key=[*DISTANCES, *experiments].index):
+        told = metrics[name]
         goal = goals.get(f"{name}.rate")
         if "runs" in told:
             lines.append(_row(name, name, told, "" if goal is None or goal.min is None else f"≥ {_percent(goal.min)}"))
@@ -35,7 +36,8 @@ def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], pack
 def _row(experiment: str, words: str, told: Mapping[str, Any], goal: str) -> str:
     distances = lookup(told, DISTANCES.get(experiment, ""))
     error = " / ".join(f"{distances[key]:.0f}" for key in ("median", "p95")) if distances else ""
-    failed = ", ".join(f"{kind} {count}" for kind, count in told["causes"].items()) or "none"
+    causes = sorted(told["causes"].items(), key=lambda cause: -cause[1])
+    failed = ", ".join(f"{kind} {count}" for kind, count in causes) or "none"
     interval = f"{100 * told['low']:.1f} to {_percent(told['high'])}"
     return f"| {words} | {told['runs']} | {_percent(told['rate'])} | {interval} | {goal} | {error} | {failed} |"
 
