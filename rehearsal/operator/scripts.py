@@ -57,12 +57,15 @@ class Operator:
         radius: float,
         band: float,
         rng: np.random.Generator,
+        judged: bool = True,
     ) -> None:
         """
         Args:
             radius: of the object, m. band: width of the map's band, m, for which the rigid target is aimed.
+            judged: whether a preview beside the object is declined; else the first plan is confirmed.
         """
         self.person, self.offset, self.radius, self.band, self.rng = person, offset, radius, band, rng
+        self.judged = judged
         self.left, self.right = hands
 
     def reach(self) -> Script:
@@ -88,7 +91,7 @@ class Operator:
                 continue
             off = self._look(previewed - view.thing)
             ending = Ending(True, "", plans, _away(targets.tip.position, view.thing), _away(previewed, view.thing))
-            if np.linalg.norm(off) < self.radius:
+            if not self.judged or np.linalg.norm(off) < self.radius:
                 view = yield from self._click(self.right, "trigger", view)
                 view = yield from self._until(lambda view: view.intent.mode == "execute")
                 view = yield from self._until(lambda view: view.intent.mode != "execute")

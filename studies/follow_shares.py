@@ -1,0 +1,102 @@
+"""Whose error is it that the tip is beside what it follows? The distance taken apart, in a few runs of `follow`.
+
+    python -m studies.follow_shares [--runs 5] [--package artifacts/package_unity/...tgz]
+
+At time t, with d the set delay, all in the frame that the client takes for the robot's base:
+
+    tip(t) - object(t - d) =   target(t - d) - object(t - d)     operator: aim, tremor, depth, lag, and filter
+                             + twin(t) - target(t - d)           following: look-ahead, network, limits
+                             + still(t) - twin(t)                model: the stand-in's tip beside the twin's
+                             + tip(t) - still(t)                 swinging
+                             + seen(t) - tip(t)                  alignment of the base
+
+twin(t) is where the twin's tip rests under what the robot is sent at t; still(t) is the stand-in's tip, a mean over
+two periods of the slowest swing. Each is the median of its length in a run.
+"""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from rehearsal.experiments.bench import Bench, bench_of
+from rehearsal.experiments.follow import Run, run
+from trunkline.frames import STANDARD_GRAVITY
+from trunkline.panda.kinematics import mount_pose
+from trunkline.pipeline.results import recorded
+from trunkline.statics.equilibria import actuated
+
+RATE = 60.0  # frames, Hz
+EVERY = 6  # frames of which the twin's rest is looked up; linear between
+SHARES = ("whole", "operator", "following", "model", "swinging", "alignment")
+
+
+@recorded("follow_shares")
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument(
+        "--package", type=Path, default=next(Path("artifacts/package_unity").glob("*.tgz"), Path("none"))
+    )
+    given = parser.parse_args()
+    bench, rows = bench_of(given.package), []
+    print("| seed | " + " | ".join(SHARES) + " | operator's lag |")
+    print("|---:|" + "---:|" * (len(SHARES) + 1))
+    for seed in range(given.runs):
+        found = run(bench, seed)
+        lengths, lag = shares(bench, found), operators_lag(bench, found)
+        rows.append([*lengths, lag])
+        print(f"| {seed} | " + " | ".join(f"{1e3 * value:.1f} mm" for value in lengths) + f" | {1e3 * lag:.0f} ms |")
+    *lengths, lag = np.median(rows, axis=0)
+    print("| median | " + " | ".join(f"{1e3 * value:.1f} mm" for value in lengths) + f" | {1e3 * lag:.0f} ms |")
+
+
+def shares(bench: Bench, found: Run) -> list[float]:
+    """Median length, m, of each of SHARES."""
+    path, session, delay = found.path, found.session, bench.config.core.follow_delay
+    targets = {view.now: view.intent.follow for view in found.views}
+    frames = [f for f in found.frames if path.begun + delay <= f.now <= path.begun + delay + path.seconds]
+    tip = np.array([frame.truth.tip for frame in frames])
+    target = np.array([targets[frame.now].tip.position for frame in frames])
+    thing = np.array([session.seen(path(frame.now - delay)) for frame in frames])
+    seen = np.array([session.seen(place) for place in tip])
+    twin = rests(bench, np.array([f.joints for f in frames]), np.array([f.commands for f in frames]))
+    still = mean_over(tip, round(2 * bench.package.period * RATE))
+    parts = (seen - thing, target - thing, twin - target, still - twin, tip - still, seen - tip)
+    return [float(np.median(np.linalg.norm(part, axis=1))) for part in parts]
+
+
+def rests(bench: Bench, joints: np.ndarray, commands: np.ndarray) -> np.ndarray:
+    """Where the twin's tip rests with the robot at `joints` (T, 7) and `commands` (T, K), m, (T, 3)."""
+    chosen = np.unique([*range(0, len(joints), EVERY), len(joints) - 1])
+    place, turn = mount_pose(joints[chosen], bench.config.mount_offset)
+    turn = turn @ np.diag([1.0, -1.0, -1.0])  # the arm's frame is half a turn about x from the mount's
+    gravity = -STANDARD_GRAVITY * turn[:, 2]
+    found = actuated(bench.package.chain, commands[chosen], gravity).position
+    tips = place + np.einsum("tij,tj->ti", turn, found)
+    return np.column_stack([np.interp(range(len(joints)), chosen, axis) for axis in tips.T])
+
+
+def mean_over(rows: np.ndarray, count: int) -> np.ndarray:
+    """Running mean of `rows` (T, 3) over about `count` of them, fewer at the ends."""
+    half, total = count // 2, np.cumsum(np.vstack([np.zeros(3), rows]), axis=0)
+    low = np.maximum(np.arange(len(rows)) - half, 0)
+    high = np.minimum(np.arange(len(rows)) + half + 1, len(rows))
+    return (total[high] - total[low]) / (high - low)[:, None]
+
+
+def operators_lag(bench: Bench, found: Run) -> float:
+    """By how much the tip target is behind the object, s: the shift by which both differ least."""
+    path, lags = found.path, np.arange(-0.2, 0.6, 0.01)
+    views = [v for v in found.views if v.intent.targets and path.begun + 1 <= v.now <= path.begun + path.seconds]
+    target = np.array([view.intent.targets.tip.position for view in views])
+
+    def apart(lag: float) -> float:
+        thing = np.array([found.session.seen(path(view.now - lag)) for view in views])
+        return float(((target - thing) ** 2).sum())
+
+    return float(min(lags, key=apart))
+
+
+if __name__ == "__main__":
+    main()
