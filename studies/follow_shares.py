@@ -35,11 +35,10 @@ SHARES = ("whole", "operator", "following", "model", "swinging", "alignment")
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--runs", type=int, default=5)
-    parser.add_argument(
-        "--package", type=Path, default=next(Path("artifacts/package_unity").glob("*.tgz"), Path("none"))
-    )
+    parser.add_argument("--package", type=Path, default=None)
     given = parser.parse_args()
-    bench, rows = bench_of(given.package), []
+    package = given.package or next(Path("artifacts/package_unity").glob("*.tgz"), Path("none"))
+    bench, rows = bench_of(package), []
     print("| seed | " + " | ".join(SHARES) + " | operator's lag |")
     print("|---:|" + "---:|" * (len(SHARES) + 1))
     for seed in range(given.runs):

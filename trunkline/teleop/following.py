@@ -43,6 +43,7 @@ class Follower:
         self._now.current_position = self._now.target_position = here.tolist()
         self._now.max_velocity, self._now.max_acceleration = limits.velocity.tolist(), limits.acceleration.tolist()
         self._now.max_jerk = limits.jerk.tolist()
+        self._now.minimum_duration = dt  # sooner there, it would run ahead
 
     def hear(self, now: float, targets: Targets | None) -> None:
         """The targets at `now`, s; None where there are none that the robot may follow."""
