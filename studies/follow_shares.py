@@ -1,6 +1,6 @@
 """Whose error is it that the tip is beside what it follows? The distance taken apart, in a few runs of `follow`.
 
-    python -m studies.follow_shares [--runs 5] [--package artifacts/package_unity/...tgz]
+    python -m studies.follow_shares [--runs 4] [--package artifacts/package_unity/...tgz]
 
 At time t, with d the set delay, all in the frame that the client takes for the robot's base:
 
@@ -11,16 +11,19 @@ At time t, with d the set delay, all in the frame that the client takes for the 
                              + seen(t) - tip(t)                  alignment of the base
 
 twin(t) is where the twin's tip rests under what the robot is sent at t; still(t) is the stand-in's tip, a mean over
-two periods of the slowest swing. Each is the median of its length in a run.
+two periods of the slowest swing. Each is the median of its length in a run. The operator's figures weigh most, so there
+are rows, too, of one who foresees nothing of the path, and of one whose errors are twice as large.
 """
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from rehearsal.experiments.bench import Bench, bench_of
 from rehearsal.experiments.follow import Run, run
+from rehearsal.operator.hands import Person
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.panda.kinematics import mount_pose
 from trunkline.pipeline.results import recorded
@@ -34,20 +37,35 @@ SHARES = ("whole", "operator", "following", "model", "swinging", "alignment")
 @recorded("follow_shares")
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--runs", type=int, default=4)
     parser.add_argument("--package", type=Path, default=None)
     given = parser.parse_args()
     package = given.package or next(Path("artifacts/package_unity").glob("*.tgz"), Path("none"))
-    bench, rows = bench_of(package), []
-    print("| seed | " + " | ".join(SHARES) + " | operator's lag |")
-    print("|---:|" + "---:|" * (len(SHARES) + 1))
-    for seed in range(given.runs):
-        found = run(bench, seed)
-        lengths, lag = shares(bench, found), operators_lag(bench, found)
-        rows.append([*lengths, lag])
-        print(f"| {seed} | " + " | ".join(f"{1e3 * value:.1f} mm" for value in lengths) + f" | {1e3 * lag:.0f} ms |")
-    *lengths, lag = np.median(rows, axis=0)
-    print("| median | " + " | ".join(f"{1e3 * value:.1f} mm" for value in lengths) + f" | {1e3 * lag:.0f} ms |")
+    bench = bench_of(package)
+    print("| operator | seed | " + " | ".join(SHARES) + " | operator's lag |")
+    print("|---|---:|" + "---:|" * (len(SHARES) + 1))
+    for name, person in people(bench.person).items():
+        one, rows = replace(bench, person=person), []
+        for seed in range(given.runs):
+            found = run(one, seed)
+            rows.append([*shares(one, found), operators_lag(one, found)])
+            tell(name, str(seed), rows[-1])
+        tell(name, "median", np.median(rows, axis=0))
+
+
+def people(person: Person) -> dict[str, Person]:
+    """Operators by what is different of them."""
+    return {
+        "typical": person,
+        "foresees nothing": replace(person, forecast=0.0),
+        "notices half as well": replace(person, unnoticed_deg=2 * person.unnoticed_deg),
+    }
+
+
+def tell(name: str, seed: str, row) -> None:
+    *lengths, lag = row
+    print(f"| {name} | {seed} | " + " | ".join(f"{1e3 * m:.1f} mm" for m in lengths) + f" | {1e3 * lag:.0f} ms |",
+          flush=True)  # fmt: skip
 
 
 def shares(bench: Bench, found: Run) -> list[float]:
