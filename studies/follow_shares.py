@@ -71,10 +71,10 @@ def tell(name: str, seed: str, row) -> None:
 def shares(bench: Bench, found: Run) -> list[float]:
     """Median length, m, of each of SHARES."""
     path, session, delay = found.path, found.session, bench.config.core.follow_delay
-    targets = {view.now: view.intent.follow for view in found.views}
+    targets = {view.now: wanted.tip.position for view in found.views if (wanted := view.intent.follow)}
     frames = [f for f in found.frames if path.begun + delay <= f.now <= path.begun + delay + path.seconds]
     tip = np.array([frame.truth.tip for frame in frames])
-    target = np.array([targets[frame.now].tip.position for frame in frames])
+    target = np.array([targets[frame.now] for frame in frames])
     thing = np.array([session.seen(path(frame.now - delay)) for frame in frames])
     seen = np.array([session.seen(place) for place in tip])
     twin = rests(bench, np.array([f.joints for f in frames]), np.array([f.commands for f in frames]))
@@ -105,11 +105,11 @@ def mean_over(rows: np.ndarray, count: int) -> np.ndarray:
 def operators_lag(bench: Bench, found: Run) -> float:
     """By how much the tip target is behind the object, s: the shift by which both differ least."""
     path, lags = found.path, np.arange(-0.2, 0.6, 0.01)
-    views = [v for v in found.views if v.intent.targets and path.begun + 1 <= v.now <= path.begun + path.seconds]
-    target = np.array([view.intent.targets.tip.position for view in views])
+    shown = [(view.now, now.tip.position) for view in found.views if (now := view.intent.targets)]
+    times, target = zip(*((now, tip) for now, tip in shown if 1 <= now - path.begun <= path.seconds), strict=True)
 
     def apart(lag: float) -> float:
-        thing = np.array([found.session.seen(path(view.now - lag)) for view in views])
+        thing = np.array([found.session.seen(path(now - lag)) for now in times])
         return float(((target - thing) ** 2).sum())
 
     return float(min(lags, key=apart))

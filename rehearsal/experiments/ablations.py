@@ -1,13 +1,13 @@
 """What each part of the system is worth: reach and follow with one thing taken away or made worse, by name.
 
-    result, _ = EXPERIMENTS[name](varied(bench, "no_preview"), seed)
+    result, _ = reach(varied(bench, "reach", "no_preview"), seed)
 
 A variant changes what runs share, so a run of it has the same object, path, operator and robot as the run of the same
 seed that has everything.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -24,28 +24,19 @@ DRAWING = PROJECT / "artifacts/build_mjcf/arm.xml"
 NOWHERE = 5.0  # m; within it of its axis the arm has no bending plane: further than anything is
 
 
-@dataclass(frozen=True)
-class Variant:
-    """`experiments` in which it says something. `change`: of what runs share."""
-
-    experiments: tuple[str, ...]
-    change: Callable[[Bench], Bench]
+Change = Callable[[Bench], Bench]
 
 
-def varied(bench: Bench, name: str) -> Bench:
-    """What runs of the variant `name` share.
+def varied(bench: Bench, experiment: str, name: str) -> Bench:
+    """What runs of the variant `name` of an experiment share.
 
     Raises:
         InputError: there is no such variant.
     """
-    if name not in VARIANTS:
-        raise InputError(f"variant: found {name!r}, expected one of {', '.join(VARIANTS)}")
-    return VARIANTS[name].change(bench)
-
-
-def variants_of(experiment: str) -> list[str]:
-    """Names of those that say something in an experiment."""
-    return [name for name, variant in VARIANTS.items() if experiment in variant.experiments]
+    known = VARIANTS.get(experiment, {})
+    if name not in known:
+        raise InputError(f"variant: found {name!r}, expected one of {experiment}: {', '.join(known) or 'none'}")
+    return known[name](bench)
 
 
 def _planned_with(bench: Bench, model: mujoco.MjModel) -> Bench:
@@ -84,13 +75,12 @@ def _delay(bench: Bench, seconds: float) -> Bench:
     return replace(bench, config=replace(bench.config, core=core))
 
 
-BOTH = ("reach", "follow")
-VARIANTS = {
-    "statics": Variant(BOTH, _statics),  # the identified model without its network: what `cad` compares with
-    "cad": Variant(BOTH, _cad),
-    "no_preview": Variant(("reach",), _no_preview),
-    "no_plane": Variant(BOTH, _no_plane),
-    **{f"base_{mm}mm": Variant(BOTH, partial(_base, alignment_mm=float(mm))) for mm in (5, 10, 20)},
-    **{f"base_{deg}deg": Variant(BOTH, partial(_base, alignment_deg=float(deg))) for deg in (1, 2, 4)},
-    **{f"delay_{s:g}s": Variant(("follow",), partial(_delay, seconds=s)) for s in (0.2, 0.5, 1.0)},
+BOTH: dict[str, Change] = {
+    "statics": _statics,  # the identified model without its network: what `cad` compares with
+    "cad": _cad,
+    "no_plane": _no_plane,
+    **{f"base_{mm}mm": partial(_base, alignment_mm=float(mm)) for mm in (5, 10, 20)},
+    **{f"base_{deg}deg": partial(_base, alignment_deg=float(deg)) for deg in (1, 2, 4)},
 }
+DELAYS = {f"delay_{s:g}s": partial(_delay, seconds=s) for s in (0.2, 0.5, 1.0)}
+VARIANTS: dict[str, dict[str, Change]] = {"reach": {**BOTH, "no_preview": _no_preview}, "follow": {**BOTH, **DELAYS}}
