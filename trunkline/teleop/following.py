@@ -5,8 +5,10 @@ What the targets ask for is heard at once and done `delay` s later, so that the 
     x(t) = mean of g(s) over |s - (t - delay)| <= width / 2,    width <= 2 (delay - KNOT)
 
 with g the axes that the targets of time s ask for. A mean about its own middle does not lag, and one over a period of
-a swing leaves nothing of it. Ruckig takes the axes there, with the velocity of x. Without targets, or where they are
-refused, the last that were not hold: the robot comes to rest there.
+a swing leaves nothing of it. Ruckig takes the axes there, with the velocity of x; so the first way, to where following
+begins, is as quick as the limits allow. That is meant: a mean of it, too, ends with the cables' friction at an edge of
+its band, 4 mm more at the stand-in's tip. Without targets, or where they are refused, the last that were not hold: the
+robot comes to rest there.
 """
 
 from bisect import bisect_left
@@ -47,7 +49,7 @@ class Follower:
 
     def hear(self, now: float, targets: Targets | None) -> None:
         """The targets at `now`, s; None where there are none that the robot may follow."""
-        if self._times and now < self._times[-1] + KNOT:
+        if self._times and now < self._times[-1] + KNOT - 1e-6:
             return
         goal = self._goals[-1]
         if targets is not None:
