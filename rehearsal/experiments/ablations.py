@@ -23,7 +23,6 @@ from trunkline.statics.chain import read_chain
 DRAWING = PROJECT / "artifacts/build_mjcf/arm.xml"
 NOWHERE = 5.0  # m; within it of its axis the arm has no bending plane: further than anything is
 
-
 Change = Callable[[Bench], Bench]
 
 

@@ -67,8 +67,8 @@ class RayHand:
         self.begun, self.lasting = now, self.person.movement
 
     def follow(self, place: np.ndarray, now: float) -> None:
-        """Keep the ray's end at a moving `place` (3,): one correction after the other, each with an error of its own
-        that stays unnoticed, evenly within `unnoticed_deg` to either side."""
+        """Keep the ray's end at a moving `place` (3,): one correction after the other, each with an error of its own,
+        spread across the ray as errors are that lie evenly within `unnoticed_deg` to either side."""
         missed = self.missed(now)
         self.start = self.goal = np.array(place, dtype=float)
         if now >= self.begun + self.lasting:

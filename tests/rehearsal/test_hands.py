@@ -87,8 +87,8 @@ def test_the_stick_brings_the_rays_end_to_the_depth_that_is_aimed_at():
     assert length == pytest.approx(distance(), abs=2e-3)
 
 
-def test_a_hand_that_follows_errs_smoothly_within_what_is_not_noticed():
-    """One direction across the ray: even to either side by the angle, and no leap from frame to frame."""
+def test_a_hand_that_follows_errs_smoothly_by_about_what_is_not_noticed():
+    """In one direction across the ray; without a leap from frame to frame, and slower than 1.8 Hz."""
     one, missed = hand(tremor_g=0.0), []
     zone = np.radians(one.person.unnoticed_deg) * distance()
     for frame in range(int(4000 * one.person.correction * RATE)):
