@@ -12,10 +12,11 @@ import sys
 from pathlib import Path
 
 from rehearsal.animation import animate
+from rehearsal.experiments.bench import bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import summary
 from rehearsal.report import draw
-from rehearsal.runs import bench_of, make, only_package, source_of, wanted
+from rehearsal.runs import make, only_package, source_of, wanted
 from trunkline.errors import in_one_line
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.limits import read_limits

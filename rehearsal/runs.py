@@ -14,18 +14,11 @@ from pathlib import Path
 from dvc.repo import Repo
 from threadpoolctl import threadpool_limits
 
-from demo.plants.choice import plant_of
-from demo.plants.stranger import Stranger
-from demo.rig import ROOT as LAB
-from demo.rig import Config as Lab
-from rehearsal import settings
-from rehearsal.experiments.bench import Bench
-from rehearsal.experiments.registry import EXPERIMENTS, VARIANTS
+from rehearsal.experiments.ablations import VARIANTS, varied
+from rehearsal.experiments.bench import Bench, bench_of
+from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, append_result, read_results
-from rehearsal.package import read_package
 from trunkline.errors import InputError
-from trunkline.pipeline.config import PROJECT, load_config, load_folder
-from trunkline.teleop.config import Config
 from trunkline.unity.unpacked import package_digest
 from trunkline.unity.unpacked import read_package as read_files
 
@@ -100,20 +93,11 @@ def make(runs: list[Run], package: Path, source: Source, table: Path, workers: i
     return [result for result in source.of(read_results(table)) if _run_of(result) in chosen]
 
 
-def bench_of(package: Path) -> Bench:
-    """The bench of a package's file and the settings of this checkout."""
-    arm = plant_of(load_config(Lab, "record", LAB))
-    if not isinstance(arm, Stranger):
-        raise InputError(f"{LAB}/params.yaml: record.plant: found another plant, expected stranger: the robot's arm")
-    config = load_folder(Config, PROJECT / "conf/teleop")
-    return Bench(read_package(package), config, arm, settings.stand_in(), settings.person(), settings.free())
-
-
 def make_one(bench: Bench, run: Run) -> tuple[Result, float]:
     """A run and its seconds of processor. One that breaks off by an error failed, and its cause is the error."""
     began = time.process_time()
     try:
-        changed = VARIANTS[run.experiment][run.variant](bench) if run.variant else bench
+        changed = varied(bench, run.experiment, run.variant) if run.variant else bench
         result, _ = EXPERIMENTS[run.experiment](changed, run.seed)
     except Exception as error:  # hours of other runs shall not end with it
         result = Result(run.experiment, run.seed, False, f"error: {type(error).__name__}: {error}")

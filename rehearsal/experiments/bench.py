@@ -17,6 +17,7 @@ from rehearsal.robot.scene import Object, Scene
 from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
 from rehearsal.settings import Free
+from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_config, load_folder
 from trunkline.teleop.config import Config
 from trunkline.teleop.messages import Box, World
@@ -71,9 +72,14 @@ class Bench:
 
 
 def bench_of(file: Path) -> Bench:
-    """The bench with the package at `file`, the lab's arm, and the settings as they are."""
+    """The bench with the package at `file`, the lab's arm, and the settings as they are.
+
+    Raises:
+        InputError: the lab's arm is no stranger, or there is no package.
+    """
     arm = plant_of(load_config(Lab, "record", LAB))
-    assert isinstance(arm, Stranger)
+    if not isinstance(arm, Stranger):
+        raise InputError(f"{LAB}/params.yaml: record.plant: found another plant, expected stranger: the robot's arm")
     config = load_folder(Config, PROJECT / "conf/teleop")
     return Bench(read_package(file), config, arm, settings.stand_in(), settings.person(), settings.free())
 

@@ -1,4 +1,4 @@
-"""All experiments, and the variants of each that say what a part of the system is worth."""
+"""All experiments. What varies them, to say what a part of the system is worth, is in ablations.py."""
 
 from collections.abc import Callable
 
@@ -8,7 +8,5 @@ from rehearsal.experiments.reach import reach
 from rehearsal.experiments.result import Result
 
 Experiment = Callable[[Bench, int], tuple[Result, list[Seen]]]  # one run, of a seed
-Change = Callable[[Bench], Bench]  # what a variant has instead
 
 EXPERIMENTS: dict[str, Experiment] = {"reach": reach, "follow": follow}
-VARIANTS: dict[str, dict[str, Change]] = {}  # experiment: name of the variant: its change
