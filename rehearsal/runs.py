@@ -65,9 +65,9 @@ def source_of(package: Path) -> Source:
         stage = repo.stage.load_one("rehearsal/dvc.yaml", "rehearse")
         names = {Path(dep.fs_path).relative_to(repo.root_dir).as_posix(): dep for dep in stage.deps}
         hashes = {
-            name: dep.get_hash().value
+            name: dep.get_hash().value if dep.exists else None
             for name, dep in names.items()
-            if not name.startswith("artifacts/") and name != "rehearsal/params.yaml"
+            if not name.startswith(f"{PACKAGES}/") and name != "rehearsal/params.yaml"
         }
     code = hashlib.sha256(json.dumps(hashes, sort_keys=True).encode()).hexdigest()
     return Source(package_digest(read_files(package))[:SHOWN], code[:SHOWN])
