@@ -15,8 +15,8 @@ demo: setup          ## run the whole pipeline, from recording the demo logs to 
 	dvc repro
 	@ls -lh artifacts/package_unity/*.tgz
 
-RUNS ?= 20
-rehearse: setup      ## rehearse the experiments on the stand-in robot: make rehearse RUNS=200; resumes where it was stopped
+RUNS ?= 10
+rehearse: setup      ## rehearse the experiments on the stand-in robot: make rehearse RUNS=20; resumes where it was stopped
 	python -m rehearsal --runs $(RUNS)
 
 test: setup          ## run every test, then lint

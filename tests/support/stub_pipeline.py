@@ -15,7 +15,7 @@ from dvc.repo import Repo
 from omegaconf import OmegaConf
 
 ROOT = Path(__file__).parents[2]
-RESULTS = ("artifacts/", "dvc.lock", "demo/dvc.lock", ".dvc/", "examples/")
+RESULTS = ("artifacts/", "dvc.lock", "demo/dvc.lock", "rehearsal/dvc.lock", ".dvc/", "examples/")
 
 STUB = '''
 import functools, hashlib, json, pathlib
