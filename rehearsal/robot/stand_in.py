@@ -203,8 +203,11 @@ class StandInRobot:
         world = self.world
         shapes = zip(self.scene.names(), world.kind, world.half, world.edge, world.place, strict=True)
         solid = [(name, kind, half, edge, place, np.eye(3)) for name, kind, half, edge, place in shapes]
-        thing, turn = self.thing, np.array(rotation(self.motion.quaternion))
-        solid.append(("the object", thing.kind, thing.half, thing.edge, self.motion.place, turn))
+        thing, pose = self.thing, np.array(rotation(self.motion.quaternion))
+        for kind, half, edge, shift, turn in zip(
+            thing.kind, thing.half, thing.edge, thing.shift, thing.turn, strict=True
+        ):
+            solid.append(("the object", kind, half, edge, self.motion.place + pose @ shift, pose @ turn))
         for unit, (centre, axis) in enumerate(zip(*self.links(), strict=True)):
             radius, rim = self.discs.radius[unit], self.discs.edge[unit]
             for name, kind, half, edge, place, turn in solid:

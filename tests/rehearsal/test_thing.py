@@ -22,7 +22,8 @@ def body(shape="box", diameter=0.05, height=0.12, mass=0.1, z=0.06, **more) -> t
 def floor(thing: Thing, friction=0.35, loss=3.0) -> tuple[World, Contacts]:
     kind, half, edge, place = Scene(0.0, Object("sphere", 0.1, 0.1, 1.0, [0.0, 0.0, 1.0])).shapes()
     world = World(kind, half, edge, place, 1e6, 2e4, 2 * 0.1 * np.sqrt(2e4 * thing.mass), loss, np.array([friction]))
-    some = [np.zeros((1, 3)), np.zeros((1, 1, 3)), np.zeros((len(thing.points), 1, 3)), np.zeros((1, 2, 3))]
+    bristles, near = np.zeros((1, len(thing.kind), 3)), np.zeros((1, len(thing.kind) + 1, 3))
+    some = [bristles, np.zeros((1, 1, 3)), np.zeros((len(thing.points), 1, 3)), near]
     return world, Contacts(*some, np.zeros((1, 3)), np.zeros((1, 1, 3)), np.zeros((1, 3)))
 
 
