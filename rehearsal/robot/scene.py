@@ -51,6 +51,10 @@ class Object:
     hanging: bool = False
     basket: Basket = field(default_factory=Basket)
 
+    def __post_init__(self):
+        if self.shape == "basket":
+            self.basket.require_room(self.diameter)
+
     @property
     def half_height(self) -> float:
         """m, from its centre of mass to what it stands on."""
@@ -151,7 +155,7 @@ def _single(object: Object) -> tuple[list[Solid], np.ndarray, float]:
         return [Solid(BOX, np.zeros(3), radius)], np.zeros((1, 3)), radius
     if object.shape == "cylinder":
         half = np.array([radius, radius, half_height])
-        return [Solid(CYLINDER, half, 0.0)], _rims(half, RIM), 0.0
+        return [Solid(CYLINDER, half, 0.0)], _rims(half), 0.0
     edge = TOY_EDGE * object.diameter if object.shape == "toy" else 0.0
     half = np.maximum([radius - edge, radius - edge, half_height - edge], 0.0)
     return [Solid(BOX, half, edge)], CORNERS * half, edge
@@ -162,13 +166,13 @@ def _basket(parts: dict[str, Part]) -> tuple[list[Solid], np.ndarray, float]:
     solids = [Solid(KINDS[part.shape], part.half, 0.0, part.place, part.turn) for part in parts.values()]
     box, bar = parts["box"], parts["bar"]
     corners = CORNERS * box.half @ box.turn.T + box.place
-    return solids, np.concatenate([corners, _rims(bar.half, RIM) @ bar.turn.T + bar.place]), 0.0
+    return solids, np.concatenate([corners, _rims(bar.half) @ bar.turn.T + bar.place]), 0.0
 
 
-def _rims(half: np.ndarray, count: int) -> np.ndarray:
-    """`count` points on each of the two rims of a cylinder, m. Shape (2 · count, 3)."""
-    angle = 2 * np.pi * np.arange(count) / count
-    rim = half[0] * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
+def _rims(half: np.ndarray) -> np.ndarray:
+    """Points on the two rims of a cylinder, m. Shape (2 RIM, 3)."""
+    angle = 2 * np.pi * np.arange(RIM) / RIM
+    rim = half[0] * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(RIM)])
     return np.concatenate([rim + [0, 0, z] for z in (-half[2], half[2])])
 
 

@@ -90,3 +90,8 @@ def test_other_objects_are_one_geom_wrapped_in_its_middle(shape):
     model = world(thing, 1.0)
     assert [model.geom(number).name for number in object_geoms(model)] == ["object_geom"]
     np.testing.assert_array_equal(thing.grip, 0)
+
+
+def test_a_bar_that_touches_its_box_is_refused_by_name():
+    with pytest.raises(ValueError, match=r"basket.rise: found 0.1 m, expected at least the bar's diameter, 0.2 m"):
+        Thing("basket", 0.2, 0.06, 0.2, "plastic", Basket(rise=0.1))

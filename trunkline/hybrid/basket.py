@@ -30,6 +30,11 @@ class Basket:
     length: Annotated[float, Field(ge=0.05, le=0.5)] = 0.16
     rise: Annotated[float, Field(ge=0.05, le=0.5)] = 0.22
 
+    def require_room(self, diameter: float) -> None:
+        """Raises ValueError if the arm would not fit under a bar of `diameter` m."""
+        if self.rise < diameter:
+            raise ValueError(f"basket.rise: found {self.rise} m, expected at least the bar's diameter, {diameter} m")
+
 
 @dataclass(frozen=True)
 class Part:

@@ -50,6 +50,10 @@ class Thing:
     material: Material
     basket: Basket = field(default_factory=Basket)
 
+    def __post_init__(self):
+        if self.shape == "basket":
+            self.basket.require_room(self.diameter)
+
     @property
     def half_height(self) -> float:
         """From its centre of mass to what it stands on, m."""
