@@ -22,7 +22,7 @@ from trunkline.hybrid.grasps import Grasp, Pull, object_in_base, pulls_of
 from trunkline.hybrid.objects import Shape, Thing
 from trunkline.hybrid.robots import FixedMount
 from trunkline.hybrid.touch import read_geometry
-from trunkline.hybrid.trials import Schedule, Tried, try_grasps
+from trunkline.hybrid.trials import Schedule, Tried, Tries, try_grasps
 from trunkline.hybrid.worlds import Surface, World
 from trunkline.settings import Seed, settings
 
@@ -125,8 +125,8 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, masses: n
         if middle[2] + thing.half_height > 0:
             raise InputError(f"height: found {height} m, expected an object below the mount")
         surfaces = {TABLE: Surface([0.0, 0.0, top], list(TABLE_SIZE), "wood")}
-    spec = compose(arm, FixedMount("fixed"), World(None, surfaces, hook), Placed(thing, middle, quaternion, hanging))
-    model = spec.compile()
+    mount, world = FixedMount("fixed"), World(None, surfaces, hook)
+    model = compose(arm, mount, world, Placed(thing, middle, quaternion, hanging)).compile()
     if timestep is not None:
         model.opt.timestep = timestep
     draws = np.random.default_rng(chart.seed).normal(size=(chart.placements, 2)) * chart.spread
@@ -135,11 +135,11 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, masses: n
     if hanging:
         poses[:, 2] += draws[:, 1]
     count = len(masses) * chart.placements
-    return try_grasps(
-        model, np.tile(poses, (len(masses), 1)), np.repeat(masses, chart.placements),
-        np.tile(pulls_of(cell.pull, cell.shortening), (count, 1)), chart.schedule, tuple(surfaces),
-        np.full(count, cell.friction),
-    )  # fmt: skip
+    pulls = np.tile(pulls_of(cell.pull, cell.shortening), (count, 1))
+    tries = Tries(
+        np.tile(poses, (len(masses), 1)), np.repeat(masses, chart.placements), pulls, np.full(count, cell.friction)
+    )
+    return try_grasps(model, compose(arm, mount).compile(), tries, chart.schedule, tuple(surfaces))
 
 
 def heaviest(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell) -> Outcome:
