@@ -68,7 +68,7 @@ def main() -> int:
     chart, arm = read_settings(options.quick), read_spec(MODEL)
     told = json.dumps(
         {
-            **asdict(chart),
+            **{key: value for key, value in asdict(chart).items() if key != "grids"},  # of those rows tell
             "contacts": [IMPRATIO, SOLREF, SOLIMP],
             "arm": hashlib.sha256(MODEL.read_bytes()).hexdigest(),
         },

@@ -4,8 +4,8 @@ A cell is one row of the chart. How far the arm is to go round the object is cho
 is then looked for on a ladder of masses by bisection. A mass is held if at least `share` of its placements are, each
 off the grasp frame by its own draw. What is held is `Tried.held`.
 
-An object hangs from a hook above it, its axis level and across the bending plane, or stands on a table, its axis
-upright; the arm hangs straight down beside it and bends in a vertical plane.
+An object hangs from a hook above it, its axis level and across the bending plane, or stands on a table: a basket with
+its bar level, all others with their axis upright. The arm hangs straight down beside it and bends in a vertical plane.
 """
 
 from collections.abc import Iterator
@@ -128,18 +128,20 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: flo
         InputError: the object does not fit between table and mount.
     """
     geometry = read_geometry(arm)
-    height = max(chart.height, cell.diameter)
-    thing = Thing(cell.shape, cell.diameter, height, BEGIN, "plastic")
-    middle = object_in_base(geometry, cell.diameter, Grasp(wrap, chart.gap), cell.pull)
+    thing = Thing(cell.shape, cell.diameter, max(chart.height, cell.diameter), BEGIN, "plastic")
+    middle = object_in_base(geometry, cell.diameter, Grasp(wrap, chart.gap), cell.pull) - thing.grip
     hanging = cell.support == "hanging"
     quaternion, surfaces, hook = (LEVEL if hanging else UPRIGHT), {}, None
     if hanging:
         hook = [float(value) for value in middle + [0, 0, cell.diameter / 2 + HOOK_ABOVE]]
-    else:  # the tip just above the table, the object beside it
-        top = -geometry.length - chart.spread
-        middle[2] = top + thing.half_height
-        if middle[2] + thing.half_height > 0:
-            raise InputError(f"height: found {height} m, expected an object below the mount")
+    else:
+        if cell.shape == "basket":  # its bar is where the arm wraps it
+            top = middle[2] - thing.half_height
+        else:  # the tip just above the table, the object beside it
+            top = -geometry.length - chart.spread
+            middle[2] = top + thing.half_height
+            if middle[2] + thing.half_height > 0:
+                raise InputError(f"height: found {chart.height} m, expected an object below the mount")
         surfaces = {TABLE: Surface([0.0, 0.0, top], list(TABLE_SIZE), "wood")}
     mount, world = FixedMount("fixed"), World(None, surfaces, hook)
     model = compose(arm, mount, world, Placed(thing, middle, quaternion, hanging)).compile()

@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.elements import actuators, give_way
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz, wxyz_from_rotation
+from trunkline.hybrid.objects import GRIP, object_geoms
 from trunkline.hybrid.worlds import HOOK_LENGTH
 from trunkline.simulation.motion import batch_of, hold, move
 from trunkline.simulation.rest import settle
@@ -28,7 +29,7 @@ BLOCK = 0.025  # s in which gravity and supports stand still
 PAID_OUT = 0.2  # m, of a cable that does not pull: out of the way of any bend
 PAY_TIME = 0.3  # s, in which it is paid out
 UNIT_CENTER = re.compile(r"unit_\d+_center")
-RECORD = ("qpos", "site_xpos")
+RECORD = ("site_xpos",)
 UP = (0.0, 0.0, 1.0)
 AT_ORIGIN = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)  # a pose
 
@@ -97,7 +98,8 @@ class Tried:
     """B grasps.
 
     Attributes:
-        path: of the object's centre in the base frame, every BLOCK s, m. Shape (B, F, 3). NaN once MuJoCo has warned.
+        path: of the middle of what the arm wraps of the object, in the base frame, every BLOCK s, m. Shape (B, F, 3).
+            NaN once MuJoCo has warned.
         distance: from there to the centre of the nearest unit, m. Shape (B, F).
         let_go: the row from which the object had no support.
         tensions: of the cables when the object was let go, N. Shape (B, K).
@@ -152,7 +154,7 @@ def try_grasps(
     centers = [site for site in range(model.nsite) if UNIT_CENTER.fullmatch(model.site(site).name)]
     distance = np.full((count, blocks), np.nan)
     path, tensions = np.full((count, blocks, 3), np.nan), np.full((count, len(straight)), np.nan)
-    sinking = [model.geom(name).id for name in surfaces]
+    grip, sinking = model.site(GRIP).id, [model.geom(name).id for name in surfaces]
     sink = to_base.apply([0, 0, -schedule.sink * BLOCK])
     moving, let_go = own, round(schedule.let_go / BLOCK)
     for block in range(blocks):
@@ -167,7 +169,7 @@ def try_grasps(
         times = time + timestep * np.arange(steps)
         commands = straight + _drawn(held[moving] - straight, tries.pulls[moving], times, schedule.close)
         found = move(batch, winches.deliver(commands, moving), RECORD, steps, steps - 1, ids=moving)
-        path[moving, block] = found["qpos"][:, 0, address : address + 3]
+        path[moving, block] = found["site_xpos"][:, 0, grip]
         away = found["site_xpos"][:, 0, centers] - path[moving, block, None]
         distance[moving, block] = np.linalg.norm(away, axis=2).min(axis=1)
         moving = moving[~batch.warning[moving].any(axis=(1, 2))]
@@ -192,9 +194,10 @@ def _set_up(batch: Batch, model: mujoco.MjModel, tries: Tries) -> Rotation:
     for geom in fixed:
         batch.expand("geom_pos")[:, geom] = to_base.apply(model.geom_pos[geom] - mounts[:, :3])
         batch.expand("geom_quat")[:, geom] = wxyz_from_rotation(to_base * rotation_from_wxyz(model.geom_quat[geom]))
-    geom, body = model.geom("object_geom").id, model.body("object").id
-    own = model.geom_friction[geom]
-    batch.expand("geom_friction")[:, geom, :2] = np.outer(tries.friction, [1, own[1] / own[0]])
+    body = model.body("object").id
+    for geom in object_geoms(model):
+        own = model.geom_friction[geom]
+        batch.expand("geom_friction")[:, geom, :2] = np.outer(tries.friction, [1, own[1] / own[0]])
     batch.expand("body_mass")[:, body] = tries.masses
     batch.expand("body_inertia")[:, body] = model.body_inertia[body] * (tries.masses / model.body_mass[body])[:, None]
     batch.set_const()
