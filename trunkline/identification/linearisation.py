@@ -9,7 +9,7 @@ from trunkline.identification.problem import Problem
 
 DIFFERENCE = 1e-3  # step of a one-sided difference: in ln(value), in a factor, or in a signed value
 # the same in ln(value) where cables rub: the arm sticks, slips and snaps, and so moves by jumps as a value changes;
-# with a smaller one, starts end at losses 10 % apart, with this at the same
+# with a smaller one, starts end at other losses, with this at the same
 RUBBING_DIFFERENCE = 0.03
 
 

@@ -2,8 +2,8 @@
 
 Where a number lies in a CDR message depends only on the lengths and strings before it, so messages that
 agree in those bytes share a layout. It is worked out once, and their numbers are then read by slicing. That is what
-this module earns: 10 to 13 times the poses per second of the decoder in `mcap_ros2`, and 6 to 10 times those of
-`rosbags`, from a log of 6000 frames of 19 bodies to the same arrays (`python -m benchmarks.decode`).
+this module earns: many times the poses per second of the decoders in `mcap_ros2` and `rosbags`, from a log to the same
+arrays (`python -m benchmarks.decode`; docs/speed.md).
 """
 
 import re

@@ -2,9 +2,8 @@
 
 The `mcap` library gives up at the first record that it cannot read. Here the next one is looked for where the damaged
 one's length says that it begins, a last chunk that was cut off is read as far as it goes, and a chunk takes no more
-memory than it says. `python -m benchmarks.decode` puts both side by side: in copies of a log with a wrong byte in the
-head of a chunk 87 % of the messages are found (with the library's `StreamReader` 70 %, and with its chunks taken
-apart one by one 81 %), in copies cut off anywhere 50 % (45 %, 45 %), an intact log in about half of the time.
+memory than it says. `python -m benchmarks.decode` puts both side by side (docs/speed.md): how many messages are found
+in copies of a log with a wrong byte in the head of a chunk, and in copies that are cut off, and how long it takes.
 """
 
 import hashlib

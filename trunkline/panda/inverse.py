@@ -5,8 +5,8 @@ moves by J^T y and clips to the joint limits. The task error e is the position e
 vector of the orientation error or, for a target that leaves the yaw free, the cross product of the pointing
 directions.
 
-Many targets at once take 0.6 ms of processor each, against mink's 21 ms; a single one takes 62 ms, three times
-mink's (`python -m benchmarks.rigid_map`). The maps ask for hundreds at once.
+The maps ask for hundreds of targets at once, which cost far less together than one by one, or by mink
+(`python -m benchmarks.rigid_map`; docs/speed.md).
 """
 
 from typing import NamedTuple
