@@ -19,8 +19,8 @@ from trunkline.identification.setup import check_parameters
 VALUES = {
     "joint_place": 0.3,
     "stiffness": 2.5, "hardening": 0.7, "joint_friction": 0.01, "damping": 0.02, "tendon_friction": 0.8,
-    "friction_time": 0.03, "kp": 1500.0, "kv": 60.0, "force_range": 45.0, "time_constant": 0.08,
-    "capstan_friction": 0.25,
+    "friction_time": 0.03, "kp": 1500.0, "kp_ratio_2": 1.3, "kp_ratio_3": 0.8, "kv": 60.0, "force_range": 45.0,
+    "time_constant": 0.08, "capstan_friction": 0.25,
     "relaxation": 0.5, "relaxation_time": 0.7, "relaxation_2": 0.1, "relaxation_time_2": 3.0, "hysteresis": 0.4,
     "yield_bend": 0.01, "hysteresis_2": 0.15, "yield_bend_2": 0.06, "hysteresis_3": 0.08, "yield_bend_3": 0.2,
     "rest_bend_x": 0.01, "rest_bend_y": -0.02, "rest_gradient_x": -0.01, "rest_gradient_y": 0.03,
@@ -175,6 +175,12 @@ def test_a_parameter_of_what_the_arm_lacks_is_refused(name, message):
         check_parameters("identify_control", config, small_spec().compile())
 
 
+def test_a_ratio_of_a_motor_that_the_arm_lacks_is_refused():
+    config = SimpleNamespace(parameters=["kp_ratio_3"])
+    with pytest.raises(InputError, match="kp_ratio_3: found it for an arm without motor 3"):
+        check_parameters("identify_control", config, cantilever_spec(2, 1.0, 0.1).compile())
+
+
 def test_candidates_do_not_mix():
     model = small_spec().compile()
     fields = candidate_fields(model, {"kp": np.array([100.0, 200.0, 300.0])})
@@ -183,6 +189,14 @@ def test_candidates_do_not_mix():
         set_fields(model, fields, candidate)
         assert PARAMETERS["kp"].read(model) == kp
         assert (model.actuator_biasprm[:, 1] == -kp).all()
+
+
+def test_a_gain_that_is_identified_again_leaves_the_ratios_of_unequal_tendons():
+    model = model_with({"kp_ratio_2": 1.3})
+    first = PARAMETERS["kp"].read(model)
+    model = model_with({"kp": 2 * first}, model=model)
+    assert model.actuator_gainprm[:3, 0] == pytest.approx(2 * first * np.array([1, 1.3, 1]))
+    assert (model.actuator_biasprm[:, 1] == -model.actuator_gainprm[:, 0]).all()
 
 
 def test_a_unit_s_factor_is_shared_by_its_two_hinges():

@@ -46,7 +46,7 @@ class Parameter:
         write: (fields, values (candidates,), model) sets it in every candidate.
         signed: whether it may be 0 or less. Only others are searched on a logarithmic scale.
         part: what of an arm it belongs to, if not every arm has it: "tendons", their motors' "dead time", RATE_LIMIT or
-            BACKLASH, or a joint's "branch 1", "slider 1", …, or "holes" on which cables rub.
+            BACKLASH, the "motor 2", …, a joint's "branch 1", "slider 1", …, or "holes" on which cables rub.
         told_by: whether trials of a kind of experiment tell it: from others alone it comes out wrong, or anyhow.
     """
 
@@ -67,6 +67,8 @@ class Parameter:
         if self.part in (RATE_LIMIT, BACKLASH):
             return numeric_place(model, self.part) is not None
         kind, _, number = self.part.partition(" ")
+        if kind == "motor":
+            return model.nu >= int(number)
         if number:
             return len(elements(model, kind, int(number)).tendon) > 0
         return not kind or model.nu > 0
@@ -177,8 +179,25 @@ def _set(name: str, index: tuple, sign: float = 1.0) -> Callable:
 
 
 def _write_kp(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
-    fields["actuator_gainprm"][:, :, 0] = values[:, None]
-    fields["actuator_biasprm"][:, :, 1] = -values[:, None]
+    """Of the first motor; the others keep their ratios to it."""
+    gains = values[:, None] * (model.actuator_gainprm[:, 0] / model.actuator_gainprm[0, 0])
+    fields["actuator_gainprm"][:, :, 0] = gains
+    fields["actuator_biasprm"][:, :, 1] = -gains
+
+
+def _gain_ratio(number: int) -> Parameter:
+    """Gain of motor `number` over that of the first: cables and winches are not equally stiff."""
+
+    def read(model: mujoco.MjModel) -> float:
+        gains = model.actuator_gainprm[:, 0]
+        return float(gains[number - 1] / gains[0]) if len(gains) >= number else 1.0
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        gain = values * fields["actuator_gainprm"][:, 0, 0]
+        fields["actuator_gainprm"][:, number - 1, 0] = gain
+        fields["actuator_biasprm"][:, number - 1, 1] = -gain
+
+    return Parameter("", ("actuator_gainprm", "actuator_biasprm"), read, write, part=f"motor {number}", told_by=_pulled)
 
 
 def _hinge_share(model: mujoco.MjModel) -> float:
@@ -367,6 +386,9 @@ PARAMETERS: dict[str, Parameter] = {
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
         part="tendons", told_by=_pulled,
     ),
+    # of motors with their cables, which are not all equally stiff
+    "kp_ratio_2": _gain_ratio(2),
+    "kp_ratio_3": _gain_ratio(3),
     "kv": Parameter(
         "N s/m", ("actuator_biasprm",), lambda m: float(-m.actuator_biasprm[0, 2]),
         _set("actuator_biasprm", (slice(None), 2), -1.0), part="tendons", told_by=_pulled_and_moving,

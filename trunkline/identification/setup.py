@@ -53,6 +53,8 @@ def _lacking(part: str) -> str:
     if part == "tendons":
         found = "found it for an arm without tendons, expected parameters of joints alone"
         return f"{found}; such an arm's pipeline ends with `dvc repro identify_damping`"
+    if part.startswith("motor "):
+        return f"found it for an arm without {part}, expected a ratio for each motor that it has but the first"
     if part == "dead time":
         found = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0"
         return f"{found}; of an arm that comes as MJCF, expected `delay` and `nsample` of its actuators in that file"
