@@ -64,12 +64,14 @@ class Bench:
 
 @dataclass
 class Seen:
-    """A frame of the run as it truly was: time, s, core's mode, the robot's state, and the object's place (3,), m."""
+    """A frame of the run as it truly was: time, s, core's mode, the robot's state, the object's place (3,) and the
+    centres of the arm's units (U, 3), m."""
 
     now: float
     mode: str
     truth: Truth
     thing: np.ndarray
+    units: np.ndarray
 
 
 def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list[View]]:
@@ -81,7 +83,8 @@ def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list
         views.append(view)
         if session.moved:
             truth = session.robot.truth()
-            frames.append(Seen(session.now, view.intent.mode, truth, session.place(session.now)))
+            units, _ = session.robot.links()
+            frames.append(Seen(session.now, view.intent.mode, truth, session.place(session.now), units))
         try:
             script.send(view)
         except StopIteration as end:

@@ -46,8 +46,9 @@ def limits_of(motors: MotorLimits, rate_limit: float = 0.0, tendons: int = 3) ->
     return Limits(*(np.append(motors.share * p, np.full(tendons, o)) for p, o in zip(panda, own, strict=True)))
 
 
-def point_to_point(start: np.ndarray, end: np.ndarray, limits: Limits, step: float) -> np.ndarray:
-    """Positions every `step` s from rest at `start` (n,) to rest at `end` (n,). Shape (T, n), both ends included.
+def point_to_point(start: np.ndarray, end: np.ndarray, limits: Limits, step: float, seconds: float = 0.0) -> np.ndarray:
+    """Positions every `step` s from rest at `start` (n,) to rest at `end` (n,), in `seconds` s or more. Shape (T, n),
+    both ends included.
 
     The last step may be shorter than the others: the end is held for the rest of it.
 
@@ -60,6 +61,8 @@ def point_to_point(start: np.ndarray, end: np.ndarray, limits: Limits, step: flo
     given.current_position, given.target_position = start.tolist(), end.tolist()
     given.max_velocity, given.max_acceleration = limits.velocity.tolist(), limits.acceleration.tolist()
     given.max_jerk = limits.jerk.tolist()
+    if seconds > 0:
+        given.minimum_duration = seconds
     found = ruckig.Trajectory(len(start))
     result = ruckig.Ruckig(len(start)).calculate(given, found)
     if result < 0:
