@@ -84,6 +84,7 @@ class Session:
         self.previewed: np.ndarray | None = None
         self.now, self.rays, self.moved, self.began = 0.0, (None, None), False, 0.0
         self.foreseen: Foreseen | None = None
+        self.offs: list[float] = []  # m, readings of how far the straight arm's tip is beside its bending plane
         self.believed = ""  # digest of the newest plan of whose end the world tells
         self.tips: list[tuple[float, np.ndarray]] = []  # s since a plan began, and where its tip is seen, m
         self.refusals: list[tuple[float, str]] = []  # times at which targets were not followed, and why
@@ -91,6 +92,11 @@ class Session:
     def seen(self, place: np.ndarray) -> np.ndarray:
         """A true place (3,), m, in the frame that the client takes for the Panda's base."""
         return self.robot.instruments.turn.apply(place) + self.robot.instruments.shift
+
+    @property
+    def beside(self) -> float:
+        """m, by which the straight arm's tip was seen beside its bending plane, before the robot moved."""
+        return float(np.mean(self.offs))
 
     def frame(self) -> View:
         """Let a frame pass."""
@@ -101,6 +107,9 @@ class Session:
         joints: Joints = tuple(float(q) for q in seen.joints)  # type: ignore[assignment]
         if self.state.mode in ("hold", "aim"):
             self._believe(seen)
+        if not self.moved:
+            mount, flange = (found[0] for found in mount_pose(seen.joints[None], self.config.mount_offset))
+            self.offs.append(float((seen.tip - mount) @ -flange[:, 1]))  # the base's y is opposite to the flange's
         given = Input(
             self.now, left, right, REFERENCE, joints, self.world, self.package.digest, self.report, self.shown,
             executor, self.foreseen.offer if self.foreseen is not None else None,
@@ -140,7 +149,8 @@ class Session:
         assert request is not None
         self.foreseen, self.previewed = None, None
         try:
-            self.plan = self.planner.plan(request, self.world, self.executor.joints, self.executor.commands)
+            here = self.executor.joints, self.executor.commands
+            self.plan = self.planner.plan(request, self.world, *here, self.beside)
         except InputError as error:
             self.report = PlanReport(request.serial, refused=str(error))
             return
@@ -149,7 +159,9 @@ class Session:
         if request.targets.thing:
             if self.foresight is not None:
                 thing = self.world.thing(request.targets.thing)
-                self.foreseen = self.foresight.grasp(plan, request.targets, thing, self.world, request.serial)
+                self.foreseen = self.foresight.grasp(
+                    plan, request.targets, thing, self.world, self.beside, request.serial
+                )
             return
         mount, _ = mount_pose(plan.joints[-1:], self.config.mount_offset)
         x, y, z = (float(value) for value in mount[0])

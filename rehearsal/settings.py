@@ -81,6 +81,7 @@ class Previewing:
     hold: Zero
     sag: Annotated[float, Field(gt=0, le=1)]
     slip: Annotated[float, Field(gt=0, le=1)]
+    lifted: Share
     friction: Share
     place: Annotated[list[Share], Field(min_length=3, max_length=3)]
     turn_deg: Zero

@@ -15,6 +15,7 @@ from trunkline.hybrid.doubts import Contact, Doubts, doubts_of
 from trunkline.hybrid.futures import Twin
 from trunkline.hybrid.objects import Thing as Shaped
 from trunkline.hybrid.robots import PandaRobot
+from trunkline.hybrid.string import hang
 from trunkline.hybrid.worlds import Surface
 from trunkline.hybrid.worlds import World as Room
 from trunkline.panda.kinematics import mount_pose
@@ -48,13 +49,12 @@ def compose_twin(
 ) -> Twin:
     """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands."""
     robot = PandaRobot("panda", known.mount_offset, known.mount_mass, 0.0, joints.tolist())
-    hanging, place = thing.support == "hanging", np.array(thing.position)
-    hook = (place + [0.0, 0.0, thing.diameter / 2 + settings.string]).tolist() if hanging else None
-    room = Room(None, {box.name: _surface(box) for box in world.boxes}, hook)
+    place = np.array(thing.position)
+    room = Room(None, {box.name: _surface(box) for box in world.boxes}, None)
     shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material)
-    spec = compose(known.arm, robot, room, Placed(shaped, place, thing.quaternion, hanging))
-    if hanging:  # what it hangs from is out of the robot's way
-        spec.geom("hook").contype = spec.geom("hook").conaffinity = 0
+    spec = compose(known.arm, robot, room, Placed(shaped, place, thing.quaternion))
+    if thing.support == "hanging":
+        hang(spec, place, thing.diameter / 2, settings.string)
     model, arm = spec.compile(), known.arm.copy().compile()
     return Twin(model, arm, _start(model, arm, joints, commands, known.mount_offset)).stepped(settings.step)
 

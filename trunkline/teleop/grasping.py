@@ -24,7 +24,8 @@ Metres = Annotated[float, Field(gt=0, le=1)]
 class Handling:
     """How things are grasped and brought elsewhere.
 
-    close: s, at least, for the cables to close. calm: s for which all waits before it and after it. lift: m. carry:
+    close: s, at least, for the cables to close. sink: m by which the mount goes down meanwhile, as the coil that closes
+    rises, so that what supports a thing bears it until the end. calm: s for which all waits before it and after it. lift: m. carry:
     m/s, at most, of the mount with something in the arm. above: m over its place from which a thing comes down. rise: m
     by which the mount rises as the arm opens, in `open` s at least. beneath: m, at most, from a thing's centre to what
     it is released over, less half its width. payload: rows of diameter, m, and the heaviest mass, kg, that is grasped,
@@ -32,6 +33,7 @@ class Handling:
     """
 
     close: Seconds
+    sink: Annotated[float, Field(ge=0, le=0.5)]
     calm: Seconds
     lift: Metres
     carry: Metres
@@ -79,8 +81,12 @@ class Grasping:
     grips: dict[str, Grip]
     handling: Handling
 
-    def grasp(self, targets: Targets, thing: Thing, joints: np.ndarray) -> list[Leg]:
-        """Approach with the arm opened, close, lift.
+    def grasp(self, targets: Targets, thing: Thing, joints: np.ndarray, beside: float = 0.0) -> list[Leg]:
+        """Approach with the arm opened, close while the mount goes down, lift.
+
+        Args:
+            beside: m, by which the straight arm's tip is seen beside the bending plane, towards its base's y: the mount
+                makes up for it, as a narrow coil must meet a thing in its middle.
 
         Raises:
             InputError: the thing is too heavy, nobody knows how to grasp it, or the rigid robot cannot be there.
@@ -94,19 +100,22 @@ class Grasping:
         if thing.support not in self.grips:
             raise InputError(f"grasp: {thing.name} is {thing.support}, expected {' or '.join(self.grips)}")
         placement = self.placement(targets, thing, joints)
-        centre, opened = np.array(thing.position), self.straight - placement.opened
+        centre = np.array(thing.position) - beside * placement.rotation[:, 1]
+        opened = self.straight - placement.opened
         closed, still, gravity = self.straight - placement.closed, np.zeros(len(opened)), _gravity(targets)
 
         def at(start: np.ndarray, place: np.ndarray) -> np.ndarray:
             return self._solve(start, centre + place, targets)
 
-        beside = at(joints, placement.come)
-        there = at(beside, placement.mount)
+        come = at(joints, placement.come)
+        there = at(come, placement.mount)
+        sunk = at(there, placement.mount - h.sink * UP)
+        up = h.lift + h.sink
         return [
-            Leg("approach", beside, opened, gravity, still),
+            Leg("approach", come, opened, gravity, still),
             Leg("approach", there, opened, gravity, still, calm=h.calm),
-            Leg("curl", there, closed, seconds=h.close, calm=h.calm),
-            Leg("lift", at(there, placement.mount + h.lift * UP), closed, seconds=h.lift / h.carry),
+            Leg("curl", sunk, closed, seconds=h.close, calm=h.calm),
+            Leg("lift", at(sunk, placement.mount + h.lift * UP), closed, seconds=up / h.carry),
         ]
 
     def placement(self, targets: Targets, thing: Thing, joints: np.ndarray) -> Placement:

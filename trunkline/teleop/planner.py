@@ -43,16 +43,21 @@ class Planner:
     chain: Chain | None = None
     grasping: Grasping | None = None
 
-    def plan(self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray) -> Plan:
+    def plan(
+        self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
+    ) -> Plan:
         """From rest at `joints` (7,), rad, and `commands` (K,), m: approach with a straight arm and curl; of a thing
         that the tip target marks, approach, curl and lift; of one that the arm holds, transfer and release.
+
+        Args:
+            beside: m, by which the straight arm's tip is seen beside the bending plane (`Grasping.grasp`).
 
         Raises:
             InputError: beginning with what forbids it: limit, self-collision, out of reach, gravity, world, payload,
                 grasp or release.
         """
         rows, phases = [np.append(joints, commands)[None]], []
-        for leg in self._legs(request.targets, world, joints, commands):
+        for leg in self._legs(request.targets, world, joints, commands, beside):
             here, end = rows[-1][-1], np.append(leg.joints, leg.commands)
             way = point_to_point(here, end, self.limits, self.step, leg.seconds)
             if self.shaper is not None and leg.gravity is not None:
@@ -66,14 +71,16 @@ class Planner:
         refuse(found, world, self.mount_offset)
         return found
 
-    def _legs(self, targets: Targets, world: World, joints: np.ndarray, commands: np.ndarray) -> list[Leg]:
+    def _legs(
+        self, targets: Targets, world: World, joints: np.ndarray, commands: np.ndarray, beside: float
+    ) -> list[Leg]:
         if targets.thing:
             thing = world.thing(targets.thing)
             if self.grasping is None:
                 raise InputError(f"grasp: found no way of grasping {thing.name}, expected a planner that has one")
             if thing.support == "held":
                 return self.grasping.bring(targets, thing, world, joints, commands)
-            return self.grasping.grasp(targets, thing, joints)
+            return self.grasping.grasp(targets, thing, joints, beside)
         there, curled = self.goal(targets, joints)
         gravity = np.array(_soft_target(targets)[1])
         return [Leg("approach", there, self.straight, gravity), Leg("curl", there, curled, gravity)]
