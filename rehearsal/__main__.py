@@ -16,6 +16,8 @@ from demo.rig import Config as Lab
 from rehearsal import settings
 from rehearsal.experiments.bench import Bench
 from rehearsal.experiments.follow import follow
+from rehearsal.experiments.grasp import grasp
+from rehearsal.experiments.handle import handle
 from rehearsal.experiments.reach import reach
 from rehearsal.experiments.report import draw, table
 from rehearsal.experiments.result import append_result, read_results
@@ -23,7 +25,7 @@ from rehearsal.package import read_package
 from trunkline.pipeline.config import PROJECT, load_config, load_folder
 from trunkline.teleop.config import Config
 
-EXPERIMENTS = {"reach": reach, "follow": follow}
+EXPERIMENTS = {"reach": reach, "follow": follow, "grasp": grasp, "handle": handle}
 
 
 def main() -> None:

@@ -157,8 +157,8 @@ class Session:
         plan = self.plan
         self.report = PlanReport(request.serial, plan.digest(), "", plan.package, plan.world)
         if request.targets.thing:
-            if self.foresight is not None:
-                thing = self.world.thing(request.targets.thing)
+            thing = self.world.thing(request.targets.thing)
+            if self.foresight is not None and thing.support != "held":
                 self.foreseen = self.foresight.grasp(
                     plan, request.targets, thing, self.world, self.beside, request.serial
                 )

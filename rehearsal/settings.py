@@ -68,6 +68,7 @@ class Grasped:
     table_azimuth_deg: Positive
     table_radius: Positive
     drop: Positive
+    calm: Positive
 
 
 @dataclass

@@ -100,6 +100,12 @@ def grasp(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     return result, frames
 
 
+def held_after(frames: list[Seen]) -> Seen | None:
+    """The first frame after the first execution, None where there was none."""
+    pairs = zip(frames, frames[1:], strict=False)
+    return next((after for frame, after in pairs if frame.mode == "execute" != after.mode), None)
+
+
 def tell(result: Result, ending: Ending, session: Session) -> None:
     """What the preview had said, and how far off it was."""
     result.plans, result.probability = ending.plans, ending.probability
@@ -123,11 +129,11 @@ def tip_difference(session: Session) -> float:
 def failure(ending: Ending, frames: list[Seen], s: settings.Grasped) -> str:
     """Why the grasp failed, "" if it did not."""
     if not ending.done:
-        named = ending.why.startswith(("aim", "out of reach", "stopped"))
+        named = ending.why.startswith(("aim", "out of reach", "stopped", "slip"))
         return ending.why if named else f"plan refused: {ending.why}"
     first, last = frames[0], frames[-1]
-    done = next(frame for frame, after in zip(frames, frames[1:], strict=False)
-                if frame.mode == "execute" and after.mode != "execute")  # fmt: skip
+    done = held_after(frames)
+    assert done is not None
     lifted = done.thing[2] - first.thing[2]
     if done.truth.hanging or lifted < s.lifted:
         early = next((frame for frame in frames if np.linalg.norm(frame.truth.arm_thing) > 0), None)

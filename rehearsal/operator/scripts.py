@@ -20,6 +20,7 @@ SETTLED = 0.4  # s after a movement until filter and ray's length have come to r
 CLICK = 0.1  # s for which a button is pressed
 ASIDE = np.array([0.0, 0.0, 0.06])  # m by which the rigid ray is moved to drop a plan that was shown
 AGAIN = 0.5  # s after which the operator tries to follow again
+LIFTED = 0.05  # m from which on the operator sees that something is lifted
 CALM = 2.0  # s after an arrival that the operator looks on
 LONGEST = 30.0  # s that the operator waits for anything
 
@@ -130,6 +131,46 @@ class Operator:
             if ending.plans < self.person.patience:
                 view, ending.why = yield from self._place_at(view, lambda view: view.thing + beside)
         return ending
+
+    def handle(self, beside: np.ndarray, spot: np.ndarray, accept: float, watch: float) -> Script:
+        """Grasp, then aim so that the thing will be at `spot` (3,), m, as it appears, confirm, look on for `watch` s."""
+        view = yield from self._until(lambda view: view.intent.mode == "aim")
+        hung = view.thing
+        ending = yield from self.grasp(beside, accept, CALM)
+        view = yield from self._react()
+        if not ending.done or view.thing[2] - hung[2] < LIFTED:
+            ending.why = ending.why or "slip: it was not lifted"
+            ending.done = False
+            return ending
+        ending.done = False
+        view, ending.why = yield from self._place_thing(view, spot)
+        if ending.why:
+            return ending
+        ending.plans += 1
+        view = yield from self._ask(view)
+        if view.intent.mode != "ready":
+            ending.why = view.intent.notice or "aim: no plan was asked for"
+            return ending
+        return (yield from self._confirm(view, ending, watch))
+
+    def _place_thing(self, view: View, spot: np.ndarray):
+        """The rigid target to where the thing that is held will be at `spot`; why not, "" if it is there."""
+        self.left.press("grip", view.now)
+        for _ in range(self.person.patience):
+            targets = view.intent.targets
+            if targets is None:
+                view = yield from self._react()
+                continue
+            goal = spot + np.array(targets.rigid.position) - targets.tip.position
+            view = yield from self._aim(self.left, goal, self.band, view.now)
+            targets = view.intent.targets
+            if targets is None:
+                continue
+            if targets.rigid.reach in ("outside", "blocked"):
+                return view, f"out of reach: rigid target {targets.rigid.reach}"
+            if np.linalg.norm(self._look(targets.tip.position - spot)) < self.band / 2:
+                return view, ""
+        return view, "aim: the thing's place was never where it was meant"
 
     def _ask(self, view: View) -> Part:
         """Ask for a plan, and see its preview to the end, or that there is none."""

@@ -24,12 +24,12 @@ Metres = Annotated[float, Field(gt=0, le=1)]
 class Handling:
     """How things are grasped and brought elsewhere.
 
-    close: s, at least, for the cables to close. sink: m by which the mount goes down meanwhile, as the coil that closes
-    rises, so that what supports a thing bears it until the end. calm: s for which all waits before it and after it. lift: m. carry:
-    m/s, at most, of the mount with something in the arm. above: m over its place from which a thing comes down. rise: m
-    by which the mount rises as the arm opens, in `open` s at least. beneath: m, at most, from a thing's centre to what
-    it is released over, less half its width. payload: rows of diameter, m, and the heaviest mass, kg, that is grasped,
-    linear between.
+    close: s, at least, for the cables to close. sink: m by which the mount goes down meanwhile, as a coil that closes
+    rises, so that what supports a thing bears it until the end. calm: s for which all waits before it and after it.
+    lift: m. carry: m/s, of the mount with something in the arm, on the average. above: m over its place from which a
+    thing comes down. rise: m by which the mount rises as the arm opens, in `open` s at least. beneath: m, at most, that
+    a thing may fall as it is let go. payload: rows of diameter, m, and the heaviest mass, kg, that is grasped, linear
+    between.
     """
 
     close: Seconds
@@ -56,7 +56,8 @@ class Handling:
 
 @dataclass(frozen=True)
 class Leg:
-    """To `joints` (7,), rad, and `commands` (K,), m, in `seconds` at least, and then at rest for `calm` s.
+    """To `joints` (7,), rad, and `commands` (K,), m, in `seconds` at least, then at rest for `calm` s; `gentle` with
+    something in the arm.
 
     `gravity`: in the arm's base frame, for legs that are shaped so that the arm does not swing on; None for the others.
     `change` (K,): m, what swings it: a command's change, or zero, the mount's way.
@@ -69,6 +70,7 @@ class Leg:
     change: np.ndarray | None = None
     seconds: float = 0.0
     calm: float = 0.0
+    gentle: bool = False
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ class Grasping:
             Leg("approach", come, opened, gravity, still),
             Leg("approach", there, opened, gravity, still, calm=h.calm),
             Leg("curl", sunk, closed, seconds=h.close, calm=h.calm),
-            Leg("lift", at(sunk, placement.mount + h.lift * UP), closed, seconds=up / h.carry),
+            Leg("lift", at(sunk, placement.mount + h.lift * UP), closed, seconds=up / h.carry, gentle=True),
         ]
 
     def placement(self, targets: Targets, thing: Thing, joints: np.ndarray) -> Placement:
@@ -140,8 +142,8 @@ class Grasping:
         there = self._solve(above, place, targets)
         away = np.linalg.norm(place + h.above * UP - mount_pose(joints[None], self.mount_offset)[0][0])
         return [
-            Leg("transfer", above, commands, seconds=float(away) / h.carry, calm=h.calm),
-            Leg("transfer", there, commands, seconds=h.above / h.carry, calm=h.calm),
+            Leg("transfer", above, commands, seconds=float(away) / h.carry, calm=h.calm, gentle=True),
+            Leg("transfer", there, commands, seconds=h.above / h.carry, calm=h.calm, gentle=True),
             Leg("release", self._solve(there, place + h.rise * UP, targets), opened, seconds=h.open),
         ]
 

@@ -16,7 +16,7 @@ from trunkline.teleop.plan import Plan
 from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.shaping import Shaper, shaped
 from trunkline.teleop.tendons import Network, bend
-from trunkline.teleop.trajectory import JOINTS, Limits, point_to_point
+from trunkline.teleop.trajectory import JOINTS, Limits, gentle, point_to_point
 from trunkline.teleop.vectors import DOWN, Vector, add, conjugate, rotate, subtract
 
 LINK_RADIUS = 0.08  # m, about the joints' centres and the mount, that no solid of the world may come into
@@ -59,7 +59,8 @@ class Planner:
         rows, phases = [np.append(joints, commands)[None]], []
         for leg in self._legs(request.targets, world, joints, commands, beside):
             here, end = rows[-1][-1], np.append(leg.joints, leg.commands)
-            way = point_to_point(here, end, self.limits, self.step, leg.seconds)
+            profile = gentle if leg.gentle else point_to_point
+            way = profile(here, end, self.limits, self.step, leg.seconds)
             if self.shaper is not None and leg.gravity is not None:
                 change = leg.commands - here[JOINTS:] if leg.change is None else leg.change
                 way = shaped(way, self.step, self.shaper(leg.gravity, leg.commands, change))
