@@ -55,9 +55,7 @@ def why_not(ending: Ending, frames: list[Seen], table: Surface, diameter: float,
     second = [frame for frame in frames if frame.mode == "execute" and frame.now > grasped.now]
     if not second:
         return "slip: it was dropped before it was brought anywhere"
-    over = [
-        frame for frame in second if (np.abs(frame.thing[:2] - table.top[:2]) <= np.array(table.size[:2]) / 2).all()
-    ]
-    if not over:
+    half = np.array(table.size[:2]) / 2
+    if not any((np.abs(frame.thing[:2] - table.top[:2]) <= half).all() for frame in second):
         return "slip: it was dropped on its way"
     return "missed: it did not stay on the table"

@@ -133,7 +133,7 @@ class Operator:
         return ending
 
     def handle(self, beside: np.ndarray, spot: np.ndarray, accept: float, watch: float) -> Script:
-        """Grasp, then aim so that the thing will be at `spot` (3,), m, as it appears, confirm, look on for `watch` s."""
+        """Grasp, aim so that the thing will be at `spot` (3,), m, as it appears, confirm, look on for `watch` s."""
         view = yield from self._until(lambda view: view.intent.mode == "aim")
         hung = view.thing
         ending = yield from self.grasp(beside, accept, CALM)

@@ -28,6 +28,7 @@ from trunkline.teleop.messages import (
 )
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
+from trunkline.teleop.trajectory import gentle
 from trunkline.teleop.vectors import DOWN
 
 GEOMETRY = spiral_chain(length=LENGTH, base_width=0.080, tip_width=0.012, units=24)
@@ -59,9 +60,7 @@ def test_a_grasp_comes_from_the_side_closes_and_lifts(planner):
     mounts = mount_pose(plan.joints, OFFSET)[0]
     at = mounts[starts["curl"]]
     np.testing.assert_allclose(at, MOUNT, atol=1e-3)
-    np.testing.assert_allclose(
-        mounts[starts["curl"] : starts["lift"]], np.tile(at, (starts["lift"] - starts["curl"], 1))
-    )
+    np.testing.assert_allclose(mounts[starts["lift"]] - at, [0, 0, -HANDLING.sink], atol=1e-3)
     np.testing.assert_allclose(mounts[-1] - at, [0, 0, HANDLING.lift], atol=1e-3)
     away = np.abs(mounts[: starts["curl"], 1] - MOUNT[1])  # heading 0: the bending plane is that of x and z
     assert away.max() == pytest.approx(config().hanging.aside, abs=1e-3)
@@ -69,6 +68,27 @@ def test_a_grasp_comes_from_the_side_closes_and_lifts(planner):
     opened, closed = STRAIGHT - plan.commands[starts["curl"]], STRAIGHT - plan.commands[-1]
     np.testing.assert_allclose(opened, [0, -config().hanging.loose, -config().hanging.loose], atol=1e-9)
     np.testing.assert_allclose(closed, [config().hanging.pull, *opened[1:]], atol=1e-9)
+
+
+def test_a_tip_that_is_seen_beside_the_bending_plane_is_made_up_for(planner):
+    plan = planner.plan(request(BALL, MOUNT), world(BALL), START, STRAIGHT, beside=0.01)
+    at = mount_pose(plan.joints[[dict(plan.phases)["curl"]]], OFFSET)[0][0]
+    np.testing.assert_allclose(at, np.array(MOUNT) - [0.0, 0.01, 0.0], atol=1e-3)
+
+
+def test_what_is_carried_is_moved_gently():
+    start, end = np.zeros(10), np.append(np.full(7, 0.4), np.zeros(3))
+    step = 1e-3
+    way = gentle(start, end, LIMITS, step, 3.0)
+    np.testing.assert_allclose(way[[0, -1]], [start, end], atol=1e-12)
+    assert len(way) == pytest.approx(3.0 / step, abs=2)
+    speed = np.diff(way[:, 0]) / step
+    assert speed.max() == pytest.approx(15 / 8 * 0.4 / 3.0, rel=1e-3)
+    assert np.abs(np.diff(speed) / step).max() == pytest.approx(10 / np.sqrt(3) * 0.4 / 9.0, rel=1e-2)
+    hasty = gentle(start, end, LIMITS, step)  # no longer than the limits ask for
+    assert (np.abs(np.diff(hasty, axis=0)).max(axis=0) / step <= LIMITS.velocity * (1 + 1e-6)).all()
+    assert (np.abs(np.diff(hasty, 2, axis=0)).max(axis=0) / step**2 <= LIMITS.acceleration * (1 + 1e-6)).all()
+    assert len(hasty) < len(way)
 
 
 def test_an_arm_before_the_object_pulls_the_other_cables(planner):
