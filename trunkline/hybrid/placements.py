@@ -39,8 +39,8 @@ class Placement:
 class Grip(Protocol):
     """A way of grasping."""
 
-    def placed(self, rotation: np.ndarray, mount: np.ndarray, here: np.ndarray) -> Placement:
-        """With the mount where the user has it; `here` (3,) is where it is now, m, less the object's centre."""
+    def placed(self, rotation: np.ndarray, mount: np.ndarray) -> Placement:
+        """With the mount where the user has it."""
         ...
 
     def near(self, rotation: np.ndarray, mount: np.ndarray, diameter: float) -> np.ndarray:
@@ -52,7 +52,7 @@ class Grip(Protocol):
 @dataclass
 class HangingSettings:
     """grasp: the grasp frame. pull: m, of the cables that close; the motors' force ends it sooner. loose: m, by which
-    the others are paid out. aside: m, from which the mount comes, across the bending plane. along, beside: m, places
+    the others are paid out. aside: m, from which the mount comes. along, beside: m, places
     that the assistant tries about the grasp frame, along the arm and away from the object."""
 
     grasp: Grasp
@@ -65,18 +65,19 @@ class HangingSettings:
 
 @dataclass(frozen=True)
 class HangingGrip:
-    """Of what hangs: the straight arm comes from the side, the nearer one, and curls towards the object."""
+    """Of what hangs: the straight arm comes from the side, towards the object, so that what it may push aside it does
+    not turn, and curls round it."""
 
     settings: HangingSettings
     geometry: ChainGeometry
 
-    def placed(self, rotation: np.ndarray, mount: np.ndarray, here: np.ndarray) -> Placement:
-        across = rotation[:, 1]
-        side = 1.0 if (here - mount) @ across >= 0 else -1.0
-        closed = pulls_of("dorsal" if _in_front(rotation, mount) else "ventral", self.settings.pull)
+    def placed(self, rotation: np.ndarray, mount: np.ndarray) -> Placement:
+        front = _in_front(rotation, mount)
+        towards = rotation[:, 0] if front else -rotation[:, 0]
+        closed = pulls_of("dorsal" if front else "ventral", self.settings.pull)
         loose = -self.settings.loose
         opened, closed = np.where(closed > 0, 0.0, loose), np.where(closed > 0, closed, loose)
-        return Placement(rotation, mount, mount + side * self.settings.aside * across, opened, closed)
+        return Placement(rotation, mount, mount - self.settings.aside * towards, opened, closed)
 
     def near(self, rotation: np.ndarray, mount: np.ndarray, diameter: float) -> np.ndarray:
         s = self.settings

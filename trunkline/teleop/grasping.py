@@ -101,7 +101,7 @@ class Grasping:
             )
         if thing.support not in self.grips:
             raise InputError(f"grasp: {thing.name} is {thing.support}, expected {' or '.join(self.grips)}")
-        placement = self.placement(targets, thing, joints)
+        placement = self.placement(targets, thing)
         centre = np.array(thing.position) - beside * placement.rotation[:, 1]
         opened = self.straight - placement.opened
         closed, still, gravity = self.straight - placement.closed, np.zeros(len(opened)), _gravity(targets)
@@ -120,12 +120,11 @@ class Grasping:
             Leg("lift", at(sunk, placement.mount + h.lift * UP), closed, seconds=up / h.carry, gentle=True),
         ]
 
-    def placement(self, targets: Targets, thing: Thing, joints: np.ndarray) -> Placement:
-        """Of the user's own targets, the robot at `joints` (7,), rad."""
+    def placement(self, targets: Targets, thing: Thing) -> Placement:
+        """Of the user's own targets."""
         centre = np.array(thing.position)
         rotation = rotation_from_wxyz(np.array(base_quaternion(targets.pointing, targets.heading))).as_matrix()
-        here = mount_pose(joints[None], self.mount_offset)[0][0] - centre
-        return self.grips[thing.support].placed(rotation, np.array(targets.rigid.position) - centre, here)
+        return self.grips[thing.support].placed(rotation, np.array(targets.rigid.position) - centre)
 
     def bring(
         self, targets: Targets, thing: Thing, world: World, joints: np.ndarray, commands: np.ndarray
