@@ -15,15 +15,15 @@ demo: setup          ## run the whole pipeline, from recording the demo logs to 
 	dvc repro
 	@ls -lh artifacts/package_unity/*.tgz
 
-RUNS ?= 20
-rehearse: setup      ## rehearse the experiments on the stand-in robot: make rehearse RUNS=200; resumes where it was stopped
+RUNS ?= 10
+rehearse: setup      ## rehearse the experiments on the stand-in robot: make rehearse RUNS=20; resumes where it was stopped
 	python -m rehearsal --runs $(RUNS)
 
 test: setup          ## run every test, then lint
 	python -m pytest -n auto --dist loadgroup
 	ruff check --output-format concise .
 
-types: setup         ## check the types of the library and the stages
+types: setup         ## check the types of all but the tests and the stand-in lab
 	pyright
 
 gate: setup          ## compare the metrics with tests/limits.yaml

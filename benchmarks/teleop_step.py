@@ -27,7 +27,6 @@ UPRIGHT = Pose((0.0, 0.0, 1.0), (0.5, 0.5, -0.5, -0.5))  # the reference's y is 
 PLACES = {"within reach": ((0.0, -0.4, 0.0), (0.1, -0.75, -0.1)), "out of reach": ((0.0, 0.3, -0.4), (0.5, 0.0, -0.4))}
 
 
-# REC
 @recorded("teleop_step")
 def main(path: Path) -> None:
     config = load_folder(Config, PROJECT / "conf/teleop")
@@ -40,12 +39,7 @@ def main(path: Path) -> None:
         state, times, sizes = core.start(), [], []
         rng = np.random.default_rng(0)
         for index in range(STEPS):
-            hands = [
-                Controller(
-                    tuple(map(float, place + rng.normal(scale=1e-3, size=3))), (1.0, 0.0, 0.0, 0.0), grip=index > 60
-                )
-                for place in places
-            ]
+            hands = [trembling(place, rng, grip=index > 60) for place in places]
             given = Input(DT * (1 + index), hands[0], hands[1], UPRIGHT, JOINTS, World("world"), "digest")
             began = time.thread_time()
             state, intent = core.step(state, given, DT)

@@ -9,18 +9,18 @@ import mujoco
 import numpy as np
 import onnxruntime
 
-from trunkline.frames import gravity_in_base
+from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.ik.ask import ask
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import actuated, equilibrium
 
 model, network = sys.argv[1:]
 chain = read_chain(mujoco.MjModel.from_xml_path(model)).smooth  # the network's arm, its tendons without friction
-tilt = np.array([0.3])  # rad, between the straight arm and gravity
-gravity = gravity_in_base(tilt)
+down = downwards(np.array([0.3]), np.array([0.0]))  # gravity 0.3 rad off the straight arm, towards the base's +x
+gravity = STANDARD_GRAVITY * down
 tensions = 5.0 * np.eye(1, chain.tendons)  # N, on the first tendon alone
 rest = equilibrium(chain, tensions, gravity)
-pose = np.concatenate([tilt[:, None], rest.position, rest.quaternion], axis=1)  # (1, 8), base frame, w first
+pose = np.concatenate([down, rest.position, rest.quaternion], axis=1)  # (1, 10), base frame, quaternion w first
 commands = ask(onnxruntime.InferenceSession(network), pose)["commands"]  # a pose that is none is an InputError
 reached = actuated(chain, commands.astype(float), gravity)
 print("tip (m):", rest.position[0].round(4))

@@ -1,61 +1,61 @@
-"""Rehearse the experiments on the stand-in robot, and tell how often they succeed.
+"""Rehearse some runs of the experiments on the stand-in robot, or film one of each.
 
-    python -m rehearsal [--only reach] [--runs 20] [--package artifacts/package_unity/...tgz] [--out artifacts/rehearse]
+    python -m rehearsal [--only reach] [--runs 10] [--variants 0] [--package FILE] [--out build/rehearse]
+    python -m rehearsal --animate [--only reach] [--seed 0]
 
-Runs that the table in the folder `out` has for the same package are not made again.
+Runs that the table in the folder `out` has of the same package and code are not made again. The committed metrics are
+of more: `dvc repro rehearsal/dvc.yaml`.
 """
 
 import argparse
-import time
+import sys
 from pathlib import Path
 
-from demo.plants.choice import plant_of
-from demo.plants.stranger import Stranger
-from demo.rig import ROOT as LAB
-from demo.rig import Config as Lab
-from rehearsal import settings
-from rehearsal.experiments.bench import Bench
-from rehearsal.experiments.follow import follow
-from rehearsal.experiments.grasp import grasp
-from rehearsal.experiments.handle import handle
-from rehearsal.experiments.reach import reach
-from rehearsal.experiments.report import draw, table
-from rehearsal.experiments.result import append_result, read_results
-from rehearsal.package import read_package
-from trunkline.pipeline.config import PROJECT, load_config, load_folder
-from trunkline.teleop.config import Config
-
-EXPERIMENTS = {"reach": reach, "follow": follow, "grasp": grasp, "handle": handle}
+from rehearsal.animation import animate
+from rehearsal.experiments.bench import bench_of
+from rehearsal.experiments.registry import EXPERIMENTS
+from rehearsal.experiments.result import summary
+from rehearsal.report import draw
+from rehearsal.runs import make, only_package, source_of, wanted
+from trunkline.errors import in_one_line
+from trunkline.pipeline.checkout import require_checkout
+from trunkline.pipeline.limits import read_limits
+from trunkline.pipeline.rehearsal_table import rehearsal_table
+from trunkline.threads import thread_count
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+@in_one_line
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="rehearsal", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--only", choices=sorted(EXPERIMENTS))
-    parser.add_argument("--runs", type=int, default=20, help="of each experiment, seeds 0, 1, ...")
+    parser.add_argument("--runs", type=_count, default=10, help="of each experiment, seeds 0, 1, ...")
+    parser.add_argument("--variants", type=_count, default=0, help="runs of each variant of them")
+    parser.add_argument("--animate", action="store_true", help="film one run of each, into artifacts/rehearse/")
+    parser.add_argument("--seed", type=_count, default=0, help="of the run that is filmed")
     parser.add_argument("--package", type=Path, default=None)
-    parser.add_argument("--out", type=Path, default=Path("artifacts/rehearse"))
+    parser.add_argument("--out", type=Path, default=Path("build/rehearse"))
     given = parser.parse_args()
-    file = given.package or next(iter(sorted(Path("artifacts/package_unity").glob("*.tgz"))), Path("none"))
-    package = read_package(file)
-    arm = plant_of(load_config(Lab, "record", LAB))
-    assert isinstance(arm, Stranger)
-    config = load_folder(Config, PROJECT / "conf/teleop")
-    bench = Bench(package, config, arm, settings.stand_in(), settings.person(), settings.free())
-    runs = given.out / "runs.csv"
-    for name in [given.only] if given.only else EXPERIMENTS:
-        made = {(result.experiment, result.seed, result.package) for result in read_results(runs)}
-        for seed in range(given.runs):
-            if (name, seed, package.digest[:12]) in made:
-                continue
-            began = time.process_time()
-            result, _ = EXPERIMENTS[name](bench, seed)
-            append_result(runs, result)
-            told = "success" if result.success else result.cause
-            print(f"{name} {seed}: {told}; {time.process_time() - began:.0f} s of processor", flush=True)
-    results = [result for result in read_results(runs) if result.package == package.digest[:12]]
-    print(table(results))
+    names = [given.only] if given.only else list(EXPERIMENTS)
+    require_checkout(Path("."))
+    package = given.package or only_package()
+    if given.animate:
+        animate(bench_of(package), names, given.seed, Path("artifacts/rehearse"))
+        return 0
+    runs = wanted({name: given.runs for name in names}, given.variants)
+    source = source_of(package)
+    results = make(runs, package, source, given.out / "runs.csv", thread_count())
+    goals = read_limits(Path("tests/limits.yaml"))["rehearse"]
+    print(rehearsal_table(summary(results), goals, f"with package `{source.package}`", variants=True))
     draw(results, given.out / "rehearsal.png")
+    return 0
+
+
+def _count(text: str) -> int:
+    count = int(text)
+    if count < 0:
+        raise ValueError(text)
+    return count
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

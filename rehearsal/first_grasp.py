@@ -1,9 +1,9 @@
-"""A first grasp on the stand-in by a motion set by hand: beside a cylinder, pull, lift, hold.
+"""A first grasp on the stand-in by a motion set by hand: beside a cylinder or a basket's bar, pull, lift, hold.
 
     python -m rehearsal.first_grasp [PICTURES]
 
 tries placements of the arm and prints of each whether it holds, and into the folder PICTURES, if given, it draws them.
-The scene is built round the arm: it hangs at rest, and the cylinder is put beside it. The arm comes from the side,
+The scene is built round the arm: it hangs at rest, and the object is put beside it. The arm comes from the side,
 waits until it is calm, pulls one tendon, lifts and holds. There is no twin and no network in here: it says what the
 stand-in can hold.
 """
@@ -12,6 +12,7 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -32,6 +33,7 @@ from trunkline.settings import read_yaml
 SETTINGS = Path(__file__).parent / "conf/rehearse/robot/stand_in.yaml"
 DIAMETER, HEIGHT, MASS, STRING = 0.05, 0.12, 0.1, 0.15  # m, m, kg, m
 PULL, LIFT, ASIDE = 0.18, 0.1, 0.16  # m, m, m by which the arm comes from the side
+TABLES = {"cylinder": [0.08, 0.08, 0.03], "basket": [0.2, 0.2, 0.03]}  # m, each for its object
 FLOOR = -0.75  # m; the robot stands on a stand
 SETTLE, CLOSE, HOLD = 3.0, 1.5, 5.0  # s
 CLEARANCE = 0.01  # m, of the arm's last unit above the table
@@ -44,8 +46,9 @@ START = np.array([0.0, -0.2, 0.0, -1.9, 0.0, 1.7, 0.785])  # rad, where the sear
 @dataclass
 class Placement:
     """tilt_deg: of the straight arm from straight down, forwards. sideways: whether it bends sideways, else forwards in
-    the vertical plane. beyond: m of the arm beyond the middle of the cylinder. hanging: whether the cylinder hangs from
-    a hook, its axis level and across the bending plane; else it stands on a table. gap: m, between arm and cylinder."""
+    the vertical plane. beyond: m of the arm beyond the middle of the cylinder, or of the basket's bar. hanging: whether
+    the cylinder hangs from a hook, its axis level and across the bending plane; else it stands on a table, as a basket
+    does. gap: m, between arm and object. mass: kg. diameter: of cylinder or bar, m. height: of cylinder or box, m."""
 
     name: str
     tilt_deg: float
@@ -53,6 +56,10 @@ class Placement:
     beyond: float
     hanging: bool = False
     gap: float = 0.01
+    shape: Literal["cylinder", "basket"] = "cylinder"
+    diameter: float = DIAMETER
+    height: float = HEIGHT
+    mass: float = MASS
 
 
 @dataclass
@@ -106,21 +113,25 @@ class Trial:
         self.grasp = joints_for(MOUNT, rotation, offset, START)
         self.lift = joints_for(MOUNT + [0, 0, LIFT], rotation, offset, self.grasp)
         self.aside = joints_for(MOUNT - [0, ASIDE, 0], rotation, offset, self.grasp)
-        shape = ("cylinder", DIAMETER, HEIGHT, MASS)
+        shape = (placement.shape, placement.diameter, placement.height, placement.mass)
         far = Scene(None, Object(*shape, [5.0, 5.0, 5.0]), {})
         centres, _ = StandInRobot(arm, far, settings, self.grasp, seed, LOOSENED).links()
         unit = int(np.searchsorted(np.cumsum(arm.chain.lengths), arm.chain.length - placement.beyond))
         side = rotation[:, 0] * [1, 1, 0] / np.linalg.norm(rotation[:2, 0])
-        middle = centres[unit] + side * ((DIAMETER + arm.chain.widths[unit]) / 2 + placement.gap)
+        middle = centres[unit] + side * ((placement.diameter + arm.chain.widths[unit]) / 2 + placement.gap)
         if placement.hanging:
             turn = Rotation.from_rotvec(np.pi / 2 * side)  # its axis level, across the bending plane
             thing = Object(*shape, middle.tolist(), wxyz_from_rotation(turn).tolist(), True)
-            self.scene = Scene(FLOOR, thing, {}, (middle + [0, 0, DIAMETER / 2 + STRING]).tolist())
+            hook = middle + [0, 0, placement.diameter / 2 + STRING]
+            self.scene = Scene(FLOOR, thing, {}, hook.tolist())
         else:
-            if not placement.sideways:
-                middle[2] = centres[-1][2] + HEIGHT / 2 - CLEARANCE
-            top = [float(middle[0]), float(middle[1]), float(middle[2] - HEIGHT / 2)]
-            self.scene = Scene(FLOOR, Object(*shape, middle.tolist()), {"table": Surface(top, [0.08, 0.08, 0.03])})
+            thing = Object(*shape, [0.0, 0.0, 0.0])
+            place = middle - thing.grip
+            if placement.shape == "cylinder" and not placement.sideways:
+                place[2] = centres[-1][2] + thing.half_height - CLEARANCE
+            thing.position = place.tolist()
+            top = place - [0, 0, thing.half_height]
+            self.scene = Scene(FLOOR, thing, {"table": Surface(top.tolist(), TABLES[placement.shape])})
         self.robot = StandInRobot(arm, self.scene, settings, self.aside, seed, LOOSENED, substeps)
         self.pictures: list[tuple[str, np.ndarray, Truth]] = []
 
@@ -140,7 +151,7 @@ class Trial:
         holding = np.linalg.norm(then[1].arm_thing, axis=1) > 0
         if not holding.any():
             return float("inf")
-        before, after = (truth.thing - centres[holding].mean(axis=0) for centres, truth in (then, now))
+        before, after = (truth.grip - centres[holding].mean(axis=0) for centres, truth in (then, now))
         return float(np.linalg.norm(after - before))
 
     def run(self) -> Held:
@@ -176,7 +187,9 @@ PLACEMENTS = [
     Placement("hanging, arm straight down, 0.12 m beyond", 0, False, 0.12, hanging=True),
     Placement("standing, arm straight down", 0, False, 0.1),
     Placement("standing, arm at 120 deg, bends sideways, 0.15 m beyond", 120, True, 0.15),
-]
+    Placement("basket on a table, arm straight down, 0.15 m beyond its bar", 0, False, 0.15, shape="basket",
+              diameter=0.03, height=0.06, mass=0.2),
+]  # fmt: skip
 
 
 def main() -> None:

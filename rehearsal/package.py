@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
@@ -20,7 +21,7 @@ from trunkline.teleop.messages import Targets
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.reach import MapReach
 from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.swing import shaper_for
+from trunkline.teleop.swing import shaper_for, slowest, swings
 from trunkline.teleop.tendons import Network, network_of
 from trunkline.teleop.trajectory import limits_of
 from trunkline.teleop.vectors import DOWN, Vector, conjugate, rotate
@@ -55,6 +56,12 @@ class Package:
     def grips(self, config: Config) -> dict[str, Grip]:
         """How things are grasped, by what supports them."""
         return {"hanging": HangingGrip(config.hanging, self.geometry)}
+
+    @cached_property
+    def period(self) -> float:
+        """s, of the slowest swing of the straight arm that a moved mount gives its tip; 0 where there is none."""
+        gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+        return float(max(slowest(swings(self.model, self.straight, None, gravity), 1).periods, default=0.0))
 
     def tip(self, mount: Vector, targets: Targets, commands: np.ndarray) -> np.ndarray:
         """Where the twin's tip comes to rest, base frame, m (3,): the arm at `mount` as `targets` turn it, its motors

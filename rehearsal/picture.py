@@ -4,7 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rehearsal.robot.thing import rotation
+from rehearsal.robot.shapes import BOX
+from rehearsal.robot.thing import Thing, rotation
+
+CORNERS = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])
 
 
 def draw(trial, file: Path) -> None:
@@ -14,23 +17,17 @@ def draw(trial, file: Path) -> None:
     pictures, scene = trial.pictures, trial.scene
     figure = Figure(figsize=(3.2 * len(pictures), 9))
     axes = figure.subplots(3, len(pictures), squeeze=False)
-    half = np.array([1, 1, 1]) * [scene.object.diameter / 2, scene.object.diameter / 2, scene.object.half_height]
-    angle = np.linspace(0, 2 * np.pi, 25)
-    rim = half * np.column_stack([np.cos(angle), np.sin(angle), np.ones(25)])
-    rims = [rim, rim * [1, 1, -1]]
-    middle = np.array(scene.object.position)
+    lines = outline(trial.robot.thing)
+    middle = pictures[0][2].grip
     for column, (name, centres, truth) in enumerate(pictures):
         turn = np.array(rotation(truth.quaternion))
         for row, (a, b) in enumerate([(1, 2), (0, 2), (0, 1)]):
             plot = axes[row, column]
             for centre, width in zip(centres, trial.robot.arm.chain.widths, strict=True):
                 plot.add_patch(_circle(centre[[a, b]], width / 2))
-            for rim in rims:
-                points = rim @ turn.T + truth.thing
-                plot.plot(points[:, a], points[:, b], "k", lw=1)
-            for start in (0, 6, 12, 18):
-                edge = np.array([rims[0][start], rims[1][start]]) @ turn.T + truth.thing
-                plot.plot(edge[:, a], edge[:, b], "k", lw=0.6)
+            for line in lines:
+                points = line @ turn.T + truth.thing
+                plot.plot(points[:, a], points[:, b], "k", lw=0.8)
             for surface in scene.surfaces.values():
                 top, size = np.array(surface.top), np.array(surface.size)
                 x, y = [top[a] - size[a] / 2, top[a] + size[a] / 2], [top[b]] * 2
@@ -38,13 +35,27 @@ def draw(trial, file: Path) -> None:
                     plot.plot(x, y, color="tab:brown", lw=3)
             plot.set_aspect("equal")
             plot.set_xlim(middle[a] - 0.3, middle[a] + 0.3)
-            plot.set_ylim(middle[b] - 0.25, middle[b] + 0.3)
+            plot.set_ylim(middle[b] - 0.3, middle[b] + 0.35)
             plot.set_xlabel("xyz"[a] + " [m]")
             plot.set_ylabel("xyz"[b] + " [m]")
         axes[0, column].set_title(name)
     figure.subplots_adjust(left=0.04, right=0.99, bottom=0.05, top=0.96, wspace=0.3)
     file.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(file, dpi=70)
+
+
+def outline(thing: Thing) -> list[np.ndarray]:
+    """Lines in the thing's frame that show its shapes, m: two ends of each, and what joins them. Shapes (n, 3)."""
+    angle = np.linspace(0, 2 * np.pi, 25)
+    circle, square = np.column_stack([np.cos(angle), np.sin(angle)]), CORNERS[[0, 1, 3, 2, 0]]
+    lines = []
+    for kind, half, edge, shift, turn in zip(thing.kind, thing.half, thing.edge, thing.shift, thing.turn, strict=True):
+        ends = square if kind == BOX and half.any() else circle
+        first, last = (np.column_stack([ends, np.full(len(ends), z)]) * (half + edge) for z in (-1, 1))
+        quarter = (len(ends) - 1) // 4
+        joined = [np.array(pair) for pair in zip(first[:-1:quarter], last[:-1:quarter], strict=True)]
+        lines += [line @ turn.T + shift for line in (first, last, *joined)]
+    return lines
 
 
 def _circle(centre, radius):

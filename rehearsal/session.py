@@ -24,6 +24,7 @@ from trunkline.teleop.executor import SimulatedRobot
 from trunkline.teleop.following import Follower
 from trunkline.teleop.messages import Box, ExecutorReport, Input, Intent, Joints, Offer, PlanReport, Pose, Thing, World
 from trunkline.teleop.plan import Plan
+from trunkline.teleop.targets import why_not
 
 RATE = 60.0  # Hz, of a headset's frames
 TICKS = 2  # in which the robot is commanded a frame
@@ -180,25 +181,30 @@ class Session:
             self.fault, self.tips, self.began = self.executor.start(self.plan, intent.execute), [], self.now
         if intent.motion == "hold" and running.mode == "running":
             self.executor.stop()
-        if intent.motion == "follow" and self.follower is None:
-            joints, commands = self.executor.joints, self.executor.commands
-            quick = replace(self.planner, chain=None)  # what the network says, as often as the targets move
-            self.follower = Follower(quick, joints, commands, 1 / RATE / TICKS)
-        if intent.motion != "follow":
-            self.follower = None
+        self._hear(intent)
         self.moved = self.moved or intent.motion != "hold"
         if not self.moved:
             return  # a robot at rest stays as it is
-        targets = intent.follow
-        for _ in range(TICKS):
-            if self.follower is not None:
+        for tick in range(TICKS):
+            if self.follower is not None and intent.motion == "follow":
                 try:
-                    self.executor.joints, self.executor.commands = self.follower.tick(targets)
+                    now = self.now + tick / RATE / TICKS
+                    self.executor.joints, self.executor.commands = self.follower.tick(now)
                 except InputError as error:
                     self.fault, self.follower = str(error), None
             self.executor.advance(1 / RATE / TICKS)
         if self.follower is not None and self.follower.refused:
             self.refusals.append((self.now, self.follower.refused))
+
+    def _hear(self, intent: Intent) -> None:
+        """While it follows, the robot hears the newest targets, those that can be followed, and does them later."""
+        if intent.mode != "follow":
+            self.follower = None
+            return
+        if self.follower is None:
+            joints, commands, delay = self.executor.joints, self.executor.commands, self.config.core.follow_delay
+            self.follower = Follower(self.planner, joints, commands, 1 / RATE / TICKS, delay, self.package.period)
+        self.follower.hear(self.now, None if why_not(intent.targets) else intent.targets)
 
     def _move(self, joints: np.ndarray, commands: np.ndarray, dt: float) -> None:
         try:

@@ -4,11 +4,14 @@ from pathlib import Path
 
 from trunkline.figures.package import roundtrip_figure
 from trunkline.figures.style import save_figure
+from trunkline.hybrid.robots import Robot
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.settings import settings
+from trunkline.teleop.settings import Teleop
 from trunkline.unity.comparison import curled, read_models
 from trunkline.unity.package import read_tarball, write_tarball
 from trunkline.unity.readers import refusals
+from trunkline.unity.shared_vectors import with_shared_vectors
 from trunkline.unity.sources import read_sources
 from trunkline.unity.twin import MANIFEST, Label, Trajectory, assemble, compare
 
@@ -18,11 +21,14 @@ ARTIFACTS = Path("artifacts/package_unity")
 @settings
 class Config(Label):
     roundtrip: Trajectory
+    robot: Robot
+    core: Teleop
 
 
 def main(config: Config) -> None:
     sources = read_sources(Path("."))
-    files, violations = assemble(config, sources, config.roundtrip)
+    files, violations = assemble(config, sources, config.roundtrip, config.robot)
+    files = with_shared_vectors(files, config.core)
     for violation in violations:
         print(f"package_unity: broken rule: {violation}")
 

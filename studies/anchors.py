@@ -110,8 +110,8 @@ def terms(z: np.ndarray, cubic: bool) -> np.ndarray:
 @cache
 def monomials(rank: int) -> tuple[np.ndarray, np.ndarray]:
     """Which coordinates the products of two and of three take. Shapes (n, 2), (m, 3)."""
-    every = range(rank)
-    return tuple(np.array(list(combinations_with_replacement(every, degree))) for degree in (2, 3))
+    second, third = (np.array(list(combinations_with_replacement(range(rank), degree))) for degree in (2, 3))
+    return second, third
 
 
 def shapes_of(experiment: Experiment, stride: int) -> np.ndarray:
@@ -196,7 +196,7 @@ def rows(session: str) -> list[str]:
 @in_one_line
 @recorded("anchors")
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--session", choices=ROOTS, action="append", help="one alone (default: all)")
     chosen_sessions = parser.parse_args().session or list(ROOTS)
     print("| releases of | model | size | position / tip error on `validate`, mm | % of length |")

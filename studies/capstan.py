@@ -144,7 +144,7 @@ def row(title: str, friction: str, errors: np.ndarray, trials: list[Trial]) -> s
 @in_one_line
 @recorded("capstan")
 def main() -> int:
-    argparse.ArgumentParser(prog="studies.capstan", description=__doc__.splitlines()[0]).parse_args()
+    argparse.ArgumentParser(prog="studies.capstan", description=__doc__).parse_args()
     trials = at_rest()
     model = cad_arm(load_config(CadConfig, "build_mjcf")).spec.compile()
     for trial in trials:

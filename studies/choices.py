@@ -4,8 +4,11 @@
 
 Needs the trials and the CAD model of the demo session (`make demo`). Each row changes one thing in the settings of
 params.yaml and conf/, runs the three stages one after the other, each on what the one before it found, and scores the
-last model on the `validate` split. CPU time is that of all threads in a stage's search, without reading trials.
-Progress goes to stderr.
+last model on the `validate` split. CPU time is that of all threads in a stage's search, without reading trials. What
+physics is worth: `python -m studies.effects`.
+
+A row is kept in docs/results/choices.csv as soon as it is done; stopped, the study goes on from there. The table is
+kept once it is whole. Progress goes to stderr.
 """
 
 import argparse
@@ -18,10 +21,10 @@ from importlib import import_module
 from pathlib import Path
 
 import mujoco
-from omegaconf import OmegaConf
 
 from benchmarks.identification.case import STAGES, require_demo, spread
 from benchmarks.identification.timing import Stopwatch
+from studies.rows import Rows, digest, other_commits
 from trunkline.errors import in_one_line
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
@@ -32,19 +35,20 @@ from trunkline.identification.problem import Bounds
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import set_up
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import CAD_MODEL, doubts, read_reported
+from trunkline.pipeline.identify import CAD_MODEL, TRIALS, doubts, read_reported
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.results import recorded
+from trunkline.settings import read_yaml
 from trunkline.trials.experiments import is_static
 from trunkline.trials.splits import VALIDATE
 from trunkline.trials.trial import Trial
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")
-FINE_EVOLUTION = Path("conf/shared/fine/differential_evolution.yaml")
 JOINT_FRICTION = Bounds(low=1e-4, high=0.1)  # rad of a joint's own spring
 MOUNT = Bounds(low=-0.1, high=0.1)  # rad by which the mount is turned in the tracked base frame
 COMMAND_DELAY = 0.02  # s
 KINDS = ("release", "curl")
+ERRORS = {"E_internal": "e_internal_mm", "position": "e_position_mm", "tip": "e_tip_mm"}
 QUICK_TRIALS = 2  # of each kind and split
 
 
@@ -55,11 +59,6 @@ class Choice:
     title: str
     settings: Callable[[str, IdentificationSettings], IdentificationSettings] = lambda stage, config: config
     trials: Callable[[list[Trial]], list[Trial]] = lambda trials: trials
-
-
-def without(name: str, stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    """A parameter that stays what it is in the CAD model."""
-    return replace(config, parameters={key: span for key, span in config.parameters.items() if key != name})
 
 
 def with_parameter(
@@ -92,15 +91,11 @@ def with_distances(stage: str, config: IdentificationSettings) -> Identification
 
 def variant(schema: type, file: Path):
     """A file of conf/shared/ as settings of type `schema`."""
-    return schema(**OmegaConf.to_container(OmegaConf.load(file)))
+    return schema(**{str(key): value for key, value in read_yaml(file).items()})
 
 
 def with_least_squares(stage: str, config: IdentificationSettings) -> IdentificationSettings:
     return replace(config, optimizer=variant(LeastSquares, LEAST_SQUARES))
-
-
-def with_evolved_factors(stage: str, config: IdentificationSettings) -> IdentificationSettings:
-    return replace(config, fine=variant(DifferentialEvolution, FINE_EVOLUTION))
 
 
 def with_factors_of_damping(stage: str, config: IdentificationSettings) -> IdentificationSettings:
@@ -109,8 +104,6 @@ def with_factors_of_damping(stage: str, config: IdentificationSettings) -> Ident
 
 CHOICES: dict[str, Choice] = {
     "committed": Choice("as committed"),
-    "no-hardening": Choice("without hardening", partial(without, "hardening")),
-    "no-creep": Choice("relaxation_time at its CAD value", partial(without, "relaxation_time")),
     "joint-friction": Choice(
         "with joint_friction", partial(with_parameter, "joint_friction", JOINT_FRICTION, "identify_damping")
     ),
@@ -120,7 +113,6 @@ CHOICES: dict[str, Choice] = {
     "velocity": Choice("started with measured velocities", trials=in_motion),
     "distances": Choice("loss: distances", with_distances),
     "least-squares": Choice("optimizer: least_squares", with_least_squares),
-    "evolved-factors": Choice("fine: differential_evolution", with_evolved_factors),
     "joint-damping": Choice("per_joint damping too", with_factors_of_damping),
 }
 
@@ -147,9 +139,9 @@ class Chain:
 
     model: mujoco.MjModel
     experiments: list[Experiment]
-    fit: Fit | None
+    fit: Fit
     spent: list[float]
-    result: Identification | None = None
+    result: Identification
 
 
 def chain(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> Chain:
@@ -158,7 +150,7 @@ def chain(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> Chain:
     Args:
         known: chains so far by all that they depend on; a row that changes a later stage alone begins with them.
     """
-    found, key = Chain(read_spec(CAD_MODEL).compile(), [], None, []), ""
+    model, spent, key = read_spec(CAD_MODEL).compile(), [], ""
     for stage in STAGES:
         config = choice.settings(stage, load_config(import_module(f"stages.{stage}").Config, stage))
         config = quick(stage, config) if is_quick else config
@@ -166,18 +158,21 @@ def chain(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> Chain:
         key += f"{stage} {config} {[trial.in_motion for trial in trials]}\n"
         if key not in known:
             with contextlib.redirect_stdout(sys.stderr):
-                known[key] = next_link(found, stage, config, trials, is_quick)
-        found = known[key]
-    return found
+                known[key] = next_link(model, spent, stage, config, trials, is_quick)
+        model, spent = known[key].model, known[key].spent
+    return known[key]
 
 
-def next_link(before: Chain, stage: str, config: IdentificationSettings, trials: list[Trial], is_quick: bool) -> Chain:
-    """The chain with one stage more."""
-    model, experiments, fit = set_up(config, trials, before.model)
+def next_link(
+    model: mujoco.MjModel, before: list[float], stage: str, config: IdentificationSettings, trials: list[Trial],
+    is_quick: bool,
+) -> Chain:
+    """One stage more, from `model`; `before`: CPU seconds of the stages that led to it."""
+    model, experiments, fit = set_up(config, trials, model)
     experiments = fewer(experiments, QUICK_TRIALS) if is_quick else experiments
     clock = Stopwatch()
     result = identify(stage, model, [e for e in experiments if e.kind in config.experiments], fit)
-    spent = [*before.spent, clock.read().cpu]
+    spent = [*before, clock.read().cpu]
     for line in [*doubts(result, fit.parameters), result.values]:
         print(f"{stage}: {line}")
     return Chain(result.models["identified"], experiments, fit, spent, result)
@@ -191,30 +186,49 @@ def fewer(experiments: list[Experiment], trials: int) -> list[Experiment]:
     return [experiment for group in groups.values() for experiment in spread(group, trials)]
 
 
-def row(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> str:
-    """One line of the table."""
+def cells(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> dict[str, float]:
+    """Of a row, by their heads."""
     found = chain(choice, is_quick, known)
     unseen = [e for e in found.experiments if e.split == VALIDATE]
     replayed = replay(found.model, unseen, found.fit.segments)
     table = scores(replayed, unseen, found.fit.loss, found.fit.weights)[VALIDATE]["by_experiment"]
-    errors = [f"{table[kind][key]:.3f}" for key in ("e_internal_mm", "e_position_mm", "e_tip_mm") for kind in KINDS]
-    return "| " + " | ".join([choice.title, *errors, *(f"{seconds:.0f}" for seconds in found.spent)]) + " |"
+    errors = {f"{error}, {kind}s (mm)": table[kind][key] for error, key in ERRORS.items() for kind in KINDS}
+    stages = [stage.removeprefix("identify_") for stage in STAGES]
+    return errors | {f"CPU {stage} (s)": seconds for stage, seconds in zip(stages, found.spent, strict=True)}
+
+
+def table_of(rows: dict[str, dict]) -> str:
+    """Of the rows, in the order of CHOICES."""
+    shown = {name: rows[name] for name in CHOICES if name in rows}
+    heads = [head for head in next(iter(shown.values())) if head.endswith(")")]
+    lines = [f"| choice | {' | '.join(heads)} |", "|---|" + "---:|" * len(heads)]
+    for name, row in shown.items():
+        values = [f"{row[head]:.0f}" if head.endswith("(s)") else f"{row[head]:.3f}" for head in heads]
+        lines.append(f"| {CHOICES[name].title} | {' | '.join(values)} |")
+    return "\n".join(lines)
 
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.choices", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.choices", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="few trials, frames and iterations: only whether it runs")
     parser.add_argument("--only", nargs="+", choices=CHOICES, default=list(CHOICES), help="some of the rows")
     arguments = parser.parse_args()
-    heads = [f"{error}, {kind}s (mm)" for error in ("E_internal", "position", "tip") for kind in KINDS]
-    heads += [f"CPU {stage.removeprefix('identify_')} (s)" for stage in STAGES]
     require_demo(CAD_MODEL)
     known: dict[str, Chain] = {}
-    with recorded("choices" if arguments.only == list(CHOICES) else "choices_part", keep=not arguments.quick):
-        print("| choice | " + " | ".join(heads) + " |\n|---|" + "---:|" * len(heads), flush=True)
-        for name in arguments.only:
-            print(row(CHOICES[name], arguments.quick, known), flush=True)
+    if arguments.quick:
+        print(table_of({name: cells(CHOICES[name], True, known) for name in arguments.only}))
+        return 0
+    committed = [load_config(import_module(f"stages.{stage}").Config, stage) for stage in STAGES]
+    table = Rows("choices", digest(committed, CAD_MODEL, TRIALS), "name")
+    is_whole = {*table.read(), *arguments.only} >= set(CHOICES)
+    with recorded("choices", keep=is_whole):
+        for name in [name for name in arguments.only if name not in table.read()]:
+            table.add(name, **cells(CHOICES[name], False, known))
+        rows = table.read()
+        print(table_of(rows))
+        if line := other_commits(rows):
+            print(line)
     return 0
 
 

@@ -7,7 +7,10 @@ tried one after the other, each in the stage that identifies it: the stage is fi
 split identify are left out in turn, and the effect is kept if it lowers the position error of the trials left out by
 more than the standard error of that difference over trials. `test` is never read. Then the simplest model and the
 chosen one are identified by all stages and scored on `validate`, beside a null model, the model without data and the
-noise floor. Progress goes to stderr.
+noise floor.
+
+An effect's row is kept in docs/results/effects.csv as soon as it is done; stopped, the study goes on from there.
+Progress goes to stderr.
 """
 
 import argparse
@@ -20,10 +23,11 @@ from importlib import import_module
 import mujoco
 import numpy as np
 
-from benchmarks.identification.case import STAGES
+from benchmarks.identification.case import STAGES, require_demo
 from stages.build_mjcf import Config as CadConfig
 from stages.build_mjcf import cad_arm
 from studies.choices import Chain, next_link
+from studies.rows import Rows, digest, other_commits
 from trunkline.arm.holes import Holes
 from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.errors import in_one_line
@@ -34,7 +38,7 @@ from trunkline.identification.null_model import hanging_still, noise_floor
 from trunkline.identification.problem import Bounds
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import read_reported
+from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported
 from trunkline.pipeline.results import recorded
 from trunkline.trials.splits import VALIDATE
 from trunkline.trials.trial import Trial
@@ -92,6 +96,7 @@ EFFECTS: dict[str, Effect] = {
     "dead_time": Effect("dead time", "identify_control", ranges(0.001, 0.2, "dead_time"), dead_time=0.02),
     "lag": Effect("lag of the motors", "identify_control", ranges(0.002, 0.3, "time_constant"), lag=0.02),
 }  # fmt: skip
+FOLDS = 3
 NO_LAG = 1e-6  # s; MuJoCo's filter wants some
 OPTIONAL = {name for effect in EFFECTS.values() for name in effect.parameters}
 
@@ -133,18 +138,18 @@ def left_out(link: Chain, stage: str, folds: int) -> np.ndarray:
 
 def chain(effects: list[Effect], last: str, known: dict[str, Chain]) -> Chain:
     """The stages up to `last`, each on what the one before it found."""
-    found, key = Chain(cad_model(effects), [], None, []), ""
+    model, spent, key = cad_model(effects), [], ""
     for stage in STAGES:
         config = settings_of(stage, effects)
-        lag = found.model.actuator_dynprm[:1, 0]
-        key += f"{stage} {config} {found.model.nq} {found.model.ntendon} {found.model.nhistory} {lag}\n"
+        lag = model.actuator_dynprm[:1, 0]
+        key += f"{stage} {config} {model.nq} {model.ntendon} {model.nhistory} {lag}\n"
         if key not in known:
             with contextlib.redirect_stdout(sys.stderr):
-                known[key] = next_link(found, stage, config, read_reported(config), is_quick=False)
-        found = known[key]
+                known[key] = next_link(model, spent, stage, config, read_reported(config), is_quick=False)
+        model, spent = known[key].model, known[key].spent
         if stage == last:
             break
-    return found
+    return known[key]
 
 
 def validated(title: str, link: Chain, trials: list[Trial], cad: mujoco.MjModel) -> list[str]:
@@ -170,30 +175,55 @@ def validated(title: str, link: Chain, trials: list[Trial], cad: mujoco.MjModel)
     return rows
 
 
+def tried(names: list[str], table: Rows, folds: int, known: dict[str, Chain]) -> list[Effect]:
+    """The effects that are kept of those to try. Rows that the table lacks are added."""
+    done, kept, last = table.read(), [], ("", np.array([]))
+    for name in names:
+        effect = EFFECTS[name]
+        if name not in done:
+            begun, stage = time.perf_counter(), effect.stage
+            if last[0] != stage:  # else what stood after the last effect of the stage is what stands before this one
+                last = stage, left_out(chain(kept, stage, known), stage, folds)
+            errors = left_out(chain([*kept, effect], stage, known), stage, folds)
+            gain = last[1] - errors
+            standard_error = gain.std(ddof=1) / np.sqrt(len(gain))
+            pays = bool(gain.mean() > standard_error)
+            table.add(
+                name, without=last[1].mean(), with_it=errors.mean(), gain=gain.mean(), standard_error=standard_error,
+                kept="yes" if pays else "no", seconds=time.perf_counter() - begun,
+            )  # fmt: skip
+            done = table.read()
+            if pays:
+                last = stage, errors
+        kept += [effect] if done[name]["kept"] == "yes" else []
+    return kept
+
+
+def effect_table(rows: dict[str, dict]) -> str:
+    lines = ["| effect | position error left out (mm): without | with | lower by | kept | seconds |"]
+    lines.append("|---|---:|---:|---:|---|---:|")
+    for name, row in rows.items():
+        means = f"{row['without']:.3f} | {row['with_it']:.3f} | {row['gain']:.3f} ± {row['standard_error']:.3f}"
+        lines.append(f"| {EFFECTS[name].title} | {means} | {row['kept']} | {row['seconds']:.0f} |")
+    return "\n".join(lines)
+
+
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.effects", description=__doc__.splitlines()[0])
-    parser.add_argument("--folds", type=int, default=3, help="groups of trials that are left out in turn")
+    parser = argparse.ArgumentParser(prog="studies.effects", description=__doc__)
+    parser.add_argument("--folds", type=int, default=FOLDS, help="groups of trials that are left out in turn")
     parser.add_argument("--only", nargs="+", choices=EFFECTS, default=list(EFFECTS), help="effects to try")
     arguments = parser.parse_args()
+    require_demo(CAD_MODEL)
     known: dict[str, Chain] = {}
-    kept: list[Effect] = []
-    with recorded("effects", keep=arguments.only == list(EFFECTS)):
-        print("| effect | position error left out (mm): without | with | lower by | kept | seconds |", flush=True)
-        print("|---|---:|---:|---:|---|---:|", flush=True)
-        for name in arguments.only:
-            effect, begun = EFFECTS[name], time.perf_counter()
-            errors = [
-                left_out(chain(effects, effect.stage, known), effect.stage, arguments.folds)
-                for effects in (kept, [*kept, effect])
-            ]
-            gain = errors[0] - errors[1]
-            standard_error = gain.std(ddof=1) / np.sqrt(len(gain))
-            pays = gain.mean() > standard_error
-            kept += [effect] if pays else []
-            means = f"{errors[0].mean():.3f} | {errors[1].mean():.3f} | {gain.mean():.3f} ± {standard_error:.3f}"
-            seconds = time.perf_counter() - begun
-            print(f"| {effect.title} | {means} | {'yes' if pays else 'no'} | {seconds:.0f} |", flush=True)
+    every = [settings_of(stage, list(EFFECTS.values())) for stage in STAGES]
+    told = [load_config(CadConfig, "build_mjcf"), every, list(EFFECTS.values()), arguments.folds, arguments.only]
+    is_whole = arguments.only == list(EFFECTS) and arguments.folds == FOLDS
+    table = Rows("effects" if is_whole else "effects_part", digest(told, TRIALS), "effect")
+    with recorded("effects", keep=is_whole):
+        kept = tried(arguments.only, table, arguments.folds, known)
+        rows = table.read()
+        print(effect_table(rows))
         words = "the tip's also in % of length; null: the mean shape at rest; CAD: the model without data"
         print(f"\nErrors on `validate`, {words}.\n")
         errors = "E_internal (mm) | position (mm) | tip (mm) | tip (%)"
@@ -203,6 +233,8 @@ def main() -> int:
             for stage in STAGES:
                 link, trials = chain(effects, stage, known), read_reported(settings_of(stage, effects))
                 print("\n".join(validated(f"{title}, {stage}", link, trials, cad_model(effects))), flush=True)
+        if line := other_commits(rows):
+            print(line)
     return 0
 
 

@@ -1,8 +1,8 @@
 """How many grasps turn out otherwise when the time step is halved: `python -m studies.halved_grasps --count 200`
 
 Random grasps of the identified arm: shape, diameter, mass, friction, pull and the place of the object by uniform draws
-about the grasp frame, hanging. Each is tried at the arm's own step and at half of it. Prints both outcomes of those
-that differ, the share that does with its Wilson 95 % interval, and how far objects that both hold end apart.
+about the grasp frame, hanging. Each is tried at the payload chart's step and at half of it. Prints both outcomes of
+those that differ, the share that does with its Wilson 95 % interval, and how far objects that both hold end apart.
 """
 
 import argparse
@@ -10,17 +10,21 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 
 from studies.payload import MODEL, read_settings
 from trunkline.errors import in_one_line
+from trunkline.hybrid.grasps import Pull
+from trunkline.hybrid.objects import Shape
 from trunkline.hybrid.payload import Cell, try_masses
 from trunkline.hybrid.shares import wilson
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
 
+SHAPES, PULLS = get_args(Shape), get_args(Pull)
 DIAMETERS, MASSES, FRICTIONS = (0.02, 0.08), (0.05, 0.5), (0.3, 0.6)  # m, kg
 WRAPS, GAPS = (0.4, 0.9), (0.0, 0.03)  # turns, m
 TOGETHER = 4  # placements of each draw
@@ -39,12 +43,14 @@ def main() -> int:
     draws = -(-options.count // TOGETHER)
     with progress(draws, "halved_grasps", "draws") as bar:
         for draw in range(draws):
-            grasp = replace(chart.grasp, wrap=rng.uniform(*WRAPS), gap=rng.uniform(*GAPS))
-            own = replace(chart, grasp=grasp, placements=TOGETHER, spread=SPREAD, seed=draw)
-            cell = Cell("hanging", str(rng.choice(["cylinder", "box", "sphere", "toy"])), rng.uniform(*DIAMETERS),
-                        rng.uniform(*FRICTIONS), str(rng.choice(["dorsal", "ventral"])), 0.2)  # fmt: skip
+            wrap = rng.uniform(*WRAPS)
+            own = replace(chart, gap=rng.uniform(*GAPS), placements=TOGETHER, spread=SPREAD, seed=draw)
+            cell = Cell("hanging", SHAPES[rng.integers(len(SHAPES))], rng.uniform(*DIAMETERS),
+                        rng.uniform(*FRICTIONS), PULLS[rng.integers(len(PULLS))], 0.2)  # fmt: skip
             mass = np.array([rng.uniform(*MASSES)])
-            whole, half = (try_masses(arm, own, cell, mass, arm.option.timestep / part) for part in (1, 2))
+            whole, half = (
+                try_masses(arm, replace(own, timestep=chart.timestep / part), cell, wrap, mass) for part in (1, 2)
+            )
             held = [tried.held(chart.sag, chart.slip) for tried in (whole, half)]
             outcomes.append(np.column_stack(held))
             both = held[0] & held[1]
@@ -59,7 +65,7 @@ def main() -> int:
     low, high = wilson(changed, count)
     print(
         f"{changed} of {count} grasps change outcome: {changed / count:.1%} ({low:.1%} to {high:.1%}); "
-        f"{found[:, 0].mean():.0%} held at the arm's own step"
+        f"{found[:, 0].mean():.0%} held at the whole step"
     )
     if len(apart):
         print(

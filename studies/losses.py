@@ -133,6 +133,7 @@ def recover(case: Case, plant: mujoco.MjModel, noise: Noise, repetitions: int, s
             for loss, table in rows.items():
                 problem = replace(case.fit, loss=loss).problem(case.model, trials)
                 found = descend(problem, start, ITERATIONS, TOLERANCE, lambda best: None)
+                assert found.linear is not None
                 width = certainty(found.linear, moves=surrogate(problem, found.vector).moves).half_width
                 table.append((found.vector - exact, width, found.converged))
                 bar.update(1)
@@ -160,7 +161,7 @@ def table(names: list[str], results: dict[str, Recovered]) -> str:
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.losses", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.losses", description=__doc__)
     parser.add_argument("--repetitions", type=int, default=20, help="with noise drawn anew, at least 2")
     parser.add_argument("--trials", type=int, default=6, help="releases of the session, at most")
     parser.add_argument("--frames", type=int, default=180, help="of each release")
@@ -172,7 +173,7 @@ def main() -> int:
     if arguments.weight_velocity is not None:
         weights = replace(case.fit.weights, weight_velocity=arguments.weight_velocity)
         case = replace(case, fit=replace(case.fit, weights=weights))
-    with recorded("losses"):
+    with recorded("losses", keep=len(sys.argv) == 1):
         with contextlib.redirect_stdout(sys.stderr):
             results = recover(case, read_spec(PLANT).compile(), read_noise(), arguments.repetitions)
         print(table(list(case.fit.parameters), results))

@@ -2,7 +2,7 @@
 
 Goes over the cells of `studies/payload.yaml` and adds a row for each to docs/results/payload.csv as soon as it is done;
 stopped, it goes on from there. A file of other settings or another arm is refused, `--anew` begins another.
-`--quick` is a small chart: fewer diameters, one friction, one pull, 1 placement, a coarser ladder.
+`--quick` is a small chart: hanging objects of two diameters, 1 placement, a coarser ladder.
 `--cells N` stops after N more. Prints the rows and their cost; docs/results/payload.png shows them.
 """
 
@@ -21,7 +21,7 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.figures.payload import payload_figure
 from trunkline.figures.style import save_figure
 from trunkline.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
-from trunkline.hybrid.payload import Cell, PayloadSettings, cells, chart_rows
+from trunkline.hybrid.payload import Cell, Outcome, PayloadSettings, cells, chart_rows
 from trunkline.pipeline.config import validated
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.results import recorded
@@ -32,10 +32,11 @@ MODEL = Path("artifacts/identify_control/arm.xml")
 SETTINGS = Path("studies/payload.yaml")
 TABLE, QUICK_TABLE = Path("docs/results/payload.csv"), Path("docs/results/payload_quick.csv")
 QUICK = {
-    "diameters": [0.03, 0.06, 0.1], "frictions": [0.45], "pulls": ["dorsal"], "shortenings": [0.2],
-    "masses": [0.1, 0.3, 0.6], "placements": 1,
+    "grids": [{"supports": ["hanging"], "shapes": ["cylinder", "box", "sphere", "toy"], "diameters": [0.03, 0.06],
+               "frictions": [0.45], "pulls": ["dorsal"], "shortenings": [0.2]}],
+    "masses": [0.1, 0.3, 0.6], "wraps": [0.6], "placements": 1,
 }  # fmt: skip
-KEYS = [field.name for field in fields(Cell)]
+KEYS, FOUND = ([field.name for field in fields(kind)] for kind in (Cell, Outcome))
 
 
 def read_settings(quick: bool) -> PayloadSettings:
@@ -67,7 +68,7 @@ def main() -> int:
     chart, arm = read_settings(options.quick), read_spec(MODEL)
     told = json.dumps(
         {
-            **asdict(chart),
+            **{key: value for key, value in asdict(chart).items() if key != "grids"},  # of those rows tell
             "contacts": [IMPRATIO, SOLREF, SOLIMP],
             "arm": hashlib.sha256(MODEL.read_bytes()).hexdigest(),
         },
@@ -82,7 +83,7 @@ def main() -> int:
     with progress(min(len(cells(chart)) - len(done), options.cells), "payload", "cells") as bar:
         for _, (cell, outcome) in zip(range(options.cells), rows, strict=False):
             row = pd.DataFrame([[*astuple(cell), *astuple(outcome), digest]],
-                               columns=[*KEYS, "mass", "share", "grasps", "settings"])  # fmt: skip
+                               columns=[*KEYS, *FOUND, "settings"])  # fmt: skip
             table, grasps = pd.concat([table, row]), grasps + outcome.grasps
             path.parent.mkdir(parents=True, exist_ok=True)
             table.to_csv(path, index=False, float_format="%.6g")
@@ -90,7 +91,7 @@ def main() -> int:
     if len(table):
         save_figure(payload_figure(table), path.with_suffix(".png"))
         with recorded("payload", keep=not options.quick and len(table) == len(cells(chart))):
-            print(table[[*KEYS, "mass", "share", "grasps"]].to_string(index=False))
+            print(table[[*KEYS, *FOUND]].to_string(index=False))
     if grasps:
         print(f"{grasps} grasps, {(time.process_time() - begun) / grasps:.2f} s of processor each")
     return 0

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from stages import build_mjcf, filter, identify_stiffness
+from trunkline.arm.uniform import Uniform
 from trunkline.errors import in_one_line
 from trunkline.filtering.filter import filter_take
 from trunkline.identification.evaluation import replay, scores
@@ -46,7 +47,7 @@ class Case:
 
 
 def cases() -> dict[str, Case]:
-    mass = load_config(build_mjcf.Config, "build_mjcf", EXAMPLE).arm.unit_masses[0]
+    mass = cad_settings()[1].unit_masses[0]
     return {
         "as in the example": Case(),
         "started at rest when the arm begins to move": Case(filtered={"release": "onset"}),
@@ -79,10 +80,17 @@ def error(case: Case, takes: list[Take]) -> tuple[float, float, float, float]:
     return table[IDENTIFY]["e_position_mm"], unseen["e_position_mm"], unseen["e_tip_mm"], unseen["e_tip_pct"]
 
 
+def cad_settings() -> tuple[build_mjcf.Config, Uniform]:
+    """Of the example's CAD model, and of its arm."""
+    config = load_config(build_mjcf.Config, "build_mjcf", EXAMPLE)
+    assert isinstance(config.arm, Uniform)
+    return config, config.arm
+
+
 def arm(case: Case) -> mujoco.MjModel:
     """The example's CAD model, changed."""
-    config = load_config(build_mjcf.Config, "build_mjcf", EXAMPLE)
-    model = build_mjcf.cad_arm(replace(config, arm=replace(config.arm, **case.arm))).spec.compile()
+    config, hose = cad_settings()
+    model = build_mjcf.cad_arm(replace(config, arm=replace(hose, **case.arm))).spec.compile()
     model.dof_dampingpoly[:, 0] = case.quadratic_damping * model.dof_damping
     return model
 

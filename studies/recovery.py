@@ -53,7 +53,7 @@ def run(module: str, folder: Path) -> None:
 
 @in_one_line
 def main() -> int:
-    argparse.ArgumentParser(prog="studies.recovery", description=__doc__.splitlines()[0]).parse_args()
+    argparse.ArgumentParser(prog="studies.recovery", description=__doc__).parse_args()
     with tempfile.TemporaryDirectory() as name, recorded("recovery"):
         folder = Path(name)
         for module in ("demo.record", *(f"stages.{stage}" for stage in set_up(folder))):

@@ -5,15 +5,19 @@ from spoilt: a start dated early, two labels exchanged, gravity turned, or a han
 trial is simulated by the identified arm, and its start detected as `filter` does). Onsets and swings spoil releases,
 the others static tilts; the stage that identifies from them runs at a small size. Errors are mean position and tip
 errors on the `validate` trials of that kind, over those of the session without a spoilt trial; beside them what the
-loss without weights of trials gets. A trial counts as named if it decides too much or is outlying, and what is said to
-look wrong must be what was spoilt. Progress goes to stderr.
+loss without weights of trials gets: the minimum at which the same search is before any trial is weighed. A trial counts
+as named if it decides too much or is outlying, and what is said to look wrong must be what was spoilt.
+
+A session's row is kept in docs/results/spoilt.csv as soon as it is done; stopped, the study goes on from there. All
+twenty take some fifteen minutes of one core. Progress goes to stderr.
 """
 
 import argparse
 import contextlib
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 
@@ -23,19 +27,24 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.identification.case import STAGES, require_demo, spread
 from stages import filter
+from studies.rows import Rows, digest, other_commits
 from trunkline.elements import give_way
 from trunkline.errors import in_one_line
 from trunkline.filtering.filter import start_of
 from trunkline.frames import make_continuous
 from trunkline.identification.evaluation import replay, scores
-from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import identify
+from trunkline.identification.experiment import Experiment, prepare
+from trunkline.identification.fit import Fit
+from trunkline.identification.identify import identify, values_of, with_parameters
+from trunkline.identification.loss import loss_of
 from trunkline.identification.optimizers import LeastSquares
+from trunkline.identification.problem import Problem
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import set_up
 from trunkline.identification.suspicion import suspicions
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.identify import CAD_MODEL, read_reported
+from trunkline.pipeline.identify import TRIALS as FILTERED
+from trunkline.pipeline.identify import read_reported
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.results import recorded
 from trunkline.signals.smoothing import low_pass
@@ -52,7 +61,8 @@ TURNED = np.radians([15, 30])
 SWUNG, SWING_FREQUENCY = (0.05, 0.15), (0.5, 1.5)  # m/s of the tip, Hz
 NOISE = 3e-4  # m, white, per axis
 WITHIN = 1.1  # times the clean session's error
-NEVER = 1e9  # times the usual loss, from which on a trial counts less
+ERRORS = ("position", "tip", "plain_position", "plain_tip")
+CLEAN = "none"  # is spoilt in the session that the others are compared with
 
 
 def early(trial: Trial, rng: np.random.Generator) -> Trial:
@@ -64,6 +74,7 @@ def exchanged(trial: Trial, rng: np.random.Generator) -> Trial:
     first = rng.integers(0, len(order) - 2)
     second = rng.integers(first + 2, len(order))
     order[[first, second]] = second, first
+    assert trial.quaternions is not None
     return replace(trial, positions=trial.positions[:, order], quaternions=trial.quaternions[:, order])
 
 
@@ -74,6 +85,7 @@ def turned(trial: Trial, rng: np.random.Generator) -> Trial:
 
 def swung(trial: Trial, rng: np.random.Generator) -> Trial:
     """The same release from a hand that swings the whole arm to and fro, one sine in all joints, and lets go."""
+    assert trial.quaternions is not None
     model = read_spec(PLANT).compile()
     start, step = prepare(trial, model, 1), float(trial.time[1] - trial.time[0])
     model.opt.gravity[:], model.opt.timestep = trial.gravity, step / 8
@@ -111,105 +123,178 @@ def swung(trial: Trial, rng: np.random.Generator) -> Trial:
 
 @dataclass
 class Spoil:
-    """says: in what is printed of the trial, if what is wrong with it was found."""
+    """says: words in what is said of the trial, any of them, if what is wrong with it was found."""
 
     title: str
     stage: str
     change: Callable[[Trial, np.random.Generator], Trial]
-    says: str
+    says: tuple[str, ...]
+
+    def is_told(self, said: str) -> bool:
+        return any(words in said for words in self.says)
 
 
 SPOILS = (
-    Spoil("start dated early", "identify_damping", early, "later fits better"),
-    Spoil("labels exchanged", "identify_stiffness", exchanged, "look exchanged"),
-    Spoil("gravity turned", "identify_stiffness", turned, "gravity"),
-    Spoil("swinging start", "identify_damping", swung, "in motion"),
+    Spoil("start dated early", "identify_damping", early, ("later fits better",)),
+    Spoil("labels exchanged", "identify_stiffness", exchanged, ("look exchanged",)),
+    Spoil("gravity turned", "identify_stiffness", turned, ("gravity turned", "gravity in its base frame")),
+    Spoil("swinging start", "identify_damping", swung, ("in motion", "when it is let go")),
 )
 
 
 @dataclass
 class Found:
-    """position, tip: errors on the validate trials, mm. told: what is said of each trial that decides too much.
-    parameters: values."""
+    """Mean errors on the validate trials, mm: position and tip, and both without weights of trials. told: what is said
+    of each trial that decides too much."""
 
     position: float
     tip: float
+    plain_position: float
+    plain_tip: float
     told: dict[str, list[str]]
-    parameters: dict[str, float]
-
-    def over(self, clean: "Found") -> np.ndarray:
-        """Both errors over those of the clean session. Shape (2,)."""
-        return np.array([self.position / clean.position, self.tip / clean.tip])
 
 
-def settings_of(stage: str, outlying: float | None = None) -> IdentificationSettings:
+@dataclass
+class Best:
+    """The best candidate of a search so far. weighed: whether trials have been weighed since."""
+
+    loss: float = np.inf
+    vector: np.ndarray | None = None
+    weighed: bool = False
+
+
+@dataclass
+class PlainFit(Fit):
+    """Keeps where least squares on whole trials, the last problem that `identify` sets, ends before trials are weighed.
+    A fit whose loss has no weights of trials ends there."""
+
+    plain: Best = field(default_factory=Best)
+
+    def problem(self, model: mujoco.MjModel, experiments: list[Experiment], step_factor: float = 1.0) -> Problem:
+        problem, best = super().problem(model, experiments, step_factor), Best()
+        residuals = problem.residuals
+
+        def noted(vectors: np.ndarray, near: np.ndarray | None = None) -> list[np.ndarray]:
+            blocks = residuals(vectors, near)
+            best.weighed |= bool((problem.trial_weights != 1).any())
+            loss = float(sum(loss_of(block)[0] for block in blocks))
+            if len(vectors) == 1 and not best.weighed and loss < best.loss:  # others are tried around an iterate
+                best.loss, best.vector = loss, vectors[0].copy()
+            return blocks
+
+        problem.residuals, self.plain = noted, best
+        return problem
+
+
+def settings_of(stage: str) -> IdentificationSettings:
     config = load_config(import_module(f"stages.{stage}").Config, stage)
-    loss = config.loss if outlying is None else replace(config.loss, outlying=outlying)
     frames = min(config.frames, FRAMES)
-    rough = replace(config.rough, frames=min(config.rough.frames, FRAMES // 2))
-    return replace(config, loss=loss, frames=frames, rough=rough, optimizer=OPTIMIZER, per_joint=[])
+    rough = replace(config.rough, step_factor=1.0, frames=min(config.rough.frames, FRAMES // 2))
+    return replace(config, frames=frames, rough=rough, optimizer=OPTIMIZER, per_joint=[])
 
 
-def found(stage: str, trials: list[Trial], outlying: float | None = None) -> Found:
+def found(stage: str, trials: list[Trial]) -> Found:
     """What the stage makes of a session."""
-    config = settings_of(stage, outlying)
-    model, experiments, fit = set_up(config, trials, read_spec(STAGES[stage]).compile())
+    model, experiments, fit = set_up(settings_of(stage), trials, read_spec(STAGES[stage]).compile())
+    fit = PlainFit(**vars(fit))
     with contextlib.redirect_stdout(sys.stderr):
         result = identify(stage, model, experiments, fit)
     identified, told = result.models["identified"], result.influence.deciding()
     for trial, experiment in zip(trials, experiments, strict=True):
         if trial.name in told:
             told[trial.name] += suspicions(trial, experiment, experiments, identified, fit)
-    errors = scores(replay(identified, experiments, fit.segments), experiments)
-    return Found(errors[VALIDATE]["e_position_mm"], errors[VALIDATE]["e_tip_mm"], told, result.values)
+    assert fit.plain.vector is not None, "a search begins without weights"
+    plain = with_parameters(model, values_of(fit.parameters, fit.plain.vector), rest=fit.rest)
+    return Found(*errors_of(identified, experiments, fit), *errors_of(plain, experiments, fit), told)
+
+
+def errors_of(model: mujoco.MjModel, experiments: list[Experiment], fit: Fit) -> tuple[float, float]:
+    """Mean position and tip error on the validate trials, mm."""
+    unseen = [e for e in experiments if e.split == VALIDATE]
+    errors = scores(replay(model, unseen, fit.segments), unseen)[VALIDATE]
+    return errors["e_position_mm"], errors["e_tip_mm"]
 
 
 def sessions(count: int) -> list[tuple[Spoil, int]]:
     return [(SPOILS[seed % len(SPOILS)], seed) for seed in range(count)]
 
 
+def clean_trials(stage: str) -> list[Trial]:
+    """Of the demo session, those to identify from, as many as the study takes, and all of `validate`."""
+    config = settings_of(stage)
+    read = [t for t in read_reported(config) if t.experiment in config.experiments]
+    return spread([t for t in read if t.split == IDENTIFY], TRIALS[stage]) + [t for t in read if t.split == VALIDATE]
+
+
+def clean_row(stage: str) -> dict[str, float | str]:
+    """Of a session without a spoilt trial. said: of the trials that are named all the same."""
+    clean = found(stage, clean_trials(stage))
+    said = [f"{name}: {'; '.join(told) or 'named'}" for name, told in clean.told.items()]
+    return {"stage": stage, "spoilt": CLEAN, "trial": "", **errors_in(clean), "others": len(said),
+            "said": " / ".join(said)}  # fmt: skip
+
+
+def spoilt_row(spoil: Spoil, seed: int) -> dict[str, float | str]:
+    """Of a session with a spoilt trial. said: of that one. others: how many others are named."""
+    session, rng = clean_trials(spoil.stage), np.random.default_rng(seed)
+    chosen = [i for i, t in enumerate(session) if t.split == IDENTIFY and (t.level is None or t.level > 20)]
+    index = int(rng.choice(chosen))
+    session[index] = spoilt = spoil.change(session[index], rng)
+    result = found(spoil.stage, session)
+    said = result.told.get(spoilt.name, []) + ["in motion at its start"] * spoilt.in_motion
+    others = len(set(result.told) - {spoilt.name})
+    return {"stage": spoil.stage, "spoilt": spoil.title, "trial": spoilt.name, **errors_in(result), "others": others,
+            "said": "; ".join(said)}  # fmt: skip
+
+
+def errors_in(found: Found) -> dict[str, float | str]:
+    return {name: getattr(found, name) for name in ERRORS}
+
+
+def report(rows: dict[str, dict], seeds: list[str]) -> None:
+    """The table of the spoilt sessions beside those without."""
+    clean = {row["stage"]: row for row in rows.values() if row["spoilt"] == CLEAN}
+    for stage, row in clean.items():
+        errors = f"position {row['position']:.3f} mm, tip {row['tip']:.3f} mm"
+        print(f"{stage} without a spoilt trial: {errors}; named: {row['said'] or 'none'}")
+    heads = ["session", "spoilt", "trial", "position", "tip", "without weights: position", "tip", "named"]
+    print(f"| {' | '.join([*heads, 'found wrong', 'others named', 'said'])} |")
+    print("|---:|---|---|---:|---:|---:|---:|---|---|---:|---|")
+    shown = [rows[seed] for seed in seeds]
+    ratios = np.array([[row[name] / clean[row["stage"]][name.removeprefix("plain_")] for name in ERRORS]
+                       for row in shown])  # fmt: skip
+    named = ["yes" if row["said"] else "no" for row in shown]
+    by_title = {spoil.title: spoil for spoil in SPOILS}
+    right = ["yes" if by_title[row["spoilt"]].is_told(row["said"]) else "no" for row in shown]
+    for seed, row, ratio, *told in zip(seeds, shown, ratios, named, right, strict=True):
+        cells = [seed, row["spoilt"], row["trial"], *(f"{value:.3f}" for value in ratio), *told]
+        print("| " + " | ".join([*cells, str(row["others"]), row["said"]]) + " |")
+    within = (ratios[:, :2] <= WITHIN).sum(axis=0)
+    near = f"{within[0]} by position and {within[1]} by tip of {len(shown)}"
+    print(f"within 10 % of the clean session: {near}; named: {named.count('yes')}; rightly: {right.count('yes')}")
+
+
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.spoilt", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.spoilt", description=__doc__)
     parser.add_argument("--sessions", type=int, default=SESSIONS)
     arguments = parser.parse_args()
-    for model in (CAD_MODEL, *STAGES.values(), PLANT):
+    models = dict.fromkeys([*STAGES.values(), PLANT])
+    for model in models:
         require_demo(model)
+    settings = [settings_of(stage) for stage in TRIALS]
+    told = [*settings, load_config(filter.Config, "filter"), TRIALS, TURNED, EARLY, SWUNG, SWING_FREQUENCY, NOISE]
+    table = Rows("spoilt", digest(told, *models, FILTERED), "session")
+    work = {stage: partial(clean_row, stage) for stage in TRIALS}
+    work |= {str(seed): partial(spoilt_row, spoil, seed) for spoil, seed in sessions(arguments.sessions)}
     with recorded("spoilt", keep=arguments.sessions == SESSIONS):
-        clean: dict[str, tuple[list[Trial], Found]] = {}
-        for stage, count in TRIALS.items():
-            config = settings_of(stage)
-            read = [t for t in read_reported(config) if t.experiment in config.experiments]
-            seen = spread([t for t in read if t.split == IDENTIFY], count)
-            trials = seen + [t for t in read if t.split == VALIDATE]
-            clean[stage] = trials, found(stage, trials)
-            own = clean[stage][1]
-            errors = f"position {own.position:.3f} mm, tip {own.tip:.3f} mm"
-            print(f"{stage} without a spoilt trial: {errors}; named: {own.told or 'none'}", flush=True)
-        heads = ["session", "spoilt", "trial", "position", "tip", "without weights: position", "tip", "named"]
-        print(f"| {' | '.join([*heads, 'found wrong', 'others named', 'said'])} |")
-        print("|---:|---|---|---:|---:|---:|---:|---|---|---:|---|", flush=True)
-        within, named, right = np.zeros(2, dtype=int), 0, 0
-        for spoil, seed in sessions(arguments.sessions):
-            trials, reference = clean[spoil.stage]
-            rng = np.random.default_rng(seed)
-            chosen = [i for i, t in enumerate(trials) if t.split == IDENTIFY and (t.level is None or t.level > 20)]
-            index = int(rng.choice(chosen))
-            session = list(trials)
-            session[index] = spoil.change(trials[index], rng)
-            robust, plain = found(spoil.stage, session), found(spoil.stage, session, NEVER)
-            name = session[index].name
-            said = robust.told.get(name, []) + ["in motion at its start"] * session[index].in_motion
-            ratios = robust.over(reference)
-            within, named = within + (ratios <= WITHIN), named + bool(said)
-            is_right = any(spoil.says in sentence for sentence in said)
-            right += is_right
-            cells = [spoil.title, name, *(f"{ratio:.3f}" for ratio in (*ratios, *plain.over(reference)))]
-            cells += ["yes" if true else "no" for true in (said, is_right)]
-            cells += [str(len(set(robust.told) - {name})), "; ".join(said)]
-            print(f"| {seed} | " + " | ".join(cells) + " |", flush=True)
-        near = f"{within[0]} by position and {within[1]} by tip of {arguments.sessions}"
-        print(f"within 10 % of the clean session: {near}; named: {named}; rightly: {right}")
+        done = table.read()
+        for key in [key for key in work if key not in done]:
+            table.add(key, **work[key]())
+        rows = {key: row for key, row in table.read().items() if key in work}
+        report(rows, [key for key in work if key not in TRIALS])
+        if line := other_commits(rows):
+            print(line)
     return 0
 
 

@@ -12,76 +12,27 @@ best known loss of a session is the least of these, and of least squares from th
 import argparse
 import contextlib
 import sys
-from dataclasses import dataclass, field
-from importlib import import_module
 
-import mujoco
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from studies.coverage import FRAMES, RANGE, STEPS, UNITS, mismatched
-from tests.support.matched_plant import FRAME, curl, motion, segments_of, small_model, static_pull, tilt
-from tests.support.noisy_trials import WEIGHTS, Stage, measured, releases, with_values
-from trunkline.arm.joints import Branch, Joints
+from studies.coverage import FRAMES, STAGES, STEPS, UNITS, bounds_of, mismatched, settings_of
+from tests.support.matched_plant import FRAME, segments_of, small_model
+from tests.support.noisy_trials import WEIGHTS, measured, with_values
 from trunkline.errors import in_one_line
 from trunkline.identification.experiment import prepare
 from trunkline.identification.optimizers import LeastSquares
 from trunkline.identification.parameters import PARAMETERS
-from trunkline.identification.problem import Bounds, Problem
+from trunkline.identification.problem import Problem
 from trunkline.identification.search import descend, search
-from trunkline.identification.settings import IdentificationSettings
-from trunkline.pipeline.config import load_config
 from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
-from trunkline.trials.trial import Trial
 
 SESSIONS = 20
 OFF = 3.0  # times, at most, either way
 POLISH = 12, 1e-6  # iterations and tolerance
 KNOWN = LeastSquares(starts=15, descents=4, iterations=12, tolerance=1e-6)  # of the best known loss
 WITHIN = 1.05  # times the best known loss
-
-
-@dataclass
-class Searched(Stage):
-    """joints, motors: what the model needs for its parameters beside springs, dampers, gains and a lag."""
-
-    joints: Joints = field(default_factory=Joints)
-    motors: dict[str, float] = field(default_factory=dict)
-
-
-def statics(truth: mujoco.MjModel, frames: int) -> list[Trial]:
-    pulls = ([12, 0, 0], [0, 12, 0], [0, 0, 12], [10, 10, 0], [0, 10, 10])
-    return [tilt(truth, angle) for angle in (20, 45, 70, 90)] + [static_pull(truth, pull) for pull in pulls]
-
-
-def driven(truth: mujoco.MjModel, frames: int) -> list[Trial]:
-    """Of the curls, the last two reach the force range."""
-    curls = [curl(truth, level, frames=frames, tendon=index % 3) for index, level in enumerate((20, 30, 45, 60))]
-    return [*curls, *(motion(truth, 20, frames=frames, seed=seed) for seed in (0, 1))]
-
-
-STAGES = {
-    "stiffness": Searched(
-        {
-            "stiffness": 2.0, "hardening": 1.5, "joint_place": 0.3, "mount_tilt_x": 0.02, "mount_tilt_y": -0.03,
-            "rest_bend_x": 0.01, "rest_bend_y": -0.01, "kp": 600.0,
-        }, statics,
-    ),
-    "damping": Searched(
-        {"stiffness": 2.0, "damping": 0.07, "relaxation": 0.3, "relaxation_time": 0.2}, releases,
-        joints=Joints([Branch(0.3, 0.5)]),
-    ),
-    "control": Searched(
-        {"kp": 600.0, "kv": 25.0, "time_constant": 0.05, "dead_time": 0.02, "force_range": 1.6}, driven,
-        motors={"dead_time": 0.02},
-    ),
-}  # fmt: skip
-
-
-def settings_of(name: str) -> IdentificationSettings:
-    """The committed settings of a stage."""
-    return load_config(import_module(f"stages.identify_{name}").Config, f"identify_{name}")
 
 
 def quiet(best: float) -> None:
@@ -100,11 +51,7 @@ def session(name: str, seed: int) -> tuple[float, bool, int, int]:
     begin = with_values(model, {key: f * value for (key, value), f in zip(scaled.items(), factors, strict=True)})
     trials = [measured(t, rng) for t in stage.trials(mismatched(with_values(model, stage.true)), FRAMES[name])]
     experiments = [prepare(trial, begin, FRAMES[name]) for trial in trials]
-    bounds = {
-        key: Bounds(value / RANGE, value * RANGE) if key in scaled else settings.parameters[key]
-        for key, value in stage.true.items()
-    }
-    problem = Problem(begin, experiments, segments_of(begin), bounds, "positions", WEIGHTS)
+    problem = Problem(begin, experiments, segments_of(begin), bounds_of(name), "positions", WEIGHTS)
     rough = search(problem, settings.optimizer, seed, quiet)
     found = descend(problem, rough.vector, *POLISH, quiet)
     truth = np.array([PARAMETERS[key].coordinate(value) for key, value in stage.true.items()])
@@ -114,7 +61,7 @@ def session(name: str, seed: int) -> tuple[float, bool, int, int]:
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="studies.starts", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="studies.starts", description=__doc__)
     parser.add_argument("--sessions", type=int, default=SESSIONS)
     arguments = parser.parse_args()
     with recorded("starts", keep=arguments.sessions == SESSIONS), threadpool_limits(1):

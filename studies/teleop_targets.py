@@ -52,7 +52,7 @@ def soft(reach: MapReach, network: Network, chain: Chain | None, model, tilt: fl
     rng = np.random.default_rng(round(tilt))
     targets, commands, foreseen, gravities, seconds, refused = [], [], [], [], [], 0
     while len(targets) + refused < count:
-        x, y, z = (float(value) for value in downwards(np.radians(tilt), rng.uniform(0, 2 * np.pi)))
+        x, y, z = (float(value) for value in downwards(np.radians(tilt), np.array(rng.uniform(0, 2 * np.pi))))
         tip = (float(rng.uniform(-0.45, 0.45)), 0.0, float(rng.uniform(-0.52, 0.2)))
         if reach.soft(tip, (x, y, z)).where != "inside":
             continue
@@ -83,7 +83,8 @@ def rigid(reach: MapReach, rng: np.random.Generator, count: int) -> None:
     for _ in range(count):
         mount, inside = (0.0, 0.0, 0.0), False
         while not inside:
-            mount = tuple(float(value) for value in rng.uniform([-0.6, -0.7, 0.0], [0.8, 0.7, 0.9]))
+            x, y, z = rng.uniform([-0.6, -0.7, 0.0], [0.8, 0.7, 0.9]).tolist()
+            mount = (x, y, z)
             inside = reach.rigid(mount, DOWN).where == "inside"
         carried = np.arctan2(mount[1], mount[0]) - np.arctan2(wrist.position[1], wrist.position[0])
         turn = least_turn(float(rng.uniform(-np.pi / 2, np.pi / 2)), wrist.angle)

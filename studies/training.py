@@ -45,6 +45,10 @@ def setting(text: str) -> Training:
     return Training(int(width), int(epochs), int(batch), float(rate), 1)
 
 
+def told(epoch: int, train_error: float, validate_error: float) -> None:
+    print(f"{epoch:4d}: {1e3 * train_error:.3f} mm, {1e3 * validate_error:.3f} mm", file=sys.stderr)
+
+
 @in_one_line
 @recorded("training")
 def main() -> int:
@@ -63,20 +67,20 @@ def main() -> int:
     held_out = table[table["split"] == "validate"]
     targets = [held_out.sample(min(arguments.targets, len(held_out)), random_state=1), unseen]
     sets = (inputs_read, command_columns(tendons), length_columns(tendons))
-    data = (*(table[columns].to_numpy() for columns in sets), loss, (table["split"] == "train").to_numpy())
+    inputs, commands, lengths = (table[columns].to_numpy() for columns in sets)
+    is_train = (table["split"] == "train").to_numpy()
 
     print("| " + " | ".join(TITLES) + " |\n" + "|---" * len(TITLES) + "|")
     for training in arguments.settings:
         cpu, wall = time.process_time(), time.perf_counter()
-        network = train(*data, training, lambda epoch, train_error, validate_error: print(
-            f"{epoch:4d}: {1e3 * train_error:.3f} mm, {1e3 * validate_error:.3f} mm", file=sys.stderr))
+        network = train(inputs, commands, lengths, loss, is_train, training, told)
         cells = [training.width, training.epochs, training.batch, f"{training.learning_rate:g}"]
         cells += [f"{time.process_time() - cpu:.0f}", f"{time.perf_counter() - wall:.0f}"]
         for rows in targets:
-            inputs = rows[inputs_read].to_numpy()
+            asked = rows[inputs_read].to_numpy()
             with torch.no_grad():
-                commands = network(torch.tensor(inputs, dtype=torch.float32)).commands.double().numpy()
-            errors = tip_errors(chain, inputs, commands).metrics(chain.length)
+                answers = network(torch.tensor(asked, dtype=torch.float32)).commands.double().numpy()
+            errors = tip_errors(chain, asked, answers).metrics(chain.length)
             cells += [f"{errors['position_error_mm'][key]:.3f}" for key in ("median", "p95")]
         cells.append(f"{errors['orientation_error_deg']['median']:.2f}")
         print("| " + " | ".join(map(str, cells)) + " |", flush=True)

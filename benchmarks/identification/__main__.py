@@ -27,7 +27,7 @@ PARTS = {
 
 @in_one_line
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="benchmarks.identification", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="benchmarks.identification", description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a small run, some minutes on 2 quiet cores")
     parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="some of the parts")
     arguments = parser.parse_args()

@@ -3,7 +3,7 @@
 import contextlib
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import import_module
 from pathlib import Path
 
@@ -118,7 +118,7 @@ class WatchedFit(Fit):
 
             def noted(vectors: np.ndarray, near: np.ndarray | None = None) -> list[np.ndarray]:
                 blocks = residuals(vectors, near)
-                self.watch.note(vectors, sum(loss_of(block) for block in blocks))
+                self.watch.note(vectors, np.sum([loss_of(block) for block in blocks], axis=0))
                 return blocks
 
             problem.residuals = noted
@@ -126,7 +126,7 @@ class WatchedFit(Fit):
 
 
 def identified(case: Case) -> Identified:
-    fit = WatchedFit(**vars(case.fit) | {"per_joint": ()}, frames=sum(e.frames for e in case.experiments))
+    fit = WatchedFit(**vars(replace(case.fit, per_joint=())), frames=sum(e.frames for e in case.experiments))
     with contextlib.redirect_stdout(io.StringIO()):
         result = identify("", case.model, case.experiments, fit)
     spent = fit.watch.clock.read()

@@ -8,6 +8,7 @@ import numpy as np
 from benchmarks.identification.case import Case, ReadCase, Size
 from benchmarks.identification.timing import Spent, alternate
 from stages import build_mjcf
+from trunkline.arm.cad import Chain
 from trunkline.elements import arm_hinges, cables
 from trunkline.frames import gravity_in_base
 from trunkline.identification.experiment import SLACK, Experiment
@@ -53,6 +54,7 @@ def _evaluation_time(case: Case, count: int, trials: int, repeats: int) -> Spent
 def _case_of_units(case: Case, units: int) -> Case:
     first = case.experiments[0]
     config = load_config(build_mjcf.Config, "build_mjcf")
+    assert isinstance(config.arm, Chain)
     model = build_mjcf.cad_arm(replace(config, arm=replace(config.arm, units=units))).spec.compile()
     experiment, segments = bent_release(model, first.frames, first.frame_step)
     return replace(case, model=model, experiments=[experiment], fit=replace(case.fit, segments=segments))

@@ -44,14 +44,15 @@ OF_JOINTS = {
     "two Maxwell branches": Terms(Joints(BRANCHES)),
     "a Jenkins element": Terms(Joints(sliders=SLIDERS[:1])),
     "three Jenkins elements": Terms(Joints(sliders=SLIDERS)),
-    "all of these": Terms(Joints(BRANCHES, SLIDERS)),
+    "round joints": Terms(Joints(round=True)),
+    "all of these": Terms(Joints(BRANCHES, SLIDERS, round=True)),
 }
 OF_CABLES = {
     NONE: Terms(),
     "motors with a dead time": Terms(dead_time=DEAD_TIME),
     "winches: rate and backlash": Terms(rate_limit=RATE_LIMIT, backlash=BACKLASH),
     "capstan friction": Terms(holes=HOLES),
-    "all, those of joints too": Terms(Joints(BRANCHES, SLIDERS), HOLES, DEAD_TIME, RATE_LIMIT, BACKLASH),
+    "all, those of joints too": Terms(Joints(BRANCHES, SLIDERS, round=True), HOLES, DEAD_TIME, RATE_LIMIT, BACKLASH),
 }
 ON = {"release": ("identify_damping", OF_JOINTS), "curl": ("identify_control", OF_CABLES)}  # by kind of trial
 

@@ -29,6 +29,8 @@ def report(read_case: ReadCase, size: Size) -> None:
         for name, options in {"as it comes": {}, f"eps {DIFFERENCE:g}": {"eps": DIFFERENCE}}.items():
             rival = by_sysid(case, size.budget / 2, **options)
             total, first = rival.clock.read(), rival.reached(SAME_LOSS * rival.best)
+            assert rival.vector is not None
+            assert first is not None
             print(f"      sysid, {name:11s} {rival.best:.4g} in {first}; {case.unseen_errors(rival.vector)}")
             print(f"                         {case.values(rival.vector)}")
             print(f"                         ended after {total}")

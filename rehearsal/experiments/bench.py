@@ -1,17 +1,24 @@
 """What both experiments begin with: robot, hands and operator, drawn by a seed."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
+from demo.plants.choice import plant_of
 from demo.plants.stranger import Stranger
+from demo.rig import ROOT as LAB
+from demo.rig import Config as Lab
+from rehearsal import settings
 from rehearsal.operator.hands import Person, RayHand
 from rehearsal.operator.scripts import Operator, Script, offset_of
-from rehearsal.package import Package
+from rehearsal.package import Package, read_package
 from rehearsal.robot.scene import Object, Scene
 from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
 from rehearsal.settings import Free
+from trunkline.errors import InputError
+from trunkline.pipeline.config import PROJECT, load_config, load_folder
 from trunkline.teleop.config import Config
 from trunkline.teleop.messages import Box, World
 from trunkline.teleop.rigid_ik import RigidIK
@@ -26,7 +33,7 @@ LONGEST = 300.0  # s of a run
 
 @dataclass(frozen=True)
 class Bench:
-    """All that runs share."""
+    """All that runs share. `judged`: whether the operator confirms only a preview whose tip is on the object."""
 
     package: Package
     config: Config
@@ -34,6 +41,7 @@ class Bench:
     stand_in: StandIn
     person: Person
     settings: Free
+    judged: bool = True
 
     def place(self, rng: np.random.Generator) -> np.ndarray:
         """A random place of the object, (3,), m: evenly over the area in front of the robot, and over the height."""
@@ -46,7 +54,8 @@ class Bench:
         dead_zone = self.config.core.rays.dead_zone
         left, right = (RayHand(origin, REFERENCE, self.person, dead_zone, rng) for origin in ORIGINS)
         offset = offset_of(self.package.reach)
-        return Operator(self.person, (left, right), offset, self.settings.diameter / 2, self.settings.band, rng)
+        radius, band = self.settings.diameter / 2, self.settings.band
+        return Operator(self.person, (left, right), offset, radius, band, rng, self.judged)
 
     def session(self, operator: Operator, thing: np.ndarray | None, seed: int, place: Place) -> Session:
         """The stand-in at its ready pose; a sphere hangs at `thing` (3,), m, or there is none."""
@@ -62,15 +71,30 @@ class Bench:
         return Session(self.package, self.config, robot, (operator.left, operator.right), world, place)
 
 
+def bench_of(file: Path) -> Bench:
+    """The bench with the package at `file`, the lab's arm, and the settings as they are.
+
+    Raises:
+        InputError: the lab's arm is no stranger, or there is no package.
+    """
+    arm = plant_of(load_config(Lab, "record", LAB))
+    if not isinstance(arm, Stranger):
+        raise InputError(f"{LAB}/params.yaml: record.plant: found another plant, expected stranger: the robot's arm")
+    config = load_folder(Config, PROJECT / "conf/teleop")
+    return Bench(read_package(file), config, arm, settings.stand_in(), settings.person(), settings.free())
+
+
 @dataclass
 class Seen:
-    """A frame of the run as it truly was: time, s, core's mode, the robot's state, the object's place (3,) and the
-    centres of the arm's units (U, 3), m."""
+    """A frame of the run as it truly was: time, s, core's mode, the robot's state, the object's place (3,), m, what the
+    robot was sent last: joints (7,), rad, and commands (K,), m, and the centres of the arm's units (U, 3), m."""
 
     now: float
     mode: str
     truth: Truth
     thing: np.ndarray
+    joints: np.ndarray
+    commands: np.ndarray
     units: np.ndarray
 
 
@@ -82,9 +106,9 @@ def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list
         view = session.frame()
         views.append(view)
         if session.moved:
-            truth = session.robot.truth()
-            units, _ = session.robot.links()
-            frames.append(Seen(session.now, view.intent.mode, truth, session.place(session.now), units))
+            truth, sent = session.robot.truth(), session.executor
+            thing, (units, _) = session.place(session.now), session.robot.links()
+            frames.append(Seen(session.now, view.intent.mode, truth, thing, sent.joints, sent.commands, units))
         try:
             script.send(view)
         except StopIteration as end:

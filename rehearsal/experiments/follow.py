@@ -3,11 +3,14 @@
 The path is drawn: along each axis two sines, from rest. The object that is followed touches nothing.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from rehearsal.experiments.bench import Bench, Seen, rehearse
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
+from rehearsal.session import Session, View
 
 EASE = 2.0  # s in which the object begins to move
 
@@ -36,8 +39,20 @@ class Path:
         return now >= self.begun + self.seconds
 
 
-def follow(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
-    """One run, and its frames from where the robot began to move."""
+@dataclass
+class Run:
+    """What came of a script: its `ending`, None where it did not end, `frames` from where the robot began to move, and
+    all `views`."""
+
+    path: Path
+    session: Session
+    ending: object
+    frames: list[Seen]
+    views: list[View]
+
+
+def run(bench: Bench, seed: int) -> Run:
+    """Follow the path that the seed draws, to its end."""
     rng = np.random.default_rng([seed, 1])
     s = bench.settings
     path = Path(bench.place(rng), s.path, s.path_hz, s.path_seconds, rng)
@@ -45,7 +60,14 @@ def follow(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     session = bench.session(operator, None, seed, path)
     delay = bench.config.core.follow_delay
     script = operator.follow(path.begin, lambda now: path.finished(now - delay), lambda now: session.seen(path(now)))
-    ending, frames, views = rehearse(session, script)
+    return Run(path, session, *rehearse(session, script))
+
+
+def follow(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
+    """One run, and its frames from where the robot began to move."""
+    found = run(bench, seed)
+    path, session, ending, frames, views = found.path, found.session, found.ending, found.frames, found.views
+    delay = bench.config.core.follow_delay
     result = Result("follow", seed, False, seconds=session.now, package=session.package.digest[:12])
     on_path = [frame for frame in frames if path.begun + delay <= frame.now <= path.begun + delay + path.seconds]
     if on_path:
@@ -63,7 +85,7 @@ def follow(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     elif not ending.done:
         result.cause = ending.why
     else:
-        result.cause = interruption(views, session.refusals, path, s.interruption)
+        result.cause = interruption(views, session.refusals, path, bench.settings.interruption)
     result.success = not result.cause
     return result, frames
 

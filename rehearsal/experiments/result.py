@@ -1,8 +1,11 @@
 """What a run comes to, its rows in a table that is resumed, and rates with their intervals."""
 
 import csv
+import os
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
+
+import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.hybrid.shares import wilson
@@ -11,7 +14,7 @@ from trunkline.hybrid.shares import wilson
 @dataclass
 class Result:
     """One run. success: as the paper defines it. cause: of a failure, its first word the kind: out of reach, aim, plan
-    refused, collision, missed, interrupted, stopped. plans: that were asked for.
+    refused, collision, missed, interrupted, stopped, error. plans: that were asked for.
 
     aimed_mm: from the tip target to the object's centre. previewed_mm: from the preview's tip to it. nearest_mm: the
     least distance of the robot's tip from it. tip_mm: median distance of the tip from the moving object as it was the
@@ -20,6 +23,8 @@ class Result:
     to the plan that was confirmed. agreed: 1 if it was at least a half for a success, or less for a failure, else 0.
     path_pct: median distance between the robot's tip and the nominal preview's, % of the arm's length. seconds: of the
     whole run.
+
+    variant: of an ablation, "" for none. package, code: digests of what the run was made of: `rehearsal.runs.Source`.
     """
 
     experiment: str
@@ -37,10 +42,13 @@ class Result:
     agreed: float = float("nan")
     path_pct: float = float("nan")
     seconds: float = 0.0
+    variant: str = ""
     package: str = ""
+    code: str = ""
 
 
 COLUMNS = [field.name for field in fields(Result)]
+_READ = {"str": str, "int": int, "float": float, "bool": "True".__eq__}
 
 
 def read_results(path: Path) -> list[Result]:
@@ -54,8 +62,9 @@ def read_results(path: Path) -> list[Result]:
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.DictReader(file)
         if reader.fieldnames != COLUMNS:
-            raise InputError(f"{path}: found columns {reader.fieldnames}, expected {COLUMNS}")
-        return [_result(row) for row in reader]
+            raise InputError(f"{path}: found columns {reader.fieldnames}, expected {COLUMNS}: delete it to begin anew")
+        kinds = {field.name: _READ[str(getattr(field.type, "__name__", field.type))] for field in fields(Result)}
+        return [Result(**{name: kinds[name](text) for name, text in row.items()}) for row in reader]
 
 
 def append_result(path: Path, result: Result) -> None:
@@ -68,6 +77,24 @@ def append_result(path: Path, result: Result) -> None:
             writer.writeheader()
         row = {name: f"{value:.4g}" if isinstance(value, float) else value for name, value in asdict(result).items()}
         writer.writerow(row)
+
+
+def rewrite_results(path: Path, results: list[Result]) -> None:
+    """The table anew, whole or not at all, its rows in the order of experiments as they first come, variant, seed."""
+    order = list(dict.fromkeys(result.experiment for result in results))
+    partial = path.with_name(f".{path.name}.partial")
+    partial.unlink(missing_ok=True)
+    for result in sorted(results, key=lambda one: (order.index(one.experiment), one.variant, one.seed)):
+        append_result(partial, result)
+    os.replace(partial, path)
+
+
+def grouped(results: list[Result]) -> dict[tuple[str, str], list[Result]]:
+    """By experiment and variant, as they first come; those without a variant before all others."""
+    found: dict[tuple[str, str], list[Result]] = {}
+    for result in sorted(results, key=lambda one: bool(one.variant)):
+        found.setdefault((result.experiment, result.variant), []).append(result)
+    return found
 
 
 def rate(results: list[Result]) -> tuple[float, float, float]:
@@ -86,9 +113,25 @@ def causes(results: list[Result]) -> dict[str, int]:
     return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
 
 
-def _result(row: dict[str, str]) -> Result:
-    numbers = {field.name: float(row[field.name]) for field in fields(Result) if field.type is float}
-    return Result(
-        row["experiment"], int(row["seed"]), row["success"] == "True", row["cause"], int(row["plans"]), **numbers,
-        package=row["package"],
-    )  # fmt: skip
+def summary(results: list[Result]) -> dict:
+    """metrics.json: by experiment, and in it by variant, runs, successes, rate, its interval from `low` to `high`,
+    causes, and of every distance that was measured median and 95th percentile over runs."""
+    found: dict = {}
+    for (experiment, variant), rows in grouped(results).items():
+        told = _told(rows)
+        if variant:
+            found.setdefault(experiment, {}).setdefault("variants", {})[variant] = told
+        else:
+            found[experiment] = told
+    return found
+
+
+def _told(rows: list[Result]) -> dict:
+    share, low, high = rate(rows)
+    successes = sum(row.success for row in rows)
+    told = {"runs": len(rows), "successes": successes, "rate": share, "low": low, "high": high, "causes": causes(rows)}
+    for name in COLUMNS:
+        values = np.array([getattr(row, name) for row in rows]) if name.endswith("_mm") else np.zeros(0)
+        if len(known := values[np.isfinite(values)]):
+            told[name] = dict(zip(("median", "p95"), np.quantile(known, (0.5, 0.95)), strict=True))
+    return told

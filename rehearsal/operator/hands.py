@@ -30,7 +30,9 @@ class Person:
     reaction: Positive
     reaction_spread: Zero
     movement: Positive
-    wander: Positive
+    unnoticed_deg: Zero
+    correction: Positive
+    forecast: Annotated[float, Field(ge=0, le=1)]
     jerk_deg: Zero
     patience: Annotated[int, Field(ge=1, le=100)]
 
@@ -54,29 +56,33 @@ class RayHand:
         self.phases = rng.uniform(0, 2 * np.pi, AXES)
         self.held: set[str] = set()
         self.start = self.goal = self.turn.apply(origin + [0.0, 0.0, -0.6]) + self.shift
-        self.begun, self.jerked = -np.inf, -np.inf
+        self.begun, self.lasting, self.jerked = -np.inf, person.movement, -np.inf
         self.error, self.last_error = np.zeros(3), np.zeros(3)  # of this aim, and of that before
 
     def aim(self, place: np.ndarray, width: float, now: float) -> None:
         """Begin to move the ray's end to `place` (3,); what is aimed at is `width` m wide."""
         self.start, self.last_error = self.wished(now), self.missed(now)
         self.goal = np.array(place, dtype=float)
-        self.error = self.spread(width) * self.rng.normal(size=3)
-        self.begun = now
+        self.error = self._missing(width / self.person.widths)
+        self.begun, self.lasting = now, self.person.movement
 
-    def follow(self, place: np.ndarray, width: float, dt: float) -> None:
-        """Keep the ray's end at a moving `place` for another `dt` s: the error wanders (Ornstein-Uhlenbeck)."""
-        keep = np.exp(-dt / self.person.wander)
-        fresh = self.spread(width) * self.rng.normal(size=3)
-        self.error = keep * self.error + np.sqrt(1 - keep**2) * fresh
+    def follow(self, place: np.ndarray, now: float) -> None:
+        """Keep the ray's end at a moving `place` (3,): one correction after the other, each with an error of its own,
+        spread across the ray as errors are that lie evenly within `unnoticed_deg` to either side."""
+        missed = self.missed(now)
         self.start = self.goal = np.array(place, dtype=float)
+        if now >= self.begun + self.lasting:
+            across = np.radians(self.person.unnoticed_deg) * self._distance() / np.sqrt(3)
+            self.last_error, self.error = missed, self._missing(across)
+            self.begun, self.lasting = now, self.person.correction
 
-    def spread(self, width: float) -> np.ndarray:
-        """Standard deviations of an aim across the ray, twice, and along it, (3,), m."""
-        p = self.person
-        across = width / p.widths
-        distance = float(np.linalg.norm(self._reference(self.goal) - self.origin))
-        return np.array([across, across, self.depth_spread(distance)])
+    def _missing(self, across: float) -> np.ndarray:
+        """An error drawn across the ray, twice, of this standard deviation, and along it, (3,), m."""
+        return np.array([across, across, self.depth_spread(self._distance())]) * self.rng.normal(size=3)
+
+    def _distance(self) -> float:
+        """m, from the hand to what it aims at."""
+        return float(np.linalg.norm(self._reference(self.goal) - self.origin))
 
     def depth_spread(self, distance: float) -> float:
         """Δd = d² η / b, m, of a disparity η seen by eyes b apart."""
@@ -84,11 +90,11 @@ class RayHand:
 
     def wished(self, now: float) -> np.ndarray:
         """Where the ray's end shall be now, (3,), m, without error and tremor."""
-        return self.start + minimum_jerk((now - self.begun) / self.person.movement) * (self.goal - self.start)
+        return self.start + minimum_jerk((now - self.begun) / self.lasting) * (self.goal - self.start)
 
     def missed(self, now: float) -> np.ndarray:
         """By how much the aim is off now, across the ray, twice, and along it, (3,), m."""
-        share = minimum_jerk((now - self.begun) / self.person.movement)
+        share = minimum_jerk((now - self.begun) / self.lasting)
         return self.last_error + share * (self.error - self.last_error)
 
     def press(self, name: str, now: float) -> None:

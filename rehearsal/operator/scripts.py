@@ -21,6 +21,7 @@ CLICK = 0.1  # s for which a button is pressed
 ASIDE = np.array([0.0, 0.0, 0.06])  # m by which the rigid ray is moved to drop a plan that was shown
 AGAIN = 0.5  # s after which the operator tries to follow again
 LIFTED = 0.05  # m from which on the operator sees that something is lifted
+GLANCE = 0.1  # s over which a velocity is seen
 CALM = 2.0  # s after an arrival that the operator looks on
 LONGEST = 30.0  # s that the operator waits for anything
 
@@ -59,12 +60,15 @@ class Operator:
         radius: float,
         band: float,
         rng: np.random.Generator,
+        judged: bool = True,
     ) -> None:
         """
         Args:
             radius: of the object, m. band: width of the map's band, m, for which the rigid target is aimed.
+            judged: whether a preview beside the object is declined; else the first plan is confirmed.
         """
         self.person, self.offset, self.radius, self.band, self.rng = person, offset, radius, band, rng
+        self.judged = judged
         self.left, self.right = hands
 
     def reach(self) -> Script:
@@ -90,7 +94,7 @@ class Operator:
                 continue
             off = self._look(previewed - view.thing)
             ending = Ending(True, "", plans, _away(targets.tip.position, view.thing), _away(previewed, view.thing))
-            if np.linalg.norm(off) < self.radius:
+            if not self.judged or np.linalg.norm(off) < self.radius:
                 view = yield from self._click(self.right, "trigger", view)
                 view = yield from self._until(lambda view: view.intent.mode == "execute")
                 view = yield from self._until(lambda view: view.intent.mode != "execute")
@@ -214,7 +218,8 @@ class Operator:
         return view, "aim: the rigid target was never where it was meant"
 
     def follow(self, begin: Callable[[float], None], finished: Callable[[float], bool], place: Callable) -> Script:
-        """Both rays on the moving object, as it was a reaction time ago, until its path is over.
+        """Both rays on the moving object until its path is over: where it appears to be now, as its motion of a
+        reaction time ago foretells.
 
         Args:
             begin: told the time when the robot has come to the object. finished: whether the path is over at a time.
@@ -227,12 +232,11 @@ class Operator:
             return Ending(False, why)
         self.right.press("grip", view.now)
         view = yield from self._react()
-        begun, last, followed, pressed = None, view.now, view.now, -np.inf
+        begun, followed, pressed = None, view.now, -np.inf
         while begun is None or not finished(view.now):
-            at = place(view.now - self.person.reaction)
-            self.right.follow(at, 2 * self.radius, view.now - last)
-            self.left.follow(at - self._apart(at), self.band, view.now - last)
-            last = view.now
+            at = self._foretold(place, view.now)
+            self.right.follow(at, view.now)
+            self.left.follow(at - self._apart(at), view.now)
             view = yield
             if view.now > pressed + CLICK:
                 self.right.let_go("stick_pressed")
@@ -247,6 +251,12 @@ class Operator:
                 self.right.press("stick_pressed", view.now)
                 pressed = view.now
         return Ending(True)
+
+    def _foretold(self, place: Callable[[float], np.ndarray], now: float) -> np.ndarray:
+        """Where the object is taken to be, (3,), m: its place and velocity are seen a reaction time late."""
+        late = self.person.reaction
+        seen, before = place(now - late), place(now - late - GLANCE)
+        return seen + self.person.forecast * late * (seen - before) / GLANCE
 
     def _place_tip(self, view: View, beside: np.ndarray):
         """The tip target onto the object, until it looks so."""

@@ -1,6 +1,7 @@
 """How the kernels of this room are compiled and kept on disk."""
 
 import hashlib
+import inspect
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +16,7 @@ import trunkline.statics.vectors
 # so the folder is named after the text of all of them.
 _HERE = Path(__file__).parent
 _OWN = [_HERE / f"{name}.py" for name in ("contact", "flange", "kernel", "shapes", "thing", "touching")]
-_CALLED = [Path(module.__file__) for module in (demo.plants.stranger_kernel, trunkline.statics.vectors)]
+_CALLED = [Path(inspect.getfile(module)) for module in (demo.plants.stranger_kernel, trunkline.statics.vectors)]
 _STAMP = hashlib.sha256(b"".join(file.read_bytes() for file in (*_OWN, *_CALLED))).hexdigest()[:12]
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -11,6 +11,7 @@ from rehearsal.robot.shapes import BOX, CYLINDER, distance
 from rehearsal.robot.thing import Motion, Thing
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+from trunkline.hybrid.basket import Basket, Part, parts_of, unit_inertia
 
 Metres = Annotated[float, Field(ge=-10, le=10)]
 Size = Annotated[float, Field(gt=0, le=10)]
@@ -22,6 +23,8 @@ RIM = 12  # points on each rim of a cylinder: it stands on these
 TOY_EDGE = 0.25  # radius of a toy's edges over its width
 HOOK_RADIUS, HOOK_LENGTH = 0.004, 0.3  # m, of the rod that ends in the hook
 DEEP = 1.0  # m, of the floor
+KINDS = {"box": BOX, "cylinder": CYLINDER}
+CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass
@@ -34,22 +37,40 @@ class Surface:
 
 @dataclass
 class Object:
-    """diameter: m; of a box or a toy, a box with round edges, its width along x and y. height: m, idle for a sphere.
-    mass: kg. position: of its centre, m. quaternion: w first; (1, 0, 0, 0) stands upright. hanging: by a string, from
-    the hook above it."""
+    """diameter: m; of a box or a toy, a box with round edges, its width along x and y; of a basket, its bar's. height:
+    m, idle for a sphere; of a basket, its box's. mass: kg. position: of its centre of mass, m. quaternion: w first;
+    (1, 0, 0, 0) stands upright. hanging: by a string, from the hook above it; a basket by its bar. basket: a basket's
+    other sizes, idle for other shapes."""
 
-    shape: Literal["cylinder", "box", "sphere", "toy"]
+    shape: Literal["cylinder", "box", "sphere", "toy", "basket"]
     diameter: Annotated[float, Field(ge=0.005, le=0.5)]
     height: Annotated[float, Field(ge=0.005, le=1)]
     mass: Annotated[float, Field(gt=0, le=20)]
     position: Place
     quaternion: Quaternion = field(default_factory=lambda: [1.0, 0.0, 0.0, 0.0])
     hanging: bool = False
+    basket: Basket = field(default_factory=Basket)
+
+    def __post_init__(self):
+        if self.shape == "basket":
+            self.basket.require_room(self.diameter)
 
     @property
     def half_height(self) -> float:
-        """m, from its centre to what it stands on."""
+        """m, from its centre of mass to what it stands on."""
+        if self.shape == "basket":
+            box = self.parts()["box"]
+            return float(box.half[2] - box.place[2])
         return self.diameter / 2 if self.shape == "sphere" else self.height / 2
+
+    @property
+    def grip(self) -> np.ndarray:
+        """The middle of what the arm wraps, in the object's frame, m. Shape (3,)."""
+        return self.parts()["bar"].place if self.shape == "basket" else np.zeros(3)
+
+    def parts(self) -> dict[str, Part]:
+        """Of a basket, by their names."""
+        return parts_of(self.basket, self.diameter, self.height)
 
 
 @dataclass
@@ -90,40 +111,69 @@ class String:
 
 
 def make_thing(object: Object, hook: list[float] | None, string: String) -> tuple[Thing, Motion]:
-    """The object as a rigid body, its mass spread evenly, and where it is at first.
+    """The object as a rigid body, and where it is at first.
 
     Raises:
         InputError: it hangs where there is no hook, or where the hook is not above it.
     """
-    radius, half_height = object.diameter / 2, object.height / 2
-    if object.shape == "sphere":
-        kind, half, edge, points = BOX, np.zeros(3), radius, np.zeros((1, 3))
-    elif object.shape == "cylinder":
-        kind, half, edge = CYLINDER, np.array([radius, radius, half_height]), 0.0
-        angle = 2 * np.pi * np.arange(RIM) / RIM
-        rim = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(RIM)])
-        points = np.concatenate([rim + [0, 0, z] for z in (-half_height, half_height)])
-    else:
-        edge = TOY_EDGE * object.diameter if object.shape == "toy" else 0.0
-        kind, half = BOX, np.maximum([radius - edge, radius - edge, half_height - edge], 0.0)
-        points = np.array(list(product((-1, 1), repeat=3))) * half
-    turn = rotation_from_wxyz(np.array(object.quaternion, dtype=float))
-    eye, end, length = _above(kind, half, edge, turn.inv().apply([0.0, 0.0, 1.0])), np.zeros(3), 0.0
+    solids, points, radius = _basket(object.parts()) if object.shape == "basket" else _single(object)
+    turn, first = rotation_from_wxyz(np.array(object.quaternion, dtype=float)), solids[0]
+    up = turn.inv().apply([0.0, 0.0, 1.0]) @ first.turn
+    eye, end, length = first.place + first.turn @ _above(first.kind, first.half, first.edge, up), np.zeros(3), 0.0
     if object.hanging:
         tied = np.array(object.position) + turn.apply(eye)
         if hook is None or hook[2] <= tied[2]:
             raise InputError(f"object.hanging: found a hook at {hook}, expected one above {tied.tolist()}")
         end = np.array(hook, dtype=float)
         length = float(np.linalg.norm(end - tied))
+    kind, half, edge, place, turns = (np.array(column) for column in zip(*solids, strict=True))
     thing = Thing(
-        kind=kind, half=half.astype(float), edge=edge, mass=object.mass, inertia=object.mass * _inertia(object),
-        points=points.astype(float), radius=edge, eye=eye, hook=end, string=length, tautness=string.tautness,
-        loss=string.loss, lip=string.lip,
+        kind=kind, half=half, edge=edge, shift=place, turn=turns, mass=object.mass,
+        inertia=object.mass * _inertia(object), points=points, radius=radius, eye=eye, hook=end, string=length,
+        tautness=string.tautness, loss=string.loss, lip=string.lip,
     )  # fmt: skip
     return thing, Motion(
         np.array(object.position, dtype=float), wxyz_from_rotation(turn), np.zeros(3), np.zeros(3),
         np.array([float(object.hanging)]),
     )  # fmt: skip
+
+
+class Solid(NamedTuple):
+    """A shape in a thing's frame; see `thing.Thing`."""
+
+    kind: int
+    half: np.ndarray
+    edge: float
+    place: np.ndarray = np.zeros(3)
+    turn: np.ndarray = np.eye(3)
+
+
+def _single(object: Object) -> tuple[list[Solid], np.ndarray, float]:
+    """The shape of an object that has one, the points by which it lies on the world (P, 3), m, and their radius, m."""
+    radius, half_height = object.diameter / 2, object.height / 2
+    if object.shape == "sphere":
+        return [Solid(BOX, np.zeros(3), radius)], np.zeros((1, 3)), radius
+    if object.shape == "cylinder":
+        half = np.array([radius, radius, half_height])
+        return [Solid(CYLINDER, half, 0.0)], _rims(half), 0.0
+    edge = TOY_EDGE * object.diameter if object.shape == "toy" else 0.0
+    half = np.maximum([radius - edge, radius - edge, half_height - edge], 0.0)
+    return [Solid(BOX, half, edge)], CORNERS * half, edge
+
+
+def _basket(parts: dict[str, Part]) -> tuple[list[Solid], np.ndarray, float]:
+    """As of `_single`: the bar first. It lies on the corners of its box, and tipped over on the rims of its bar."""
+    solids = [Solid(KINDS[part.shape], part.half, 0.0, part.place, part.turn) for part in parts.values()]
+    box, bar = parts["box"], parts["bar"]
+    corners = CORNERS * box.half @ box.turn.T + box.place
+    return solids, np.concatenate([corners, _rims(bar.half) @ bar.turn.T + bar.place]), 0.0
+
+
+def _rims(half: np.ndarray) -> np.ndarray:
+    """Points on the two rims of a cylinder, m. Shape (2 RIM, 3)."""
+    angle = 2 * np.pi * np.arange(RIM) / RIM
+    rim = half[0] * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(RIM)])
+    return np.concatenate([rim + [0, 0, z] for z in (-half[2], half[2])])
 
 
 def _above(kind: int, half: np.ndarray, edge: float, up: np.ndarray) -> np.ndarray:
@@ -137,6 +187,8 @@ def _above(kind: int, half: np.ndarray, edge: float, up: np.ndarray) -> np.ndarr
 def _inertia(object: Object) -> np.ndarray:
     """Moments of inertia of 1 kg about its axes, m². Shape (3,). A toy's round edges are left out."""
     width, height = object.diameter, object.height
+    if object.shape == "basket":
+        return unit_inertia(object.parts())
     if object.shape == "sphere":
         return np.full(3, width**2 / 10)
     if object.shape == "cylinder":

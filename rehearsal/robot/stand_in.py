@@ -61,7 +61,8 @@ class StandIn:
 class Truth:
     """What is so at this moment, for scoring alone; Panda's base frame.
 
-    tip (3,), thing (3,): m. tip_axes (3, 3), quaternion (4,): of the tip and of the object. speed (3,): m/s, its own.
+    tip (3,), thing (3,), grip (3,): m; of the object, its centre of mass and the middle of what the arm wraps of it.
+    tip_axes (3, 3), quaternion (4,): of the tip and of the object. speed (3,): m/s, its own.
     arm_thing (U, 3), arm_world (U, W, 3), thing_world (W, 3): forces on the first of the two, N; W in the order of
     `Scene.names`. hanging: whether the object's string is on the hook.
     """
@@ -71,6 +72,7 @@ class Truth:
     tip: np.ndarray
     tip_axes: np.ndarray
     thing: np.ndarray
+    grip: np.ndarray
     quaternion: np.ndarray
     speed: np.ndarray
     arm_thing: np.ndarray
@@ -163,10 +165,12 @@ class StandInRobot:
     def truth(self) -> Truth:
         """What is so."""
         row, c = self.rows[-1], self.contacts
+        thing, quaternion = row[THING][:3].copy(), row[THING][3:].copy()
+        grip = thing + np.array(rotation(quaternion)) @ self.scene.object.grip
         return Truth(
             time=self.time, joints=self.joints[0].copy(), tip=row[TIP].copy(),
-            tip_axes=row[TIP_AXES].reshape(3, 3).copy(), thing=row[THING][:3].copy(),
-            quaternion=row[THING][3:].copy(), speed=self.motion.speed.copy(),
+            tip_axes=row[TIP_AXES].reshape(3, 3).copy(), thing=thing, grip=grip, quaternion=quaternion,
+            speed=self.motion.speed.copy(),
             arm_thing=c.arm_thing.copy(), arm_world=c.arm_world.copy(), thing_world=c.thing_world.copy(),
             hanging=bool(self.motion.hanging[0]),
         )  # fmt: skip
@@ -203,8 +207,11 @@ class StandInRobot:
         world = self.world
         shapes = zip(self.scene.names(), world.kind, world.half, world.edge, world.place, strict=True)
         solid = [(name, kind, half, edge, place, np.eye(3)) for name, kind, half, edge, place in shapes]
-        thing, turn = self.thing, np.array(rotation(self.motion.quaternion))
-        solid.append(("the object", thing.kind, thing.half, thing.edge, self.motion.place, turn))
+        thing, pose = self.thing, np.array(rotation(self.motion.quaternion))
+        for kind, half, edge, shift, turn in zip(
+            thing.kind, thing.half, thing.edge, thing.shift, thing.turn, strict=True
+        ):
+            solid.append(("the object", kind, half, edge, self.motion.place + pose @ shift, pose @ turn))
         for unit, (centre, axis) in enumerate(zip(*self.links(), strict=True)):
             radius, rim = self.discs.radius[unit], self.discs.edge[unit]
             for name, kind, half, edge, place, turn in solid:

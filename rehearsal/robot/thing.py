@@ -9,17 +9,20 @@ from trunkline.statics.vectors import cross, dot, plus, turned
 
 
 class Thing(NamedTuple):
-    """A body of a shape, its frame in its centre of mass, its axes principal.
+    """A body of S shapes, its frame in its centre of mass, its axes principal.
 
-    kind, half (3,), edge: as of `shapes.Shape`. mass: kg. inertia (3,): kg m².
+    kind (S,), half (S, 3), edge (S,): as of `shapes.Shape`. shift (S, 3): m, of their centres. turn (S, 3, 3): the
+    body's frame ← theirs. mass: kg. inertia (3,): kg m².
     points (P, 3): m, with which it touches the world, balls of `radius` m.
     eye (3,): m, where the string is tied. hook (3,): m, in the world, over which its loop hangs. string: m, its length.
     tautness: N/m. loss: N s/m. lip: m by which the string must be slack to leave the hook.
     """
 
-    kind: int
+    kind: np.ndarray
     half: np.ndarray
-    edge: float
+    edge: np.ndarray
+    shift: np.ndarray
+    turn: np.ndarray
     mass: float
     inertia: np.ndarray
     points: np.ndarray

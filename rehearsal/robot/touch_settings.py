@@ -55,7 +55,7 @@ def make_touch(
     l - (W + W') Δθ/4, W and W' its upper and lower widths. The disc's edge is half of that.
     """
     kind, half, edge, place = scene.shapes()
-    units, shapes = chain.units, len(kind)
+    units, solids, shapes = chain.units, len(thing.kind), len(kind)
     width = chain.widths * (1 + chain.ratio) / 2
     rim = chain.lengths - chain.joint_range * chain.widths * (1 + chain.ratio) / 4
     round_edge = np.minimum(np.maximum(rim, 0.1 * chain.lengths), width) / 2
@@ -78,8 +78,8 @@ def make_touch(
         loss=touch.world_loss, friction=touch.object_world * np.maximum(1 + drawn[1 + shapes :], LOWEST),
     )  # fmt: skip
     contacts = Contacts(
-        thing=np.zeros((units, 3)), world=np.zeros((units, shapes, 3)), lying=np.zeros((len(thing.points), shapes, 3)),
-        near=np.zeros((units, 1 + shapes, 3)), arm_thing=np.zeros((units, 3)), arm_world=np.zeros((units, shapes, 3)),
-        thing_world=np.zeros((shapes, 3)),
+        thing=np.zeros((units, solids, 3)), world=np.zeros((units, shapes, 3)),
+        lying=np.zeros((len(thing.points), shapes, 3)), near=np.zeros((units, solids + shapes, 3)),
+        arm_thing=np.zeros((units, 3)), arm_world=np.zeros((units, shapes, 3)), thing_world=np.zeros((shapes, 3)),
     )  # fmt: skip
     return discs, world, contacts

@@ -1,7 +1,8 @@
 """All contacts of a step: the arm with the thing and with the world, the thing with the world.
 
-A unit of the arm touches as a flat disc with round edges, which lies in its middle: a point for each shape, the nearest
-one, so that it slides and rolls without corners. The arm does not touch itself, nor the Panda anything.
+A unit of the arm touches as a flat disc with round edges, which lies in its middle: a point for each shape, of the
+thing as of the world, the nearest one, so that it slides and rolls without corners. The arm does not touch itself, nor
+the Panda anything.
 """
 
 from typing import NamedTuple
@@ -54,9 +55,9 @@ class World(NamedTuple):
 class Contacts(NamedTuple):
     """What contacts remember from step to step, and the forces of the last one, N, on the first named of the two.
 
-    thing (U, 3): the arm's bristles on the thing, in the thing's frame, which turns with what is held. world (U, W, 3),
-    lying (P, W, 3): the arm's and the thing's on the world. near (U, 1 + W, 3): where a disc was nearest, from its
-    centre, m, first to the thing, then to the world.
+    thing (U, S, 3): the arm's bristles on the thing's shapes, in the thing's frame, which turns with what is held.
+    world (U, W, 3), lying (P, W, 3): the arm's and the thing's on the world. near (U, S + W, 3): where a disc was
+    nearest, from its centre, m, first to the thing's shapes, then to the world.
     arm_thing (U, 3), arm_world (U, W, 3), thing_world (W, 3): forces, in the world.
     """
 
@@ -83,6 +84,7 @@ def touch_all(h, discs, world, thing, motion, contacts, work, turn, place):
     centre = (motion.place[0], motion.place[1], motion.place[2])
     speed = (motion.speed[0], motion.speed[1], motion.speed[2])
     spin = spin_of(thing, motion, pose)
+    shapes = len(thing.kind)
     force, torque = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     contacts.arm_thing[:] = 0.0
     contacts.arm_world[:] = 0.0
@@ -97,32 +99,37 @@ def touch_all(h, discs, world, thing, motion, contacts, work, turn, place):
         turning, moving = (m[0], m[1], m[2]), (m[3], m[4], m[5])
         size = discs.radius[u] + discs.edge[u]
 
-        inside = turned(unpose, plus(disc, -1.0, centre))
-        away, _ = distance(thing.kind, thing.half, thing.edge, inside)
-        if away < size:
-            near = turned(unpose, _row(contacts.near[u, 0]))
-            near, away, gradient = nearest(
-                thing.kind, thing.half, thing.edge, inside, turned(unpose, axis), discs.radius[u], near
-            )
-            _write(contacts.near[u, 0], turned(pose, near))
-        depth = discs.edge[u] - away
-        if away < size and depth > 0:
-            normal = turned(pose, gradient)
-            point = plus(plus(disc, 1.0, turned(pose, near)), -(discs.edge[u] - 0.5 * depth), normal)
+        for s in range(shapes):
+            out = _rows(thing.turn[s])
+            within = transposed(out)
+            inside = turned(within, plus(turned(unpose, plus(disc, -1.0, centre)), -1.0, _row(thing.shift[s])))
+            away, _ = distance(thing.kind[s], thing.half[s], thing.edge[s], inside)
+            if away < size:
+                near, away, gradient = nearest(
+                    thing.kind[s], thing.half[s], thing.edge[s], inside, turned(within, turned(unpose, axis)),
+                    discs.radius[u], turned(within, turned(unpose, _row(contacts.near[u, s]))),
+                )  # fmt: skip
+                near = turned(pose, turned(out, near))
+                _write(contacts.near[u, s], near)
+            depth = discs.edge[u] - away
+            if away >= size or depth <= 0:
+                contacts.thing[u, s] = 0.0
+                continue
+            normal = turned(pose, turned(out, gradient))
+            point = plus(plus(disc, 1.0, near), -(discs.edge[u] - 0.5 * depth), normal)
             lever = plus(point, -1.0, centre)
             at = turned(back, plus(point, -1.0, place))
             mine = turned(turn, plus(moving, 1.0, cross(turning, at)))
             velocity = plus(plus(mine, -1.0, speed), -1.0, cross(spin, lever))
             pushed, bristle = touch(
-                h, depth, normal, velocity, turned(pose, _row(contacts.thing[u])), discs.hardness[u], discs.loss,
+                h, depth, normal, velocity, turned(pose, _row(contacts.thing[u, s])), discs.hardness[u], discs.loss,
                 discs.stiffness[u], discs.damping[u], discs.on_thing[u],
             )  # fmt: skip
-            _write(contacts.thing[u], turned(unpose, bristle))
-            _write(contacts.arm_thing[u], pushed)
+            _write(contacts.thing[u, s], turned(unpose, bristle))
+            for a in range(3):
+                contacts.arm_thing[u, a] += pushed[a]
             _push(work.pushed[i], at, turned(back, pushed))
             force, torque = plus(force, -1.0, pushed), plus(torque, -1.0, cross(lever, pushed))
-        else:
-            contacts.thing[u] = 0.0
 
         for w in range(len(world.kind)):
             inside = plus(disc, -1.0, _row(world.place[w]))
@@ -130,9 +137,9 @@ def touch_all(h, discs, world, thing, motion, contacts, work, turn, place):
             if away < size:
                 near, away, normal = nearest(
                     world.kind[w], world.half[w], world.edge[w], inside, axis, discs.radius[u],
-                    _row(contacts.near[u, 1 + w]),
+                    _row(contacts.near[u, shapes + w]),
                 )  # fmt: skip
-                _write(contacts.near[u, 1 + w], near)
+                _write(contacts.near[u, shapes + w], near)
             depth = discs.edge[u] - away
             if away >= size or depth <= 0:
                 contacts.world[u, w] = 0.0
@@ -191,6 +198,11 @@ def _push(pushed, at, force):
 @kernel
 def _row(array):
     return array[0], array[1], array[2]
+
+
+@kernel
+def _rows(matrix):
+    return _row(matrix[0]), _row(matrix[1]), _row(matrix[2])
 
 
 @kernel

@@ -24,6 +24,7 @@ from demo.plants.stranger_kernel import (
     work_for,
 )
 from demo.record import Config
+from tests.support.stranger_links import add_link
 from trunkline.arm.spiral import spiral_chain
 from trunkline.pipeline.config import load_config
 
@@ -73,7 +74,7 @@ def mujoco_twin(plant: Stranger, load: float) -> mujoco.MjModel:
     spec.option.gravity = GRAVITY
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
     cables = [spec.add_tendon(name=f"cable_{k}") for k in range(3)]
-    body, bottom = spec.worldbody, 0.0
+    body = spec.worldbody
 
     def holes(name, radius, height):
         for k, (azimuth, cable) in enumerate(zip(links.azimuth, cables, strict=True)):
@@ -82,18 +83,12 @@ def mujoco_twin(plant: Stranger, load: float) -> mujoco.MjModel:
             cable.wrap_site(f"{name}_{k}")
 
     holes("base", links.base_radius, 0.0)
-    for i, length in enumerate(links.lengths):
-        body = body.add_body(pos=[0, 0, bottom])
-        body.explicitinertial, body.mass, body.ipos = True, links.masses[i], [0, 0, -length / 2]
-        body.inertia = [links.transverse[i], links.transverse[i], links.axial[i]]
-        for k, axis in enumerate(([1, 0, 0], [0, 1, 0])):
-            joint = body.add_joint(name=f"{i}_{k}", axis=axis, springref=links.rest[i, k])
-            joint.stiffness = [links.stiffness[i], 0, 0]
+    for i in range(len(links.lengths)):
+        body = add_link(body, links, i)
         for unit in np.flatnonzero(links.hole_link == i):
             holes(f"unit_{unit}", links.hole_radius[unit], links.hole_height[unit])
-        bottom = -length
     if load:
-        point = body.add_body(pos=[0, 0, bottom])
+        point = body.add_body(pos=[0, 0, -links.lengths[-1]])
         point.explicitinertial, point.mass, point.inertia, point.ipos = True, load, [1e-15] * 3, [0, 0, 0]
     model = spec.compile()
     model.tendon_stiffness[:] = links.cable_stiffness

@@ -1,5 +1,6 @@
 """The wheel, installed where no checkout is, does what examples/library.py shows."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -13,7 +14,8 @@ import onnx
 import pytest
 
 from tests.support.bent_chain import stump, stump_spec
-from trunkline.frames import gravity_in_base
+from trunkline.frames import STANDARD_GRAVITY, downwards
+from trunkline.ik.inputs import DIRECTION
 from trunkline.ik.network import InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.statics.chain import read_chain
@@ -64,8 +66,9 @@ def test_the_example_runs_outside_of_a_checkout(python, tmp_path):
     chain = read_chain(stump())
     tensions = np.zeros((2, 3))
     tensions[0, 0] = 5.0
-    rest = equilibrium(chain, tensions, gravity_in_base(0.3))
-    inputs = np.concatenate([np.full((2, 1), 0.3), rest.position, rest.quaternion], axis=1)
+    down = downwards(np.full(2, 0.3), np.zeros(2))
+    rest = equilibrium(chain, tensions, STANDARD_GRAVITY * down)
+    inputs = np.concatenate([down, rest.position, rest.quaternion], axis=1)
     network = InverseKinematics(8, inputs, rest.commands, rest.lengths)
     onnx.save(to_onnx(network, ["a", "b", "c"], 0.005), str(tmp_path / "ik.onnx"))
     spec = stump_spec()
@@ -79,6 +82,12 @@ def test_the_example_runs_outside_of_a_checkout(python, tmp_path):
     low, high = rest.commands.min(axis=0) - 1e-4, rest.commands.max(axis=0) + 1e-4  # within which the network keeps
     assert ((low <= np.array(commands, float)) & (np.array(commands, float) <= high)).all()
     assert 0 < float(missed[0]) < 1e3 * chain.length
+
+
+def test_the_example_asks_as_the_packed_network_is_asked():
+    """The test above makes its own network, of the form that gravity has by default."""
+    manifest = json.loads((ROOT / "artifacts/package_unity/manifest.json").read_text())
+    assert manifest["network"]["input_order"] == DIRECTION
 
 
 def test_the_example_is_twenty_lines():

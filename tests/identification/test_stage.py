@@ -7,15 +7,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import curl, release, small_model, tilt
-from tests.support.small_arm import small_spec
+from tests.support.matched_plant import begin_project, curl, release, tilt
 from trunkline.errors import InputError
 from trunkline.identification.fit import Polish, Rough
 from trunkline.identification.loss import Loss
 from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import Bounds
-from trunkline.identification.saving import save_model
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.pipeline.identify import CAD_MODEL, read_reported, run
 from trunkline.trials.splits import DECIDING
@@ -52,12 +50,7 @@ def truth_of(model: mujoco.MjModel, **scales: float) -> mujoco.MjModel:
 def project(tmp_path, monkeypatch):
     """A folder with a model and none of the trials yet; returns the model and a function that writes trials."""
     monkeypatch.chdir(tmp_path)
-    spec, model = small_spec(6), small_model(6)
-    spec.option.timestep = model.opt.timestep
-    spec.compile()
-    (tmp_path / "artifacts/build_mjcf").mkdir(parents=True)
-    (tmp_path / "artifacts/build_mjcf/arm.xml").write_text(save_model(spec, model))
-    (tmp_path / "data/processed/filter").mkdir(parents=True)
+    model = begin_project(tmp_path, 6)
     return tmp_path, model, lambda trials: write_trials(tmp_path / "data/processed/filter", trials)
 
 

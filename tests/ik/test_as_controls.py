@@ -5,25 +5,13 @@ import copy
 import numpy as np
 import pytest
 
-from tests.support.bent_chain import stump
 from trunkline.frames import gravity_in_base
 from trunkline.ik import as_controls
 from trunkline.ik.as_controls import AsControls, draw_targets, driven, score, settled
 from trunkline.ik.polish import polish
 from trunkline.simulation.drive import drive
-from trunkline.statics.chain import read_chain
 
 ANGLES = np.radians([[0.0], [60.0]])
-
-
-@pytest.fixture(scope="module")
-def model():
-    return stump()
-
-
-@pytest.fixture(scope="module")
-def chain(model):
-    return read_chain(model)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,6 @@ import pandas as pd
 import pytest
 import torch
 
-from tests.support.bent_chain import stump
 from trunkline.dataset.columns import command_columns, length_columns, tension_columns
 from trunkline.dataset.table import command_by_tension, sample_table, tip_by_tension
 from trunkline.errors import InputError
@@ -28,19 +27,8 @@ from trunkline.ik.polish import polish
 from trunkline.ik.score import outside_targets, tip_errors
 from trunkline.ik.tip_loss import tip_loss
 from trunkline.ik.training import Training, train
-from trunkline.statics.chain import read_chain
 
 UNITY_OPS = {"Gather", "Mul", "Add", "Sub", "Concat", "Gemm", "Relu", "Clip"}
-
-
-@pytest.fixture(scope="module")
-def model():
-    return stump()
-
-
-@pytest.fixture(scope="module")
-def chain(model):
-    return read_chain(model)
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ import pandas as pd
 import pytest
 import torch
 
-from tests.support.bent_chain import stump
 from trunkline.dataset import sampling
 from trunkline.dataset.columns import DOWN, command_columns, length_columns, tension_columns
 from trunkline.dataset.deviation import mujoco_deviation
@@ -23,21 +22,10 @@ from trunkline.ik.onnx import to_onnx
 from trunkline.ik.score import length_errors, tip_errors
 from trunkline.ik.tip_loss import tip_loss
 from trunkline.ik.training import Training, train
-from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import actuated
 
 # ops of opset 15 that Unity's inference engine runs (its manual, "Supported ONNX operators")
 UNITY_OPS = {"Gather", "Sin", "Cos", "Mul", "Add", "Sub", "Concat", "Gemm", "Relu", "Clip"}
-
-
-@pytest.fixture(scope="module")
-def model():
-    return stump()
-
-
-@pytest.fixture(scope="module")
-def chain(model):
-    return read_chain(model)
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from tests.support.bent_chain import stump
 from trunkline.dataset.columns import length_columns
 from trunkline.dataset.sampling import pull_directions
 from trunkline.dataset.table import sample_table
@@ -13,14 +12,8 @@ from trunkline.frames import downwards, gravity_in_base
 from trunkline.ik.inputs import TILT
 from trunkline.ik.polish import polish
 from trunkline.ik.score import beyond_range, largest_difference, outside_targets
-from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium, forward
 from trunkline.statics.restart import restart
-
-
-@pytest.fixture(scope="module")
-def chain():
-    return read_chain(stump())
 
 
 @pytest.fixture(scope="module")

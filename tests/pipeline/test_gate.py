@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from trunkline.errors import InputError
+from trunkline.hybrid.shares import wilson
 from trunkline.pipeline import baseline, gate
 from trunkline.pipeline.limits import Limit, limit_files, lookup, metrics_folder, read_limits
 
@@ -179,6 +180,68 @@ def test_bounds_by_hand(limit, before, expected):
     assert Limit(**limit).bound(before) == pytest.approx(expected)
 
 
+SHARES = "fit:\n  hold.rate: {min: 0.95, interval: hold.high, slack: 0.02}\n"
+
+
+def share(found, runs, **more):
+    low, high = wilson(found, runs)
+    return {"hold": {"rate": found / runs, "low": low, "high": high} | more}
+
+
+@pytest.mark.parametrize(
+    ("metrics", "problem"),
+    [
+        (share(196, 200), None),
+        (share(187, 200), None),  # 93.5 %, and may be 96 %
+        (share(182, 200), "found 0.91, its interval to 0.942"),
+        (share(18, 20), None),
+        (share(196, 200, high=None), "hold.high: found None, expected the better end of its interval"),
+        (share(196, 200, rate=None), "null, expected a value"),
+    ],
+)
+def test_a_share_falls_short_only_if_its_interval_does(tmp_path, metrics, problem):
+    (tmp_path / "limits.yaml").write_text(SHARES)
+    limit = read_limits(tmp_path / "limits.yaml")["fit"]["hold.rate"]
+    lines = limit.problems(metrics, "hold.rate", None)
+    assert [line for line in lines if problem is None or not line.startswith(problem)] == []
+    assert bool(lines) == bool(problem)
+
+
+def test_a_share_is_held_to_the_baseline_by_its_interval_too():
+    limit = Limit(min=0.5, interval="hold.high", slack=0.02)
+    assert limit.problems(share(195, 200), "hold.rate", 1.0) == []  # to 0.989: a few of 200 are chance
+    (line,) = limit.problems(share(190, 200), "hold.rate", 1.0)
+    assert line.endswith("baseline 1, expected at least 0.98")
+
+
+def test_a_stage_that_never_ran_is_told_and_holds_nothing_until_it_did(project, capsys):
+    """Its first baseline ends that: from then on it fails without its metrics."""
+    (project / "tests" / "limits.yaml").write_text(LIMITS + "rare:\n  rate: {min: 0.5}\n")
+    assert gate.main(project) == 0
+    assert "gate: rare: never ran, its 1 rows hold nothing yet" in capsys.readouterr().out
+    commit(project)
+    assert renew(project, "of what ran") == 0
+    file = project / "artifacts" / "rare" / "metrics.json"
+    file.parent.mkdir()
+    file.write_text('{"rate": 0.4}')
+    assert found(project)[0].startswith("rare: rate: no baseline")
+    assert found(project)[1] == "rare: rate: found 0.4, expected at least 0.5"
+    file.write_text('{"rate": 0.6}')
+    commit(project)
+    assert renew(project, "it ran") == 0
+    assert found(project) == []
+    file.unlink()
+    assert found(project) == ["rare: artifacts/rare/metrics.json is missing"]
+    assert gate.main(project) == 1
+
+
+def test_of_the_project_s_stages_only_the_rehearsal_may_not_have_run():
+    """No baseline without a row of each other stage, or a stage's metrics could be deleted unseen."""
+    for file in limit_files(ROOT):
+        before = baseline.read_baseline(baseline.baseline_file(file))
+        assert set(own_limits(file)) - set(before.metrics) <= {"rehearse"}
+
+
 def test_a_row_without_a_baseline_fails_and_the_command_adds_it(project):
     (project / "tests" / "limits.yaml").write_text(LIMITS + "  error.cad: {better: lower}\n")
     assert found(project) == ['fit: error.cad: no baseline, expected one (`make baseline REASON="..."`)']
@@ -320,8 +383,12 @@ own_limits = cache(read_limits)  # of a file that no test writes to
 def own_rows():
     for file in limit_files(ROOT):
         for stage, rows in own_limits(file).items():
-            for key in rows:
+            for key in rows if metrics_of(file, stage).exists() else ():  # what never ran is told by the gate
                 yield pytest.param(file, stage, key, id=f"{metrics_folder(file).name}-{stage}-{key}")
+
+
+def metrics_of(file, stage):
+    return metrics_folder(file) / "artifacts" / stage / "metrics.json"
 
 
 def copied(file, folder):
@@ -329,9 +396,9 @@ def copied(file, folder):
     (folder / "tests").mkdir()
     shutil.copy(file, folder / "tests" / "limits.yaml")
     before = baseline.read_baseline(baseline.baseline_file(file))
-    for stage in own_limits(file):
+    for stage in filter(lambda stage: metrics_of(file, stage).exists(), own_limits(file)):
         (folder / "artifacts" / stage).mkdir(parents=True)
-        shutil.copy(metrics_folder(file) / "artifacts" / stage / "metrics.json", folder / "artifacts" / stage)
+        shutil.copy(metrics_of(file, stage), folder / "artifacts" / stage)
     return before
 
 
@@ -351,6 +418,8 @@ def test_each_row_can_fail(file, stage, key, tmp_path):
         assert limit.rises or bound > 0  # nothing of which more is better can be negative
         bad = bound + (1 if limit.rises else -1) * max(1e-6 * abs(bound), 1e-12)
     holder[key.rpartition(".")[2]] = bad
+    if limit.interval:
+        lookup(metrics, limit.interval.rpartition(".")[0])[limit.interval.rpartition(".")[2]] = bad
     path.write_text(json.dumps(metrics))
     lines = gate.failures(own_limits(file), before, tmp_path)
     assert any(line.startswith(f"{stage}: {key}: found ") for line in lines), lines

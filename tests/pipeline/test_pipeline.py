@@ -33,8 +33,10 @@ EXAMPLES = sorted(
 
 # What surrounds every stage (load, show, refuse, write) and never changes a number: no reason to run again.
 INERT = ("trunkline/errors.py", "trunkline/progress.py", "trunkline/settings.py", "trunkline/threads.py")
-INERT += ("trunkline/figures/", "trunkline/pipeline/")
+INERT += ("trunkline/figures/", "trunkline/pipeline/", "rehearsal/report.py")
 ACTIVE = ("trunkline/pipeline/identify.py",)
+
+REHEARSE = "rehearsal/dvc.yaml:rehearse"  # takes hours: runs when it is asked for
 
 LONG = ("distances.csv", "errors.csv", "deviation.csv")  # plot data of thousands of rows: in the cache
 
@@ -61,7 +63,9 @@ def test_one_name_everywhere():
         assert stage["desc"]
 
 
-@pytest.mark.parametrize("file", ["dvc.yaml", "demo/dvc.yaml", *sorted({e.partition(":")[0] for e in EXAMPLES})])
+@pytest.mark.parametrize(
+    "file", ["dvc.yaml", "demo/dvc.yaml", "rehearsal/dvc.yaml", *sorted({e.partition(":")[0] for e in EXAMPLES})]
+)
 def test_a_pipeline_can_be_read_like_a_table_of_contents(file):
     lines = (ROOT / file).read_text().splitlines()
     assert [line for line in lines if len(line) > 120] == []
@@ -115,7 +119,16 @@ def test_the_lab_lists_its_settings(stages):
     assert params == LAB_S_SETTINGS
 
 
-@pytest.mark.parametrize("address", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record"])
+def test_the_rehearsal_lists_its_settings(stages):
+    """Those of its own, of teleoperation, and of the robot's arm, which is the lab's."""
+    params = {_relative(dep): dep.params for dep in stages[REHEARSE].deps if hasattr(dep, "params")}
+    params.pop("versions.yaml")
+    own = {file.relative_to(ROOT).as_posix(): [] for file in (ROOT / "rehearsal/conf").rglob("*.yaml")}
+    own |= {"rehearsal/params.yaml": ["rehearse"], "conf/teleop/config.yaml": []}
+    assert params == own | _settings_of_the_rig()
+
+
+@pytest.mark.parametrize("address", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record", REHEARSE])
 def test_a_stage_lists_the_libraries_that_its_numbers_go_through(stages, address):
     """Those that it imports, directly or through its rooms, so that another version of one runs it again."""
     (listed,) = (dep.params for dep in stages[address].deps if _relative(dep) == "versions.yaml")
@@ -149,9 +162,10 @@ def test_an_example_s_settings_are_checked(address):
     assert check_settings(ROOT / folder) == sorted(s.partition(":")[2] for s in EXAMPLES if s.startswith(folder))
 
 
-@pytest.mark.parametrize("name", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record"])
+@pytest.mark.parametrize("name", [*STAGES, *EXAMPLES, "demo/dvc.yaml:record", REHEARSE])
 def test_a_stage_depends_on_the_code_it_imports_and_no_other(stages, name):
-    deps = {dep for dep in map(_relative, stages[name].deps) if dep.startswith(("stages", "trunkline", "demo"))}
+    rooms = ("stages", "trunkline", "demo", "rehearsal")
+    deps = {dep for dep in map(_relative, stages[name].deps) if dep.startswith(rooms)}
     deps = {dep for dep in deps if not dep.endswith(".yaml")}
     modules = _code(stages[name])
     covers = {dep: {m for m in modules if m == dep or m.startswith(f"{dep}/")} for dep in deps}
@@ -197,6 +211,26 @@ def pipeline(tmp_path_factory):
     assert sorted(ran) == sorted(["demo.record", *(f"stages.{name}" for name in STAGES)])
     pipeline.commit()
     return pipeline
+
+
+def test_the_rehearsal_runs_when_it_is_asked_for_and_lags_otherwise(pipeline):
+    """Its results are to be those it wrote; that the pipeline went on since is no mismatch."""
+    assert lock.mismatches(pipeline.folder) == []  # it never ran
+    assert pipeline.ran("dvc", "repro", "-q", "rehearsal/dvc.yaml") == ["rehearsal.rehearse"]
+    pipeline.commit()
+    assert lock.mismatches(pipeline.folder) == []
+    pipeline.edit("stages/package_unity.py", lambda text: f"{text}\n# edited\n")
+    assert pipeline.ran("dvc", "repro", "-q") == ["stages.package_unity"]
+    pipeline.commit()
+    assert lock.mismatches(pipeline.folder) == []
+    pipeline.edit("artifacts/rehearse/runs.csv", lambda text: f"{text}edited\n")
+    (problem,) = lock.mismatches(pipeline.folder)
+    assert problem.startswith("rehearse: changed outs: artifacts/rehearse/runs.csv")
+    pipeline.restore()
+    (pipeline.folder / "rehearsal/dvc.lock").unlink()
+    assert "rehearse: never ran" in lock.mismatches(pipeline.folder)
+    pipeline.run("git", "reset", "-q", "--hard", "HEAD~2")
+    pipeline.run("dvc", "checkout", "-q")
 
 
 def test_nothing_changed_runs_nothing(pipeline):
@@ -296,11 +330,50 @@ def test_a_queued_sweep_runs_every_value(pipeline):
     assert (pipeline.folder / "params.yaml").read_text() == before
 
 
+def test_what_was_pushed_is_pulled_elsewhere_and_not_run_again(pipeline, tmp_path):
+    """docs/remotes.md, with a folder as the remote: the results, and then a session of one's own."""
+    store = ("-q", "-d", "store", str(tmp_path / "store"))
+    make = ("make", "--silent", "--assume-old=setup")  # the environment is there
+    pipeline.run("dvc", "remote", "add", "--local", *store)
+    pipeline.run(*make, "push")
+    there = pipeline.clone(tmp_path / "there")
+    missing = {name for name in _outputs(pipeline) if not (there.folder / name).exists()}
+    assert {"data/raw/demo", "artifacts/identify_control/arm.xml", "data/processed/fk_dataset"} <= missing
+    there.run("dvc", "remote", "add", *store)
+    there.run(*make, "pull")
+    assert all(_content(there, name) == _content(pipeline, name) for name in _outputs(pipeline))
+    assert there.ran("dvc", "repro", "-q") == []
+
+    own = "data/raw/july"
+    (there.folder / own).mkdir()
+    (there.folder / own / "release_1.mcap").write_text("poses")
+    there.run("dvc", "add", "-q", own)
+    there.run(*make, "push")
+    there.commit()
+    elsewhere = there.clone(tmp_path / "elsewhere")
+    assert not (elsewhere.folder / own).exists()
+    elsewhere.run(*make, "pull")
+    assert _content(elsewhere, own) == {f"{own}/release_1.mcap": b"poses"}
+    assert _content(elsewhere, "data/processed") == _content(pipeline, "data/processed")
+    pipeline.run("dvc", "remote", "remove", "--local", "store")
+
+
+def _outputs(pipeline: StubPipeline) -> list[str]:
+    declared = json.loads((pipeline.folder / "stub.json").read_text())
+    return [name for stage in declared.values() for name in stage["outs"] if (pipeline.folder / name).exists()]
+
+
+def _content(pipeline: StubPipeline, name: str) -> dict[str, bytes]:
+    """Of a file, or of those in a folder."""
+    path = pipeline.folder / name
+    files = [path] if path.is_file() else [file for file in path.rglob("*") if file.is_file()]
+    return {file.relative_to(pipeline.folder).as_posix(): file.read_bytes() for file in files}
+
+
 @pytest.fixture
 def clone(pipeline, tmp_path):
-    """A fresh clone of the stub pipeline: no data, no cache."""
-    subprocess.run(["git", "clone", "-q", pipeline.folder, tmp_path / "clone"], check=True)
-    return tmp_path / "clone"
+    """A fresh clone of the stub pipeline."""
+    return pipeline.clone(tmp_path / "clone").folder
 
 
 def test_lock_of_a_fresh_clone_is_in_order(clone):
@@ -398,10 +471,10 @@ def _relative_files(folder: Path, below: str) -> list[str]:
 
 
 def _and_below(stages, name: str) -> set[str]:
-    """The stage and all that read, directly or not, what it writes."""
+    """The stage and all that read, directly or not, what it writes, of what `dvc repro` runs."""
     found, outs = {name}, {_relative(out) for out in stages[name].outs}
     for other in stages.values():
-        if other.addressing != name and outs & {_relative(dep) for dep in other.deps}:
+        if other.addressing not in (name, REHEARSE) and outs & {_relative(dep) for dep in other.deps}:
             found |= _and_below(stages, other.addressing)
     return found
 
@@ -448,7 +521,7 @@ def _imported(file: str) -> set[str]:
                 modules = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
             for module in modules:
                 parts = module.split(".")
-                if parts[0] in ("trunkline", "demo"):
+                if parts[0] in ("trunkline", "demo", "rehearsal"):
                     todo += ["/".join(parts) + ".py"]
                     todo += ["/".join([*parts[:n], "__init__.py"]) for n in range(1, len(parts) + 1)]
     return found

@@ -1,5 +1,6 @@
 """The README: its generated blocks are current. What it points to: test_docs.py."""
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -7,7 +8,7 @@ import pytest
 import yaml
 
 from trunkline.identification.parameters import PARAMETERS
-from trunkline.pipeline.readme import generate, score_table, with_blocks
+from trunkline.pipeline.readme import generate, rehearsal_block, score_table, with_blocks
 from trunkline.pipeline.truth_table import LACKING, TRUTH, error_table, expectation, holds, identified, truth_table
 
 ROOT = Path(__file__).parents[2]
@@ -104,6 +105,25 @@ def test_scores_are_told_by_kind_and_together(tmp_path):
     assert rows == ["| goal", "| curls", "| motions", "| releases, curls and motions, `identify_control`"]
 
 
+def test_the_rehearsal_s_block_says_with_which_package_it_was_or_that_nothing_is_committed(tmp_path):
+    assert rehearsal_block(tmp_path, variants=False) == "(no runs are committed yet)"
+    told = {"runs": 200, "rate": 0.975, "low": 0.943, "high": 0.989, "causes": {"aim": 5}}
+    told |= {"nearest_mm": {"median": 12.0, "p95": 21.0}, "variants": {"no preview": {**told, "runs": 40}}}
+    files = {"tests/limits.yaml": "rehearse:\n  reach.rate: {min: 0.98, interval: reach.high}\n"}
+    files["artifacts/package_unity/manifest.json"] = "{}"
+    package = hashlib.sha256(b"{}").hexdigest()[:12]
+    files["artifacts/rehearse/metrics.json"] = json.dumps({"package": package, "reach": told})
+    for name, text in files.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    head, _, row = rehearsal_block(tmp_path, variants=False).splitlines()
+    assert head.startswith(f"| experiment, with this package, `{package}` |")
+    assert row == "| reach | 200 | 97.5 % | 94.3 to 98.9 % | ≥ 98 % | 12 / 21 | aim 5 |"
+    assert rehearsal_block(tmp_path, variants=True).splitlines()[3].startswith("| … no preview | 40 |")
+    (tmp_path / "artifacts/package_unity/manifest.json").write_text("{ }")
+    assert f"with another package, `{package}`" in rehearsal_block(tmp_path, variants=False)
+
+
 def test_errors_of_starts_and_of_the_clock_are_against_the_truth(judged):
     lines = dict(line.strip("| ").split(" | ", 1) for line in error_table(judged).splitlines()[2:])
     assert lines["detected start of a release, late"] == "-2.00 ms | -5.00 ms | 2 trials, all splits"
@@ -127,9 +147,9 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "relaxation": None,  # the lab's arm has three branches, the model one
         "relaxation_time": None,
         "kp": True,
-        "kv": False,
+        "kv": True,
         "time_constant": True,
-        "dead_time": True,
+        "dead_time": False,
         "force_range": False,
         "capstan_friction": True,
     }

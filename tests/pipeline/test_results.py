@@ -91,7 +91,7 @@ def test_a_file_that_is_none_is_one_line(tmp_path, text):
 
 def test_every_study_and_benchmark_keeps_its_results_and_every_kept_one_is_shown():
     code = "".join(file.read_text(encoding="utf-8") for name in ("studies", "benchmarks") for file in modules(name))
-    named = set(re.findall(r'recorded\("(\w+)"', code)) | {"choices_part"}
+    named = set(re.findall(r'recorded\("(\w+)"', code))
     named |= {f"identification_{part}" for part in PARTS}
     pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md"))
     shown = re.findall(r"^<!-- results/(\w+) -->$", pages, re.MULTILINE)

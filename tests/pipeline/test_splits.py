@@ -12,7 +12,7 @@ import yaml
 from stages import filter as filter_stage
 from stages import score as score_stage
 from tests.identification.test_stage import settings
-from tests.support.matched_plant import curl, release, small_model, tilt
+from tests.support.matched_plant import begin_project, curl, release, small_model, tilt
 from tests.support.sessions import all_truths, instruments, record, static_truth
 from tests.support.small_arm import small_spec
 from trunkline.filtering.filter import Filter
@@ -103,12 +103,7 @@ def test_trials_come_only_for_the_splits_that_are_asked_for(tmp_path):
 def project(tmp_path, monkeypatch):
     """A folder with a model; trials of all splits come from a model with other parameters."""
     monkeypatch.chdir(tmp_path)
-    spec, model = small_spec(4), small_model(4)
-    spec.option.timestep = model.opt.timestep
-    spec.compile()
-    (tmp_path / "artifacts/build_mjcf").mkdir(parents=True)
-    (tmp_path / "artifacts/build_mjcf/arm.xml").write_text(save_model(spec, model))
-    (tmp_path / "data/processed/filter").mkdir(parents=True)
+    model = begin_project(tmp_path, 4)
     return tmp_path, model
 
 

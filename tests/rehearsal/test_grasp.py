@@ -1,4 +1,4 @@
-"""A grasp from its beginning to its end: the first of `rehearsal.first_grasp`."""
+"""Grasps from their beginning to their end: the first and the last of `rehearsal.first_grasp`."""
 
 import numpy as np
 import pytest
@@ -34,3 +34,16 @@ def test_half_the_step_gives_the_same_grasp(trials):
     assert again.held == held.held
     assert again.units >= 4
     assert np.linalg.norm(whole.robot.truth().thing - half.robot.truth().thing) < 0.02
+
+
+def test_a_basket_is_lifted_off_its_table_by_its_bar_and_held():
+    trial = Trial(stranger(), settings(), PLACEMENTS[-1], seed=1)
+    held, basket = trial.run(), trial.scene.object
+    assert basket.shape == "basket"
+    assert held.held
+    assert held.lifted > LIFT
+    assert held.slipped < 0.02
+    truth = trial.robot.truth()
+    assert truth.grip[2] > truth.thing[2] + 0.15  # it hangs below its bar
+    np.testing.assert_allclose(-truth.arm_thing.sum(axis=0)[2], basket.mass * 9.80665, rtol=0.1)
+    np.testing.assert_array_equal(truth.thing_world, 0)

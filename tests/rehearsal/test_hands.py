@@ -7,6 +7,7 @@ import pytest
 
 from rehearsal import settings
 from rehearsal.operator.hands import RayHand
+from rehearsal.operator.scripts import Operator
 from rehearsal.session import RATE, REFERENCE
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz
 from trunkline.teleop.hands import ray_length
@@ -84,3 +85,29 @@ def test_the_stick_brings_the_rays_end_to_the_depth_that_is_aimed_at():
         x, y, z = (float(value) for value in end(one, 1.0, length))
         seen = (x, y, z)
     assert length == pytest.approx(distance(), abs=2e-3)
+
+
+def test_a_hand_that_follows_errs_smoothly_by_about_what_is_not_noticed():
+    """In one direction across the ray; without a leap from frame to frame, and slower than 1.8 Hz."""
+    one, missed = hand(tremor_g=0.0), []
+    zone = np.radians(one.person.unnoticed_deg) * distance()
+    for frame in range(int(4000 * one.person.correction * RATE)):
+        one.follow(PLACE, frame / RATE)
+        missed.append(one.missed(frame / RATE))
+    across = np.array(missed)[:, 0]
+    at_corrections = across[:: round(one.person.correction * RATE)]
+    assert at_corrections.std() == pytest.approx(zone / np.sqrt(3), rel=0.05)
+    assert np.abs(np.diff(across)).max() < 0.5 * zone
+    power = np.abs(np.fft.rfft(across)) ** 2
+    frequency = np.fft.rfftfreq(len(across), 1 / RATE)
+    assert power[frequency > 1.8].sum() < 0.02 * power.sum()
+
+
+@pytest.mark.parametrize(("forecast", "behind"), [(0.0, 1.0), (1.0, 0.0)])
+def test_an_operator_is_behind_by_the_part_of_the_reaction_time_that_is_not_foretold(forecast, behind):
+    person = replace(settings.person(), forecast=forecast)
+    hands = (hand(), hand())
+    operator = Operator(person, hands, PLACE, 0.03, 0.03, np.random.default_rng(0))
+    velocity = np.array([0.0, 0.05, 0.02])
+    found = operator._foretold(lambda now: PLACE + velocity * now, 3.0)
+    np.testing.assert_allclose(found, PLACE + velocity * (3.0 - behind * person.reaction), atol=1e-12)

@@ -13,6 +13,7 @@ from demo.plants.stranger_kernel import accelerate, bend, place, pull, work_for
 from rehearsal.robot.kernel import set_moving
 from rehearsal.robot.stand_in import straight_state
 from tests.rehearsal.arm import stranger
+from tests.support.stranger_links import add_link
 from trunkline.arm.spiral import spiral_chain
 from trunkline.frames import wxyz_from_rotation
 
@@ -33,17 +34,11 @@ def chain(plant: Stranger) -> mujoco.MjModel:
     spec.compiler.degree = spec.compiler.autolimits = False
     spec.option.gravity = GRAVITY
     spec.option.disableflags = mujoco.mjtDisableBit.mjDSBL_CONTACT
-    body, bottom = spec.worldbody.add_body(name="base"), 0.0
+    body = spec.worldbody.add_body(name="base")
     body.add_freejoint()
     body.explicitinertial, body.mass, body.inertia, body.ipos = True, 1.0, [1e-3] * 3, [0, 0, 0]
-    for i, length in enumerate(links.lengths):
-        body = body.add_body(pos=[0, 0, bottom])
-        body.explicitinertial, body.mass, body.ipos = True, links.masses[i], [0, 0, -length / 2]
-        body.inertia = [links.transverse[i], links.transverse[i], links.axial[i]]
-        for k, axis in enumerate(([1, 0, 0], [0, 1, 0])):
-            joint = body.add_joint(name=f"{i}_{k}", axis=axis, springref=links.rest[i, k])
-            joint.stiffness = [links.stiffness[i], 0, 0]
-        bottom = -length
+    for i in range(len(links.lengths)):
+        body = add_link(body, links, i)
     return spec.compile()
 
 

@@ -26,6 +26,7 @@ class Arc:
 
     def __init__(self, off: list[float]):
         self.digest, self.reach, self.straight, self.off = PACKAGE, Everywhere(), STRAIGHT, off
+        self.period = 0.6
 
     def planner(self, _):
         return Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.01)
@@ -107,3 +108,13 @@ def test_following_moves_the_robot_until_the_path_is_over():
     # a hand that trembles at the edge of this arm's reach is refused now and then, and the robot holds meanwhile
     assert {why.partition(":")[0] for _, why in found.refusals} <= {"out of reach"}
     assert len(found.refusals) < 0.1 * len(views)
+
+
+def test_an_operator_who_does_not_judge_confirms_the_first_plan():
+    found, operator = session([0.2, 0.2])
+    operator.judged = False
+    ending, _, views = rehearse(found, operator.reach())
+    assert ending.done
+    assert ending.plans == 1
+    assert ending.previewed > 0.15
+    assert any(view.intent.mode == "execute" for view in views)

@@ -6,6 +6,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from rehearsal.robot.scene import Object, Scene, String, make_thing
+from rehearsal.robot.shapes import distance
 from rehearsal.robot.thing import Motion, Thing, move_thing, pull_string, rotation, spin_of
 from rehearsal.robot.touching import Contacts, World, lie
 
@@ -22,7 +23,8 @@ def body(shape="box", diameter=0.05, height=0.12, mass=0.1, z=0.06, **more) -> t
 def floor(thing: Thing, friction=0.35, loss=3.0) -> tuple[World, Contacts]:
     kind, half, edge, place = Scene(0.0, Object("sphere", 0.1, 0.1, 1.0, [0.0, 0.0, 1.0])).shapes()
     world = World(kind, half, edge, place, 1e6, 2e4, 2 * 0.1 * np.sqrt(2e4 * thing.mass), loss, np.array([friction]))
-    some = [np.zeros((1, 3)), np.zeros((1, 1, 3)), np.zeros((len(thing.points), 1, 3)), np.zeros((1, 2, 3))]
+    bristles, near = np.zeros((1, len(thing.kind), 3)), np.zeros((1, len(thing.kind) + 1, 3))
+    some = [bristles, np.zeros((1, 1, 3)), np.zeros((len(thing.points), 1, 3)), near]
     return world, Contacts(*some, np.zeros((1, 3)), np.zeros((1, 1, 3)), np.zeros((1, 3)))
 
 
@@ -121,3 +123,69 @@ def test_a_string_holds_its_weight_and_leaves_the_hook_when_it_is_slack():
     motion.place[2] += 0.02
     pull_string(thing, motion, rotation(motion.quaternion), NONE)
     assert motion.hanging[0] == 0
+
+
+def basket(**more) -> tuple[Thing, Motion]:
+    return body("basket", diameter=0.03, height=0.06, mass=0.2, **more)
+
+
+def mechanical(thing: Thing, motion: Motion) -> float:
+    """Energy of a thing that falls, J."""
+    spin = spin_of(thing, motion, rotation(motion.quaternion))
+    kinetic = 0.5 * (thing.mass * motion.speed @ motion.speed + np.dot(spin, motion.momentum))
+    return float(kinetic + thing.mass * G * motion.place[2])
+
+
+def test_a_basket_lies_on_points_of_its_own_surface_and_its_bar_is_along_y():
+    thing, _ = basket()
+    grip = Object("basket", 0.03, 0.06, 0.2, [0.0, 0.0, 0.0]).grip
+
+    def away(point):
+        inside = [(point - shift) @ turn for shift, turn in zip(thing.shift, thing.turn, strict=True)]
+        shapes = zip(thing.kind, thing.half, thing.edge, inside, strict=True)
+        return min(distance(kind, half, edge, tuple(at))[0] for kind, half, edge, at in shapes)
+
+    np.testing.assert_allclose([away(point) for point in thing.points], 0, atol=1e-12)
+    np.testing.assert_allclose(thing.eye, grip + [0, 0, 0.015], atol=1e-9)
+    assert away(grip + [0, 0.079, 0.014]) < 0 < away(grip + [0.079, 0, 0.014])
+
+
+def test_a_basket_stands_still_on_a_table():
+    thing, motion = basket(z=Object("basket", 0.03, 0.06, 0.2, [0.0, 0.0, 0.0]).half_height)
+    world, contacts = floor(thing)
+    fall(thing, motion, world, contacts, DOWN, 1.0)
+    before = motion.place.copy(), motion.quaternion.copy()
+    fall(thing, motion, world, contacts, DOWN, 2.0)
+    np.testing.assert_allclose(motion.place, before[0], atol=1e-5)
+    np.testing.assert_allclose(motion.quaternion, before[1], atol=1e-6)
+    np.testing.assert_allclose(contacts.thing_world[0], [0, 0, thing.mass * G], atol=1e-4)
+
+
+def test_a_basket_dropped_askew_gains_no_energy():
+    askew = list(Rotation.from_euler("xy", [50, 20], degrees=True).as_quat(scalar_first=True))
+    thing, motion = basket(z=0.3, quaternion=askew)
+    world, contacts = floor(thing)
+    found = [mechanical(thing, motion)]
+    for _ in range(300):
+        fall(thing, motion, world, contacts, DOWN, 0.005)
+        found.append(mechanical(thing, motion))
+    lost = found[0] - found[-1]
+    assert lost > 0.1
+    assert (np.array(found) - np.minimum.accumulate(found)).max() < 0.01 * lost
+    assert motion.place[2] > 0.01
+
+
+def test_a_basket_hangs_upright_by_its_bar():
+    """Tilted by 3°, its string over the hook, it swings about upright, and the string bears its weight in the mean."""
+    askew = list(Rotation.from_euler("x", 3, degrees=True).as_quat(scalar_first=True))
+    thing, motion = basket(z=0.1, hanging=True, quaternion=askew)
+    borne, tops = [], []
+    for _ in range(round(4 / H)):
+        turn = rotation(motion.quaternion)
+        force, torque = pull_string(thing, motion, turn, spin_of(thing, motion, turn))
+        move_thing(thing, motion, force, torque, DOWN, H)
+        borne.append(force[2])
+        tops.append(np.degrees(np.arccos(min(turn[2][2], 1.0))))
+    assert motion.hanging[0] == 1
+    assert np.mean(borne) == pytest.approx(thing.mass * G, rel=0.01)
+    assert 1.0 < max(tops) < 5.0

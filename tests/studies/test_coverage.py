@@ -1,13 +1,23 @@
-"""The study of coverage at a small size: known parameters come back from afar, and a wrong plant shows."""
+"""The study of coverage at a small size: known parameters come back from afar, forces over the masses."""
 
 import numpy as np
+import pytest
 
-from studies.coverage import cover
+from studies.coverage import MASS_FACTOR, cover
 
 
-def test_a_wrong_plant_shows_beside_the_right_one():
-    right, wrong = cover("damping", True, 2), cover("damping", False, 2)
-    damping = right.names.index("damping")
-    assert np.abs(right.errors)[:, damping].max() < 0.02
-    assert (np.abs(wrong.errors) > wrong.widths)[:, damping].all(), "dry friction passes for damping, in every trial"
-    assert len(right.rows("`identify_damping`", "the model")) == len(right.names)
+@pytest.mark.parametrize("is_matched", [True, False], ids=["the model", "a heavier plant with dry friction"])
+def test_what_is_known_comes_back(is_matched):
+    found = cover("damping", is_matched, 2)
+    assert found.names == ["stiffness", "damping", "relaxation", "relaxation_time"]
+    errors = np.abs(found.errors)
+    assert errors[:, 0].max() < 0.5 * np.log(MASS_FACTOR), "expected over the factor of the masses"
+    assert errors.max() < 0.15
+    assert (np.array(found.widths) > 0).all()
+    assert len(found.rows("`identify_damping`", "the model")) == len(found.names)
+
+
+def test_signed_parameters_come_back_over_their_truth():
+    found = cover("stiffness", True, 1)
+    assert {"joint_place", "mount_tilt_x", "rest_bend_y"} <= set(found.names)
+    assert np.abs(found.errors).max() < 0.1

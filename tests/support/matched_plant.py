@@ -3,6 +3,8 @@
 On purpose with plain `mj_step` and not with trunkline.simulation, which these trials are to check.
 """
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -22,6 +24,7 @@ from trunkline.elements import (
 )
 from trunkline.frames import gravity_in_base, wxyz_from_rotation
 from trunkline.identification.experiment import SLACK
+from trunkline.identification.saving import save_model
 from trunkline.trials.trial import Trial
 
 FRAME = 1 / 120
@@ -35,6 +38,17 @@ def small_model(units: int = 6, joints: Joints | None = None, **motors: float) -
     model = spec.compile()
     model.dof_damping[: arm_hinges(model)] *= 4
     model.tendon_frictionloss[cables(model)] = 0.3
+    return model
+
+
+def begin_project(folder: Path, units: int) -> mujoco.MjModel:
+    """Write `small_model` where `build_mjcf` writes the CAD model, and make room for trials; the model."""
+    spec, model = small_spec(units), small_model(units)
+    spec.option.timestep = model.opt.timestep
+    spec.compile()
+    (folder / "artifacts/build_mjcf").mkdir(parents=True)
+    (folder / "artifacts/build_mjcf/arm.xml").write_text(save_model(spec, model))
+    (folder / "data/processed/filter").mkdir(parents=True)
     return model
 
 

@@ -3,6 +3,7 @@
 Quick, and honest about what depends on what: an output changes exactly when something its stage declares has changed.
 """
 
+import copy
 import json
 import os
 import shutil
@@ -14,7 +15,7 @@ from dvc.repo import Repo
 from omegaconf import OmegaConf
 
 ROOT = Path(__file__).parents[2]
-RESULTS = ("artifacts/", "dvc.lock", "demo/dvc.lock", ".dvc/", "examples/")
+RESULTS = ("artifacts/", "dvc.lock", "demo/dvc.lock", "rehearsal/dvc.lock", ".dvc/", "examples/")
 
 STUB = '''
 import functools, hashlib, json, pathlib
@@ -59,6 +60,13 @@ class StubPipeline:
         shutil.copy(ROOT / ".dvc" / "config", folder / ".dvc" / "config")
         self._write_stubs()
         self.commit()
+
+    def clone(self, folder: Path) -> "StubPipeline":
+        """Another clone, which has what Git has: no data, no cache."""
+        self.run("git", "clone", "-q", ".", str(folder))
+        other = copy.copy(self)
+        other.folder = folder
+        return other
 
     def run(self, *command: str) -> str:
         """Output of a command in the repository; fails with what it printed."""

@@ -410,8 +410,16 @@ def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
             lambda take: take.experiment != "curl",
             [NO_TEST, "experiments: no curl in the session: data/raw/README.md tells which settings do without"],
         ),
+        (
+            lambda take: take.experiment != "motion",
+            [
+                NO_TEST,
+                "experiments: no motion in the session: in params.yaml `experiments: [curl]` under "
+                "identify_control: data/raw/README.md",
+            ],
+        ),
     ],
-    ids=["identify alone", "validate alone", "no curl"],
+    ids=["identify alone", "validate alone", "no curl", "no motion"],
 )
 def test_a_split_or_an_experiment_that_the_session_lacks_is_said(folder, sound, kept, said):
     taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in sound.values() if kept(some)]

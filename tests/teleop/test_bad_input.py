@@ -5,81 +5,59 @@ from dataclasses import replace
 import pytest
 
 from tests.support.operator import TABLE, Operator
-from trunkline.teleop.messages import Pose, World
+from trunkline.teleop.messages import World
+from trunkline.teleop.recorder import FAULTS
 from trunkline.teleop.transitions import MODES
 
-NAN = float("nan")
-
-
-def swap(operator):
-    left, right = operator.given.left, operator.given.right
-    return operator.step(left={"position": right.position}, right={"position": left.position})
-
-
 # what goes wrong, and the line that says so
-BAD = {
-    "nan position": (
-        lambda o: o.wait(0.2, left={"position": (NAN, 0.0, 0.0)}),
-        "left controller: pose is not a number; holding",
-    ),
-    "infinite quaternion": (
-        lambda o: o.wait(0.2, right={"quaternion": (1.0, 0.0, 0.0, float("inf"))}),
-        "right controller: pose is not a number; holding",
-    ),
-    "nan stick": (
-        lambda o: o.wait(0.2, right={"stick": (0.0, NAN)}),
-        "right controller: pose is not a number; holding",
-    ),
-    "quaternion of length 2": (
-        lambda o: o.wait(0.2, right={"quaternion": (2.0, 0.0, 0.0, 0.0)}),
-        "right controller: quaternion is not of unit length; holding",
-    ),
-    "controller gone": (lambda o: o.wait(0.2, right={"tracked": False}), "right controller: not tracked; holding"),
-    "time goes back": (lambda o: o.step(seconds=-0.5), "clock went back by 0.5 s; holding"),
-    "nan stamp": (lambda o: o.step(seconds=NAN), "stamp is not a number; holding"),
-    "gap": (lambda o: o.step(seconds=0.4), "client silent for 0.40 s; holding"),
-    "silent": (lambda o: o.wait(0.3, seconds=0.0), "client silent for 0.27 s; holding"),
-    "no step": (lambda o: o.step(dt=0.0), "step of 0 s: expected a positive time; holding"),
-    "nan step": (lambda o: o.step(dt=NAN), "step of nan s: expected a positive time; holding"),
-    "swapped": (swap, "controllers have changed places; holding until both grips are let go"),
-    "other package": (
-        lambda o: o.step(package="b" * 64),
-        "package: found digest bbbbbbbbbbbb, expected aaaaaaaaaaaa; holding",
-    ),
-    "no package": (lambda o: o.step(package=""), "package: found digest none, expected aaaaaaaaaaaa; holding"),
-    "no alignment": (lambda o: o.step(alignment=None), "base is not aligned; holding"),
-    "alignment is no pose": (
-        lambda o: o.step(alignment=Pose((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))),
-        "base alignment is not a pose; holding",
-    ),
-    "nan joints": (lambda o: o.step(joints=(NAN,) * 7), "robot's joints are not numbers; holding"),
+LINES = {
+    "nan position": "left controller: pose is not a number; holding",
+    "infinite quaternion": "right controller: pose is not a number; holding",
+    "nan stick": "right controller: pose is not a number; holding",
+    "quaternion of length 2": "right controller: quaternion is not of unit length; holding",
+    "controller gone": "right controller: not tracked; holding",
+    "time goes back": "clock went back by 0.5 s; holding",
+    "nan stamp": "stamp is not a number; holding",
+    "gap": "client silent for 0.40 s; holding",
+    "silent": "client silent for 0.27 s; holding",
+    "no step": "step of 0 s: expected a positive time; holding",
+    "nan step": "step of nan s: expected a positive time; holding",
+    "other package": "package: found digest bbbbbbbbbbbb, expected aaaaaaaaaaaa; holding",
+    "no package": "package: found digest none, expected aaaaaaaaaaaa; holding",
+    "no alignment": "base is not aligned; holding",
+    "alignment is no pose": "base alignment is not a pose; holding",
+    "nan joints": "robot's joints are not numbers; holding",
+    "swapped": "controllers have changed places; holding until both grips are let go",
 }
 
 
-@pytest.mark.parametrize("bad", BAD)
+def test_every_fault_has_its_line():
+    assert set(LINES) == set(FAULTS)
+
+
+@pytest.mark.parametrize("bad", FAULTS)
 @pytest.mark.parametrize("mode", MODES)
 def test_robot_holds_and_says_why(mode, bad):
     operator = Operator()
     operator.to(mode)
     if mode == "hold":
         operator.step(left={"tracked": True, "grip": True})
-    spoil, line = BAD[bad]
     start = len(operator.intents)
-    intent = spoil(operator)
+    intent = FAULTS[bad](operator)
     assert intent.motion == "hold"
     assert intent.mode == ("stopped" if mode == "stopped" else "hold")
     if bad == "silent":  # said as soon as it is known
         intent = next(intent for intent in operator.intents[start:] if intent.notice.startswith("client"))
-    assert intent.notice == line
-    assert "\n" not in line
+    assert intent.notice == LINES[bad]
+    assert "\n" not in LINES[bad]
 
 
-@pytest.mark.parametrize("bad", BAD)
+@pytest.mark.parametrize("bad", FAULTS)
 def test_robot_may_be_moved_again_only_by_a_new_plan_and_a_new_confirmation(bad):
     operator = Operator()
     operator.to("execute")
     good = operator.given
-    BAD[bad][0](operator)
+    FAULTS[bad](operator)
     operator.given = replace(good, stamp=operator.given.stamp if operator.given.stamp > 0 else good.stamp)
     for _ in range(120):
         assert operator.step().motion == "hold"

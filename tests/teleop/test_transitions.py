@@ -5,53 +5,9 @@ from dataclasses import replace
 import pytest
 
 from tests.support.operator import Everywhere, Operator
-from trunkline.teleop.messages import ExecutorReport, PlanReport, Pose
+from trunkline.teleop.messages import PlanReport, Pose
+from trunkline.teleop.recorder import PLAN
 from trunkline.teleop.transitions import EVENTS, MEANING, MODES, TRANSITIONS
-
-D = "d" * 64
-
-
-def cause(operator: Operator, event: str, mode: str):
-    """Make `event` happen, whatever the mode; the intent once it has."""
-    given = operator.given
-    if event == "stop":
-        return operator.step(left={"secondary": True})
-    if event == "fault":
-        return operator.step(executor=ExecutorReport("fault", D, "joint 3 reflex"))
-    if event == "lost":
-        return operator.step(seconds=0.2, left={"tracked": False})
-    if event == "void":
-        return operator.step(world=replace(given.world, digest="another"))
-    if event == "released":
-        return operator.step(left={"grip": False}, right={"grip": False})
-    if event == "refused":
-        return operator.step(plan=PlanReport(operator.state.serial, refused="joint limit"))
-    if event == "settled":
-        return operator.wait(
-            0.5 if mode == "hold" else 0.0,
-            left={"tracked": True, "grip": False},
-            right={"grip": False, "trigger": False},
-        )
-    if event == "reset":
-        return operator.step(right={"primary": True})
-    if event in ("ask", "confirm") and mode == "aim":
-        operator.wait(0.2, left={"grip": True}, right={"grip": True})
-    if event in ("ask", "confirm"):
-        operator.step(right={"trigger": False})
-        return operator.step(right={"trigger": True, "grip": True})
-    if event == "planned":
-        return operator.step(plan=PlanReport(operator.state.serial, D, "", given.package, given.world.digest))
-    if event == "shown":
-        return operator.step(shown=D)
-    if event == "elapsed":
-        return operator.wait(0.6)
-    if event == "done":
-        return operator.step(executor=ExecutorReport("done", D))
-    assert event in ("follow", "unfollow")
-    if mode == "aim":
-        operator.wait(0.2, left={"grip": True}, right={"grip": True})
-    operator.step(left={"stick_pressed": False})
-    return operator.step(left={"stick_pressed": True})
 
 
 @pytest.mark.parametrize("event", EVENTS)
@@ -64,7 +20,7 @@ def test_every_event_leads_where_the_table_says_and_nowhere_else(mode, event):
         operator.step(left={"tracked": True, "grip": True})
     if mode == "delay" and event in ("done", "planned", "shown"):
         assert operator.state.waited < 0.1  # so that the delay does not end meanwhile
-    after = cause(operator, event, mode).mode
+    after = operator.cause(event).mode
     expected = TRANSITIONS.get((mode, event), mode)
     # What a press means depends on the mode: one button, one event. A trigger asks or confirms, a stick follows or not;
     # nothing settles unless the grips are let go.
@@ -96,12 +52,12 @@ def test_robot_holds_in_every_mode_but_two(mode):
 
 def test_only_what_was_shown_and_confirmed_is_executed():
     operator = Operator()
-    assert operator.to("execute").execute == D
+    assert operator.to("execute").execute == PLAN
     executed = [index for index, intent in enumerate(operator.intents) if intent.execute]
     first = executed[0]
-    assert any(intent.preview == D for intent in operator.intents[:first])
-    assert operator.inputs[first].shown == D
-    assert {intent.execute for intent in operator.intents[first:]} == {D}
+    assert any(intent.preview == PLAN for intent in operator.intents[:first])
+    assert operator.inputs[first].shown == PLAN
+    assert {intent.execute for intent in operator.intents[first:]} == {PLAN}
     delay = [intent.countdown for intent in operator.intents if intent.mode == "delay"]
     assert delay[0] == pytest.approx(0.5)
     assert delay == sorted(delay, reverse=True)
@@ -112,7 +68,7 @@ def test_a_trigger_held_since_before_the_preview_ended_confirms_nothing():
     operator = Operator()
     operator.to("preview")
     operator.step(right={"trigger": True})
-    assert operator.step(shown=D).mode == "ready"
+    assert operator.step(shown=PLAN).mode == "ready"
     assert operator.wait(0.2).mode == "ready"
     operator.step(right={"trigger": False})
     assert operator.step(right={"trigger": True}).mode == "delay"
@@ -170,11 +126,11 @@ def test_an_answer_to_an_earlier_request_is_no_plan():
     operator = Operator()
     operator.to("plan")
     for report in (
-        PlanReport(operator.state.serial - 1, D, "", operator.given.package, "world"),
-        PlanReport(operator.state.serial + 1, D, "", operator.given.package, "world"),
+        PlanReport(operator.state.serial - 1, PLAN, "", operator.given.package, "world"),
+        PlanReport(operator.state.serial + 1, PLAN, "", operator.given.package, "world"),
     ):
         assert operator.step(plan=report).mode == "plan"
-    assert operator.step(plan=PlanReport(operator.state.serial, D, "", "b" * 64, "world")).notice == (
+    assert operator.step(plan=PlanReport(operator.state.serial, PLAN, "", "b" * 64, "world")).notice == (
         "no plan: it was made for another package or world"
     )
 

@@ -22,6 +22,7 @@ from trunkline.arm.joints import Branch, Joints, add_elements
 from trunkline.dataset.gravities import spread
 from trunkline.errors import InputError
 from trunkline.frames import downwards
+from trunkline.hybrid.robots import PandaRobot
 from trunkline.ik.inputs import TILT
 from trunkline.reachability.sheets import Sheets
 from trunkline.unity.importer import as_imported
@@ -35,6 +36,7 @@ from trunkline.unity.twin import MANIFEST, MODEL, NETWORK, Label, Sources, Traje
 ROOT = Path(__file__).parents[2]
 LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0")
 TRAJECTORY = Trajectory(duration=0.4, pull=0.04, tilts_deg=[0.0, 57.3])
+ROBOT = PandaRobot("panda", 0.05, 0.6, 0.1, [0.0, -0.2, 0.0, -1.9, 0.0, 1.7, 0.785398])
 
 
 def network(inputs: int = 8, opset: int = 15, outputs: list[str] | None = None) -> bytes:
@@ -68,18 +70,33 @@ def grids() -> dict[str, np.ndarray]:
     }
 
 
-@pytest.fixture
-def sources(tmp_path) -> Sources:
-    (tmp_path / "ik.onnx").write_bytes(network())
-    np.savez(tmp_path / "grids.npz", **grids())
+def row(value: float, unit: str, low: float, high: float) -> dict:
+    return {"value": value, "unit": unit, "interval_95_given_model": [low, high], "at_bound": False}
+
+
+PARAMETERS = {
+    "identify_stiffness": {
+        "parameters": {"stiffness": row(0.5, "N m/rad", 0.4, 0.6), "kp": row(1900.0, "N/m", 1000.0, 3600.0)},
+        "correlation": {"stiffness": {"stiffness": 1.0, "kp": 0.3}, "kp": {"stiffness": 0.3, "kp": 1.0}},
+        "fitted_to": ["pull_1"],
+    },
+    "identify_damping": {"parameters": {"damping": row(0.02, "N m s/rad", 0.01, 0.04)}, "correlation": {"damping": {}}},
+    "identify_control": {"parameters": {"kp": row(2000.0, "N/m", 1800.0, 2200.0)}, "correlation": {"kp": {"kp": 1.0}}},
+}
+
+
+def sources_in(folder: Path) -> Sources:
+    (folder / "ik.onnx").write_bytes(network())
+    np.savez(folder / "grids.npz", **grids())
     ball = trimesh.creation.icosphere(subdivisions=1, radius=0.3)
-    ball.export(tmp_path / "soft_030.obj")
-    ball.export(tmp_path / "rigid.stl")
+    ball.export(folder / "soft_030.obj")
+    ball.export(folder / "rigid.stl")
     return Sources(
         mjcf=small_mjcf(),
-        network=tmp_path / "ik.onnx",
-        meshes=sorted([*tmp_path.glob("*.obj"), *tmp_path.glob("*.stl")]),
-        grids=tmp_path / "grids.npz",
+        parameters=PARAMETERS,
+        network=folder / "ik.onnx",
+        meshes=sorted([*folder.glob("*.obj"), *folder.glob("*.stl")]),
+        grids=folder / "grids.npz",
         metrics={"train_ik": {"opset": 15}},
         texts={"README.md": b"twin", "LICENSE.md": b"free", "CHANGELOG.md": b"new"},
         trunkline="0.1.0",
@@ -87,8 +104,13 @@ def sources(tmp_path) -> Sources:
 
 
 @pytest.fixture
+def sources(tmp_path) -> Sources:
+    return sources_in(tmp_path)
+
+
+@pytest.fixture
 def files(sources) -> dict[str, bytes]:
-    files, violations = assemble(LABEL, sources, TRAJECTORY)
+    files, violations = assemble(LABEL, sources, TRAJECTORY, ROBOT)
     assert violations == []
     return files
 
@@ -110,7 +132,7 @@ def test_the_curl_bends_the_arm_towards_the_pulled_tendon():
 
 def test_the_same_inputs_give_the_same_bytes(sources, tmp_path):
     for name in ("a.tgz", "b.tgz"):
-        write_tarball(tmp_path / name, assemble(LABEL, sources, TRAJECTORY)[0])
+        write_tarball(tmp_path / name, assemble(LABEL, sources, TRAJECTORY, ROBOT)[0])
     assert (tmp_path / "a.tgz").read_bytes() == (tmp_path / "b.tgz").read_bytes()
 
 
@@ -125,7 +147,7 @@ def test_every_file_and_folder_has_a_meta_with_its_own_lasting_guid(files, sourc
     }
     assert len(set(guids.values())) == len(guids)
     later = Label(**vars(LABEL) | {"version": "2.0.0"})
-    again, _ = assemble(later, sources, TRAJECTORY)
+    again, _ = assemble(later, sources, TRAJECTORY, ROBOT)
     assert all(again[path] == files[path] for path in guids)
 
 
@@ -144,6 +166,7 @@ def test_the_manifest_is_valid_and_true(files, sources):
     assert list(manifest.network.outputs) == ["commands", "lengths", "tip"]
     assert manifest.network.doubt_beyond == 0.005
     assert set(manifest.meshes) == {"rigid", "soft_030"}
+    assert manifest.hybrid.robot == ROBOT
     with pytest.raises(ValueError, match="extra"):
         Manifest.model_validate(json.loads(files[MANIFEST]) | {"surprise": 1})
 
@@ -199,7 +222,7 @@ def test_the_headset_tells_what_is_out_of_reach(files):
 def test_maps_that_do_not_say_what_is_out_of_reach_are_one_line(sources, missing):
     np.savez(sources.grids, **{name: values for name, values in grids().items() if name != missing})
     with pytest.raises(InputError, match=f"grids.npz: found no {missing}, expected"):
-        assemble(LABEL, sources, TRAJECTORY)
+        assemble(LABEL, sources, TRAJECTORY, ROBOT)
 
 
 def harden(mjcf: str) -> str:
@@ -214,7 +237,7 @@ def harden(mjcf: str) -> str:
 
 def test_springs_that_stiffen_are_restored_from_the_manifest(sources):
     sources.mjcf = harden(sources.mjcf)
-    files, violations = assemble(LABEL, sources, TRAJECTORY)
+    files, violations = assemble(LABEL, sources, TRAJECTORY, ROBOT)
     assert violations == []
     model = Manifest.model_validate_json(files[MANIFEST]).model
     calibrated, mjcf = mujoco.MjModel.from_xml_string(sources.mjcf), files[MODEL].decode()
@@ -241,12 +264,12 @@ def test_what_a_file_cannot_say_of_winches_is_stated_and_left_out(sources):
     spec = mujoco.MjSpec.from_string(sources.mjcf)
     for name, value in (("rate_limit", 0.25), ("backlash", 3e-4)):
         spec.add_numeric(name=name, data=[value], size=1)
-    files, violations = assemble(LABEL, replace(sources, mjcf=spec.to_xml()), TRAJECTORY)
+    files, violations = assemble(LABEL, replace(sources, mjcf=spec.to_xml()), TRAJECTORY, ROBOT)
     assert violations == []
     described = Manifest.model_validate_json(files[MANIFEST]).model
     assert (described.rate_limit, described.backlash) == (0.25, 3e-4)
     assert b"numeric" not in files[MODEL]
-    plain = Manifest.model_validate_json(assemble(LABEL, sources, TRAJECTORY)[0][MANIFEST]).model
+    plain = Manifest.model_validate_json(assemble(LABEL, sources, TRAJECTORY, ROBOT)[0][MANIFEST]).model
     assert (plain.rate_limit, plain.backlash) == (0, 0)
 
 
@@ -254,7 +277,7 @@ def test_branches_of_joints_are_packed_under_names_that_unity_can_hold(sources):
     """A branch's hinge and the tendon that ties it have names of their own."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)
     add_elements(spec, Joints([Branch(0.3, 0.5)]), 1e-5)
-    files, violations = assemble(LABEL, replace(sources, mjcf=spec.to_xml()), TRAJECTORY)
+    files, violations = assemble(LABEL, replace(sources, mjcf=spec.to_xml()), TRAJECTORY, ROBOT)
     assert not violations
     packed = mujoco.MjModel.from_xml_string(files[MODEL].decode())
     names = [packed.tendon(i).name for i in range(packed.ntendon)]
@@ -298,7 +321,7 @@ def test_what_unity_would_compile_loses_nothing_but_digits(files, sources):
 def test_a_simulation_that_warns_breaks_a_rule(sources):
     sources.mjcf = sources.mjcf.replace('armature="1e-05"', 'armature="0"').replace("-80 0", "-80000 0")
     sources.mjcf = sources.mjcf.replace("-2000", "-2e7").replace('gainprm="2000"', 'gainprm="2e7"')
-    _, violations = assemble(LABEL, sources, TRAJECTORY)
+    _, violations = assemble(LABEL, sources, TRAJECTORY, ROBOT)
     assert [violation.element for violation in violations] == ["simulation"]
 
 
@@ -321,34 +344,35 @@ def test_a_network_of_another_shape_is_one_line(sources):
     with pytest.raises(
         InputError, match=r"ik.onnx: found inputs of width \[7\].*expected one input \(theta_g"
     ):
-        assemble(LABEL, sources, TRAJECTORY)
+        assemble(LABEL, sources, TRAJECTORY, ROBOT)
     sources.network.write_bytes(b"not a network")
     with pytest.raises(InputError, match="expected an ONNX file"):
-        assemble(LABEL, sources, TRAJECTORY)
+        assemble(LABEL, sources, TRAJECTORY, ROBOT)
 
 
 def test_a_network_that_does_not_say_what_it_gives_or_gives_other_tendons_is_one_line(sources):
     sources.network.write_bytes(network(outputs=["tendon_2", "tendon_1", "tendon_3"]))
     with pytest.raises(InputError, match=r"ik.onnx: found outputs \['tendon_2', .* expected .* \['tendon_1', "):
-        assemble(LABEL, sources, TRAJECTORY)
+        assemble(LABEL, sources, TRAJECTORY, ROBOT)
     silent = onnx.load_model_from_string(network())
     del silent.metadata_props[:]
     sources.network.write_bytes(silent.SerializeToString())
     with pytest.raises(InputError, match="ik.onnx: found no 'inputs' in the file's metadata"):
-        assemble(LABEL, sources, TRAJECTORY)
+        assemble(LABEL, sources, TRAJECTORY, ROBOT)
 
 
 def test_a_grid_without_a_lattice_is_one_line(sources):
     np.savez(sources.grids, soft_030=np.zeros((2, 2, 2)))
     with pytest.raises(InputError, match="grids.npz: soft_030: found no origin"):
-        assemble(LABEL, sources, TRAJECTORY)
+        assemble(LABEL, sources, TRAJECTORY, ROBOT)
 
 
 @pytest.fixture
 def project(tmp_path, sources) -> Path:
     """A folder with all that the stage reads."""
     root = tmp_path / "project"
-    shutil.copytree(ROOT / "conf/package_unity", root / "conf/package_unity")
+    for folder in ("package_unity", "shared"):
+        shutil.copytree(ROOT / "conf" / folder, root / "conf" / folder)
     for name in ("params.yaml", "LICENSE", "CHANGELOG.md", "docs/unity.md"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, root / name)
@@ -360,11 +384,13 @@ def project(tmp_path, sources) -> Path:
         (root / "artifacts" / stage / "metrics.json").write_text("{}")
     for stage in ("build_mjcf", "identify_control"):
         (root / "artifacts" / stage / "arm.xml").write_text(sources.mjcf)
+    for stage, found in sources.parameters.items():
+        (root / "artifacts" / stage / "parameters.json").write_text(json.dumps(found))
     shutil.copy(sources.network, root / "artifacts/train_ik/ik.onnx")
     (root / "artifacts/reachability/meshes").mkdir()
     for path in sources.meshes:
         shutil.copy(path, root / "artifacts/reachability/meshes")
-    shutil.copy(sources.grids, root / "artifacts/reachability")
+    np.savez(root / "artifacts/reachability/grids.npz", **grids(), **sheets_of_a_ball().arrays())
     return root
 
 
@@ -392,11 +418,13 @@ def test_the_stage_writes_package_manifest_and_metrics(project, change):
     assert (out / "manifest.json").read_bytes() == files[MANIFEST]
     assert onnx.load_model_from_string(files[NETWORK]).graph.name == "ik"
     assert json.loads(files["package.json"])["version"] in tarball.name
+    assert "Tests/Vectors/steps.json" in files
 
 
 @pytest.mark.parametrize(
     "missing",
-    ["identify_control/arm.xml", "train_ik/ik.onnx", "reachability/grids.npz", "ingest/metrics.json"],
+    ["identify_control/arm.xml", "train_ik/ik.onnx", "reachability/grids.npz", "ingest/metrics.json",
+     "identify_damping/parameters.json"],
 )
 def test_a_missing_input_is_one_line_and_leaves_nothing(project, missing):
     (project / "artifacts" / missing).unlink()
@@ -418,7 +446,7 @@ def sheets_of_a_ball() -> Sheets:
 def files_with_sheets(sources) -> dict[str, bytes]:
     sheets = sheets_of_a_ball()
     np.savez(sources.grids, **grids(), **sheets.arrays())
-    files, violations = assemble(LABEL, sources, TRAJECTORY)
+    files, violations = assemble(LABEL, sources, TRAJECTORY, ROBOT)
     assert violations == []
     return files
 
@@ -456,4 +484,4 @@ def test_sheets_are_read_by_the_manifest_and_damaged_ones_refused(files_with_she
 def test_sheets_of_other_shapes_are_one_line(sources):
     np.savez(sources.grids, **grids(), **sheets_of_a_ball().arrays() | {"sheets_downs": np.zeros((3, 3))})
     with pytest.raises(InputError, match=r"sheets_points of shape \(20, 12, 8, 3\), sheets_downs of shape \(3, 3\)"):
-        assemble(LABEL, sources, TRAJECTORY)
+        assemble(LABEL, sources, TRAJECTORY, ROBOT)

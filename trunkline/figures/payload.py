@@ -4,9 +4,9 @@ import matplotlib.pyplot as plt
 import pandas as pd
 from matplotlib.figure import Figure
 
-from trunkline.figures.style import HYBRID, IDENTIFIED, INITIAL, MEASURED
+from trunkline.figures.style import DOUBTFUL, HYBRID, IDENTIFIED, INITIAL, MEASURED
 
-COLOURS = {"cylinder": IDENTIFIED, "box": INITIAL, "sphere": HYBRID, "toy": MEASURED}
+COLOURS = {"cylinder": IDENTIFIED, "box": INITIAL, "sphere": HYBRID, "toy": MEASURED, "basket": DOUBTFUL}
 MARKS = ("o-", "s--", "^:", "v-.")
 
 

@@ -20,6 +20,7 @@ from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.hybrid.compose import panda_joints
 from trunkline.hybrid.doubts import Draws
+from trunkline.hybrid.objects import GRIP, object_geoms
 from trunkline.hybrid.string import EYE, STRING
 from trunkline.hybrid.torques import joint_torques, servo_commands
 from trunkline.identification.parameters import PARAMETERS, candidate_fields
@@ -90,7 +91,7 @@ class Piece:
         qpos: of the composed model. Shape (B, F, nq).
         tip, mount: of the arm. Shape (B, F, 3).
         object: position and quaternion of what is grasped. Shape (B, F, 7); NaN where there is none.
-        away: from its centre to that of the nearest unit, m. Shape (B, F).
+        away: from the middle of what the arm wraps of it to the centre of the nearest unit, m. Shape (B, F).
         sound: whether MuJoCo has not warned. A future that is not sound stands still. Shape (B,).
     """
 
@@ -217,8 +218,9 @@ def _place(batch: Batch, model: mujoco.MjModel, start: np.ndarray | None, way: W
     turned = Rotation.from_rotvec(np.outer(draws.turns, [0, 0, 1])) * rotation_from_wxyz(pose[:, 3:])
     pose[:, 3:] = np.where(draws.turns[:, None] != 0, wxyz_from_rotation(turned), pose[:, 3:])
     pose[:, :3] += draws.offsets
-    geom = model.geom("object_geom").id
-    batch.expand("geom_friction")[:, geom, :2] *= draws.friction[:, None]
+    friction = batch.expand("geom_friction")
+    for geom in object_geoms(model):
+        friction[:, geom, :2] *= draws.friction[:, None]
     tie = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_EQUALITY, "hanging")
     if (string := _number(model, mujoco.mjtObj.mjOBJ_BODY, STRING)) >= 0:  # its hook moves along
         batch.expand("body_pos")[:, string] += draws.offsets
@@ -240,7 +242,8 @@ def _piece(twin: Twin, batch: Batch, time: np.ndarray, found: dict[str, np.ndarr
     pose, away = np.full((count, number, 7), np.nan), np.full((count, number), np.nan)
     if thing >= 0:
         pose = np.concatenate([found["xpos"][:, :, thing], found["xquat"][:, :, thing]], axis=2)
-        gaps = found["site_xpos"][:, :, twin.centers] - pose[:, :, None, :3]
+        sites = found["site_xpos"]
+        gaps = sites[:, :, twin.centers] - sites[:, :, model.site(GRIP).id, None]
         away = np.linalg.norm(gaps, axis=3).min(axis=2)
     sound = ~batch.warning.any(axis=(1, 2))
     return Piece(time, found["qpos"], found["site_xpos"][:, :, tip], found["xpos"][:, :, mount], pose, away, sound)

@@ -1,4 +1,4 @@
-"""What holds the arm: the Panda, or a mount that stands still. A config group each in `conf/hybrid/robot/`.
+"""What holds the arm: the Panda, or a mount that stands still. A config group each in `conf/shared/robot/`.
 
 The arm's base frame has the straight arm along -z and tendon 1 over +x; a mount has z out of the flange. So the base
 is the mount turned by half a turn about its x, and then by `azimuth` about the arm's axis.
@@ -23,8 +23,9 @@ Metres = Annotated[float, Field(ge=-10, le=10)]
 Turn = Annotated[float, Field(ge=-7, le=7)]  # rad
 THINNEST = 0.01  # m, of the cylinder that stands for the motors
 
-# Servos of MuJoCo Menagerie's `franka_emika_panda`, tuned by Google DeepMind on that model: stand-ins for the maker's
-# joint controller, which is not published. N m/rad and N m s/rad.
+# Gains of the actuators in MuJoCo Menagerie (Google DeepMind), `franka_emika_panda/panda.xml`, whose joints have an
+# armature of 0.1 kg m² and a damping of 1 N m s/rad besides: stand-ins for the maker's joint controller, which is not
+# published. N m/rad and N m s/rad.
 KP = (4500.0, 4500.0, 3500.0, 3500.0, 2000.0, 2000.0, 2000.0)
 KV = (450.0, 450.0, 350.0, 350.0, 200.0, 200.0, 200.0)
 

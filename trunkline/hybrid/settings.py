@@ -1,4 +1,4 @@
-"""What a hybrid robot is set by: the groups of `conf/hybrid/`."""
+"""What a hybrid robot is set by: the groups of `conf/hybrid/`, and the robot of `conf/shared/`."""
 
 from trunkline.hybrid.objects import Thing
 from trunkline.hybrid.robots import Robot

@@ -72,6 +72,15 @@ def disagreements(baseline: Baseline, folder: Path) -> list[str]:
     return found
 
 
+def unrun(limits: Limits, baseline: Baseline, folder: Path) -> list[str]:
+    """Stages that have neither metrics in `folder` nor a row in the baseline."""
+    return [
+        stage
+        for stage in limits
+        if stage not in baseline.metrics and not (folder / "artifacts" / stage / "metrics.json").exists()
+    ]
+
+
 def renewed(before: Baseline | None, limits: Limits, folder: Path, commit: str, reason: str) -> Baseline:
     """The baseline after `before`, of the metrics in `folder`.
 
@@ -80,7 +89,10 @@ def renewed(before: Baseline | None, limits: Limits, folder: Path, commit: str, 
     """
     values: dict[str, dict[str, float]] = {}
     worse = []
+    never = [] if before is None else unrun(limits, before, folder)
     for stage, rows in limits.items():
+        if stage in never:
+            continue
         metrics = read_metrics(folder, stage)
         for key, limit in rows.items():
             if problems := limit.problems(metrics, key, None):

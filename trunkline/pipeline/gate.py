@@ -2,21 +2,24 @@
 
 A row is held to its goal, where it has one, and to a bound near its value in `baseline.json`, which only
 `make baseline` changes. The gate needs no history, and fails closed: what is missing, null, not a number or not finite
-fails, and so does a row without a baseline. Metrics that no row names are let alone.
+fails, and so does a row without a baseline. Metrics that no row names are let alone. A stage that has no row in the
+baseline and no metrics has never run, as the rehearsal before its first: that is told, and no failure.
 """
 
 import sys
 from pathlib import Path
 
 from trunkline.errors import InputError
-from trunkline.pipeline.baseline import Baseline, baseline_file, disagreements, read_baseline
+from trunkline.pipeline.baseline import Baseline, baseline_file, disagreements, read_baseline, unrun
 from trunkline.pipeline.limits import Limits, limit_files, metrics_folder, read_limits, read_metrics
 
 
 def failures(limits: Limits, baseline: Baseline, folder: Path) -> list[str]:
     """One line per metric in `folder` that breaks its limit, naming stage and key; empty if all is well."""
-    found = []
+    found, never = [], unrun(limits, baseline, folder)
     for stage, rows in limits.items():
+        if stage in never:
+            continue
         try:
             metrics = read_metrics(folder, stage)
         except InputError as error:
@@ -40,10 +43,14 @@ def main(root: Path = Path(".")) -> int:
             return 1
         folder = metrics_folder(file)
         example = "" if folder == root else f"{folder.name}: "
+        never = unrun(limits, baseline, folder)
+        for stage in never:
+            print(f"gate: {example}{stage}: never ran, its {len(limits[stage])} rows hold nothing yet")
         problems = [*failures(limits, baseline, folder), *disagreements(baseline, folder)]
         for problem in problems:
             print(f"gate: FAIL {example}{problem}")
-        count, stages = count + sum(len(rows) for rows in limits.values()), stages + len(limits)
+        held = [rows for stage, rows in limits.items() if stage not in never]
+        count, stages = count + sum(map(len, held)), stages + len(held)
         found += len(problems)
     print(f"gate: {count} metrics in {stages} stages, {found} problems")
     return 1 if found else 0

@@ -29,6 +29,7 @@ class Limit:
     factor: how many times worse than the baseline it may be; for a share (from 0 to 1) of which more is better, how
         many times as much may be missing from 1.
     slack: how much worse than the baseline, in the metric's own unit; the larger of the two counts.
+    interval: of a share of trials, the key of its interval's better end: the share falls short only if that end does.
     """
 
     max: float | None = None
@@ -38,6 +39,7 @@ class Limit:
     factor: Annotated[float, Field(ge=1, le=3)] = 1.3
     slack: NonNegativeFloat = 0.0
     below: Below | None = None
+    interval: str | None = None
 
     def __post_init__(self):
         given = [name for name in ("max", "min", "better", "equals") if getattr(self, name) is not None]
@@ -72,18 +74,22 @@ class Limit:
             return [] if same else [f"found {value!r}, expected {self.equals!r}"]
         if not is_finite(value):
             return [f"found {value!r}, expected a finite number"]
+        end = value if self.interval is None else lookup(metrics, self.interval)
+        if not is_finite(end):
+            return [f"{self.interval}: found {end!r}, expected the better end of its interval"]
+        told = f"{value:g}" if self.interval is None else f"{value:g}, its interval to {end:g}"
         found = []
-        if self.max is not None and value > self.max:
-            found.append(f"found {value:g}, expected at most {self.max:g}")
-        if self.min is not None and value < self.min:
-            found.append(f"found {value:g}, expected at least {self.min:g}")
+        if self.max is not None and end > self.max:
+            found.append(f"found {told}, expected at most {self.max:g}")
+        if self.min is not None and end < self.min:
+            found.append(f"found {told}, expected at least {self.min:g}")
         if self.below is not None:
             found += self._not_below(value, lookup(metrics, self.below.key), self.below)
         if before is not None:
             near = self.near(before)
-            if value > near if self.rises else value < near:
+            if end > near if self.rises else end < near:
                 word = "at most" if self.rises else "at least"
-                found.append(f"found {value:g}, baseline {before:g}, expected {word} {near:g}")
+                found.append(f"found {told}, baseline {before:g}, expected {word} {near:g}")
         return found
 
     @staticmethod

@@ -2,6 +2,9 @@
 
 Works in a fresh clone, without data or cache. DVC compares commands, parameters and every file that is there;
 files that only the cache holds are compared through the lock: what a stage read must be what another wrote.
+
+A stage whose dvc.yaml says `meta: {on_demand: true}`, as the rehearsal's of hours, may lag behind what it read: its
+results must be those that it wrote, and no more is asked. `dvc status` tells whether it lags.
 """
 
 import subprocess
@@ -29,6 +32,8 @@ def _unlocked(repo: Repo) -> list[str]:
     found = []
     for stage in repo.index.stages:
         entries = [*stage.deps, *stage.outs]
+        if _on_demand(stage) and not _has_results(stage):
+            continue
         new = [str(_path(entry)) for entry in entries if not entry.hash_info]
         if new:
             what = "never ran" if len(new) == len(entries) else f"not in the lock file: {', '.join(new)}"
@@ -43,16 +48,18 @@ def _changed(repo: Repo) -> list[str]:
     expected = {Path(file) for file in listed.split("\0") if file}
     expected |= {folder for file in expected for folder in file.parents}
     expected |= {_path(out) for out in repo.index.outs if not out.use_cache}
+    lagging = {stage.addressing: _has_results(stage) for stage in repo.index.stages if _on_demand(stage)}
     found = []
     for address, changes in repo.status().items():
         stage = address.rpartition(":")[2]
         for change in changes:
             if isinstance(change, str):  # "changed command"
-                found.append(f"{stage}: {change}")
+                found += [] if address in lagging else [f"{stage}: {change}"]
                 continue
             found += [
                 f"{stage}: {kind}: {name}: {state}"
                 for kind, states in change.items()
+                if address not in lagging or (lagging[address] and kind == "changed outs")
                 for name, state in states.items()
                 if state not in ABSENT or Path(name) in expected
             ]
@@ -64,9 +71,19 @@ def _inconsistent(repo: Repo) -> list[str]:
     return [
         f"{stage.name}: read another {_path(dep)} than {out.stage.name} wrote"
         for stage in repo.index.stages
+        if not _on_demand(stage)
         for dep in stage.deps
         if (out := written.get(_path(dep))) and dep.hash_info and dep.hash_info != out.hash_info
     ]
+
+
+def _on_demand(stage) -> bool:
+    return bool((stage.meta or {}).get("on_demand"))
+
+
+def _has_results(stage) -> bool:
+    """It ran, or somebody put results in its place."""
+    return any(out.hash_info or (Path(out.fs_path).exists() and not out.use_cache) for out in stage.outs)
 
 
 def _path(entry) -> Path:

@@ -3,6 +3,7 @@
 Generated blocks stand between `<!-- name -->` and `<!-- /name -->`.
 """
 
+import hashlib
 import json
 import re
 import shutil
@@ -21,6 +22,7 @@ from trunkline.pipeline.baseline import baseline_file, read_baseline
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.limits import Limit, lookup, metrics_folder, read_limits
+from trunkline.pipeline.rehearsal_table import rehearsal_table
 from trunkline.pipeline.results import block
 from trunkline.pipeline.truth_table import KINDS, STAGES, error_table, truth_table
 from trunkline.trials.experiments import EXPERIMENTS
@@ -30,6 +32,7 @@ from trunkline.trials.splits import DECIDING, TEST
 PICTURES = {
     "artifacts/identify_control/distances.png": "docs/distances.png",
     "artifacts/reachability/maps.png": "docs/maps.png",
+    "artifacts/rehearse/still.png": "docs/rehearsal.png",
     "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
 }
 EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README and of its own README
@@ -86,11 +89,12 @@ BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")  # an iden
 def pipeline_graph(root: Path) -> str:
     """The stages of dvc.yaml as a mermaid flowchart and a table; edges that follow from others are left out."""
     with Repo(str(root)) as repo:
-        stages = {s.addressing: s for s in repo.index.stages if not s.addressing.startswith("examples/")}
+        others = ("examples/", "rehearsal/")  # `dvc repro` alone runs neither
+        stages = {s.addressing: s for s in repo.index.stages if not s.addressing.startswith(others)}
         edges = [(above.addressing, stage.addressing) for stage, above in repo.index.graph.edges]
         graph = networkx.DiGraph()
         graph.add_nodes_from(stages)
-        graph.add_edges_from(edge for edge in edges if edge[0] in stages)
+        graph.add_edges_from(edge for edge in edges if stages.keys() >= set(edge))
     reduced = networkx.transitive_reduction(graph)
     order = list(networkx.lexicographical_topological_sort(reduced, key=list(stages).index))
     names = {address: address.removesuffix(".yaml").rpartition(":")[2] for address in order}
@@ -179,13 +183,25 @@ def score_table(root: Path) -> str:
     return "\n".join([*_head(f"trials of `{TEST}`"), goal, *rows])
 
 
-def example_table(folder: Path) -> str:
+def rehearsal_block(root: Path, variants: bool) -> str:
+    """What the committed runs of the rehearsal came to, and whether with the package of these results."""
+    metrics = _metrics(root, "rehearse")
+    if metrics is None:
+        return "(no runs are committed yet)"
+    manifest = (root / "artifacts" / "package_unity" / "manifest.json").read_bytes()
+    now = hashlib.sha256(manifest).hexdigest().startswith(metrics["package"])
+    package = f"with {'this' if now else 'another'} package, `{metrics['package']}`"
+    return rehearsal_table(metrics, read_limits(root / "tests" / "limits.yaml")["rehearse"], package, variants)
+
+
+def example_table(folder: Path, all_splits: bool = True) -> str:
     """An example's releases by split, beside what an identified model stands beside, and the arm's repeatability."""
     scored = lookup(_metrics(folder, "score"), "identify_damping")
     fitted = _metrics(folder, "identify_damping")
     head, line = _head("releases")
     rows = [head + " repeatability |", line + "---:|"]
-    for split, metrics in ((TEST, scored), *((split, fitted) for split in reversed(DECIDING))):
+    fits = [(split, fitted) for split in reversed(DECIDING)] if all_splits else []
+    for split, metrics in ((TEST, scored), *fits):
         scatter = [_number(lookup(metrics, f"repeatability_mm.release.{key}_mm")) for key in ("mean", "tip")]
         for words, at in (("", f"{split}."), (", without repaired trials", f"{split}.without_repaired.")):
             if not words or lookup(metrics, f"identified.{at}trials") is not None:
@@ -262,13 +278,12 @@ def with_blocks(text: str, blocks: dict[str, str]) -> str:
 def generate(root: Path) -> dict[Path, str]:
     """README.md, the examples' own, the reference of sessions and the pages on results, with their generated blocks as
     they should be."""
-    examples = {}
-    for name in EXAMPLES:
-        examples[name] = example_table(root / "examples" / name)
+    examples = {name: example_table(root / "examples" / name) for name in EXAMPLES}
     results = results_table(root / "tests" / "limits.yaml", RESULTS)
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
-    own["score"] = score_table(root)
-    blocks = {root / "README.md": own | examples}
+    own |= {"score": score_table(root), "rehearsal": rehearsal_block(root, variants=False)}
+    own |= {name: example_table(root / "examples" / name, all_splits=False) for name in EXAMPLES}
+    blocks = {root / "README.md": own}
     blocks[root / "data" / "raw" / "README.md"] = {"experiments": experiment_table()}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
     for page in sorted((root / "docs").rglob("*.md")):
@@ -276,6 +291,7 @@ def generate(root: Path) -> dict[Path, str]:
         if names:
             blocks[page] = {name: block(root / "docs" / f"{name}.json") for name in names}
     blocks.setdefault(root / "docs" / "identification.md", {})["parameters"] = parameter_table(root)
+    blocks.setdefault(root / "docs" / "rehearsal.md", {})["rehearsal"] = rehearsal_block(root, variants=True)
     truth = {"truth": truth_table(root), "errors": error_table(root)}
     blocks.setdefault(root / "docs" / "results" / "intervals.md", {}).update(truth)
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}

@@ -89,6 +89,8 @@ def _missing(takes: list[Take]) -> list[str]:
     lacking = [experiment for experiment in EXPERIMENTS if experiment not in kinds]
     if lacking:
         told = "data/raw/README.md tells which settings do without"
+        if len(lacking) == 1 and (way_out := EXPERIMENTS[lacking[0]].without):  # two that are missing need another
+            told = f"in params.yaml {way_out}: data/raw/README.md"
         said.append(f"experiments: no {', '.join(lacking)} in the session: {told}")
     return said + [
         f"splits: no {experiment} of the split {split}, which the session has"

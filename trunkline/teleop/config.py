@@ -1,4 +1,4 @@
-"""All settings of conf/teleop/config.yaml: of the core, of the motors, of what shapes a plan."""
+"""All settings of conf/teleop/config.yaml: of the core (`conf/shared/core/`), of the motors, of what shapes a plan."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""What the core is set by: see conf/teleop/config.yaml for what each number means to a user."""
+"""What the core is set by: see conf/shared/core/two_rays.yaml for what each number means to a user."""
 
 from dataclasses import dataclass
 from typing import Annotated, Literal

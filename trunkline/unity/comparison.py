@@ -10,7 +10,8 @@ from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import Laws, compile_with
 from trunkline.unity.manifest import Manifest
 from trunkline.unity.roundtrip import curl, deviation, simulate
-from trunkline.unity.twin import MANIFEST, MODEL, Trajectory, without_dead_time, without_rubbing, without_winches
+from trunkline.unity.twin import MANIFEST, MODEL, Trajectory
+from trunkline.unity.unsupported import without_dead_time, without_rubbing, without_winches
 
 
 @dataclass

@@ -7,6 +7,7 @@ import mujoco
 from pydantic import BaseModel, ConfigDict, Field
 
 from trunkline.elements import cables
+from trunkline.hybrid.robots import Robot
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw, TendonLaw
 
@@ -90,6 +91,15 @@ class Model(_Block):
     )
 
 
+class Hybrid(_Block):
+    arm: str = Field(description="the calibrated model whole, for MuJoCo itself: another file, not to be imported")
+    parameters: str = Field(
+        description="what was identified, a stage after the other: of each parameter `value`, `unit` and"
+        " `interval_95_given_model`, and how those of a stage correlate; the latest stage counts"
+    )
+    robot: Robot = Field(description="what holds the arm, as `trunkline/hybrid/robots.py` says")
+
+
 class Network(_Block):
     file: str
     opset: int
@@ -154,6 +164,7 @@ class Manifest(_Block):
     units: Units = Units()
     frames: Frames = Frames()
     model: Model
+    hybrid: Hybrid
     network: Network
     meshes: dict[str, Mesh]
     grids: dict[str, Grid]

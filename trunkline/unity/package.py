@@ -43,6 +43,11 @@ def with_metas(name: str, files: dict[str, bytes]) -> dict[str, bytes]:
     return dict(sorted((files | metas).items()))
 
 
+def without_metas(files: dict[str, bytes]) -> dict[str, bytes]:
+    """The files without what `with_metas` has put beside them."""
+    return {path: data for path, data in files.items() if not path.endswith(".meta")}
+
+
 def _meta(name: str, path: str, is_folder: bool) -> bytes:
     guid = hashlib.sha256(f"{name}/{path}".encode()).hexdigest()[:32]
     folder = "folderAsset: yes\nDefaultImporter:\n  externalObjects: {}\n" if is_folder else ""

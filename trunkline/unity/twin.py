@@ -1,5 +1,6 @@
 """The twin, whole: the calibrated model and all that was made from it, as the files of a Unity package."""
 
+import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -8,18 +9,20 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, capstan_friction, is_hole, numeric
 from trunkline.errors import InputError
+from trunkline.hybrid.robots import Robot
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize
-from trunkline.unity.manifest import Manifest, Versions, describe_model, hashes
+from trunkline.unity.manifest import Hybrid, Manifest, Versions, describe_model, hashes
 from trunkline.unity.network import describe_network
 from trunkline.unity.package import package_json, with_metas
 from trunkline.unity.reach_maps import convert_grids, convert_meshes, convert_sheets, describe_reach
 from trunkline.unity.roundtrip import curl, deviation, simulate
 from trunkline.unity.rules import Violation, lint_mjcf
+from trunkline.unity.unsupported import without_dead_time, without_rubbing, without_winches
 
 MODEL = "Runtime/Model/arm.xml"
+CALIBRATED, PARAMETERS = "Runtime/Model/calibrated.xml", "Runtime/Model/parameters.json"
 NETWORK = "Runtime/Network/ik.onnx"
 MANIFEST = "Runtime/manifest.json"
 SCRIPT_NAMES = ("CalibratedSprings.cs", "SoftReach.cs", "Trunkline.asmdef")
@@ -59,10 +62,11 @@ class Trajectory:
 class Sources:
     """What the earlier stages made: the calibrated MJCF, files to read, metrics by stage, texts by name.
 
-    trunkline: version of the code that made it.
+    parameters: by stage of identification, the latest last. trunkline: version of the code that made it.
     """
 
     mjcf: str
+    parameters: dict[str, dict]
     network: Path
     meshes: list[Path]
     grids: Path
@@ -72,7 +76,7 @@ class Sources:
 
 
 def assemble(
-    label: Label, sources: Sources, trajectory: Trajectory
+    label: Label, sources: Sources, trajectory: Trajectory, robot: Robot
 ) -> tuple[dict[str, bytes], list[Violation]]:
     """All files of the package by path, and the rules that it breaks."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)
@@ -104,10 +108,11 @@ def assemble(
             label.name, label.version, label.display_name, label.unity, label.description
         ),
         MODEL: mjcf.encode(),
+        CALIBRATED: sources.mjcf.encode(),
+        PARAMETERS: identified(sources.parameters),
         NETWORK: network,
     }
     files |= {f"Runtime/{path.name}": path.read_bytes() for path in SCRIPTS}
-    files = with_metas(label.name, files | meshes | grids | sheets | {MANIFEST: b""})
     manifest = Manifest(
         name=label.name,
         versions=Versions(
@@ -125,43 +130,37 @@ def assemble(
             capstan_friction=friction,
             **winches,
         ),
+        hybrid=Hybrid(arm=CALIBRATED, parameters=PARAMETERS, robot=robot),
         network=network_block,
         meshes=mesh_blocks,
         grids=grid_blocks,
         reach=reach,
         metrics=sources.metrics,
-        sha256=hashes({path: data for path, data in files.items() if path != MANIFEST}),
+        sha256={},
     )
-    files[MANIFEST] = (manifest.model_dump_json(indent=2) + "\n").encode()
-    return files, violations + found
+    return sealed(manifest, files | meshes | grids | sheets), violations + found
 
 
-def without_dead_time(spec: mujoco.MjSpec) -> float:
-    """Take the motors' dead time from a model in place, as no component of the importer has it; s, as it was."""
-    dead_time = max((float(actuator.delay) for actuator in spec.actuators), default=0.0)
-    for actuator in spec.actuators:
-        actuator.delay, actuator.nsample, actuator.interp = 0, 0, 0
-    return dead_time
+def sealed(manifest: Manifest, files: dict[str, bytes]) -> dict[str, bytes]:
+    """A package's `files` with a `.meta` beside each, and with the `manifest` that has the digests of them all."""
+    files = with_metas(manifest.name, files | {MANIFEST: b""})
+    digests = hashes({path: data for path, data in files.items() if path != MANIFEST})
+    manifest = manifest.model_copy(update={"sha256": digests})
+    return files | {MANIFEST: (manifest.model_dump_json(indent=2) + "\n").encode()}
 
 
-def without_rubbing(spec: mujoco.MjSpec) -> float:
-    """Take the tendons by which cables rub from a model in place, as their friction has to follow the tension at every
-    step; the coefficient μ, as it was."""
-    friction = capstan_friction(spec.compile())
-    for tendon in [tendon for tendon in spec.tendons if is_hole(tendon.name)]:
-        spec.delete(tendon)
-    for number in [number for number in spec.numerics if number.name == CAPSTAN_FRICTION]:
-        spec.delete(number)
-    return friction
-
-
-def without_winches(spec: mujoco.MjSpec) -> dict[str, float]:
-    """Take rate limit and backlash of the motors' winches from a model in place, as commands have to be shaped with
-    them before they are sent; what they were by name, 0 for none."""
-    model, names = spec.compile(), (RATE_LIMIT, BACKLASH)
-    for number in [number for number in spec.numerics if number.name in names]:
-        spec.delete(number)
-    return {name: numeric(model, name) for name in names}
+def identified(parameters: dict[str, dict]) -> bytes:
+    """What `parameters.json` of the stages say that a preview needs, one after the other; the rest is about trials."""
+    kept = ("value", "unit", "interval_95_given_model")
+    stages = [
+        {
+            "stage": stage,
+            "parameters": {name: {key: row[key] for key in kept} for name, row in found["parameters"].items()},
+            "correlation": found["correlation"],
+        }
+        for stage, found in parameters.items()
+    ]
+    return (json.dumps({"stages": stages}, indent=2) + "\n").encode()
 
 
 def movement(model: mujoco.MjModel, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:

@@ -1,5 +1,5 @@
-"""A finished package, read back: its digest, its model with its springs, and its maps in the base frames, as the stage
-`reachability` wrote them."""
+"""A finished package, read back: its digest, its maps in the base frames, as the stage `reachability` wrote them, the
+model that Unity shows, and what a preview needs: the calibrated arm, what holds it, and how sure its parameters are."""
 
 import hashlib
 import json
@@ -7,8 +7,11 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
+from pydantic import TypeAdapter
 
 from trunkline.errors import InputError
+from trunkline.hybrid import doubts
+from trunkline.hybrid.robots import Robot
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
 from trunkline.unity.package import read_tarball
@@ -76,6 +79,37 @@ def model_of(files: dict[str, bytes]) -> mujoco.MjModel:
     springs, dampers = ([JointLaw(**law) for law in block[name]] for name in ("springs", "dampers"))
     laws = Laws(springs, dampers, [TendonLaw(**law) for law in block["diagonals"]])
     return compile_with(files[MODEL].decode(), laws)
+
+
+def arm_of(files: dict[str, bytes]) -> mujoco.MjSpec:
+    """The calibrated arm, with the motors' dead time and winches, and cables that rub: what `hybrid.compose` takes."""
+    return mujoco.MjSpec.from_string(_file(files, "arm").decode())
+
+
+def doubts_of(files: dict[str, bytes], contact: doubts.Contact | None = None) -> doubts.Doubts:
+    """What is not known of the arm, and of what it touches.
+
+    Raises:
+        InputError: naming a parameter that is unknown or whose interval is none.
+    """
+    return doubts.doubts_of(json.loads(_file(files, "parameters"))["stages"], contact)
+
+
+def robot_of(files: dict[str, bytes]) -> Robot:
+    """What holds the arm."""
+    return TypeAdapter(Robot).validate_python(_hybrid(files)["robot"])
+
+
+def _file(files: dict[str, bytes], name: str) -> bytes:
+    """The file that the manifest's block `hybrid` calls `name`."""
+    return files[_hybrid(files)[name]]
+
+
+def _hybrid(files: dict[str, bytes]) -> dict:
+    manifest = _manifest(files)
+    if "hybrid" not in manifest:
+        raise InputError(f"{MANIFEST}: found no block hybrid, expected a package that a preview can be made of")
+    return manifest["hybrid"]
 
 
 def _manifest(files: dict[str, bytes]) -> dict:

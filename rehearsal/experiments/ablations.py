@@ -1,0 +1,85 @@
+"""What each part of the system is worth: reach and follow with one thing taken away or made worse, by name.
+
+    result, _ = reach(varied(bench, "reach", "no_preview"), seed)
+
+A variant changes what runs share, so a run of it has the same object, path, operator and robot as the run of the same
+seed that has everything.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import mujoco
+
+from rehearsal.experiments.bench import Bench
+from rehearsal.experiments.lookup import lookup
+from trunkline.errors import InputError
+from trunkline.pipeline.config import PROJECT
+from trunkline.pipeline.inputs import read_model
+from trunkline.statics.chain import read_chain
+
+DRAWING = PROJECT / "artifacts/build_mjcf/arm.xml"
+NOWHERE = 5.0  # m; within it of its axis the arm has no bending plane: further than anything is
+
+Change = Callable[[Bench], Bench]
+
+
+def varied(bench: Bench, experiment: str, name: str) -> Bench:
+    """What runs of the variant `name` of an experiment share.
+
+    Raises:
+        InputError: there is no such variant.
+    """
+    known = VARIANTS.get(experiment, {})
+    if name not in known:
+        raise InputError(f"variant: found {name!r}, expected one of {experiment}: {', '.join(known) or 'none'}")
+    return known[name](bench)
+
+
+def _planned_with(bench: Bench, model: mujoco.MjModel) -> Bench:
+    """Plans, previews and shapers by `model` alone, without the network; reach stays by the package's maps."""
+    chain = read_chain(model).smooth
+    straight = model.tendon_length0[model.actuator_trnid[:, 0]]
+    package = replace(bench.package, network=lookup(chain), model=model, chain=chain, straight=straight)
+    return replace(bench, package=package)
+
+
+def _statics(bench: Bench) -> Bench:
+    return _planned_with(bench, bench.package.model)
+
+
+def _cad(bench: Bench, drawing: Path = DRAWING) -> Bench:
+    return _planned_with(bench, read_model(drawing))
+
+
+def _no_preview(bench: Bench) -> Bench:
+    return replace(bench, judged=False)
+
+
+def _no_plane(bench: Bench) -> Bench:
+    core = bench.config.core
+    core = replace(core, bending_plane=replace(core.bending_plane, axis=NOWHERE))
+    return replace(bench, config=replace(bench.config, core=core))
+
+
+def _base(bench: Bench, **off: float) -> Bench:
+    sensors = replace(bench.stand_in.sensors, **off)
+    return replace(bench, stand_in=replace(bench.stand_in, sensors=sensors))
+
+
+def _delay(bench: Bench, seconds: float) -> Bench:
+    core = replace(bench.config.core, follow_delay=seconds)
+    return replace(bench, config=replace(bench.config, core=core))
+
+
+BOTH: dict[str, Change] = {
+    "statics": _statics,  # the identified model without its network: what `cad` compares with
+    "cad": _cad,
+    "no_plane": _no_plane,
+    **{f"base_{mm}mm": partial(_base, alignment_mm=float(mm)) for mm in (5, 10, 20)},
+    **{f"base_{deg}deg": partial(_base, alignment_deg=float(deg)) for deg in (1, 2, 4)},
+}
+DELAYS = {f"delay_{s:g}s": partial(_delay, seconds=s) for s in (0.2, 0.5, 1.0)}
+VARIANTS: dict[str, dict[str, Change]] = {"reach": {**BOTH, "no_preview": _no_preview}, "follow": {**BOTH, **DELAYS}}

@@ -1,0 +1,49 @@
+"""Rehearse the experiments on the stand-in robot as often as the committed metrics are of; resumes where it was
+stopped."""
+
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field
+
+from rehearsal.experiments.registry import EXPERIMENTS
+from rehearsal.experiments.result import rewrite_results, summary
+from rehearsal.report import draw
+from rehearsal.runs import make, only_package, source_of, wanted
+from trunkline.errors import nearest
+from trunkline.pipeline.limits import read_limits
+from trunkline.pipeline.rehearsal_table import rehearsal_table
+from trunkline.pipeline.stage import run_stage, write_json
+from trunkline.settings import settings
+from trunkline.threads import thread_count
+
+OUT = Path("artifacts/rehearse")
+
+
+@settings
+class Config:
+    """runs: of each experiment. of_variants: of each variant of them."""
+
+    runs: dict[str, Annotated[int, Field(ge=1, le=100_000)]]
+    of_variants: Annotated[int, Field(ge=0, le=100_000)]
+
+    def __post_init__(self):
+        for name in self.runs:
+            if name not in EXPERIMENTS:
+                raise ValueError(f"runs: found {name!r}, expected experiments{nearest(name, list(EXPERIMENTS))}")
+
+
+def main(config: Config) -> None:
+    package = only_package()
+    source = source_of(package)
+    results = make(wanted(config.runs, config.of_variants), package, source, OUT / "runs.csv", thread_count())
+    rewrite_results(OUT / "runs.csv", results)
+    metrics = {"package": source.package, **summary(results)}
+    write_json(OUT / "metrics.json", metrics)
+    draw(results, OUT / "rehearsal.png")
+    goals = read_limits(Path("tests/limits.yaml"))["rehearse"]
+    print(rehearsal_table(metrics, goals, f"with package `{source.package}`", variants=True))
+
+
+if __name__ == "__main__":
+    run_stage("rehearse", Config, main, root="rehearsal")

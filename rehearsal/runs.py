@@ -1,0 +1,147 @@
+"""Which runs a rehearsal is made of, and how they are made: side by side, each a row of the table when it ends."""
+
+import hashlib
+import json
+import multiprocessing
+import os
+import threading
+import time
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from dvc.repo import Repo
+from threadpoolctl import threadpool_limits
+
+from rehearsal.experiments.ablations import VARIANTS, varied
+from rehearsal.experiments.bench import Bench, bench_of
+from rehearsal.experiments.registry import EXPERIMENTS
+from rehearsal.experiments.result import Result, append_result, read_results
+from trunkline.errors import InputError
+from trunkline.unity.unpacked import package_digest
+from trunkline.unity.unpacked import read_package as read_files
+
+PACKAGES = Path("artifacts/package_unity")
+SHOWN = 12  # digits of a digest
+
+
+@dataclass(frozen=True)
+class Source:
+    """What runs are made of: `package` and `code`, digests; rows of another source do not count.
+
+    code: of the files and settings that rehearsal/dvc.yaml lists for the stage, as DVC sees them, without the package.
+    """
+
+    package: str
+    code: str
+
+    def of(self, results: Iterable[Result]) -> list[Result]:
+        return [result for result in results if (result.package, result.code) == (self.package, self.code)]
+
+
+@dataclass(frozen=True)
+class Run:
+    experiment: str
+    seed: int
+    variant: str = ""
+
+
+def only_package(folder: Path = PACKAGES) -> Path:
+    """The package that the pipeline made.
+
+    Raises:
+        InputError: there is none, or more than one.
+    """
+    found = sorted(folder.glob("*.tgz"))
+    if len(found) != 1:
+        raise InputError(f"{folder}: found {len(found)} packages (*.tgz), expected one: `make demo` makes it")
+    return found[0]
+
+
+def source_of(package: Path) -> Source:
+    """Of a package and of the checkout in whose top we are."""
+    with Repo() as repo:
+        stage = repo.stage.load_one("rehearsal/dvc.yaml", "rehearse")
+        names = {Path(dep.fs_path).relative_to(repo.root_dir).as_posix(): dep for dep in stage.deps}
+        hashes = {
+            name: dep.get_hash().value if dep.exists else None
+            for name, dep in names.items()
+            if not name.startswith(f"{PACKAGES}/") and name != "rehearsal/params.yaml"
+        }
+    code = hashlib.sha256(json.dumps(hashes, sort_keys=True).encode()).hexdigest()
+    return Source(package_digest(read_files(package))[:SHOWN], code[:SHOWN])
+
+
+def wanted(runs: dict[str, int], of_variants: int) -> list[Run]:
+    """Seeds 0, 1, ... of each experiment, so many each, then of each of its variants."""
+    plain = [Run(name, seed) for name, count in runs.items() for seed in range(count)]
+    variants = [(name, variant) for name in runs for variant in VARIANTS.get(name, {})]
+    return plain + [Run(name, seed, variant) for name, variant in variants for seed in range(of_variants)]
+
+
+def make(runs: list[Run], package: Path, source: Source, table: Path, workers: int) -> list[Result]:
+    """Those of `runs` that `table` has not, of this source; then all of `runs` that it has."""
+    made = {_run_of(result) for result in source.of(read_results(table))}
+    missing = [run for run in runs if run not in made]
+    for number, (result, seconds) in enumerate(_made(missing, package, workers), start=1):
+        append_result(table, replace(result, package=source.package, code=source.code))
+        told = "success" if result.success else result.cause
+        name = f"{result.experiment}, {result.variant}" if result.variant else result.experiment
+        print(f"{number} of {len(missing)}: {name} {result.seed}: {told}; {seconds:.0f} s of processor", flush=True)
+    chosen = set(runs)
+    return [result for result in source.of(read_results(table)) if _run_of(result) in chosen]
+
+
+def make_one(bench: Bench, run: Run) -> tuple[Result, float]:
+    """A run and its seconds of processor. One that breaks off by an error failed, and its cause is the error."""
+    began = time.process_time()
+    try:
+        changed = varied(bench, run.experiment, run.variant) if run.variant else bench
+        result, _ = EXPERIMENTS[run.experiment](changed, run.seed)
+    except Exception as error:  # hours of other runs shall not end with it
+        result = Result(run.experiment, run.seed, False, f"error: {type(error).__name__}: {error}")
+    return replace(result, variant=run.variant), time.process_time() - began
+
+
+def _made(runs: list[Run], package: Path, workers: int):
+    """Each run as it ends."""
+    if workers == 1 or len(runs) < 2:
+        bench = bench_of(package) if runs else None
+        yield from (make_one(bench, run) for run in runs)
+        return
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, context, _begin, (package,)) as pool:
+        try:
+            for done in as_completed([pool.submit(_next, run) for run in runs]):
+                yield done.result()
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+
+
+_bench: Bench | None = None  # of a worker
+
+
+def _begin(package: Path) -> None:
+    global _bench
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threadpool_limits(1)
+    _bench = bench_of(package)
+
+
+def _end_with_parent() -> None:
+    """A worker whose parent was killed would wait for ever for its next run."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
+
+
+def _next(run: Run) -> tuple[Result, float]:
+    assert _bench is not None
+    return make_one(_bench, run)
+
+
+def _run_of(result: Result) -> Run:
+    return Run(result.experiment, result.seed, result.variant)

@@ -1,0 +1,79 @@
+"""Variants: each changes what it names and nothing else, and a model answers without a network."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from rehearsal import settings
+from rehearsal.experiments.ablations import VARIANTS, varied
+from rehearsal.experiments.bench import Bench
+from rehearsal.experiments.lookup import lookup, tensions_of
+from tests.rehearsal.arm import settings as stand_in
+from tests.rehearsal.arm import stranger
+from tests.support.bent_chain import hardening_stump
+from tests.support.operator import config
+from trunkline.errors import InputError
+from trunkline.frames import STANDARD_GRAVITY, downwards
+from trunkline.statics.chain import read_chain
+from trunkline.statics.equilibria import equilibrium
+from trunkline.teleop.alignment import Aligned, align, wrist_of
+from trunkline.teleop.tendons import bend
+from trunkline.teleop.vectors import DOWN
+
+READY = (0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785)
+MODELS = ("statics", "cad")  # that need a package, and a drawing of the arm
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("experiment", "name"), [(one, name) for one, names in VARIANTS.items() for name in names if name not in MODELS]
+)
+def test_a_variant_changes_one_thing(bench, experiment, name):
+    found = varied(bench, experiment, name)
+    changed = [field.name for field in fields(Bench) if getattr(found, field.name) != getattr(bench, field.name)]
+    same = name == f"delay_{config().core.follow_delay:g}s"
+    assert len(changed) == (0 if same else 1)
+
+
+@pytest.mark.parametrize(("experiment", "name"), [("reach", "delay_1s"), ("follow", "no_preview")])
+def test_a_variant_of_another_experiment_is_refused_with_those_there_are(bench, experiment, name):
+    with pytest.raises(InputError, match=f"'{name}', expected one of {experiment}: statics, cad"):
+        varied(bench, experiment, name)
+
+
+def test_without_bending_planes_the_wrist_does_not_turn_for_the_tip(bench):
+    wrist, mount, tip = wrist_of(READY, 0.05), (0.5, 0.0, 0.5), (0.5, 0.1, 0.1)
+    plain, without = (
+        align(tip, mount, DOWN, wrist, Aligned(0.0, 0, 0.0), one.config.core.bending_plane)
+        for one in (bench, varied(bench, "follow", "no_plane"))
+    )
+    assert abs(plain.heading) > 0.5
+    assert without == Aligned(0.0, 0, 0.0)
+
+
+def test_a_bases_error_is_the_size_that_its_name_says(bench):
+    assert varied(bench, "follow", "base_20mm").stand_in.sensors.alignment_mm == 20.0
+    assert varied(bench, "follow", "base_4deg").stand_in.sensors.alignment_deg == 4.0
+    assert replace(varied(bench, "follow", "base_4deg").stand_in.sensors, alignment_deg=0.5) == bench.stand_in.sensors
+
+
+def test_a_table_of_equilibria_answers_for_a_model_that_no_network_knows():
+    chain, down = read_chain(hardening_stump()), downwards(0.6, 1.0)
+    tensions = np.zeros((1, chain.tendons))
+    tensions[0, :2] = 0.37 * chain.max_tension[:2]
+    x, y, z = (float(v) for v in equilibrium(chain, tensions, STANDARD_GRAVITY * down).position[0])
+    gravity = tuple(map(float, down))
+    first = bend(lookup(chain), (x, y, z), gravity, chain.length)
+    assert 1e-4 < np.linalg.norm(first.tip - (x, y, z)) < 0.1 * chain.length
+    np.testing.assert_allclose(bend(lookup(chain), (x, y, z), gravity, 0.01, chain).tip, (x, y, z), atol=1e-4)
+
+
+def test_no_more_than_two_tendons_of_the_table_are_taut():
+    tensions = tensions_of(read_chain(hardening_stump()))
+    assert (np.count_nonzero(tensions, axis=1) <= 2).all()
+    assert len(np.unique(tensions, axis=0)) == len(tensions)

@@ -1,0 +1,141 @@
+"""Which runs are made, that a stopped rehearsal goes on, and what its rows are of."""
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from matplotlib.image import imread
+
+from rehearsal import runs
+from rehearsal.experiments.result import Result, read_results, summary
+from rehearsal.report import draw
+from rehearsal.runs import Run, Source, make, make_one, only_package, source_of, wanted
+from trunkline.errors import InputError
+from trunkline.pipeline.limits import Limit
+from trunkline.pipeline.rehearsal_table import rehearsal_table
+
+ROOT = Path(__file__).parents[2]
+SOURCE = Source("package", "code")
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Runs without a robot: the seeds that were made, with the bench's own."""
+    seeds = []
+
+    def touch(bench, seed):
+        if seed == 7:
+            raise FloatingPointError("diverged")
+        seeds.append((bench.name, seed))
+        return Result("touch", seed, seed % 2 == 0, "" if seed % 2 == 0 else "aim: beside it", nearest_mm=seed), []
+
+    monkeypatch.setattr(runs, "EXPERIMENTS", {"touch": touch})
+    monkeypatch.setitem(runs.VARIANTS, "touch", {"off by 5 mm": lambda bench: SimpleNamespace(name="off")})
+    monkeypatch.setattr(runs, "bench_of", lambda package: SimpleNamespace(name="own"))
+    return seeds
+
+
+def test_a_stopped_rehearsal_goes_on(made, tmp_path):
+    table = tmp_path / "runs.csv"
+    make(wanted({"touch": 3}, 0), Path("package.tgz"), SOURCE, table, workers=1)
+    results = make(wanted({"touch": 5}, 2), Path("package.tgz"), SOURCE, table, workers=1)
+    assert made == [("own", 0), ("own", 1), ("own", 2), ("own", 3), ("own", 4), ("off", 0), ("off", 1)]
+    rows = [(one.seed, one.variant) for one in results]
+    assert rows == [(0, ""), (1, ""), (2, ""), (3, ""), (4, ""), (0, "off by 5 mm"), (1, "off by 5 mm")]
+    assert len(make(wanted({"touch": 2}, 0), Path("package.tgz"), SOURCE, table, workers=1)) == 2  # as asked, no more
+
+
+@pytest.mark.parametrize("other", [replace(SOURCE, package="another"), replace(SOURCE, code="another")])
+def test_rows_of_another_package_or_code_do_not_count(made, tmp_path, other):
+    table = tmp_path / "runs.csv"
+    make([Run("touch", 0)], Path("package.tgz"), SOURCE, table, workers=1)
+    (result,) = make([Run("touch", 0)], Path("package.tgz"), other, table, workers=1)
+    assert len(made) == 2
+    assert (result.package, result.code) == (other.package, other.code)
+    assert len(read_results(table)) == 2
+
+
+def test_a_run_that_breaks_off_has_failed(made):
+    result, _ = make_one(SimpleNamespace(name="own"), Run("touch", 7, "off by 5 mm"))
+    assert (result.success, result.cause) == (False, "error: FloatingPointError: diverged")
+    assert result.variant == "off by 5 mm"
+
+
+def test_rates_are_told_by_experiment_and_variant(made, tmp_path):
+    results = make(wanted({"touch": 4}, 2), Path("package.tgz"), SOURCE, tmp_path / "runs.csv", workers=1)
+    told = summary(results)["touch"]
+    assert (told["runs"], told["successes"], told["rate"], told["causes"]) == (4, 2, 0.5, {"aim": 2})
+    assert 0.1 < told["low"] < 0.5 < told["high"] < 0.9
+    assert told["nearest_mm"] == {"median": pytest.approx(1.5), "p95": pytest.approx(2.85)}
+    assert "tip_mm" not in told, "it was never measured"
+    assert told["variants"]["off by 5 mm"]["runs"] == 2
+    table = rehearsal_table({"package": "abc", "touch": told}, {"touch.rate": Limit(min=0.9)}, "of a test", True)
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]]
+    assert rows[0][:3] == ["touch", "4", "50 %"]
+    assert rows[0][4] == "≥ 90 %"
+    assert rows[0][6] == "aim 2"
+    assert rows[1][0] == "… off by 5 mm"
+
+
+def test_the_table_is_in_the_paper_s_order_and_names_frequent_causes_first():
+    told = {"runs": 9, "rate": 0.5, "low": 0.2, "high": 0.8, "causes": {"aim": 1, "missed": 4}}
+    table = rehearsal_table({"follow": told, "handle": told, "package": "abc", "reach": told}, {}, "of a test", True)
+    rows = table.splitlines()[2:]
+    assert [row.split(" | ")[0] for row in rows] == ["| reach", "| follow", "| handle"]
+    assert all(row.endswith("| missed 4, aim 1 |") for row in rows)
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """What dvc.yaml of the rehearsal names, with a package whose manifest says nothing of other files."""
+    folder = tmp_path / "checkout"
+    for name in ("rehearsal", "demo", "trunkline", "conf/teleop", ".dvc/config", "params.yaml", "versions.yaml"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
+        copy(ROOT / name, folder / name)
+    subprocess.run(["git", "init", "-q"], cwd=folder, check=True)
+    return folder
+
+
+def test_the_code_of_runs_is_what_the_stage_depends_on(checkout, monkeypatch):
+    monkeypatch.chdir(checkout)
+    monkeypatch.setattr(runs, "read_files", lambda package: {})
+    monkeypatch.setattr(runs, "package_digest", lambda files: "0123456789abcdef")
+    before = source_of(Path("package.tgz"))
+    assert re.fullmatch("[0-9a-f]{12}", before.code)
+    assert before.package == "0123456789ab"
+
+    def after(name, old, new):
+        text = (checkout / name).read_text()
+        assert old in text
+        (checkout / name).write_text(text.replace(old, new, 1))
+        return source_of(Path("package.tgz"))
+
+    assert after("rehearsal/params.yaml", "200", "7") == before, "how many runs there are changes none of them"
+    assert after("rehearsal/report.py", "success", "successes") == before
+    assert after("rehearsal/conf/rehearse/robot/stand_in.yaml", "\n", "\n# a comment\n") == before
+    settings = after("rehearsal/conf/rehearse/robot/stand_in.yaml", "azimuth: 0.0", "azimuth: 0.1")
+    code = after("trunkline/teleop/core.py", "\n", "\n# edited\n")
+    assert len({before.code, settings.code, code.code}) == 3
+
+
+def test_the_picture_names_who_failed_and_who_did_not(tmp_path):
+    rows = [Result("reach", seed, True, nearest_mm=9.0) for seed in range(3)]
+    rows += [Result("grasp", seed, False, "slip: out of the coil", variant="CAD") for seed in range(2)]
+    draw(rows, tmp_path / "some.png")
+    draw(rows[:3], tmp_path / "none.png")
+    some, none = (imread(tmp_path / f"{name}.png") for name in ("some", "none"))
+    assert some.shape[0] > none.shape[0], "a line each"
+
+
+def test_without_a_package_there_is_one_line(tmp_path):
+    with pytest.raises(InputError, match="found 0 packages .* `make demo` makes it"):
+        only_package(tmp_path)
+    for name in ("a.tgz", "b.tgz"):
+        (tmp_path / name).touch()
+    with pytest.raises(InputError, match="found 2 packages"):
+        only_package(tmp_path)

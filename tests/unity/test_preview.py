@@ -1,0 +1,147 @@
+"""What a preview needs, from the package alone: the arm moves as the identified one, free and in a grasp, and futures
+are drawn from the same doubts."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.hybrid.conftest import rubbing_arm
+from tests.unity.test_twin import LABEL, PARAMETERS, ROBOT, sources  # noqa: F401
+from trunkline.arm.spiral import spiral_chain
+from trunkline.elements import capstan_friction
+from trunkline.errors import InputError
+from trunkline.hybrid.compose import Placed, compose
+from trunkline.hybrid.doubts import Contact, nominal_draw, read_doubts
+from trunkline.hybrid.futures import Twin, Way, futures
+from trunkline.hybrid.objects import Thing
+from trunkline.hybrid.preview import Holding, joined, preview
+from trunkline.hybrid.robots import FixedMount
+from trunkline.hybrid.touch import read_geometry
+from trunkline.hybrid.worlds import World
+from trunkline.unity.package import write_tarball
+from trunkline.unity.sources import IDENTIFIED
+from trunkline.unity.twin import CALIBRATED, MANIFEST, MODEL, Trajectory, assemble
+from trunkline.unity.unpacked import arm_of, doubts_of, package_digest, read_package, robot_of
+
+ARTIFACTS = Path(__file__).parents[2] / "artifacts"
+SECONDS, LET_GO, PULL, CURL = 0.6, 0.25, 0.02, Trajectory(0.2, 0.02, [0.0])
+
+
+@pytest.fixture
+def mjcf() -> str:
+    """Of a short arm with all that Unity's importer has no component for but backlash."""
+    spec = rubbing_arm(spiral_chain(0.2, 0.05, 0.02, 6), 3)
+    spec.compile()
+    return spec.to_xml()
+
+
+@pytest.fixture
+def files(sources, mjcf, tmp_path) -> dict[str, bytes]:  # noqa: F811
+    """As a client reads them."""
+    made, _ = assemble(LABEL, replace(sources, mjcf=mjcf), CURL, ROBOT)
+    write_tarball(tmp_path / "twin.tgz", made)
+    return read_package(tmp_path / "twin.tgz")
+
+
+def way_of(arm: mujoco.MjModel, joints=(), seconds: float = SECONDS) -> Way:
+    """Tendon 1 is drawn in, the others are paid out."""
+    time = 0.01 * np.arange(round(seconds / 0.01) + 1)
+    straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
+    drawn = np.clip(time / 0.3, 0, 1)[:, None] * np.array([-PULL, PULL, PULL])
+    return Way(0.01, np.tile(np.array(joints, dtype=float), (len(time), 1)), straight + drawn, LET_GO)
+
+
+def free(spec: mujoco.MjSpec) -> Twin:
+    return Twin(compose(spec, FixedMount("fixed")).compile(), spec.compile())
+
+
+def grasping(spec: mujoco.MjSpec) -> Twin:
+    """A cylinder that hangs beside the arm, two thirds down, until it is let go."""
+    geometry = read_geometry(spec)
+    x, z = 0.6 * geometry.widths[0] + 0.01, -0.7 * geometry.length
+    level = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)
+    placed = Placed(Thing("cylinder", 0.03, 0.1, 0.02, "plastic"), np.array([x, 0.0, z]), level, True)
+    world = World(None, {}, [x, 0.0, z + 0.15])
+    return Twin(compose(spec, FixedMount("fixed"), world, placed).compile(), spec.compile())
+
+
+def moved(twin: Twin) -> np.ndarray:
+    return joined(list(futures(twin, way_of(twin.arm), nominal_draw()))).qpos
+
+
+@pytest.mark.parametrize("scene", [free, grasping])
+def test_the_arm_of_the_package_moves_as_the_identified_one_to_the_bit(files, mjcf, scene):
+    expected = moved(scene(mujoco.MjSpec.from_string(mjcf)))
+    np.testing.assert_array_equal(moved(scene(arm_of(files))), expected)
+    assert np.ptp(expected[0, :, 0]) > 0 or np.ptp(expected[0, :, 1]) > 0
+    assert np.abs(moved(scene(mujoco.MjSpec.from_string(files[MODEL].decode()))) - expected).max() > 1e-3
+
+
+def test_the_grasped_object_is_touched(mjcf):
+    """Else the grasp above would be another free motion."""
+    spec = mujoco.MjSpec.from_string(mjcf)
+    touched, alone = moved(grasping(spec)), moved(free(spec))
+    assert np.abs(touched[:, :, : alone.shape[2]] - alone).max() > 1e-2
+
+
+def test_a_preview_needs_the_package_alone(files):
+    assert package_digest(files)
+    arm, robot = arm_of(files), robot_of(files)
+    assert capstan_friction(arm.compile()) > 0
+    assert robot == ROBOT
+    twin = Twin(compose(arm, robot).compile(), arm.compile())
+    found = preview(twin, way_of(twin.arm, robot.ready, 0.3), doubts_of(files), Holding(0.1), count=3)
+    assert found.motion.sound.all()
+    assert found.spread[-1] > 1e-4
+    assert len(set(found.draws.values["kp"])) == 3
+
+
+def test_doubts_of_the_package_are_those_of_the_stages(files, tmp_path):
+    contact = Contact(friction=0.1)
+    for stage, found in PARAMETERS.items():
+        (tmp_path / f"{stage}.json").write_text(json.dumps(found))
+    expected = read_doubts([tmp_path / f"{stage}.json" for stage in IDENTIFIED], contact)
+    doubts = doubts_of(files, contact)
+    assert (doubts.names, doubts.contact) == (expected.names, contact)
+    np.testing.assert_array_equal(doubts.deviation, expected.deviation)
+    np.testing.assert_array_equal(doubts.correlation, expected.correlation)
+    assert doubts.names == ("stiffness", "kp", "damping")
+    width = np.log(2200 / 1800) / 3.92  # the latest stage's
+    assert doubts.deviation[1] == pytest.approx(width, rel=1e-3)
+
+
+def test_a_package_without_them_is_one_line(files):
+    manifest = json.loads(files[MANIFEST])
+    del manifest["hybrid"]
+    old = files | {MANIFEST: json.dumps(manifest).encode()}
+    for read in (arm_of, doubts_of, robot_of):
+        with pytest.raises(InputError, match=r"manifest\.json: found no block hybrid, expected"):
+            read(old)
+
+
+@pytest.fixture(scope="module")
+def built() -> dict[str, bytes]:
+    """The package that the stage made last."""
+    found = sorted((ARTIFACTS / "package_unity").glob("*.tgz"))
+    if not found:
+        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
+    return read_package(found[0])
+
+
+@pytest.mark.parametrize("scene", [free, grasping])
+def test_the_arm_of_the_package_that_was_built_moves_as_the_identified_one(built, scene):
+    identified = mujoco.MjSpec.from_file(str(ARTIFACTS / "identify_control/arm.xml"))
+    np.testing.assert_array_equal(moved(scene(arm_of(built))), moved(scene(identified)))
+    assert built[CALIBRATED] == (ARTIFACTS / "identify_control/arm.xml").read_bytes()
+
+
+def test_a_preview_needs_the_package_that_was_built_alone(built):
+    arm, robot = arm_of(built), robot_of(built)
+    twin = Twin(compose(arm, robot).compile(), arm.compile()).stepped(1 / 240)
+    found = preview(twin, way_of(twin.arm, robot.ready, 0.4), doubts_of(built), count=3)
+    assert found.motion.sound.all()
+    assert found.spread[-1] > 1e-4

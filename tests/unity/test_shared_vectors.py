@@ -1,0 +1,190 @@
+"""Shared vectors: a package's own core and network answer them, byte for byte, and they cover what there is."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter
+
+from tests.support.operator import config
+from tests.teleop.test_bad_input import LINES
+from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, grids, sheets_of_a_ball, sources_in
+from trunkline.errors import InputError
+from trunkline.hybrid.robots import FixedMount
+from trunkline.teleop.messages import Input, from_json
+from trunkline.teleop.settings import Teleop
+from trunkline.teleop.transitions import MODES, TRANSITIONS
+from trunkline.unity.answers import answers_of
+from trunkline.unity.package import read_tarball
+from trunkline.unity.readers import ENGINES, ENGINES_APART, refusals
+from trunkline.unity.shared_vectors import FOLDER, STEPS, cases_file, steps_file, with_shared_vectors
+from trunkline.unity.twin import NETWORK, assemble
+from trunkline.unity.unpacked import package_digest, robot_of
+
+BUILT = sorted((Path(__file__).parents[2] / "artifacts/package_unity").glob("*.tgz"))
+CASES = ("alignment", "rigid_reach", "soft_reach", "targets", "network")
+MOST = 1_500_000  # bytes of all, unpacked
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory):
+    """A package of balls without shared vectors."""
+    sources = sources_in(tmp_path_factory.mktemp("balls"))
+    np.savez(sources.grids, **grids(), **sheets_of_a_ball().arrays())
+    return assemble(LABEL, sources, TRAJECTORY, ROBOT)[0]
+
+
+@pytest.fixture(scope="module")
+def of_one_tilt(tmp_path_factory):
+    """The same with maps of the paper's gravity alone."""
+    sources = sources_in(tmp_path_factory.mktemp("one_tilt"))
+    axis = np.linspace(-0.8, 0.8, 17)
+    points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
+    soft = np.linalg.norm(points - [0, 0, -0.3], axis=-1) - 0.2
+    arrays = {"soft_030": soft, "soft_035": soft - 0.02, "rigid": np.linalg.norm(points - 0.4, axis=-1) - 0.3}
+    np.savez(sources.grids, **grids() | arrays | {"origin": np.full(3, -0.8), "spacing": np.full(3, 0.1)})
+    return assemble(LABEL, sources, TRAJECTORY, ROBOT)[0]
+
+
+@pytest.fixture(scope="module", params=["plain", "of_one_tilt", "built"])
+def files(request):
+    """Small packages, and the one that the stage made last."""
+    if request.param != "built":
+        return with_shared_vectors(request.getfixturevalue(request.param), config().core)
+    if not BUILT:
+        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
+    return read_tarball(BUILT[0])
+
+
+@pytest.fixture(scope="module")
+def recorded(files):
+    """What steps.json says."""
+    return json.loads(files[STEPS])
+
+
+@pytest.fixture(scope="module")
+def answers(files, recorded):
+    """Those of the package, by the settings that its vectors name."""
+    return answers_with(files, recorded)
+
+
+def answers_with(files, recorded, **changes):
+    settings = TypeAdapter(Teleop).validate_python(recorded["settings"] | changes)
+    return answers_of(files, settings, recorded["mount_offset"])
+
+
+def cases(files, name) -> list[tuple[dict, dict]]:
+    return [(case["question"], case["answer"]) for case in json.loads(files[f"{FOLDER}/{name}.json"])["cases"]]
+
+
+def test_the_core_answers_the_recorded_inputs_byte_for_byte(files, recorded, answers):
+    nan = lambda dt: math.nan if dt is None else dt  # noqa: E731
+    sequences = {
+        one["name"]: [(nan(step["dt"]), from_json(Input, json.dumps(step["input"]))) for step in one["steps"]]
+        for one in recorded["sequences"]
+    }
+    assert len(sequences) == len(recorded["sequences"])
+    assert recorded["package"] == answers.core.package
+    assert recorded["mount_offset"] == robot_of(files).mount_offset
+    assert steps_file(answers.core, sequences) == files[STEPS]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_questions_are_answered_byte_for_byte(files, answers, name):
+    assert cases_file(answers, name, [question for question, _ in cases(files, name)]) == files[f"{FOLDER}/{name}.json"]
+
+
+def test_another_core_answers_otherwise(files, recorded, answers):
+    """A client that errs is found out: here by one setting, by a millimetre of its mount, by a map's lattice."""
+    for change in ({"look_back": 0.3}, {"moved": 0.0001}, {"delay": 0.6}):
+        other = answers_with(files, recorded, **change)
+        sequences = {
+            one["name"]: [(step["dt"], from_json(Input, json.dumps(step["input"]))) for step in one["steps"]]
+            for one in recorded["sequences"] if None not in [step["dt"] for step in one["steps"]]
+        }  # fmt: skip
+        assert (
+            steps_file(other.core, sequences).partition(b"sequences")[2]
+            != steps_file(answers.core, sequences).partition(b"sequences")[2]
+        ), change
+
+
+def test_every_mode_transition_and_fault_is_among_the_steps(recorded):
+    sequences = {one["name"]: [step["intent"] for step in one["steps"]] for one in recorded["sequences"]}
+    for (mode, event), after in TRANSITIONS.items():
+        modes = [intent["mode"] for intent in sequences[f"{mode}, {event}"]]
+        assert modes[-1] == after
+        assert (mode, after) in zip(modes, modes[1:], strict=False)
+    every = [intent for one in sequences.values() for intent in one]
+    assert {intent["mode"] for intent in every} == set(MODES)
+    said = {intent["notice"] for intent in every}
+    for fault, line in LINES.items():  # but for how long a client was silent: steps are longer here
+        assert any(found.startswith(line[: line.index("0.27")] if fault == "silent" else line) for found in said), fault
+    assert {intent["motion"] for intent in every} == {"hold", "execute", "follow"}
+
+
+def test_steps_have_targets_of_every_kind_of_reach_under_several_gravities(recorded):
+    (steps,) = (one["steps"] for one in recorded["sequences"] if one["name"] == "reach")
+    targets = [step["intent"]["targets"] for step in steps if step["intent"]["targets"]]
+    assert {target["tip"]["reach"] for target in targets} >= {"inside", "outside", "blocked"}
+    assert {target["rigid"]["reach"] for target in targets} >= {"inside", "unknown"}
+    tilts = np.degrees([math.acos(-target["pointing"][2]) for target in targets])
+    assert len(set(np.round(tilts))) > 5
+    assert any(target["tilt_limited"] for target in targets)
+
+
+def test_look_ups_are_inside_outside_and_unknown_under_gravity_from_many_sides(files):
+    for name in ("rigid_reach", "soft_reach"):
+        found = [answer["where"] for _, answer in cases(files, name)]
+        assert min(found.count("inside"), found.count("outside")) > 5
+        assert "unknown" in found
+    gravities = {tuple(np.round(question["gravity"], 6)) for question, _ in cases(files, "soft_reach")}
+    assert len(gravities) > 10
+    reach = [answer[end]["reach"] for _, answer in cases(files, "targets") for end in ("rigid", "tip")]
+    assert set(reach) == {"inside", "outside", "unknown", "blocked"}
+
+
+def test_half_planes_change_late(files):
+    """On the way around, one is kept at which the other asks for less, by no more than the hysteresis."""
+    found = [(question["last"], answer["aligned"]) for question, answer in cases(files, "alignment")]
+    kept = [abs(new["turned"]) > math.pi / 2 + 1e-6 for last, new in found if new["half_plane"] == last["half_plane"]]
+    assert any(kept)
+    assert {new["half_plane"] for _, new in found} == {0, 1}
+    assert max(abs(new["turned"]) for _, new in found) < math.pi  # the wrist's limits aside
+
+
+def test_the_network_s_answers_are_those_of_every_engine(files):
+    calls = cases(files, "network")
+    poses = np.array([question["pose"] for question, _ in calls], dtype=np.float32)
+    for answer in ENGINES.values():
+        for name, values in zip(("commands", "lengths", "tip"), answer(files[NETWORK], poses), strict=True):
+            expected = [found[name] for _, found in calls]
+            np.testing.assert_allclose(values, expected, rtol=0, atol=2 * ENGINES_APART)
+    assert any(found["doubtful"] for _, found in calls)
+
+
+def test_vectors_are_small_and_part_of_the_package(files):
+    paths = [STEPS, *(f"{FOLDER}/{name}.json" for name in CASES)]
+    assert sum(len(files[path]) for path in paths) < MOST
+    assert package_digest(files)
+    assert all(f"{path}.meta" in files for path in paths)
+    assert set(paths).isdisjoint(refusals(files))
+
+
+def test_the_same_package_has_the_same_vectors(plain):
+    one, other = (with_shared_vectors(plain, config().core) for _ in range(2))
+    assert one == other
+    assert with_shared_vectors(one, config().core) == one
+
+
+def test_an_arm_on_a_mount_that_stands_still_has_none(tmp_path):
+    made, _ = assemble(LABEL, sources_in(tmp_path), TRAJECTORY, FixedMount("fixed"))
+    assert with_shared_vectors(made, config().core) == made
+    assert robot_of(made) == FixedMount("fixed")
+
+
+def test_maps_that_leave_nothing_within_reach_are_one_line(plain, monkeypatch):
+    monkeypatch.setattr("trunkline.unity.questions.TRIES", 1)
+    with pytest.raises(InputError, match="maps: found no mount and tip within reach in 1 tries, expected"):
+        with_shared_vectors(plain, config().core)

@@ -1,0 +1,46 @@
+"""The rehearsal's metrics as a Markdown table: what `make rehearse` prints, and what the docs show."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from trunkline.pipeline.limits import Limit, lookup
+
+# in the paper's order, and the column of the tip's distance from the object by which an experiment is told
+DISTANCES = {"reach": "nearest_mm", "follow": "tip_mm", "grasp": "", "handle": ""}
+
+
+def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], package: str, variants: bool) -> str:
+    """A row an experiment, and with `variants` one for each of its variants below it.
+
+    Args:
+        metrics: as `rehearsal.experiments.result.summary` makes them.
+        goals: the gate's rows of the rehearsal.
+        package: with which package the runs were made, in words.
+    """
+    lines = [
+        f"| experiment, {package} | runs | success | 95 % interval | goal "
+        "| tip's distance: median / 95th percentile of runs, mm | failures |",
+        "|---|---:|---:|---:|---:|---:|---|",
+    ]
+    experiments = [name for name, told in metrics.items() if isinstance(told, Mapping)]  # the others: of which package
+    for name in sorted(experiments, key=[*DISTANCES, *experiments].index):
+        told = metrics[name]
+        goal = goals.get(f"{name}.rate")
+        if "runs" in told:
+            lines.append(_row(name, name, told, "" if goal is None or goal.min is None else f"≥ {_percent(goal.min)}"))
+        if variants:
+            lines += [_row(name, f"… {variant}", row, "") for variant, row in told.get("variants", {}).items()]
+    return "\n".join(lines)
+
+
+def _row(experiment: str, words: str, told: Mapping[str, Any], goal: str) -> str:
+    distances = lookup(told, DISTANCES.get(experiment, ""))
+    error = " / ".join(f"{distances[key]:.0f}" for key in ("median", "p95")) if distances else ""
+    causes = sorted(told["causes"].items(), key=lambda cause: -cause[1])
+    failed = ", ".join(f"{kind} {count}" for kind, count in causes) or "none"
+    interval = f"{100 * told['low']:.1f} to {_percent(told['high'])}"
+    return f"| {words} | {told['runs']} | {_percent(told['rate'])} | {interval} | {goal} | {error} | {failed} |"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %".replace(".0 %", " %")

@@ -1,0 +1,34 @@
+"""What MuJoCo's Unity importer has no component for, taken from a model in place; what it was is returned, for the
+manifest. `calibrated.xml` of the package keeps it all."""
+
+import mujoco
+
+from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, capstan_friction, is_hole, numeric
+
+
+def without_dead_time(spec: mujoco.MjSpec) -> float:
+    """Take the motors' dead time from a model in place, as no component of the importer has it; s, as it was."""
+    dead_time = max((float(actuator.delay) for actuator in spec.actuators), default=0.0)
+    for actuator in spec.actuators:
+        actuator.delay, actuator.nsample, actuator.interp = 0, 0, 0
+    return dead_time
+
+
+def without_rubbing(spec: mujoco.MjSpec) -> float:
+    """Take the tendons by which cables rub from a model in place, as their friction has to follow the tension at every
+    step; the coefficient μ, as it was."""
+    friction = capstan_friction(spec.compile())
+    for tendon in [tendon for tendon in spec.tendons if is_hole(tendon.name)]:
+        spec.delete(tendon)
+    for number in [number for number in spec.numerics if number.name == CAPSTAN_FRICTION]:
+        spec.delete(number)
+    return friction
+
+
+def without_winches(spec: mujoco.MjSpec) -> dict[str, float]:
+    """Take rate limit and backlash of the motors' winches from a model in place, as commands have to be shaped with
+    them before they are sent; what they were by name, 0 for none."""
+    model, names = spec.compile(), (RATE_LIMIT, BACKLASH)
+    for number in [number for number in spec.numerics if number.name in names]:
+        spec.delete(number)
+    return {name: numeric(model, name) for name in names}
