@@ -8,11 +8,15 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from trunkline.arm.geometry import ChainGeometry
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.hybrid.placements import Grip, HangingGrip
+from trunkline.hybrid.touch import read_geometry
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain, read_chain
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.config import Config
+from trunkline.teleop.grasping import Grasping
 from trunkline.teleop.messages import Targets
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.reach import MapReach
@@ -22,7 +26,7 @@ from trunkline.teleop.tendons import Network, network_of
 from trunkline.teleop.trajectory import limits_of
 from trunkline.teleop.vectors import DOWN, Vector, conjugate, rotate
 from trunkline.unity import unpacked
-from trunkline.unity.twin import MANIFEST
+from trunkline.unity.twin import MANIFEST, MODEL
 
 
 @dataclass(frozen=True)
@@ -35,17 +39,23 @@ class Package:
     network: Network
     model: mujoco.MjModel
     chain: Chain
+    geometry: ChainGeometry
     straight: np.ndarray
     rate_limit: float
 
     def planner(self, config: Config) -> Planner:
         """The planner that this package and the settings of teleoperation make."""
         limits = limits_of(config.motors, self.rate_limit, len(self.straight))
-        shaper = shaper_for(self.model, config.shaping)
+        shaper, rigid = shaper_for(self.model, config.shaping), RigidIK(config.mount_offset)
+        grasping = Grasping(rigid, config.mount_offset, self.straight, self.grips(config), config.handling)
         return Planner(
-            RigidIK(config.mount_offset), self.network, self.straight, limits, config.mount_offset,
-            shaper=shaper, chain=self.chain,
+            rigid, self.network, self.straight, limits, config.mount_offset, shaper=shaper, chain=self.chain,
+            grasping=grasping,
         )  # fmt: skip
+
+    def grips(self, config: Config) -> dict[str, Grip]:
+        """How things are grasped, by what supports them."""
+        return {"hanging": HangingGrip(config.hanging, self.geometry)}
 
     @cached_property
     def period(self) -> float:
@@ -79,6 +89,7 @@ def read_package(path: Path) -> Package:
         network_of(files[network["file"]]),
         compiled,
         read_chain(compiled).smooth,
+        read_geometry(mujoco.MjSpec.from_string(files[MODEL].decode())),
         np.array([model["rest_lengths"][name] for name in network["output_order"]]),
         float(model["rate_limit"]),
     )

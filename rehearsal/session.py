@@ -1,16 +1,20 @@
 """One session at the stand-in robot: controllers in, the core's intents, plans, their preview, and the robot's motion.
 
 It is what a client does, without a headset: it asks for plans when the core does, shows each as where the twin's tip
-comes to rest, runs what the core says, and holds otherwise.
+comes to rest, or what may come of a grasp, runs what the core says, and holds otherwise. Between plans it looks where
+things are.
 """
 
+import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from rehearsal.foresight import Foreseen, Foresight
 from rehearsal.operator.hands import RayHand
 from rehearsal.package import Package
+from rehearsal.robot.sensors import Seen
 from rehearsal.robot.stand_in import StandInRobot
 from trunkline.errors import InputError
 from trunkline.panda.kinematics import mount_pose
@@ -18,13 +22,15 @@ from trunkline.teleop.config import Config
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
 from trunkline.teleop.following import Follower
-from trunkline.teleop.messages import ExecutorReport, Input, Intent, Joints, PlanReport, Pose, World
+from trunkline.teleop.messages import Box, ExecutorReport, Input, Intent, Joints, Offer, PlanReport, Pose, Thing, World
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.targets import why_not
 
 RATE = 60.0  # Hz, of a headset's frames
 TICKS = 2  # in which the robot is commanded a frame
 REFERENCE = Pose((1.3, 0.0, 0.6), (0.5, 0.5, 0.5, 0.5))  # where the operator stands: y up, looking along the base's -x
+
+MOVED = 0.005  # m by which a thing must be seen elsewhere than believed
 
 Place = Callable[[float], np.ndarray]  # true position (3,), m, of the object in the Panda's base frame at a time, s
 
@@ -34,6 +40,7 @@ class View:
     """What the operator sees at a frame, in the frame that the client takes for the Panda's base.
 
     thing, tip (3,): m, of the object and of the robot's tip. previewed: m, where the shown plan's tip comes to rest.
+    probability: that the shown plan's grasp holds. offer: the assistant's.
     """
 
     now: float
@@ -41,10 +48,18 @@ class View:
     thing: np.ndarray
     tip: np.ndarray
     previewed: np.ndarray | None
+    probability: float | None = None
+    offer: Offer | None = None
+
+
+def make_world(boxes: tuple[Box, ...], things: tuple[Thing, ...] = ()) -> World:
+    """With its digest."""
+    return World(hashlib.sha256(repr((boxes, things)).encode()).hexdigest(), boxes, things)
 
 
 class Session:
-    """From the robot at rest with its arm straight. `place` says where the object truly is."""
+    """From the robot at rest with its arm straight. `place` says where the object truly is; `foresight` previews
+    grasps."""
 
     def __init__(
         self,
@@ -54,9 +69,10 @@ class Session:
         hands: tuple[RayHand, RayHand],
         world: World,
         place: Place,
+        foresight: Foresight | None = None,
     ) -> None:
         self.package, self.config, self.robot, self.hands = package, config, robot, hands
-        self.world, self.place = world, place
+        self.world, self.place, self.foresight = world, place, foresight
         self.core = Teleoperation(config.core, package.reach, package.digest, config.mount_offset)
         self.state, self.planner = self.core.start(), package.planner(config)
         self.executor = SimulatedRobot(
@@ -67,42 +83,87 @@ class Session:
         self.report: PlanReport | None = None
         self.fault, self.shown, self.showing, self.since = "", "", "", 0.0
         self.previewed: np.ndarray | None = None
-        self.now, self.rays, self.moved = 0.0, (None, None), False
+        self.now, self.rays, self.moved, self.began = 0.0, (None, None), False, 0.0
+        self.foreseen: Foreseen | None = None
+        self.offs: list[float] = []  # m, readings of how far the straight arm's tip is beside its bending plane
+        self.believed = ""  # digest of the newest plan of whose end the world tells
+        self.tips: list[tuple[float, np.ndarray]] = []  # s since a plan began, and where its tip is seen, m
         self.refusals: list[tuple[float, str]] = []  # times at which targets were not followed, and why
 
     def seen(self, place: np.ndarray) -> np.ndarray:
         """A true place (3,), m, in the frame that the client takes for the Panda's base."""
         return self.robot.instruments.turn.apply(place) + self.robot.instruments.shift
 
+    @property
+    def beside(self) -> float:
+        """m, by which the straight arm's tip was seen beside its bending plane, before the robot moved."""
+        return float(np.mean(self.offs))
+
     def frame(self) -> View:
         """Let a frame pass."""
         self.now += 1 / RATE
         left, right = (hand.controller(self.now, end) for hand, end in zip(self.hands, self.rays, strict=True))
         executor = ExecutorReport("fault", "", self.fault) if self.fault else self.executor.state()
-        joints: Joints = tuple(float(q) for q in self.robot.seen().joints)  # type: ignore[assignment]
+        seen = self.robot.seen()
+        joints: Joints = tuple(float(q) for q in seen.joints)  # type: ignore[assignment]
+        if self.state.mode in ("hold", "aim"):
+            self._believe(seen)
+        if not self.moved:
+            mount, flange = (found[0] for found in mount_pose(seen.joints[None], self.config.mount_offset))
+            self.offs.append(float((seen.tip - mount) @ -flange[:, 1]))  # the base's y is opposite to the flange's
         given = Input(
-            self.now, left, right, REFERENCE, joints, self.world, self.package.digest, self.report, self.shown, executor
-        )
+            self.now, left, right, REFERENCE, joints, self.world, self.package.digest, self.report, self.shown,
+            executor, self.foreseen.offer if self.foreseen is not None else None,
+        )  # fmt: skip
         self.state, intent = self.core.step(self.state, given, 1 / RATE)
         self.rays = intent.rays
         if intent.request is not None and (self.report is None or self.report.serial != intent.request.serial):
             self._plan(intent)
         self._show(intent)
         self._drive(intent)
-        previewed = self.previewed if intent.mode in ("preview", "ready", "delay") else None
         tip = self.seen(self.robot.truth().tip)
-        return View(self.now, intent, self.seen(self.place(self.now)), tip, previewed)
+        if intent.motion == "execute":
+            self.tips.append((self.now - self.began, tip))
+        found = View(self.now, intent, self.seen(self.place(self.now)), tip, None)
+        if intent.mode in ("preview", "ready", "delay"):
+            found.previewed = self.previewed
+            if self.foreseen is not None:
+                found.probability, found.offer = self.foreseen.probability, self.foreseen.offer
+        return found
+
+    def _believe(self, seen: Seen) -> None:
+        """The world as it is seen: where things are, and what holds them after a plan has been run."""
+        for thing in self.world.things:
+            x, y, z = (float(value) for value in seen.thing)
+            support, report = thing.support, self.executor.state()
+            if report.mode == "done" and report.digest != self.believed and self.plan is not None:
+                self.believed, phases = report.digest, dict(self.plan.phases)
+                lifted = z - thing.position[2] > self.config.handling.lift / 2
+                support = "standing" if "release" in phases else "held" if "lift" in phases and lifted else support
+            if support != thing.support or np.linalg.norm(seen.thing - thing.position) > MOVED:
+                a, b, c, d = (float(value) for value in seen.thing_quaternion)
+                now = replace(thing, position=(x, y, z), quaternion=(a, b, c, d), support=support)
+                self.world = make_world(self.world.boxes, (now,))
 
     def _plan(self, intent: Intent) -> None:
         request = intent.request
         assert request is not None
+        self.foreseen, self.previewed = None, None
         try:
-            self.plan = self.planner.plan(request, self.world, self.executor.joints, self.executor.commands)
+            here = self.executor.joints, self.executor.commands
+            self.plan = self.planner.plan(request, self.world, *here, self.beside)
         except InputError as error:
             self.report = PlanReport(request.serial, refused=str(error))
             return
         plan = self.plan
         self.report = PlanReport(request.serial, plan.digest(), "", plan.package, plan.world)
+        if request.targets.thing:
+            thing = self.world.thing(request.targets.thing)
+            if self.foresight is not None and thing.support != "held":
+                self.foreseen = self.foresight.grasp(
+                    plan, request.targets, thing, self.world, self.beside, request.serial
+                )
+            return
         mount, _ = mount_pose(plan.joints[-1:], self.config.mount_offset)
         x, y, z = (float(value) for value in mount[0])
         self.previewed = self.package.tip((x, y, z), request.targets, plan.commands[-1])
@@ -117,7 +178,7 @@ class Session:
     def _drive(self, intent: Intent) -> None:
         running = self.executor.state()
         if intent.motion == "execute" and running.digest != intent.execute and self.plan is not None:
-            self.fault = self.executor.start(self.plan, intent.execute)
+            self.fault, self.tips, self.began = self.executor.start(self.plan, intent.execute), [], self.now
         if intent.motion == "hold" and running.mode == "running":
             self.executor.stop()
         self._hear(intent)

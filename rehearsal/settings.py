@@ -2,19 +2,22 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Literal, TypeVar
 
 from omegaconf import OmegaConf
 from pydantic import Field
 
 from rehearsal.operator.hands import Person
 from rehearsal.robot.stand_in import StandIn
+from trunkline.hybrid.worlds import Material
 from trunkline.pipeline.config import validated
 from trunkline.settings import read_yaml
 
 CONF = Path(__file__).parent / "conf/rehearse"
 Metres = Annotated[float, Field(ge=-5, le=5)]
 Positive = Annotated[float, Field(gt=0, le=100)]
+Zero = Annotated[float, Field(ge=0, le=100)]
+Share = Annotated[float, Field(ge=0, le=1)]
 Kind = TypeVar("Kind")
 
 
@@ -39,6 +42,55 @@ class Free:
     interruption: Positive
 
 
+@dataclass
+class Grasped:
+    """Grasping what hangs, and handing it over: see conf/rehearse/experiments/grasp.yaml."""
+
+    shapes: Annotated[list[Literal["cylinder", "sphere"]], Field(min_length=1)]
+    thin: Positive
+    wide: Positive
+    light: Positive
+    heavy: Positive
+    height: Positive
+    string: Positive
+    yaw_deg: Zero
+    near: Positive
+    far: Positive
+    side_deg: Positive
+    low: Metres
+    high: Metres
+    hold: Positive
+    slip: Positive
+    lifted: Positive
+    accept: Share
+    table: Annotated[list[Positive], Field(min_length=3, max_length=3)]
+    table_top: Metres
+    table_azimuth_deg: Positive
+    table_radius: Positive
+    drop: Positive
+    calm: Positive
+
+
+@dataclass
+class Previewing:
+    """Previews of grasps, and the assistant: see conf/rehearse/preview/batch.yaml."""
+
+    futures: Annotated[int, Field(ge=1, le=1000)]
+    assistant: Annotated[int, Field(ge=0, le=1000)]
+    sure: Share
+    step: Annotated[float, Field(gt=0, le=0.01)]
+    hold: Zero
+    sag: Annotated[float, Field(gt=0, le=1)]
+    slip: Annotated[float, Field(gt=0, le=1)]
+    lifted: Share
+    friction: Share
+    place: Annotated[list[Share], Field(min_length=3, max_length=3)]
+    turn_deg: Zero
+    material: Material
+    string: Positive
+    mount_mass: Positive
+
+
 def stand_in() -> StandIn:
     return _read(StandIn, "robot/stand_in.yaml")
 
@@ -49,6 +101,14 @@ def person() -> Person:
 
 def free() -> Free:
     return _read(Free, "experiments/free.yaml")
+
+
+def grasped() -> Grasped:
+    return _read(Grasped, "experiments/grasp.yaml")
+
+
+def previewing() -> Previewing:
+    return _read(Previewing, "preview/batch.yaml")
 
 
 def _read(kind: type[Kind], file: str) -> Kind:

@@ -86,8 +86,8 @@ def bench_of(file: Path) -> Bench:
 
 @dataclass
 class Seen:
-    """A frame of the run as it truly was: time, s, core's mode, the robot's state, the object's place (3,), m, and what
-    the robot was sent last: joints (7,), rad, and commands (K,), m."""
+    """A frame of the run as it truly was: time, s, core's mode, the robot's state, the object's place (3,), m, what the
+    robot was sent last: joints (7,), rad, and commands (K,), m, and the centres of the arm's units (U, 3), m."""
 
     now: float
     mode: str
@@ -95,6 +95,7 @@ class Seen:
     thing: np.ndarray
     joints: np.ndarray
     commands: np.ndarray
+    units: np.ndarray
 
 
 def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list[View]]:
@@ -106,8 +107,8 @@ def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list
         views.append(view)
         if session.moved:
             truth, sent = session.robot.truth(), session.executor
-            thing = session.place(session.now)
-            frames.append(Seen(session.now, view.intent.mode, truth, thing, sent.joints, sent.commands))
+            thing, (units, _) = session.place(session.now), session.robot.links()
+            frames.append(Seen(session.now, view.intent.mode, truth, thing, sent.joints, sent.commands, units))
         try:
             script.send(view)
         except StopIteration as end:

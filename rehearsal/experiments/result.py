@@ -19,7 +19,10 @@ class Result:
     aimed_mm: from the tip target to the object's centre. previewed_mm: from the preview's tip to it. nearest_mm: the
     least distance of the robot's tip from it. tip_mm: median distance of the tip from the moving object as it was the
     set delay before; worst_mm: its 95th percentile. robot_mm: median distance of the tip from where the operator's rays
-    wanted it then: what is left when the operator's own lag and aim are taken out. seconds: of the whole run.
+    wanted it then: what is left when the operator's own lag and aim are taken out. probability: that the preview gave
+    to the plan that was confirmed. agreed: 1 if it was at least a half for a success, or less for a failure, else 0.
+    path_pct: median distance between the robot's tip and the nominal preview's, % of the arm's length. seconds: of the
+    whole run.
 
     variant: of an ablation, "" for none. package, code: digests of what the run was made of: `rehearsal.runs.Source`.
     """
@@ -35,6 +38,9 @@ class Result:
     tip_mm: float = float("nan")
     worst_mm: float = float("nan")
     robot_mm: float = float("nan")
+    probability: float = float("nan")
+    agreed: float = float("nan")
+    path_pct: float = float("nan")
     seconds: float = 0.0
     variant: str = ""
     package: str = ""
@@ -69,7 +75,7 @@ def append_result(path: Path, result: Result) -> None:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         if new:
             writer.writeheader()
-        row = {name: f"{value:.1f}" if isinstance(value, float) else value for name, value in asdict(result).items()}
+        row = {name: f"{value:.4g}" if isinstance(value, float) else value for name, value in asdict(result).items()}
         writer.writerow(row)
 
 

@@ -20,6 +20,7 @@ SETTLED = 0.4  # s after a movement until filter and ray's length have come to r
 CLICK = 0.1  # s for which a button is pressed
 ASIDE = np.array([0.0, 0.0, 0.06])  # m by which the rigid ray is moved to drop a plan that was shown
 AGAIN = 0.5  # s after which the operator tries to follow again
+LIFTED = 0.05  # m from which on the operator sees that something is lifted
 GLANCE = 0.1  # s over which a velocity is seen
 CALM = 2.0  # s after an arrival that the operator looks on
 LONGEST = 30.0  # s that the operator waits for anything
@@ -34,6 +35,8 @@ class Ending:
     plans: int = 0
     aimed: float = np.nan  # m, from the tip target to the object, as they truly appear
     previewed: float = np.nan  # m, likewise from the tip of the preview
+    probability: float = np.nan  # that was shown of the plan confirmed
+    offers: int = 0  # of the assistant's that were taken
 
 
 def offset_of(reach: MapReach) -> np.ndarray:
@@ -102,6 +105,117 @@ class Operator:
             why, beside = "aim: no preview came to the object", beside - off
             view = yield from self._drop(view)
         return Ending(False, why, plans)
+
+    def grasp(self, beside: np.ndarray, accept: float, watch: float) -> Script:
+        """Mark the object, aim the mount beside it, watch the preview, confirm it where it is sure enough, else take
+        the assistant's offer, else aim anew; then look on.
+
+        Args:
+            beside: of the mount's place, less the object's centre, (3,), m. accept: probability. watch: s.
+        """
+        view = yield from self._until(lambda view: view.intent.mode == "aim")
+        view = yield from self._place_tip(view, np.zeros(3))
+        view, why = yield from self._place_at(view, lambda view: view.thing + beside)
+        ending = Ending(False, why)
+        while not ending.why and ending.plans < self.person.patience:
+            ending.plans += 1
+            view = yield from self._ask(view)
+            if view.intent.mode != "ready":
+                ending.why = view.intent.notice or "aim: no plan was asked for"
+            elif view.probability is None or view.probability >= accept:
+                ending.probability = np.nan if view.probability is None else view.probability
+                return (yield from self._confirm(view, ending, watch))
+            elif view.offer is not None and view.offer.probability >= accept:
+                ending.offers += 1
+                view = yield from self._take_offer(view)
+                continue
+            else:
+                ending.why = "aim: no preview was sure enough to hold"
+                view = yield from self._drop(view)
+            if ending.plans < self.person.patience:
+                view, ending.why = yield from self._place_at(view, lambda view: view.thing + beside)
+        return ending
+
+    def handle(self, beside: np.ndarray, spot: np.ndarray, accept: float, watch: float) -> Script:
+        """Grasp, aim so that the thing will be at `spot` (3,), m, as it appears, confirm, look on for `watch` s."""
+        view = yield from self._until(lambda view: view.intent.mode == "aim")
+        hung = view.thing
+        ending = yield from self.grasp(beside, accept, CALM)
+        view = yield from self._react()
+        if not ending.done or view.thing[2] - hung[2] < LIFTED:
+            ending.why = ending.why or "slip: it was not lifted"
+            ending.done = False
+            return ending
+        ending.done = False
+        view, ending.why = yield from self._place_thing(view, spot)
+        if ending.why:
+            return ending
+        ending.plans += 1
+        view = yield from self._ask(view)
+        if view.intent.mode != "ready":
+            ending.why = view.intent.notice or "aim: no plan was asked for"
+            return ending
+        return (yield from self._confirm(view, ending, watch))
+
+    def _place_thing(self, view: View, spot: np.ndarray):
+        """The rigid target to where the thing that is held will be at `spot`; why not, "" if it is there."""
+        self.left.press("grip", view.now)
+        for _ in range(self.person.patience):
+            targets = view.intent.targets
+            if targets is None:
+                view = yield from self._react()
+                continue
+            goal = spot + np.array(targets.rigid.position) - targets.tip.position
+            view = yield from self._aim(self.left, goal, self.band, view.now)
+            targets = view.intent.targets
+            if targets is None:
+                continue
+            if targets.rigid.reach in ("outside", "blocked"):
+                return view, f"out of reach: rigid target {targets.rigid.reach}"
+            if np.linalg.norm(self._look(targets.tip.position - spot)) < self.band / 2:
+                return view, ""
+        return view, "aim: the thing's place was never where it was meant"
+
+    def _ask(self, view: View) -> Part:
+        """Ask for a plan, and see its preview to the end, or that there is none."""
+        view = yield from self._click(self.right, "trigger", view)
+        view = yield from self._until(lambda view: view.intent.mode in ("ready", "aim"))
+        return (yield from self._react())
+
+    def _confirm(self, view: View, ending: Ending, watch: float):
+        """Confirm what is shown, and look on until it is done, and for `watch` s more."""
+        view = yield from self._click(self.right, "trigger", view)
+        view = yield from self._until(lambda view: view.intent.mode == "execute")
+        view = yield from self._until(lambda view: view.intent.mode != "execute")
+        if view.intent.mode != "aim":
+            ending.why = f"stopped: {view.intent.notice}"
+            return ending
+        yield from self._wait(watch)
+        ending.done = True
+        return ending
+
+    def _take_offer(self, view: View) -> Part:
+        """The rigid target to where the assistant has it; the other hand's grip is the dead man's then."""
+        self.left.let_go("grip")
+        view = yield from self._react()
+        view = yield from self._click(self.left, "primary", view)
+        view = yield from self._until(lambda view: view.intent.mode == "aim")
+        self.right.press("grip", view.now)
+        return (yield from self._react())
+
+    def _place_at(self, view: View, goal: Callable[[View], np.ndarray]):
+        """The rigid target to `goal`, until it looks so; why not, "" if it is there."""
+        self.left.press("grip", view.now)
+        for _ in range(self.person.patience):
+            view = yield from self._aim(self.left, goal(view), self.band, view.now)
+            targets = view.intent.targets
+            if targets is None:
+                continue
+            if targets.rigid.reach in ("outside", "blocked"):
+                return view, f"out of reach: rigid target {targets.rigid.reach}"
+            if np.linalg.norm(self._look(np.array(targets.rigid.position) - goal(view))) < self.band / 2:
+                return view, ""
+        return view, "aim: the rigid target was never where it was meant"
 
     def follow(self, begin: Callable[[float], None], finished: Callable[[float], bool], place: Callable) -> Script:
         """Both rays on the moving object until its path is over: where it appears to be now, as its motion of a
@@ -191,6 +305,7 @@ class Operator:
     def _drop(self, view: View) -> Part:
         """Give up the plan that is shown: the rigid target is aimed anew."""
         self.left.let_go("grip")
+        self.right.let_go("grip")
         view = yield from self._react()
         self.left.press("grip", view.now)
         yield from self._wait(CLICK)

@@ -44,7 +44,10 @@ class Sent:
         self.instruments = SimpleNamespace(turn=Rotation.identity(), shift=np.zeros(3))
 
     def seen(self):
-        return SimpleNamespace(joints=self.joints[0])
+        return SimpleNamespace(joints=self.joints[0], tip=np.zeros(3))
+
+    def links(self):
+        return np.zeros((1, 3)), np.zeros((1, 3))
 
     def truth(self):
         return SimpleNamespace(tip=np.zeros(3))

@@ -101,18 +101,6 @@ def test_the_arm_is_straight_until_the_rigid_robot_has_arrived(planner):
     np.testing.assert_allclose(plan.joints[curl:], np.tile(plan.joints[-1], (len(plan.joints) - curl, 1)), atol=1e-9)
 
 
-def test_all_phases_of_a_handling(planner):
-    place = targets((0.5, -0.2, 0.5), (TIP[0], TIP[1] - 0.3, TIP[2]))
-    plan = planner.plan(request(MOUNT, TIP), WORLD, START, STRAIGHT, lift=0.1, place=place)
-    assert [name for name, _ in plan.phases] == ["approach", "curl", "lift", "transfer", "release"]
-    heights = [mount_pose(plan.joints[[row]], OFFSET)[0][0] for _, row in plan.phases]
-    assert heights[3][2] - heights[2][2] == pytest.approx(0.1, abs=1e-3)
-    assert heights[4][1] == pytest.approx(-0.2, abs=1e-3)
-    np.testing.assert_allclose(plan.commands[-1], STRAIGHT, atol=1e-9)
-    closed = plan.commands[dict(plan.phases)["lift"] : dict(plan.phases)["release"]]
-    np.testing.assert_allclose(closed, np.tile(closed[0], (len(closed), 1)), atol=1e-9)
-
-
 def test_shaping_makes_a_plan_longer_and_leads_to_the_same(planner):
     plain = planner.plan(request(MOUNT, TIP), WORLD, START, STRAIGHT)
     shaper = mode_shaper(0.6, 0.03, "zvd")

@@ -21,6 +21,7 @@ from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.hybrid.compose import panda_joints
 from trunkline.hybrid.doubts import Draws
 from trunkline.hybrid.objects import GRIP, object_geoms
+from trunkline.hybrid.string import EYE, STRING
 from trunkline.hybrid.torques import joint_torques, servo_commands
 from trunkline.identification.parameters import PARAMETERS, candidate_fields
 from trunkline.identification.saving import ELEMENTS
@@ -128,12 +129,12 @@ def futures(twin: Twin, way: Way, draws: Draws) -> Iterator[Piece]:
     first[:, servos.motors] = servos.commands[0]
     hold(batch, model, first)
     winches, own = Winches(batch, first[:, motors]), np.arange(count, dtype=np.int32)
-    tie = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_EQUALITY, "hanging")
+    ties = [tie for name in ("hanging", EYE) if (tie := _number(model, mujoco.mjtObj.mjOBJ_EQUALITY, name)) >= 0]
     for begin in range(0, frames, FRAMES):
         number = min(FRAMES, frames - begin)
         time = timestep * (begin * every + np.arange(number * every))
-        if tie >= 0 and way.let_go is not None and time[0] >= way.let_go - timestep / 2:
-            batch.bind("eq_active")[:, tie] = 0
+        if ties and way.let_go is not None and time[0] >= way.let_go - timestep / 2:
+            batch.bind("eq_active")[:, ties] = 0
         rows = way.at(time)
         controls = np.zeros((count, len(time), model.nu))
         controls[:, :, servos.motors] = servos.at(time)
@@ -221,9 +222,16 @@ def _place(batch: Batch, model: mujoco.MjModel, start: np.ndarray | None, way: W
     for geom in object_geoms(model):
         friction[:, geom, :2] *= draws.friction[:, None]
     tie = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_EQUALITY, "hanging")
+    if (string := _number(model, mujoco.mjtObj.mjOBJ_BODY, STRING)) >= 0:  # its hook moves along
+        batch.expand("body_pos")[:, string] += draws.offsets
     if tie >= 0:  # the hook moves along
         arms = rotation_from_wxyz(pose[:, 3:]).apply(model.eq_data[tie, :3])
         batch.expand("eq_data")[:, tie, 3:6] = pose[:, :3] + arms
+
+
+def _number(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    """Of what is called so, -1 where there is none."""
+    return mujoco.mj_name2id(model, kind, name)
 
 
 def _piece(twin: Twin, batch: Batch, time: np.ndarray, found: dict[str, np.ndarray]) -> Piece:

@@ -29,11 +29,13 @@ class Holding:
         sag: m, by which the object may move against the mount, which the arm bears: it gives way and swings. What is
             lifted must be lifted by more.
         slip: m, by which it may move away from the nearest unit.
+        lifted: m, by which it must be higher then than at first.
     """
 
     since: float
     sag: Metres = 0.08
     slip: Metres = 0.02
+    lifted: Annotated[float, Field(ge=-1, le=1)] | None = None
 
     def holds(self, motion: Piece) -> np.ndarray:
         """Which futures hold the object. Shape (B,)."""
@@ -42,6 +44,8 @@ class Holding:
         with np.errstate(invalid="ignore"):
             stays = np.linalg.norm(beside[:, -1] - beside[:, first], axis=1) < self.sag
             stays &= motion.away[:, -1] < motion.away[:, first] + self.slip
+            if self.lifted is not None:
+                stays &= motion.object[:, first, 2] - motion.object[:, 0, 2] > self.lifted
         return stays & motion.sound
 
 

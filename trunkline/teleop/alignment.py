@@ -97,8 +97,7 @@ def align(tip: Vector, mount: Vector, pointing: Vector, wrist: Wrist, last: Alig
     away = rotate(conjugate(least_rotation(DOWN, pointing)), subtract(tip, mount))
     if math.hypot(away[0], away[1]) < settings.axis:
         return last
-    carried = math.atan2(mount[1], mount[0]) - math.atan2(wrist.position[1], wrist.position[0])
-    present = wrist.heading + carried
+    present = carried_heading(mount, wrist)
     azimuth = math.atan2(away[1], away[0])
     found = [least_turn(wrapped(azimuth - angle - present), wrist.angle) for angle in settings.half_planes]
     turns = {half_plane: turn for half_plane, turn in enumerate(found) if turn is not None}
@@ -108,6 +107,12 @@ def align(tip: Vector, mount: Vector, pointing: Vector, wrist: Wrist, last: Alig
     if last.half_plane in turns and abs(turns[last.half_plane]) <= abs(turns[best]) + settings.hysteresis:
         best = last.half_plane
     return Aligned(wrapped(azimuth - settings.half_planes[best]), best, turns[best])
+
+
+def carried_heading(mount: Vector, wrist: Wrist) -> float:
+    """The heading, rad, that the arm has when joint 1 has carried the wrist around the base to the mount at `mount`."""
+    carried = math.atan2(mount[1], mount[0]) - math.atan2(wrist.position[1], wrist.position[0])
+    return wrapped(wrist.heading + carried)
 
 
 def least_turn(turn: float, angle: float) -> float | None:

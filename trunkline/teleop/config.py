@@ -4,7 +4,9 @@ from typing import Annotated
 
 from pydantic import Field
 
+from trunkline.hybrid.placements import HangingSettings
 from trunkline.settings import settings
+from trunkline.teleop.grasping import Handling
 from trunkline.teleop.settings import Teleop
 from trunkline.teleop.shaping import Shaping
 from trunkline.teleop.trajectory import MotorLimits
@@ -12,9 +14,11 @@ from trunkline.teleop.trajectory import MotorLimits
 
 @settings
 class Config:
-    """`mount_offset`: m, from the Panda's flange to the soft arm's mount."""
+    """`hanging`: how what hangs is grasped. `mount_offset`: m, from the Panda's flange to the soft arm's mount."""
 
     core: Teleop
     motors: MotorLimits
     shaping: Shaping
+    handling: Handling
+    hanging: HangingSettings
     mount_offset: Annotated[float, Field(ge=0, le=0.5)]

@@ -16,7 +16,7 @@ from trunkline.teleop.reach import Reach
 from trunkline.teleop.settings import Teleop
 from trunkline.teleop.soundness import clock_fault, fault_of, setting_fault, swapped
 from trunkline.teleop.state import Pinned, State
-from trunkline.teleop.targets import place, tilted, why_not
+from trunkline.teleop.targets import bring, offered, place, tilted, why_not
 from trunkline.teleop.transitions import TRANSITIONS, Event, first_event
 
 AIMING = ("aim", "follow")
@@ -112,14 +112,16 @@ class Teleoperation:
 
     def _targets(self, state: State, given: Input) -> Targets | None:
         if state.mode not in AIMING and state.pinned is not None:
-            return state.pinned.request.targets
-        rigid, tip = state.hands[self._rigid].target, state.hands[1 - self._rigid].target
-        if rigid is None or tip is None:
+            return offered(state.pinned.request.targets, given.offer)
+        rigid, tip, held = state.hands[self._rigid].target, state.hands[1 - self._rigid].target, given.world.held
+        if rigid is None or (tip is None and held is None):
             return None
-        wrist = wrist_of(given.joints, self.mount_offset)
-        return place(
-            rigid, tip, state.pointing, state.limited, wrist, state.aligned, given.world, self.reach, self.settings
-        )
+        wrist, world, last = wrist_of(given.joints, self.mount_offset), given.world, state.aligned
+        if held is not None:
+            return bring(held, rigid, state.pointing, state.limited, wrist, last.half_plane, world, self.reach)
+        assert tip is not None
+        found = place(rigid, tip, state.pointing, state.limited, wrist, last, world, self.reach, self.settings)
+        return offered(found, given.offer)
 
     def _remembered(self, state: State, targets: Targets) -> State:
         """The state with `targets` in its history, which keeps what may be looked back to."""
@@ -165,7 +167,7 @@ class Teleoperation:
         elif event == "follow":
             assert targets is not None
             state = replace(state, pinned=self._pin(state.serial, targets, given), history=state.history[-1:])
-        elif before == mode == "aim":
+        elif mode == "aim" and (before == "aim" or event == "void"):
             state = self._offers_taken(state, targets)
         if mode not in PLANNED:
             state = replace(state, pinned=None, digest="", following=None)
@@ -180,6 +182,7 @@ class Teleoperation:
         """Everything pinned to what the plan is asked for; both hands' targets are those of before the press."""
         wanted = looked_back(state, self.settings)
         assert wanted is not None
+        wanted = replace(wanted, better=None)  # of an older plan
         positions = (wanted.rigid.position, wanted.tip.position)
         hands = [replace(state.hands[i], gripped_at=None, target=positions[i != self._rigid]) for i in (0, 1)]
         pinned = self._pin(state.serial + 1, wanted, given)
@@ -194,7 +197,9 @@ class Teleoperation:
         hands = list(state.hands)
         for index, hand in enumerate(hands):
             if targets is not None and "primary" in hand.pressed and not hand.grips:
-                offer = (targets.rigid if index == self._rigid else targets.tip).offer
+                offer, better = (targets.rigid if index == self._rigid else targets.tip).offer, targets.better
+                if index == self._rigid and better is not None:
+                    offer, state = better.rigid, replace(state, pointing=better.pointing)
                 hands[index] = replace(hand, target=offer or hand.target)
         return replace(state, left=hands[0], right=hands[1])
 

@@ -82,6 +82,13 @@ def refusal(state: State, given: Input, settings: Teleop) -> str:
     return f"no plan within {settings.safety.plan_wait:g} s" if late else ""
 
 
+def takes_offer(state: State, given: Input, settings: Teleop) -> bool:
+    """Whether the assistant's offer for the plan that is shown is taken: the rigid hand's primary, its grip let go."""
+    hand, pinned = state.hands[("left", "right").index(settings.rigid_hand)], state.pinned
+    mine = pinned is not None and given.offer is not None and given.offer.thing == pinned.request.targets.thing
+    return mine and "primary" in hand.pressed and not hand.grips
+
+
 def changed_since(state: State, given: Input, ends: Ends, settings: Teleop) -> str:
     """What has changed of that for which the plan was made, "" where nothing has."""
     pinned = state.pinned
@@ -91,6 +98,8 @@ def changed_since(state: State, given: Input, ends: Ends, settings: Teleop) -> s
         return "world changed"
     if given.alignment != pinned.alignment:
         return "base alignment changed"
+    if state.mode in ("preview", "ready") and takes_offer(state, given, settings):
+        return "the offer was taken"
     if state.mode in ("ready", "delay") and given.shown != state.digest:
         return "another plan was shown"
     if state.mode in ("plan", "preview", "ready"):

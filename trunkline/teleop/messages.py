@@ -61,12 +61,54 @@ class Box:
 
 
 @dataclass(frozen=True)
+class Thing:
+    """Something to grasp, as the client believes it: `position` of its centre, m, and `quaternion`, in the base frame.
+
+    `diameter`: m, of a box its width along x and y; `height`: m, along z, idle for a sphere; `mass`: kg. `support`:
+    what holds it: a hook, a surface, or the arm.
+    """
+
+    __pydantic_config__ = STRICT
+    name: str
+    shape: Literal["cylinder", "box", "sphere", "toy"]
+    diameter: Number
+    height: Number
+    mass: Number
+    position: Vector
+    quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    support: Literal["hanging", "standing", "held"] = "hanging"
+
+
+@dataclass(frozen=True)
 class World:
-    """What stands around the robot: its `digest`, which changes with it, and the solids that no target may be in."""
+    """What stands around the robot: its `digest`, which changes with it, the solids that no target may be in, and the
+    things that can be grasped."""
 
     __pydantic_config__ = STRICT
     digest: str
     boxes: tuple[Box, ...] = ()
+    things: tuple[Thing, ...] = ()
+
+    def thing(self, name: str) -> Thing:
+        """That of this name; there is one, as names come from here."""
+        return next(thing for thing in self.things if thing.name == name)
+
+    @property
+    def held(self) -> Thing | None:
+        """What the arm holds."""
+        return next((thing for thing in self.things if thing.support == "held"), None)
+
+
+@dataclass(frozen=True)
+class Offer:
+    """The assistant's: with the mount at `rigid`, m, the end effector `pointing`, the thing is held with `probability`,
+    more surely than where the user has it."""
+
+    __pydantic_config__ = STRICT
+    thing: str
+    rigid: Vector
+    pointing: Vector
+    probability: Number
 
 
 @dataclass(frozen=True)
@@ -97,7 +139,8 @@ class Input:
     """All that the core hears at one step.
 
     `joints`: of the rigid robot, rad. `alignment`: None until the base is aligned. `package`: digest of the package in
-    use. `plan`: the newest report. `shown`: digest of the plan whose preview has been shown to its end.
+    use. `plan`: the newest report. `shown`: digest of the plan whose preview has been shown to its end. `offer`: a
+    place of the mount that the assistant has found better than that of the newest plan.
     """
 
     __pydantic_config__ = STRICT
@@ -111,6 +154,7 @@ class Input:
     plan: PlanReport | None = None
     shown: str = ""
     executor: ExecutorReport = ExecutorReport()
+    offer: Offer | None = None
 
 
 @dataclass(frozen=True)
@@ -136,7 +180,9 @@ class Targets:
     `pointing`: direction in which the end effector points, unit length; `heading`: angle of the soft arm's tendon 1
     about the arm's axis, rad (`alignment.base_quaternion`). `half_plane`: which bends, 0 dorsal, 1 ventral. `turned`:
     by which the wrist turns from where it is, rad; None where no half-plane is within the wrist's limits.
-    `tilt_limited`: the controller was tilted further than the end effector may be.
+    `tilt_limited`: the controller was tilted further than the end effector may be. `thing`: name of what the tip target
+    marks, to be grasped, or of what the arm holds, to be brought to where the tip target is then; "" for nothing.
+    `better`: the assistant's offer; an offer only.
     """
 
     __pydantic_config__ = STRICT
@@ -147,6 +193,8 @@ class Targets:
     half_plane: int
     turned: Number | None
     tilt_limited: bool = False
+    thing: str = ""
+    better: Offer | None = None
 
 
 @dataclass(frozen=True)

@@ -10,15 +10,15 @@ from trunkline.panda.collision import clearance
 from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, joint_frames
 from trunkline.statics.chain import Chain
 from trunkline.teleop.alignment import base_quaternion
+from trunkline.teleop.grasping import Grasping, Leg
 from trunkline.teleop.messages import Request, Targets, World
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.shaping import Shaper, shaped
 from trunkline.teleop.tendons import Network, bend
-from trunkline.teleop.trajectory import JOINTS, Limits, point_to_point
-from trunkline.teleop.vectors import DOWN, Vector, add, conjugate, rotate, scale, subtract
+from trunkline.teleop.trajectory import JOINTS, Limits, gentle, point_to_point
+from trunkline.teleop.vectors import DOWN, Vector, add, conjugate, rotate, subtract
 
-UP: Vector = (0.0, 0.0, 1.0)
 LINK_RADIUS = 0.08  # m, about the joints' centres and the mount, that no solid of the world may come into
 
 # The shaper for the arm's swings: of a gravity direction (3,) in its base frame, the commands at the end (K,), and by
@@ -30,7 +30,7 @@ ShaperOf = Callable[[np.ndarray, np.ndarray, np.ndarray], Shaper]
 class Planner:
     """What plans are made with. `straight`: commands that leave the arm straight, m, (K,). `tolerance`: m, how far
     from its target the tip may be foreseen. `step`: s, between a plan's rows. `chain`: the arm's statics, by which the
-    network's answers are corrected."""
+    network's answers are corrected. `grasping`: how things are grasped."""
 
     rigid: RigidIK
     network: Network
@@ -41,48 +41,50 @@ class Planner:
     step: float = 0.002
     shaper: ShaperOf | None = None
     chain: Chain | None = None
+    grasping: Grasping | None = None
 
     def plan(
-        self,
-        request: Request,
-        world: World,
-        joints: np.ndarray,
-        commands: np.ndarray,
-        lift: float = 0.0,
-        place: Targets | None = None,
+        self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
     ) -> Plan:
-        """From rest at `joints` (7,), rad, and `commands` (K,), m: approach with a straight arm and curl; with `lift`
-        m, lift; with `place`, transfer there and release.
+        """From rest at `joints` (7,), rad, and `commands` (K,), m: approach with a straight arm and curl; of a thing
+        that the tip target marks, approach, curl and lift; of one that the arm holds, transfer and release.
+
+        Args:
+            beside: m, by which the straight arm's tip is seen beside the bending plane (`Grasping.grasp`).
 
         Raises:
-            InputError: beginning with what forbids it: limit, self-collision, out of reach, gravity or world.
+            InputError: beginning with what forbids it: limit, self-collision, out of reach, gravity, world, payload,
+                grasp or release.
         """
-        targets = request.targets
-        mount, _ = self._curled(targets)
-        there, curled = self.goal(targets, joints)
-        goals = [("approach", there, self.straight), ("curl", there, curled)]
-        if lift > 0:
-            above = self.rigid.solve(there, add(mount, scale(UP, lift)), targets.pointing, targets.heading)
-            goals.append(("lift", above, curled))
-        if place is not None:
-            goals.append(("transfer", self.goal(place, goals[-1][1])[0], curled))
-            goals.append(("release", goals[-1][1], self.straight))
-        here = np.append(joints, commands)
-        rows, phases = [here[None]], []
-        for name, end_joints, end_commands in goals:
-            end = np.append(end_joints, end_commands)
-            way = point_to_point(here, end, self.limits, self.step)
-            if self.shaper is not None:
-                base = place if place is not None and name in ("transfer", "release") else targets
-                gravity = np.array(rotate(conjugate(base_quaternion(base.pointing, base.heading)), DOWN))
-                way = shaped(way, self.step, self.shaper(gravity, end_commands, end_commands - here[JOINTS:]))
-            phases.append((name, sum(map(len, rows)) - 1))
-            rows.append(way[1:])
-            here = end
+        rows, phases = [np.append(joints, commands)[None]], []
+        for leg in self._legs(request.targets, world, joints, commands, beside):
+            here, end = rows[-1][-1], np.append(leg.joints, leg.commands)
+            profile = gentle if leg.gentle else point_to_point
+            way = profile(here, end, self.limits, self.step, leg.seconds)
+            if self.shaper is not None and leg.gravity is not None:
+                change = leg.commands - here[JOINTS:] if leg.change is None else leg.change
+                way = shaped(way, self.step, self.shaper(leg.gravity, leg.commands, change))
+            if not phases or phases[-1][0] != leg.phase:
+                phases.append((leg.phase, sum(map(len, rows)) - 1))
+            rows.append(np.concatenate([way[1:], np.tile(end, (round(leg.calm / self.step), 1))]))
         every = np.concatenate(rows)
         found = Plan(self.step, every[:, :JOINTS], every[:, JOINTS:], tuple(phases), request.package, request.world)
         refuse(found, world, self.mount_offset)
         return found
+
+    def _legs(
+        self, targets: Targets, world: World, joints: np.ndarray, commands: np.ndarray, beside: float
+    ) -> list[Leg]:
+        if targets.thing:
+            thing = world.thing(targets.thing)
+            if self.grasping is None:
+                raise InputError(f"grasp: found no way of grasping {thing.name}, expected a planner that has one")
+            if thing.support == "held":
+                return self.grasping.bring(targets, thing, world, joints, commands)
+            return self.grasping.grasp(targets, thing, joints, beside)
+        there, curled = self.goal(targets, joints)
+        gravity = np.array(_soft_target(targets)[1])
+        return [Leg("approach", there, self.straight, gravity), Leg("curl", there, curled, gravity)]
 
     def goal(self, targets: Targets, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Joints (7,), rad, the nearest to `joints`, and commands (K,), m, that bring mount and tip to their targets.

@@ -1,12 +1,25 @@
 """Targets: where both rays want the robot, tested against what it can reach and what stands in the way."""
 
 import math
+from dataclasses import replace
 
-from trunkline.teleop.alignment import Aligned, Wrist, align, base_quaternion
-from trunkline.teleop.messages import Target, Targets, World
+from trunkline.teleop.alignment import Aligned, Wrist, align, base_quaternion, carried_heading
+from trunkline.teleop.messages import Offer, Target, Targets, Thing, World
 from trunkline.teleop.reach import Reach, Reading
 from trunkline.teleop.settings import Orientation, Teleop
-from trunkline.teleop.vectors import DOWN, Vector, add, conjugate, cross, dot, norm, rotate, scale, subtract
+from trunkline.teleop.vectors import (
+    DOWN,
+    Vector,
+    add,
+    conjugate,
+    cross,
+    distance,
+    dot,
+    norm,
+    rotate,
+    scale,
+    subtract,
+)
 
 
 def place(
@@ -20,11 +33,18 @@ def place(
     reach: Reach,
     settings: Teleop,
 ) -> Targets:
-    """Both targets (base frame, m) with their reach under the gravity that the arm will have there."""
+    """Both targets (base frame, m) with their reach under the gravity that the arm will have there.
+
+    A tip target that marks a thing is in its centre. Whether it can be grasped no map tells: plan and preview do.
+    """
+    thing = marked(tip, world, settings.mark)
+    tip = tip if thing is None else thing.position
     aligned = align(tip, rigid, pointing, wrist, last, settings.bending_plane)
     turn = base_quaternion(pointing, aligned.heading)
     back = conjugate(turn)
-    found = reach.soft(rotate(back, subtract(tip, rigid)), rotate(back, DOWN))
+    found = Reading("unknown")
+    if thing is None:
+        found = reach.soft(rotate(back, subtract(tip, rigid)), rotate(back, DOWN))
     offer = None if found.offer is None else add(rigid, rotate(turn, found.offer))
     return Targets(
         _target(rigid, reach.rigid(rigid, pointing), world),
@@ -34,7 +54,48 @@ def place(
         aligned.half_plane,
         aligned.turned,
         limited,
+        "" if thing is None else thing.name,
     )
+
+
+def bring(
+    held: Thing,
+    rigid: Vector,
+    pointing: Vector,
+    limited: bool,
+    wrist: Wrist,
+    half_plane: int,
+    world: World,
+    reach: Reach,
+) -> Targets:
+    """Targets of an arm that holds a thing: the mount goes to `rigid`, the wrist as joint 1 carries it, and the tip
+    target is where the thing comes to."""
+    heading = carried_heading(rigid, wrist)
+    there = base_quaternion(pointing, heading)
+    here = base_quaternion(wrist.pointing, wrist.heading)
+    beside = rotate(conjugate(here), subtract(held.position, wrist.position))
+    tip = add(rigid, rotate(there, beside))
+    return Targets(
+        _target(rigid, reach.rigid(rigid, pointing), world),
+        _target(tip, Reading("unknown"), world),
+        pointing,
+        heading,
+        half_plane,
+        0.0,
+        limited,
+        held.name,
+    )
+
+
+def marked(tip: Vector, world: World, within: float) -> Thing | None:
+    """The thing nearest to the tip target, at most `within` m from it."""
+    near = [thing for thing in world.things if distance(tip, thing.position) <= within]
+    return min(near, key=lambda thing: distance(tip, thing.position), default=None)
+
+
+def offered(targets: Targets, offer: Offer | None) -> Targets:
+    """The targets with the assistant's offer, where it is for the thing that they mark."""
+    return replace(targets, better=offer) if offer is not None and offer.thing == targets.thing else targets
 
 
 def _target(position: Vector, reading: Reading, world: World) -> Target:

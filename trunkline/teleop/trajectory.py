@@ -46,8 +46,9 @@ def limits_of(motors: MotorLimits, rate_limit: float = 0.0, tendons: int = 3) ->
     return Limits(*(np.append(motors.share * p, np.full(tendons, o)) for p, o in zip(panda, own, strict=True)))
 
 
-def point_to_point(start: np.ndarray, end: np.ndarray, limits: Limits, step: float) -> np.ndarray:
-    """Positions every `step` s from rest at `start` (n,) to rest at `end` (n,). Shape (T, n), both ends included.
+def point_to_point(start: np.ndarray, end: np.ndarray, limits: Limits, step: float, seconds: float = 0.0) -> np.ndarray:
+    """Positions every `step` s from rest at `start` (n,) to rest at `end` (n,), in `seconds` s or more. Shape (T, n),
+    both ends included.
 
     The last step may be shorter than the others: the end is held for the rest of it.
 
@@ -60,6 +61,8 @@ def point_to_point(start: np.ndarray, end: np.ndarray, limits: Limits, step: flo
     given.current_position, given.target_position = start.tolist(), end.tolist()
     given.max_velocity, given.max_acceleration = limits.velocity.tolist(), limits.acceleration.tolist()
     given.max_jerk = limits.jerk.tolist()
+    if seconds > 0:
+        given.minimum_duration = seconds
     found = ruckig.Trajectory(len(start))
     result = ruckig.Ruckig(len(start)).calculate(given, found)
     if result < 0:
@@ -68,3 +71,19 @@ def point_to_point(start: np.ndarray, end: np.ndarray, limits: Limits, step: flo
         )
     times = step * np.arange(int(np.ceil(found.duration / step)) + 1)
     return np.array([found.at_time(float(min(t, found.duration)))[0] for t in times])
+
+
+def gentle(start: np.ndarray, end: np.ndarray, limits: Limits, step: float, seconds: float = 0.0) -> np.ndarray:
+    """As `point_to_point`, with the least jerk for its duration, so that what is carried feels least of it:
+
+        x(τ) = x_0 + (x_1 - x_0) (10 τ³ - 15 τ⁴ + 6 τ⁵),    τ = t / T,
+
+    whose largest velocity, acceleration and jerk are 15/8 Δ/T, 10/√3 Δ/T² and 60 Δ/T³ (T. Flash, N. Hogan, J. Neurosci.
+    5 (1985) 1688-1703).
+    """
+    away = np.abs(end - start)
+    least = [15 / 8 * away / limits.velocity, np.sqrt(10 / np.sqrt(3) * away / limits.acceleration),
+             np.cbrt(60 * away / limits.jerk)]  # fmt: skip
+    duration = max(seconds, float(np.max(least)))
+    share = np.minimum(step * np.arange(int(np.ceil(duration / step)) + 1) / max(duration, step), 1.0)[:, None]
+    return start + (end - start) * share**3 * (10 - 15 * share + 6 * share**2)

@@ -1,0 +1,61 @@
+"""Grasp what hangs, bring it to a table and let it go: success is that it rests there."""
+
+import numpy as np
+
+from rehearsal import settings
+from rehearsal.experiments.bench import Bench, Seen, rehearse
+from rehearsal.experiments.grasp import beside, failure, held_after, hung, session_of
+from rehearsal.experiments.result import Result
+from rehearsal.operator.scripts import Ending
+from rehearsal.robot.scene import Surface
+
+STILL = 0.03  # m/s
+LYING = 0.01  # m by which the object's height over the table may be off half its width
+
+
+def table_for(s: settings.Grasped, place: list[float], rng: np.random.Generator) -> Surface:
+    """To either side of the object."""
+    azimuth = np.arctan2(place[1], place[0]) + rng.choice([-1, 1]) * np.radians(s.table_azimuth_deg)
+    top = [s.table_radius * float(np.cos(azimuth)), s.table_radius * float(np.sin(azimuth)), s.table_top]
+    return Surface(top, list(s.table))
+
+
+def handle(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
+    """One run, and its frames from where the robot began to move."""
+    rng, s = np.random.default_rng([seed, 3]), settings.grasped()
+    object = hung(bench, s, rng)
+    table = table_for(s, object.thing.position, rng)
+    operator = bench.operator(rng)
+    session = session_of(bench, s, object, operator, seed, table)
+    above = object.thing.diameter / 2 + s.drop
+    spot = session.seen(np.array(table.top)) + [0.0, 0.0, above]
+    ending, frames, _ = rehearse(session, operator.handle(beside(bench, object), spot, s.accept, s.calm))
+    result = Result("handle", seed, False, seconds=session.now, package=session.package.digest[:12])
+    if not isinstance(ending, Ending):
+        result.cause = "stopped: the run did not end"
+        return result, frames
+    result.cause = why_not(ending, frames, table, object.thing.diameter, s)
+    result.success = not result.cause
+    result.plans, result.probability = ending.plans, ending.probability
+    if np.isfinite(ending.probability):
+        result.agreed = float((ending.probability >= 0.5) == result.success)
+    return result, frames
+
+
+def why_not(ending: Ending, frames: list[Seen], table: Surface, diameter: float, s: settings.Grasped) -> str:
+    """Why the object does not rest on the table, "" if it does."""
+    grasped = held_after(frames)
+    if grasped is None or not ending.done:
+        return failure(ending, frames, s)
+    last = frames[-1]
+    off = last.thing - np.array(table.top)
+    on = bool((np.abs(off[:2]) <= np.array(table.size[:2]) / 2).all())
+    if on and abs(off[2] - diameter / 2) < LYING and np.linalg.norm(last.truth.speed) < STILL:
+        return "" if not np.linalg.norm(last.truth.arm_thing) else "stopped: the arm still touches it"
+    second = [frame for frame in frames if frame.mode == "execute" and frame.now > grasped.now]
+    if not second:
+        return "slip: it was dropped before it was brought anywhere"
+    half = np.array(table.size[:2]) / 2
+    if not any((np.abs(frame.thing[:2] - table.top[:2]) <= half).all() for frame in second):
+        return "slip: it was dropped on its way"
+    return "missed: it did not stay on the table"

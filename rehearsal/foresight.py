@@ -1,0 +1,85 @@
+"""What a client shows of a plan for a grasp or a hand-over before it is confirmed: a preview, and perhaps an offer.
+
+Futures begin where the approach ends: until then nothing is touched.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from rehearsal.settings import Previewing
+from rehearsal.twin import Believed, compose_twin
+from trunkline.frames import rotation_from_wxyz
+from trunkline.hybrid.assistant import best, try_places
+from trunkline.hybrid.futures import Twin, Way
+from trunkline.hybrid.placements import Grip
+from trunkline.hybrid.preview import Holding, Preview, preview
+from trunkline.teleop.alignment import base_quaternion
+from trunkline.teleop.messages import Offer, Targets, Thing, World
+from trunkline.teleop.plan import Plan
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """preview: from `begins` s of the plan on. offer: the assistant's, None where it has nothing better."""
+
+    preview: Preview
+    begins: float
+    offer: Offer | None = None
+
+    @property
+    def probability(self) -> float:
+        """That all goes well, as the futures say."""
+        found = self.preview.probability
+        assert found is not None
+        return found
+
+
+@dataclass(frozen=True)
+class Foresight:
+    """grips: those of the planner, by what supports a thing."""
+
+    known: Believed
+    grips: dict[str, Grip]
+    settings: Previewing
+
+    def grasp(self, plan: Plan, targets: Targets, thing: Thing, world: World, beside: float, seed: int) -> Foreseen:
+        """Futures of a plan to grasp; where they are not sure to hold, the assistant looks for a better place.
+
+        Args:
+            beside: m, for which the plan's mount makes up (`Grasping.grasp`); the twin's arm is straight.
+        """
+        s, way, begins = self.settings, *self.way(plan, "curl")
+        x, y, z = (float(value) for value in thing.position - beside * _rotation(targets)[:, 1])
+        twin = compose_twin(self.known, world, replace(thing, position=(x, y, z)), way.joints[0], way.commands[0], s)
+        holding = Holding(way.duration - s.hold, s.sag, s.slip, s.lifted)
+        found = Foreseen(preview(twin, way, self.known.doubts, holding, s.futures, seed), begins)
+        if found.probability >= s.sure or s.assistant == 0:
+            return found
+        return replace(found, offer=self._offer(twin, way, holding, targets, thing, found.probability, seed))
+
+    def way(self, plan: Plan, first: str) -> tuple[Way, float]:
+        """The plan from the phase `first` on, held for a while at its end, and when that phase begins, s."""
+        row, more = dict(plan.phases)[first], round(self.settings.hold / plan.step)
+        joints, commands = (
+            np.concatenate([rows[row:], np.tile(rows[-1], (more, 1))]) for rows in (plan.joints, plan.commands)
+        )
+        return Way(plan.step, joints, commands), plan.step * row
+
+    def _offer(
+        self, twin: Twin, way: Way, holding: Holding, targets: Targets, thing: Thing, own: float, seed: int
+    ) -> Offer | None:
+        s, centre = self.settings, np.array(thing.position)
+        mount = np.array(targets.rigid.position) - centre
+        places = self.grips[thing.support].near(_rotation(targets), mount, thing.diameter)
+        shares = try_places(twin, way, self.known.doubts, holding, places - mount, s.assistant, seed + 1)
+        chosen = best(places - mount, shares)
+        if shares[chosen] <= own:
+            return None
+        x, y, z = (float(value) for value in centre + places[chosen])
+        return Offer(thing.name, (x, y, z), targets.pointing, float(shares[chosen]))
+
+
+def _rotation(targets: Targets) -> np.ndarray:
+    """Axes of the arm's base frame, in columns. Shape (3, 3)."""
+    return rotation_from_wxyz(np.array(base_quaternion(targets.pointing, targets.heading))).as_matrix()

@@ -1,0 +1,33 @@
+"""The assistant: a few places of the mount near the user's own, tried in one batch.
+
+A mount that is elsewhere, turned alike, is an object that is elsewhere the other way. So one composed model and one
+plan serve all places, each with the same futures: places differ by what they are, not by their luck.
+"""
+
+import numpy as np
+
+from trunkline.hybrid.doubts import Doubts, Draws, draw
+from trunkline.hybrid.futures import Twin, Way, futures
+from trunkline.hybrid.preview import Holding, joined
+
+
+def try_places(
+    twin: Twin, way: Way, doubts: Doubts, holding: Holding, offsets: np.ndarray, count: int, seed: int = 0
+) -> np.ndarray:
+    """Share of `count` futures that hold the object, for each place. Shape (P,).
+
+    Args:
+        offsets: where the mount of each place is, less that of the plan, world axes, m. Shape (P, 3).
+    """
+    one, places = draw(doubts, twin.arm, count, seed), len(offsets)
+    moved = np.tile(one.offsets, (places, 1)) - np.repeat(offsets, count, axis=0)
+    values = {name: np.tile(column, places) for name, column in one.values.items()}
+    many = Draws(values, np.tile(one.friction, places), moved, np.tile(one.turns, places))
+    motion = joined(list(futures(twin, way, many)))
+    return holding.holds(motion).reshape(places, count).mean(axis=1)
+
+
+def best(offsets: np.ndarray, shares: np.ndarray) -> int:
+    """The place that holds most surely, the nearest to the plan's own among equals."""
+    away = np.linalg.norm(offsets, axis=1)
+    return int(np.lexsort((away, -shares))[0])
