@@ -1,7 +1,7 @@
 """All that a client has: the Unity package, and nothing else. Network, maps and model come out of its files."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -32,7 +32,7 @@ from trunkline.unity.twin import MANIFEST, MODEL
 @dataclass(frozen=True)
 class Package:
     """`straight`: the motors' commands (K,), m, that leave the arm straight; a command is a path length, so a pull is
-    `straight` less the command. `rate_limit`: m/s, of the winches, 0 for none."""
+    `straight` less the command. `rate_limit`: m/s, of the winches, 0 for none. `files`: contents by path."""
 
     digest: str
     reach: MapReach
@@ -42,6 +42,7 @@ class Package:
     geometry: ChainGeometry
     straight: np.ndarray
     rate_limit: float
+    files: dict[str, bytes] = field(repr=False)
 
     def planner(self, config: Config) -> Planner:
         """The planner that this package and the settings of teleoperation make."""
@@ -92,4 +93,5 @@ def read_package(path: Path) -> Package:
         read_geometry(mujoco.MjSpec.from_string(files[MODEL].decode())),
         np.array([model["rest_lengths"][name] for name in network["output_order"]]),
         float(model["rate_limit"]),
+        files,
     )

@@ -106,8 +106,10 @@ def make_one(bench: Bench, run: Run) -> tuple[Result, float]:
 
 def _made(runs: list[Run], package: Path, workers: int):
     """Each run as it ends."""
-    if workers == 1 or len(runs) < 2:
-        bench = bench_of(package) if runs else None
+    if not runs:
+        return
+    if workers == 1 or len(runs) == 1:
+        bench = bench_of(package)
         yield from (make_one(bench, run) for run in runs)
         return
     context = multiprocessing.get_context("spawn")

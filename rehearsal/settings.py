@@ -88,7 +88,6 @@ class Previewing:
     turn_deg: Zero
     material: Material
     string: Positive
-    mount_mass: Positive
 
 
 def stand_in() -> StandIn:

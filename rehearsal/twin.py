@@ -1,17 +1,15 @@
 """The twin that plans are tried on: the identified arm on the Panda, the world as the client believes it, the thing."""
 
-import json
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 
 from rehearsal.settings import Previewing
-from trunkline.errors import existing
+from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.hybrid.compose import Placed, compose, panda_joints
-from trunkline.hybrid.doubts import Contact, Doubts, doubts_of
+from trunkline.hybrid.doubts import Contact, Doubts
 from trunkline.hybrid.futures import Twin
 from trunkline.hybrid.objects import Thing as Shaped
 from trunkline.hybrid.robots import PandaRobot
@@ -21,34 +19,37 @@ from trunkline.hybrid.worlds import World as Room
 from trunkline.panda.kinematics import mount_pose
 from trunkline.simulation.rest import settle
 from trunkline.teleop.messages import Box, Thing, World
-
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
+from trunkline.unity import unpacked
 
 
 @dataclass(frozen=True)
 class Believed:
-    """arm: as identified. doubts: about its parameters, contacts and places. mount_offset: m. mount_mass: kg."""
+    """What the package says. doubts: about the arm's parameters, contacts and places."""
 
     arm: mujoco.MjSpec
     doubts: Doubts
-    mount_offset: float
-    mount_mass: float
+    robot: PandaRobot
 
 
-def believed(settings: Previewing, mount_offset: float, artifacts: Path = Path("artifacts")) -> Believed:
-    """What the pipeline has identified. It is not all in the package yet, so it is read from the artifacts."""
-    stages = [json.loads(existing(artifacts / stage / "parameters.json").read_text()) for stage in STAGES]
+def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
+    """Out of the files of a package.
+
+    Raises:
+        InputError: it has nothing to preview with, or holds the arm by another robot.
+    """
     x, y, z = settings.place
     contact = Contact(settings.friction, (x, y, z), float(np.radians(settings.turn_deg)))
-    arm = mujoco.MjSpec.from_file(str(existing(artifacts / STAGES[-1] / "arm.xml")))
-    return Believed(arm, doubts_of(stages, contact), mount_offset, settings.mount_mass)
+    robot = unpacked.robot_of(files)
+    if not isinstance(robot, PandaRobot):
+        raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: the rehearsal moves that")
+    return Believed(unpacked.arm_of(files), unpacked.doubts_of(files, contact), robot)
 
 
 def compose_twin(
     known: Believed, world: World, thing: Thing, joints: np.ndarray, commands: np.ndarray, settings: Previewing
 ) -> Twin:
     """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands."""
-    robot = PandaRobot("panda", known.mount_offset, known.mount_mass, 0.0, joints.tolist())
+    robot = replace(known.robot, ready=joints.tolist())
     place = np.array(thing.position)
     room = Room(None, {box.name: _surface(box) for box in world.boxes}, None)
     shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material)
@@ -56,7 +57,7 @@ def compose_twin(
     if thing.support == "hanging":
         hang(spec, place, thing.diameter / 2, settings.string)
     model, arm = spec.compile(), known.arm.copy().compile()
-    return Twin(model, arm, _start(model, arm, joints, commands, known.mount_offset)).stepped(settings.step)
+    return Twin(model, arm, _start(model, arm, joints, commands, robot.mount_offset)).stepped(settings.step)
 
 
 def _start(

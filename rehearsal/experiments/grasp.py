@@ -57,13 +57,13 @@ def session_of(
     robot = StandInRobot(bench.arm, Scene(FLOOR, thing, surfaces, hook), bench.stand_in, ready, seed)
     boxes = (FLOOR_BOX,) if table is None else (FLOOR_BOX, box_of(table))
     seen = robot.seen()
+    assert thing.shape != "basket"  # `Grasped.shapes` has none
     a, b, c = (float(value) for value in seen.thing)
     d, e, f, g = (float(value) for value in seen.thing_quaternion)
     told = Thing(NAME, thing.shape, thing.diameter, thing.height, thing.mass, (a, b, c), (d, e, f, g))
     previewing = settings.previewing()
-    foresight = Foresight(
-        believed(previewing, bench.config.mount_offset), bench.package.grips(bench.config), previewing
-    )
+    known = believed(previewing, bench.package.files)
+    foresight = Foresight(known, bench.package.grips(bench.config), previewing)
     return Session(
         bench.package, bench.config, robot, (operator.left, operator.right), make_world(boxes, (told,)),
         lambda now: robot.truth().thing, foresight,
