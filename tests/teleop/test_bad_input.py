@@ -112,3 +112,15 @@ def test_buttons_held_when_a_controller_appears_are_no_presses():
     assert operator.wait(0.2, right={"tracked": True, "primary": True}).mode == "stopped"
     operator.step(right={"primary": False})
     assert operator.step(right={"primary": True}).mode == "hold"
+
+
+def test_a_target_around_which_a_solid_comes_just_before_the_trigger_is_no_target():
+    """What was judged before the press was judged in a world without it."""
+    operator = Operator()
+    x, y, z = operator.to("aim").targets.tip.position
+    table = Box("the table", (x - 0.1, y - 0.1, z - 0.1), (x + 0.1, y + 0.1, z + 0.1))
+    operator.step(world=World("a table was moved there", (table,)))
+    intent = operator.step(right={"trigger": True})
+    assert intent.mode == "aim"
+    assert intent.request is None
+    assert "inside the table" in intent.notice

@@ -52,6 +52,8 @@ class Teleoperation:
         if state.alignment != alignment:  # what is parked in the base frame is elsewhere in the room now
             left, right = (replace(hand, target=None) for hand in state.hands)
             state = replace(state, alignment=alignment, left=left, right=right, history=())
+        if state.world != given.world.digest:  # what was judged before was judged in another world
+            state = replace(state, world=given.world.digest, history=())
         ends = (ray_end(state.left, alignment), ray_end(state.right, alignment))
         state = self._parked(state, ends, alignment, dt)
         targets = self._targets(state, given)

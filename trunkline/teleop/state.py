@@ -22,7 +22,8 @@ class State:
     """All that the core remembers from step to step.
 
     `silent`: s without a new stamp. `sound_for`: s for which all was sound and nothing pressed. `waited`: s in this
-    mode. `history`: (stamp, targets) of the last while, to look back from a press and to follow with a delay.
+    mode. `world`: its digest. `history`: (stamp, targets) of the last while in it, to look back from a press and to
+    follow with a delay.
     `digest`: of the plan that is there. `running`: the robot was seen to run it.
     """
 
@@ -37,6 +38,7 @@ class State:
     limited: bool = False
     aligned: Aligned = Aligned(0.0, 0, 0.0)
     alignment: Pose | None = None
+    world: str = ""
     history: tuple[tuple[float, Targets], ...] = ()
     serial: int = 0
     pinned: Pinned | None = None
