@@ -2,7 +2,8 @@
 
 The other commit is cloned into a temporary folder; both run on this checkout's session, one stage after the other, each
 on what its own earlier stages wrote. Results of this checkout are left alone: it is copied too. With `--stages`, only
-those run, on what the stages before them wrote in this checkout.
+those run, on what the stages before them wrote in this checkout. With `--record`, each commit first records the session
+of its own lab, as `make demo` does: for a commit that cannot read this one's.
 """
 
 import argparse
@@ -32,16 +33,17 @@ class Cost(NamedTuple):
     memory: float
 
 
-def run_stage(stage: str, folder: Path) -> Cost:
-    """Run one stage in `folder`, the root of a checkout, with this Python.
+def run_stage(module: str, folder: Path) -> Cost:
+    """Run a stage's module in `folder`, the root of a checkout, with this Python.
 
     Raises:
         InputError: the stage failed; the message is its last line.
     """
     begun, first, lines = time.monotonic(), 0.0, []
     process = subprocess.Popen(
-        [sys.executable, "-m", f"stages.{stage}"],
-        cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        [sys.executable, "-m", module],
+        cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)},
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
     assert process.stdout is not None
     for line in process.stdout:
@@ -49,22 +51,23 @@ def run_stage(stage: str, folder: Path) -> Cost:
         lines.append(line)
     _, status, usage = os.wait4(process.pid, 0)
     if status:
-        raise InputError(f"{folder.name}: {stage}: {lines[-1] if lines else 'no output'}")
+        raise InputError(f"{folder.name}: {module}: {lines[-1] if lines else 'no output'}")
     return Cost(time.monotonic() - begun, first, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
 
 
-def copies(other: str, session: str, folder: Path, results: bool) -> dict[str, Path]:
-    """This working tree and commit `other`, each in a folder of its own with the session's logs.
+def copies(other: str, session: str | None, folder: Path, results: bool) -> dict[str, Path]:
+    """This working tree and commit `other`, each in a folder of its own with the session's logs, if one is named.
 
     With `results`, also with what this checkout's stages wrote.
     """
-    logs = ROOT / "data" / "raw" / session
-    if not logs.is_dir():
+    logs = ROOT / "data" / "raw" / session if session else None
+    if logs and not logs.is_dir():
         raise InputError(f"{logs}: no such folder, expected a session's logs (run `make demo`)")
     made = {"here": folder / "here", other: folder / "other"}
     for path in made.values():
         subprocess.run(["git", "clone", "-q", str(ROOT), str(path)], check=True)
-        shutil.copytree(logs, path / "data" / "raw" / session)
+        if session and logs:
+            shutil.copytree(logs, path / "data" / "raw" / session)
     subprocess.run(["git", "checkout", "-q", other], cwd=made[other], check=True)
     listing = ["git", "ls-files", "-z", "--modified", "--others", "--exclude-standard"]
     for name in subprocess.run(listing, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0"):
@@ -79,27 +82,44 @@ def copies(other: str, session: str, folder: Path, results: bool) -> dict[str, P
     return made
 
 
+def told(cost: Cost | None) -> str:
+    """Cells of the table."""
+    if cost is None:
+        return "– | – | – | –"
+    return f"{cost.wall:.1f} s | {cost.first:.1f} s | {cost.cpu:.0f} s | {cost.memory:.0f} MiB"
+
+
 @in_one_line
 @recorded("pipeline")
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--against", default="HEAD~1", help="the other commit")
     parser.add_argument("--session", default="demo")
+    parser.add_argument("--record", action="store_true", help="each commit records its own lab's session")
     parser.add_argument("--stages", nargs="+", help="all by default")
     chosen = parser.parse_args()
-    stages = chosen.stages or list(yaml.safe_load((ROOT / "dvc.yaml").read_text())["stages"])
     with tempfile.TemporaryDirectory() as folder:
-        made = copies(chosen.against, chosen.session, Path(folder), bool(chosen.stages))
-        totals = {name: 0.0 for name in made}
-        print(f"wall s (to the first line; CPU s; MiB), here against {chosen.against}")
-        for stage in stages:
-            costs = {name: run_stage(stage, path) for name, path in made.items()}
-            cells = [f"{c.wall:6.1f} ({c.first:4.1f}; {c.cpu:6.1f}; {c.memory:5.0f})" for c in costs.values()]
-            ratio = costs["here"].wall / costs[chosen.against].wall
-            print(f"{stage:20s} {'  '.join(cells)}  ratio {ratio:.2f}", flush=True)
-            totals = {name: total + costs[name].wall for name, total in totals.items()}
+        session = None if chosen.record else chosen.session
+        made = copies(chosen.against, session, Path(folder), bool(chosen.stages))
+        known = {name: list(yaml.safe_load((path / "dvc.yaml").read_text())["stages"]) for name, path in made.items()}
+        modules = ["demo.record"] if chosen.record else []
+        modules += [f"stages.{stage}" for stage in chosen.stages or known["here"]]
+        totals = dict.fromkeys(made, 0.0)
+        words = "time | first line | processor | memory"
+        print(f"| stage | here: {words} | {chosen.against}: {words} | time, ratio |")
+        print(f"|---|{'---:|' * 9}", flush=True)
+        for module in modules:
+            stage = module.rpartition(".")[2]
+            costs = {
+                name: run_stage(module, path) if stage in [*known[name], "record"] else None
+                for name, path in made.items()
+            }
+            here, other = costs["here"], costs[chosen.against]
+            ratio = f"{here.wall / other.wall:.2f}" if here and other else "–"
+            print(f"| {stage} | {told(here)} | {told(other)} | {ratio} |", flush=True)
+            totals = {name: totals[name] + (cost.wall if cost else 0.0) for name, cost in costs.items()}
         here, other = totals.values()
-        print(f"{'all':20s} {here:6.1f} against {other:.1f}  ratio {here / other:.2f}")
+        print(f"| all | {here:.1f} s | | | | {other:.1f} s | | | | {here / other:.2f} |")
     return 0
 
 
