@@ -13,7 +13,6 @@ from rehearsal.operator.scripts import Ending, Operator
 from rehearsal.robot.scene import Object, Scene, Surface
 from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import Session, make_world
-from rehearsal.twin import believed
 from trunkline.frames import wxyz_from_rotation
 from trunkline.hybrid.grasps import object_in_base
 from trunkline.teleop.messages import Box, Thing
@@ -61,9 +60,10 @@ def session_of(
     a, b, c = (float(value) for value in seen.thing)
     d, e, f, g = (float(value) for value in seen.thing_quaternion)
     told = Thing(NAME, thing.shape, thing.diameter, thing.height, thing.mass, (a, b, c), (d, e, f, g))
-    previewing = settings.previewing()
-    known = believed(previewing, bench.package.files)
-    foresight = Foresight(known, bench.package.grips(bench.config), previewing)
+    foresight = None
+    if bench.judged:
+        assert bench.known is not None
+        foresight = Foresight(bench.known, bench.package.grips(bench.config), bench.previewing)
     return Session(
         bench.package, bench.config, robot, (operator.left, operator.right), make_world(boxes, (told,)),
         lambda now: robot.truth().thing, foresight,
