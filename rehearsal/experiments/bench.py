@@ -17,6 +17,7 @@ from rehearsal.robot.scene import Object, Scene
 from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
 from rehearsal.settings import Free, Previewing
+from rehearsal.settings import previewing as read_previewing
 from rehearsal.twin import Believed, believed
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_config, load_folder
@@ -45,7 +46,7 @@ class Bench:
     settings: Free
     judged: bool = True
     known: Believed | None = None
-    previewing: Previewing = field(default_factory=settings.previewing)
+    previewing: Previewing = field(default_factory=read_previewing)
 
     def place(self, rng: np.random.Generator) -> np.ndarray:
         """A random place of the object, (3,), m: evenly over the area in front of the robot, and over the height."""
@@ -85,7 +86,7 @@ def bench_of(file: Path) -> Bench:
     if not isinstance(arm, Stranger):
         raise InputError(f"{LAB}/params.yaml: record.plant: found another plant, expected stranger: the robot's arm")
     config = load_folder(Config, PROJECT / "conf/teleop")
-    package, previewing = read_package(file), settings.previewing()
+    package, previewing = read_package(file), read_previewing()
     known = believed(previewing, package.files)
     return Bench(
         package, config, arm, settings.stand_in(), settings.person(), settings.free(), known=known,
