@@ -83,13 +83,19 @@ def beside(bench: Bench, hung: Hung) -> np.ndarray:
     return -centre[0] * hung.towards - [0.0, 0.0, centre[2]]
 
 
-def grasp(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
-    """One run, and its frames from where the robot began to move."""
+def run(bench: Bench, seed: int) -> tuple[object, list[Seen], Session]:
+    """One run: how it ended, its frames from where the robot began to move, and the session."""
     rng, s = np.random.default_rng([seed, 2]), settings.grasped()
     object = hung(bench, s, rng)
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed)
     ending, frames, _ = rehearse(session, operator.grasp(beside(bench, object), s.accept, s.hold))
+    return ending, frames, session
+
+
+def grasp(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
+    """One run, and its frames from where the robot began to move."""
+    s, (ending, frames, session) = settings.grasped(), run(bench, seed)
     result = Result("grasp", seed, False, seconds=session.now, package=session.package.digest[:12])
     if not isinstance(ending, Ending):
         result.cause = "stopped: the run did not end"
