@@ -9,6 +9,7 @@ counted. A machine's seconds are those of processor over its cores, as futures a
 
 import argparse
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
@@ -33,9 +34,20 @@ from trunkline.threads import thread_count
 
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 STEPS = (1 / 480, 1 / 240, 1 / 200)  # s; joint limits and contacts, of 0.01 s, allow no longer one than 5 ms
-DIAMETER, MASS = 0.04, 0.1  # m, kg
 CLOSE, LET_GO, LENGTH, PULL, LIFT = 1.0, 1.75, 4.0, 0.2, 0.3  # s, s, s, m of cable, rad of the Panda's second joint
 PAID_OUT, PAY_TIME = 0.2, 0.3  # m and s, of cables that do not pull
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Diameter, m, and mass, kg, of the cylinder; turns of the arm round it; m between them, and beside the bending
+    plane."""
+
+    diameter: float = 0.04
+    mass: float = 0.1
+    wrap: float = 0.6
+    gap: float = 0.02
+    beside: float = 0.0
 
 
 @recorded("preview")
@@ -69,16 +81,17 @@ def main(path: Path, count: int) -> None:
         )
 
 
-def grasp(path: Path) -> tuple[Twin, Way]:
+def grasp(path: Path, placing: Placing | None = None) -> tuple[Twin, Way]:
     """The Panda in its ready pose with the arm beside the cylinder, and the motion."""
-    spec, robot = read_spec(path), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
+    p, spec, robot = placing or Placing(), read_spec(path), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
+    middle = object_in_base(read_geometry(spec), p.diameter, Grasp(p.wrap, p.gap), "dorsal")
     assert isinstance(robot, PandaRobot)
-    ready, middle = np.array(robot.ready), object_in_base(read_geometry(spec), DIAMETER, Grasp(0.6, 0.02), "dorsal")
+    ready = np.array(robot.ready)
     mounts, turns = mount_pose(ready[None], robot.mount_offset)
     base = turns[0] @ np.diag([1.0, -1.0, -1.0])
-    center = mounts[0] + base @ middle
-    hook = [float(value) for value in center + [0, 0, DIAMETER / 2 + HOOK_ABOVE]]
-    thing = Thing("cylinder", DIAMETER, 0.12, MASS, "plastic")
+    center = mounts[0] + base @ (middle + [0, p.beside, 0])
+    hook = [float(value) for value in center + [0, 0, p.diameter / 2 + HOOK_ABOVE]]
+    thing = Thing("cylinder", p.diameter, 0.12, p.mass, "plastic")
     level = np.zeros(4)
     mujoco.mju_mat2Quat(level, base.ravel())
     mujoco.mju_mulQuat(level, level.copy(), np.array(LEVEL))

@@ -178,7 +178,8 @@ class Session:
     def _drive(self, intent: Intent) -> None:
         running = self.executor.state()
         if intent.motion == "execute" and running.digest != intent.execute and self.plan is not None:
-            self.fault, self.tips, self.began = self.executor.start(self.plan, intent.execute), [], self.now
+            self.fault, self.tips = self.executor.start(self.plan, intent.execute), []
+            self.began = self.now - 1 / RATE  # `now` is the end of a frame, in which the plan runs already
         if intent.motion == "hold" and running.mode == "running":
             self.executor.stop()
         self._hear(intent)

@@ -1,9 +1,12 @@
-"""What each part of the system is worth: reach and follow with one thing taken away or made worse, by name.
+"""What each part of the system is worth: an experiment with one thing taken away or made worse, by name.
 
     result, _ = reach(varied(bench, "reach", "no_preview"), seed)
 
 A variant changes what runs share, so a run of it has the same object, path, operator and robot as the run of the same
 seed that has everything.
+
+Variants of a grasp that do not ask what the batch of futures is worth preview the nominal one alone, as `single` does:
+it is what they compare with.
 """
 
 from collections.abc import Callable
@@ -16,12 +19,17 @@ import mujoco
 from rehearsal.experiments.bench import Bench
 from rehearsal.experiments.lookup import lookup
 from trunkline.errors import InputError
+from trunkline.hybrid.doubts import Contact, Doubts
+from trunkline.hybrid.friction import TPU_ON
+from trunkline.hybrid.touch import read_geometry
 from trunkline.pipeline.config import PROJECT
-from trunkline.pipeline.inputs import read_model
+from trunkline.pipeline.inputs import read_model, read_spec
 from trunkline.statics.chain import read_chain
 
 DRAWING = PROJECT / "artifacts/build_mjcf/arm.xml"
 NOWHERE = 5.0  # m; within it of its axis the arm has no bending plane: further than anything is
+SLIPPERY = 0.7  # of the friction that is believed
+SURE = Doubts(contact=Contact(0.0, (0.0, 0.0, 0.0), 0.0))  # of everything
 
 Change = Callable[[Bench], Bench]
 
@@ -74,12 +82,51 @@ def _delay(bench: Bench, seconds: float) -> Bench:
     return replace(bench, config=replace(bench.config, core=core))
 
 
-BOTH: dict[str, Change] = {
-    "statics": _statics,  # the identified model without its network: what `cad` compares with
-    "cad": _cad,
+def _single(bench: Bench) -> Bench:
+    """One future, with all as it is believed, of the plan and of each place that the assistant tries."""
+    assert bench.known is not None
+    one = replace(bench.previewing, futures=1, assistant=min(bench.previewing.assistant, 1))
+    return replace(bench, known=replace(bench.known, doubts=SURE), previewing=one)
+
+
+def _cad_grasp(bench: Bench, drawing: Path = DRAWING) -> Bench:
+    """Shaped and previewed with the drawing's arm. A grasp is planned by its geometry, which the identified one has."""
+    bench, spec, model = _single(bench), read_spec(drawing), read_model(drawing)
+    assert bench.known is not None
+    package = replace(bench.package, model=model, chain=read_chain(model).smooth, geometry=read_geometry(spec))
+    return replace(bench, package=package, known=replace(bench.known, arm=spec))
+
+
+def _slippery(bench: Bench) -> Bench:
+    """The futures stay as they are: whether they foresee it is the question."""
+    touch = replace(bench.stand_in.touch, arm_object=SLIPPERY * TPU_ON[bench.previewing.material])
+    return replace(bench, stand_in=replace(bench.stand_in, touch=touch))
+
+
+def _both(first: Change, second: Change) -> Change:
+    return lambda bench: second(first(bench))
+
+
+WORSE: dict[str, Change] = {
     "no_plane": _no_plane,
     **{f"base_{mm}mm": partial(_base, alignment_mm=float(mm)) for mm in (5, 10, 20)},
     **{f"base_{deg}deg": partial(_base, alignment_deg=float(deg)) for deg in (1, 2, 4)},
 }
+BOTH: dict[str, Change] = {
+    "statics": _statics,  # the identified model without its network: what `cad` compares with
+    "cad": _cad,
+    **WORSE,
+}
+GRASP: dict[str, Change] = {
+    "single": _single,
+    "no_preview": _no_preview,
+    "cad": _cad_grasp,
+    **{name: _both(_single, change) for name, change in WORSE.items()},
+    "slippery": _slippery,
+}
 DELAYS = {f"delay_{s:g}s": partial(_delay, seconds=s) for s in (0.2, 0.5, 1.0)}
-VARIANTS: dict[str, dict[str, Change]] = {"reach": {**BOTH, "no_preview": _no_preview}, "follow": {**BOTH, **DELAYS}}
+VARIANTS: dict[str, dict[str, Change]] = {
+    "reach": {**BOTH, "no_preview": _no_preview},
+    "follow": {**BOTH, **DELAYS},
+    "grasp": GRASP,
+}

@@ -1,6 +1,6 @@
 """What both experiments begin with: robot, hands and operator, drawn by a seed."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,9 @@ from rehearsal.package import Package, read_package
 from rehearsal.robot.scene import Object, Scene
 from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
-from rehearsal.settings import Free
+from rehearsal.settings import Free, Previewing
+from rehearsal.settings import previewing as read_previewing
+from rehearsal.twin import Believed, believed
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_config, load_folder
 from trunkline.teleop.config import Config
@@ -33,7 +35,8 @@ LONGEST = 300.0  # s of a run
 
 @dataclass(frozen=True)
 class Bench:
-    """All that runs share. `judged`: whether the operator confirms only a preview whose tip is on the object."""
+    """All that runs share. `judged`: whether plans are previewed and the operator confirms only one whose preview is
+    good. `known`, `previewing`: what grasps are previewed with; the package's arm and `previewing` by themselves."""
 
     package: Package
     config: Config
@@ -42,6 +45,8 @@ class Bench:
     person: Person
     settings: Free
     judged: bool = True
+    known: Believed | None = None
+    previewing: Previewing = field(default_factory=read_previewing)
 
     def place(self, rng: np.random.Generator) -> np.ndarray:
         """A random place of the object, (3,), m: evenly over the area in front of the robot, and over the height."""
@@ -81,7 +86,12 @@ def bench_of(file: Path) -> Bench:
     if not isinstance(arm, Stranger):
         raise InputError(f"{LAB}/params.yaml: record.plant: found another plant, expected stranger: the robot's arm")
     config = load_folder(Config, PROJECT / "conf/teleop")
-    return Bench(read_package(file), config, arm, settings.stand_in(), settings.person(), settings.free())
+    package, previewing = read_package(file), read_previewing()
+    known = believed(previewing, package.files)
+    return Bench(
+        package, config, arm, settings.stand_in(), settings.person(), settings.free(), known=known,
+        previewing=previewing,
+    )  # fmt: skip
 
 
 @dataclass

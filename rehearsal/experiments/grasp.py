@@ -13,7 +13,6 @@ from rehearsal.operator.scripts import Ending, Operator
 from rehearsal.robot.scene import Object, Scene, Surface
 from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import Session, make_world
-from rehearsal.twin import believed
 from trunkline.frames import wxyz_from_rotation
 from trunkline.hybrid.grasps import object_in_base
 from trunkline.teleop.messages import Box, Thing
@@ -61,9 +60,10 @@ def session_of(
     a, b, c = (float(value) for value in seen.thing)
     d, e, f, g = (float(value) for value in seen.thing_quaternion)
     told = Thing(NAME, thing.shape, thing.diameter, thing.height, thing.mass, (a, b, c), (d, e, f, g))
-    previewing = settings.previewing()
-    known = believed(previewing, bench.package.files)
-    foresight = Foresight(known, bench.package.grips(bench.config), previewing)
+    foresight = None
+    if bench.judged:
+        assert bench.known is not None
+        foresight = Foresight(bench.known, bench.package.grips(bench.config), bench.previewing)
     return Session(
         bench.package, bench.config, robot, (operator.left, operator.right), make_world(boxes, (told,)),
         lambda now: robot.truth().thing, foresight,
@@ -83,13 +83,19 @@ def beside(bench: Bench, hung: Hung) -> np.ndarray:
     return -centre[0] * hung.towards - [0.0, 0.0, centre[2]]
 
 
-def grasp(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
-    """One run, and its frames from where the robot began to move."""
+def run(bench: Bench, seed: int) -> tuple[object, list[Seen], Session]:
+    """One run: how it ended, its frames from where the robot began to move, and the session."""
     rng, s = np.random.default_rng([seed, 2]), settings.grasped()
     object = hung(bench, s, rng)
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed)
     ending, frames, _ = rehearse(session, operator.grasp(beside(bench, object), s.accept, s.hold))
+    return ending, frames, session
+
+
+def grasp(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
+    """One run, and its frames from where the robot began to move."""
+    s, (ending, frames, session) = settings.grasped(), run(bench, seed)
     result = Result("grasp", seed, False, seconds=session.now, package=session.package.digest[:12])
     if not isinstance(ending, Ending):
         result.cause = "stopped: the run did not end"

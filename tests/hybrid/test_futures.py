@@ -14,7 +14,7 @@ from trunkline.frames import STANDARD_GRAVITY
 from trunkline.hybrid.compose import Placed, compose
 from trunkline.hybrid.doubts import Contact, Doubts, Draws, doubts_of, draw, nominal_draw
 from trunkline.hybrid.friction import TPU_ON
-from trunkline.hybrid.futures import Twin, Way, futures, rows_of
+from trunkline.hybrid.futures import Twin, Way, eased, futures, rows_of
 from trunkline.hybrid.objects import Thing
 from trunkline.hybrid.preview import Holding, joined, nominal, preview
 from trunkline.hybrid.robots import FixedMount, PandaRobot
@@ -177,6 +177,31 @@ def test_a_future_slides_where_coulomb_says(incline):
     np.testing.assert_array_equal(found.held[clear], found.draws.friction[clear] > 1)
     assert 0 < found.probability < 1
     assert found.interval == pytest.approx(wilson(int(found.held.sum()), 16))
+
+
+def test_what_rests_in_a_preview_creeps_far_less_than_counts_as_a_slip(incline):
+    twin, way = incline
+    long = Way(way.step, np.zeros((301, 0)), np.tile(way.commands[0], (301, 1)))
+    motion = run(twin, long, Draws({}, np.array([1.3]), np.zeros((1, 3)), np.zeros(1)))
+    early, last = motion.object[0, [15, -1], 0]
+    assert motion.time[-1] > 2.9
+    assert abs(last - early) < 0.1 * Holding(0.0).slip
+
+
+def contacts(model: mujoco.MjModel, geom: str, other: str) -> int:
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    wanted = {model.geom(geom).id, model.geom(other).id}
+    return sum({*data.contact[number].geom.tolist()} == wanted for number in range(data.ncon))
+
+
+def test_a_unit_touches_what_hangs_in_one_point_and_a_table_bears_in_several(small):
+    thing = Thing("cylinder", 0.05, 0.03, 0.1, "plastic")
+    world = World(None, {"table": Surface([0.0, 0.0, -0.5], [2.0, 2.0, 0.03], "wood")}, None)
+    model = compose(small, FixedMount("fixed"), world, Placed(thing, np.array([0, 0, -0.4851]))).compile()
+    hung, stands = eased(model, True), eased(model, False)
+    assert contacts(hung, "object_geom", "table") == 1 < 3 <= contacts(stands, "object_geom", "table")
+    assert stands.opt.impratio == hung.opt.impratio < model.opt.impratio
 
 
 def test_less_sure_friction_makes_outcomes_differ_more(incline):

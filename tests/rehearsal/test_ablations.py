@@ -6,44 +6,93 @@ import numpy as np
 import pytest
 
 from rehearsal import settings
-from rehearsal.experiments.ablations import VARIANTS, varied
+from rehearsal.experiments.ablations import SURE, VARIANTS, _cad_grasp, varied
 from rehearsal.experiments.bench import Bench
 from rehearsal.experiments.lookup import lookup, tensions_of
+from rehearsal.package import Package
+from rehearsal.twin import Believed
 from tests.rehearsal.arm import settings as stand_in
 from tests.rehearsal.arm import stranger
-from tests.support.bent_chain import hardening_stump
+from tests.support.bent_chain import hardening_stump, stump_spec
 from tests.support.operator import config
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, downwards
+from trunkline.hybrid.doubts import Contact, Doubts, draw
+from trunkline.hybrid.friction import TPU_ON
+from trunkline.hybrid.robots import PandaRobot
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium
 from trunkline.teleop.alignment import Aligned, align, wrist_of
 from trunkline.teleop.tendons import bend
 from trunkline.teleop.vectors import DOWN
 
+FRICTION, PLACE = 0.2, (0.005, 0.005, 0.005)
 READY = (0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785)
 MODELS = ("statics", "cad")  # that need a package, and a drawing of the arm
 
 
 @pytest.fixture(scope="module")
 def bench() -> Bench:
-    return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free())  # type: ignore[arg-type]
+    robot = PandaRobot("panda", 0.05, 0.8, 0.0, list(READY))
+    known = Believed(stump_spec(), Doubts(("kp",), np.ones(1), np.eye(1), Contact(FRICTION, PLACE, 0.1)), robot)
+    return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free(), known=known)  # type: ignore[arg-type]
+
+
+def changed(found: Bench, bench: Bench) -> list[str]:
+    return [field.name for field in fields(Bench) if getattr(found, field.name) is not getattr(bench, field.name)
+            and getattr(found, field.name) != getattr(bench, field.name)]  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("experiment", "name"), [(one, name) for one, names in VARIANTS.items() for name in names if name not in MODELS]
+    ("experiment", "name"),
+    [(one, name) for one in ("reach", "follow") for name in VARIANTS[one] if name not in MODELS],
 )
 def test_a_variant_changes_one_thing(bench, experiment, name):
-    found = varied(bench, experiment, name)
-    changed = [field.name for field in fields(Bench) if getattr(found, field.name) != getattr(bench, field.name)]
     same = name == f"delay_{config().core.follow_delay:g}s"
-    assert len(changed) == (0 if same else 1)
+    assert len(changed(varied(bench, experiment, name), bench)) == (0 if same else 1)
+
+
+@pytest.mark.parametrize("name", [name for name in VARIANTS["grasp"] if name not in (*MODELS, "single")])
+def test_a_variant_of_a_grasp_changes_one_thing_more_than_what_it_compares_with(bench, name):
+    beside = bench if name in ("no_preview", "slippery") else varied(bench, "grasp", "single")
+    found = varied(bench, "grasp", name)
+    assert len(changed(found, beside)) == 1
 
 
 @pytest.mark.parametrize(("experiment", "name"), [("reach", "delay_1s"), ("follow", "no_preview")])
 def test_a_variant_of_another_experiment_is_refused_with_those_there_are(bench, experiment, name):
     with pytest.raises(InputError, match=f"'{name}', expected one of {experiment}: statics, cad"):
         varied(bench, experiment, name)
+
+
+def test_a_single_preview_is_of_what_is_believed(bench):
+    found = varied(bench, "grasp", "single")
+    one = draw(found.known.doubts, found.known.arm.compile(), found.previewing.futures, 0)
+    assert (len(one), one.values) == (1, {})
+    assert (one.friction[0], *one.offsets[0], one.turns[0]) == (1.0, 0.0, 0.0, 0.0, 0.0)
+    assert np.ptp(draw(bench.known.doubts, bench.known.arm.compile(), 8, 0).friction) > 0
+
+
+def test_without_a_preview_no_grasp_is_foreseen(bench):
+    assert not varied(bench, "grasp", "no_preview").judged
+
+
+def test_the_drawings_arm_takes_the_identified_ones_place(bench, tmp_path):
+    drawing, other = tmp_path / "arm.xml", stump_spec(5)
+    other.compile()
+    other.to_file(str(drawing))
+    package = Package("", None, None, None, None, None, np.zeros(3), 0.0, {})  # type: ignore[arg-type]
+    found = _cad_grasp(replace(bench, package=package), drawing)
+    assert found.known.arm.compile().nv == found.package.model.nv == found.package.chain.units * 2 == 10
+    assert found.package.geometry.units == 5
+    assert found.known.robot == bench.known.robot
+    assert found.known.doubts == SURE
+
+
+def test_a_slippery_robot_is_so_by_what_is_believed(bench):
+    found = varied(bench, "grasp", "slippery")
+    assert found.stand_in.touch.arm_object == pytest.approx(0.7 * TPU_ON[bench.previewing.material])
+    assert found.stand_in.touch.arm_world == bench.stand_in.touch.arm_world
 
 
 def test_without_bending_planes_the_wrist_does_not_turn_for_the_tip(bench):

@@ -2,6 +2,8 @@
 
 The identified parameters are written into the arm's own model, which has the places that they know, and carried over
 to the composed model by the names of joints, tendons, actuators and numbers, as there all have other places.
+
+Most of the cost is the contact solver's, so contacts are as few and as soft as outcomes allow: `eased`.
 """
 
 import copy
@@ -32,6 +34,7 @@ from trunkline.simulation.winch import Winches
 FRAME = 1 / 60  # s, about, between frames of a motion
 FRAMES = 15  # of a piece: 0.25 s
 KNOTS = 0.1  # s between rows at which the Panda's torques are computed
+EASED_IMPRATIO = 10.0  # friction over normal impedance: what is held creeps more, but far less than counts as a slip
 UNIT_CENTER = re.compile(r"unit_\d+_center")
 RECORD = ("qpos", "site_xpos", "xpos", "xquat")
 
@@ -117,7 +120,8 @@ def futures(twin: Twin, way: Way, draws: Draws) -> Iterator[Piece]:
             f"plan: found {way.joints.shape[1]} joints and {way.commands.shape[1]} cables, "
             f"expected {len(joints)} and {len(motors)}"
         )
-    batch = batch_of(model, count)
+    ties = [tie for name in ("hanging", EYE) if (tie := _number(model, mujoco.mjtObj.mjOBJ_EQUALITY, name)) >= 0]
+    batch = batch_of(eased(model, bool(ties)), count)
     _set_parameters(batch, twin, draws)
     _place(batch, model, twin.start, way, draws)
     timestep = model.opt.timestep
@@ -129,7 +133,6 @@ def futures(twin: Twin, way: Way, draws: Draws) -> Iterator[Piece]:
     first[:, servos.motors] = servos.commands[0]
     hold(batch, model, first)
     winches, own = Winches(batch, first[:, motors]), np.arange(count, dtype=np.int32)
-    ties = [tie for name in ("hanging", EYE) if (tie := _number(model, mujoco.mjtObj.mjOBJ_EQUALITY, name)) >= 0]
     for begin in range(0, frames, FRAMES):
         number = min(FRAMES, frames - begin)
         time = timestep * (begin * every + np.arange(number * every))
@@ -142,6 +145,16 @@ def futures(twin: Twin, way: Way, draws: Draws) -> Iterator[Piece]:
         controls[:, :, motors] = winches.deliver(sent, own)
         found = move(batch, controls, RECORD, every, every - 1)
         yield _piece(twin, batch, time[every - 1 :: every], found)
+
+
+def eased(model: mujoco.MjModel, hanging: bool) -> mujoco.MjModel:
+    """A copy with contacts that cost less: of less stiff friction, and of what hangs, one point for each unit of the
+    arm that touches it, round as both are. What stands needs several, or it would rock."""
+    model = copy.copy(model)
+    model.opt.impratio = min(EASED_IMPRATIO, model.opt.impratio)
+    if hanging:
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_MULTICCD
+    return model
 
 
 @dataclass(frozen=True)
