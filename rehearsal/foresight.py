@@ -17,6 +17,7 @@ from trunkline.hybrid.preview import Holding, Preview, preview
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.messages import Offer, Targets, Thing, World
 from trunkline.teleop.plan import Plan
+from trunkline.teleop.things import grip_of, way_of_grasping
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Foreseen:
 
 @dataclass(frozen=True)
 class Foresight:
-    """grips: those of the planner, by what supports a thing."""
+    """grips: those of the planner, by the way of grasping."""
 
     known: Believed
     grips: dict[str, Grip]
@@ -69,9 +70,9 @@ class Foresight:
     def _offer(
         self, twin: Twin, way: Way, holding: Holding, targets: Targets, thing: Thing, own: float, seed: int
     ) -> Offer | None:
-        s, centre = self.settings, np.array(thing.position)
+        s, centre = self.settings, np.array(grip_of(thing))
         mount = np.array(targets.rigid.position) - centre
-        places = self.grips[thing.support].near(_rotation(targets), mount, thing.diameter)
+        places = self.grips[way_of_grasping(thing)].near(_rotation(targets), mount, thing.diameter)
         shares = try_places(twin, way, self.known.doubts, holding, places - mount, s.assistant, seed + 1)
         chosen = best(places - mount, shares)
         if shares[chosen] <= own:

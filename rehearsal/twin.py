@@ -19,6 +19,7 @@ from trunkline.hybrid.worlds import World as Room
 from trunkline.panda.kinematics import mount_pose
 from trunkline.simulation.rest import settle
 from trunkline.teleop.messages import Box, Thing, World
+from trunkline.teleop.vectors import Quaternion, unit
 from trunkline.unity import unpacked
 
 
@@ -50,10 +51,13 @@ def compose_twin(
 ) -> Twin:
     """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands."""
     robot = replace(known.robot, ready=joints.tolist())
-    place = np.array(thing.position)
-    room = Room(None, {box.name: _surface(box) for box in world.boxes}, None)
-    shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material)
-    spec = compose(known.arm, robot, room, Placed(shaped, place, thing.quaternion))
+    place, turn = np.array(thing.position), thing.quaternion
+    surfaces = {box.name: _surface(box) for box in world.boxes}
+    shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material, thing.basket)
+    if thing.support == "standing":
+        turn = _upright(turn)
+        _stand(place, shaped.half_height, list(surfaces.values()))
+    spec = compose(known.arm, robot, Room(None, surfaces, None), Placed(shaped, place, turn))
     if thing.support == "hanging":
         hang(spec, place, thing.diameter / 2, settings.string)
     model, arm = spec.compile(), known.arm.copy().compile()
@@ -74,6 +78,20 @@ def _start(
         if name:
             pose[model.joint(name).qposadr[0]] = rest[arm.jnt_qposadr[number]]
     return pose
+
+
+def _upright(quaternion: Quaternion) -> Quaternion:
+    """Its turn about the vertical alone."""
+    w, _, _, z = quaternion
+    return unit((w, 0.0, 0.0, z))
+
+
+def _stand(place: np.ndarray, half_height: float, surfaces: list[Surface]) -> None:
+    """Put the board under `place` (3,), m, to where what stands there says that it is: both are seen not quite true."""
+    under = [board for board in surfaces if (np.abs(place[:2] - board.top[:2]) <= np.array(board.size[:2]) / 2).all()]
+    if under:
+        highest = max((board for board in under if board.top[2] < place[2]), key=lambda board: board.top[2])
+        highest.top[2] = float(place[2] - half_height)
 
 
 def _surface(box: Box) -> Surface:

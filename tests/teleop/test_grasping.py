@@ -9,7 +9,7 @@ from tests.support.operator import DT, PACKAGE, Operator, config
 from tests.teleop.test_plan import LENGTH, LIMITS, MOUNT, NETWORK, OFFSET, START, STRAIGHT
 from trunkline.arm.spiral import spiral_chain
 from trunkline.errors import InputError
-from trunkline.hybrid.placements import HangingGrip
+from trunkline.hybrid.placements import SideGrip
 from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.grasping import Grasping
 from trunkline.teleop.messages import (
@@ -32,7 +32,7 @@ from trunkline.teleop.trajectory import gentle
 from trunkline.teleop.vectors import DOWN
 
 GEOMETRY = spiral_chain(length=LENGTH, base_width=0.080, tip_width=0.012, units=24)
-GRIP = HangingGrip(config().hanging, GEOMETRY)
+GRIP = SideGrip(config().hanging, GEOMETRY)
 HANDLING = config().handling
 BALL = Thing("the ball", "sphere", 0.05, 0.05, 0.1, (0.55, 0.1, 0.15))
 
@@ -60,7 +60,7 @@ def test_a_grasp_comes_from_the_side_closes_and_lifts(planner):
     mounts = mount_pose(plan.joints, OFFSET)[0]
     at = mounts[starts["curl"]]
     np.testing.assert_allclose(at, MOUNT, atol=1e-3)
-    np.testing.assert_allclose(mounts[starts["lift"]] - at, [0, 0, -HANDLING.sink], atol=1e-3)
+    np.testing.assert_allclose(mounts[starts["lift"]] - at, [0, 0, -config().hanging.sink], atol=1e-3)
     np.testing.assert_allclose(mounts[-1] - at, [0, 0, HANDLING.lift], atol=1e-3)
     last = mounts[: starts["curl"]][-100:]  # heading 0: the object is at +x
     assert (last[:, 0] < MOUNT[0] + 1e-3).all()

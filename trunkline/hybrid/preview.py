@@ -26,8 +26,8 @@ class Holding:
     """What counts as held, from the time `since`, s, when the object loses its support or is lifted, to the end.
 
     Attributes:
-        sag: m, by which the object may move against the mount, which the arm bears: it gives way and swings. What is
-            lifted must be lifted by more.
+        sag: m, by which what the arm wraps of the object may move against the mount, which the arm bears: it gives way
+            and swings. What is lifted must be lifted by more.
         slip: m, by which it may move away from the nearest unit.
         lifted: m, by which it must be higher then than at first.
     """
@@ -40,12 +40,12 @@ class Holding:
     def holds(self, motion: Piece) -> np.ndarray:
         """Which futures hold the object. Shape (B,)."""
         first = int(np.argmin(np.abs(motion.time - self.since)))
-        beside = motion.object[:, :, :3] - motion.mount
+        beside = motion.grip - motion.mount
         with np.errstate(invalid="ignore"):
             stays = np.linalg.norm(beside[:, -1] - beside[:, first], axis=1) < self.sag
             stays &= motion.away[:, -1] < motion.away[:, first] + self.slip
             if self.lifted is not None:
-                stays &= motion.object[:, first, 2] - motion.object[:, 0, 2] > self.lifted
+                stays &= motion.grip[:, first, 2] - motion.grip[:, 0, 2] > self.lifted
         return stays & motion.sound
 
 
@@ -125,5 +125,5 @@ def preview(
 def joined(pieces: list[Piece]) -> Piece:
     """Pieces one after the other; sound is what is so at last."""
     along = {name: np.concatenate([getattr(piece, name) for piece in pieces], axis=1)
-             for name in ("qpos", "tip", "mount", "object", "away")}  # fmt: skip
+             for name in ("qpos", "tip", "mount", "object", "grip", "away")}  # fmt: skip
     return Piece(time=np.concatenate([piece.time for piece in pieces]), sound=pieces[-1].sound, **along)
