@@ -114,7 +114,7 @@ def test_what_is_held_is_brought_down_and_let_go(planner):
     speed = np.linalg.norm(np.diff(mounts[:release], axis=0), axis=1).max() / plan.step
     assert speed < 3 * HANDLING.carry
     assert (STRAIGHT - plan.commands[-1]).max() <= 1e-9
-    np.testing.assert_allclose(mounts[-1] - goal, [0, 0, HANDLING.rise], atol=1e-3)
+    np.testing.assert_allclose(mounts[-1] - goal, [0, 0, config().hanging.rise], atol=1e-3)
 
 
 REFUSED = {

@@ -41,6 +41,11 @@ class Placement:
 class Grip(Protocol):
     """A way of grasping."""
 
+    @property
+    def rise(self) -> float:
+        """m, by which the mount rises as the arm opens again, to let go."""
+        ...
+
     def placed(self, rotation: np.ndarray, mount: np.ndarray) -> Placement:
         """With the mount where the user has it."""
         ...
@@ -55,13 +60,15 @@ class Grip(Protocol):
 class SideSettings:
     """grasp: the grasp frame. pull: m, of the cables that close; the motors' force ends it sooner. loose: m, by which
     the others are paid out. sink: m, by which the mount goes down meanwhile, as a coil that closes rises, so that what
-    supports a thing bears it until the end. aside: m, from which the mount comes. along, beside: m, places that the
+    supports a thing bears it until the end. rise: m, by which the mount rises as the arm opens again, to let it go.
+    aside: m, from which the mount comes. along, beside: m, places that the
     assistant tries about the grasp frame, along the arm and away from the object."""
 
     grasp: Grasp
     pull: Metres
     loose: Metres
     sink: Metres
+    rise: Metres
     aside: Metres
     along: Annotated[list[Offset], Field(min_length=1, max_length=9)]
     beside: Annotated[list[Offset], Field(min_length=1, max_length=9)]
@@ -74,6 +81,10 @@ class SideGrip:
 
     settings: SideSettings
     geometry: ChainGeometry
+
+    @property
+    def rise(self) -> float:
+        return self.settings.rise
 
     def placed(self, rotation: np.ndarray, mount: np.ndarray) -> Placement:
         front = _in_front(rotation, mount)

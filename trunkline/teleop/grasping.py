@@ -28,8 +28,8 @@ class Handling:
 
     close: s, at least, for the cables to close. calm: s for which all waits before it and after it.
     lift: m. carry: m/s, of the mount with something in the arm, on the average. above: m over its place from which a
-    thing comes down. rise: m by which the mount rises as the arm opens, in `open` s at least. beneath: m, at most, that
-    a thing may fall as it is let go. payload: of each way of grasping, rows of diameter, m, and the heaviest mass, kg,
+    thing comes down. open: s, at least, in which the arm opens while the mount rises. beneath: m, at most, that a
+    thing may fall as it is let go. payload: of each way of grasping, rows of diameter, m, and the heaviest mass, kg,
     that is grasped, linear between.
     """
 
@@ -38,7 +38,6 @@ class Handling:
     lift: Metres
     carry: Metres
     above: Metres
-    rise: Metres
     open: Seconds
     beneath: Metres
     payload: dict[str, Annotated[list[tuple[Metres, Mass]], Field(min_length=1, max_length=50)]]
@@ -138,14 +137,14 @@ class Grasping:
         """
         h, place = self.handling, np.array(targets.rigid.position)
         _require_ground(thing, targets.tip.position, world, h.beneath)
-        opened = np.maximum(commands, self.straight)
+        opened, rise = np.maximum(commands, self.straight), self.grips[way_of_grasping(thing)].rise
         above = self._solve(joints, place + h.above * UP, targets)
         there = self._solve(above, place, targets)
         away = np.linalg.norm(place + h.above * UP - mount_pose(joints[None], self.mount_offset)[0][0])
         return [
             Leg("transfer", above, commands, seconds=float(away) / h.carry, calm=h.calm, gentle=True),
             Leg("transfer", there, commands, seconds=h.above / h.carry, calm=h.calm, gentle=True),
-            Leg("release", self._solve(there, place + h.rise * UP, targets), opened, seconds=h.open),
+            Leg("release", self._solve(there, place + rise * UP, targets), opened, seconds=h.open),
         ]
 
     def _solve(self, start: np.ndarray, mount: np.ndarray, targets: Targets) -> np.ndarray:

@@ -11,8 +11,10 @@ WHOLE = np.eye(3)
 
 
 def way_of_grasping(thing: Thing) -> str:
-    """What a basket is grasped by is its bar, whatever supports it; all else is grasped as its support allows."""
-    return "basket" if thing.shape == "basket" else thing.support
+    """A basket is grasped by its bar, whatever supports it; all else is as it hangs, and is in the arm since it did."""
+    if thing.shape == "basket":
+        return "basket"
+    return "standing" if thing.support == "standing" else "hanging"
 
 
 def grip_of(thing: Thing) -> Vector:
