@@ -44,15 +44,15 @@ class Foresight:
     grips: dict[str, Grip]
     settings: Previewing
 
-    def grasp(self, plan: Plan, targets: Targets, thing: Thing, world: World, beside: float, seed: int) -> Foreseen:
+    def grasp(self, plan: Plan, targets: Targets, thing: Thing, world: World, hangs: np.ndarray, seed: int) -> Foreseen:
         """Futures of a plan to grasp; where they are not sure to hold, the assistant looks for a better place.
 
         Args:
-            beside: m, for which the plan's mount makes up (`Grasping.grasp`); the twin's arm is straight.
+            hangs: where the straight arm's tip is seen in its base frame, (3,), m: the twin leans likewise.
         """
         s, way, begins = self.settings, *self.way(plan, "curl")
-        x, y, z = (float(value) for value in thing.position - beside * _rotation(targets)[:, 1])
-        twin = compose_twin(self.known, world, replace(thing, position=(x, y, z)), way.joints[0], way.commands[0], s)
+        lean = self.known.lean(hangs)
+        twin = compose_twin(self.known, world, thing, way.joints[0], way.commands[0], s, lean)
         holding = Holding(way.duration - s.hold, s.sag, s.slip, s.lifted)
         found = Foreseen(preview(twin, way, self.known.doubts, holding, s.futures, seed), begins)
         if found.probability >= s.sure or s.assistant == 0:

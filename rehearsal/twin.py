@@ -4,10 +4,11 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rehearsal.settings import Previewing
 from trunkline.errors import InputError
-from trunkline.frames import STANDARD_GRAVITY
+from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz, wxyz_from_rotation
 from trunkline.hybrid.compose import Placed, compose, panda_joints
 from trunkline.hybrid.doubts import Contact, Doubts
 from trunkline.hybrid.futures import Twin
@@ -19,8 +20,10 @@ from trunkline.hybrid.worlds import World as Room
 from trunkline.panda.kinematics import mount_pose
 from trunkline.simulation.rest import settle
 from trunkline.teleop.messages import Box, Thing, World
-from trunkline.teleop.vectors import Quaternion, unit
+from trunkline.teleop.vectors import Quaternion, least_rotation, unit
 from trunkline.unity import unpacked
+
+GRAVITY = np.array([[0.0, 0.0, -STANDARD_GRAVITY]])  # m/s², where the arm hangs straight down
 
 
 @dataclass(frozen=True)
@@ -30,6 +33,17 @@ class Believed:
     arm: mujoco.MjSpec
     doubts: Doubts
     robot: PandaRobot
+
+    def lean(self, hangs: np.ndarray) -> Rotation:
+        """The least turn of the arm on its mount by which its tip, straight down, is seen at `hangs` (3,), m, in the
+        base frame."""
+        arm = self.arm.copy().compile()
+        straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
+        x, y, z = (float(value) for value in settle(arm, straight[None], GRAVITY).position[0])
+        a, b, c = (float(value) for value in hangs)
+        seen, own = np.linalg.norm((a, b, c)), np.linalg.norm((x, y, z))
+        turn = least_rotation((x / own, y / own, z / own), (a / seen, b / seen, c / seen))
+        return rotation_from_wxyz(np.array(turn))
 
 
 def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
@@ -47,9 +61,16 @@ def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
 
 
 def compose_twin(
-    known: Believed, world: World, thing: Thing, joints: np.ndarray, commands: np.ndarray, settings: Previewing
+    known: Believed,
+    world: World,
+    thing: Thing,
+    joints: np.ndarray,
+    commands: np.ndarray,
+    settings: Previewing,
+    lean: Rotation,
 ) -> Twin:
-    """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands."""
+    """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands;
+    `lean` is how its arm is turned on its mount."""
     robot = replace(known.robot, ready=joints.tolist())
     place, turn = np.array(thing.position), thing.quaternion
     surfaces = {box.name: _surface(box) for box in world.boxes}
@@ -58,18 +79,24 @@ def compose_twin(
         turn = _upright(turn)
         _stand(place, shaped.half_height, list(surfaces.values()))
     spec = compose(known.arm, robot, Room(None, surfaces, None), Placed(shaped, place, turn))
+    spec.body("base").quat = wxyz_from_rotation(lean)
     if thing.support == "hanging":
         hang(spec, place, thing.diameter / 2, settings.string)
     model, arm = spec.compile(), known.arm.copy().compile()
-    return Twin(model, arm, _start(model, arm, joints, commands, robot.mount_offset)).stepped(settings.step)
+    return Twin(model, arm, _start(model, arm, joints, commands, robot.mount_offset, lean)).stepped(settings.step)
 
 
 def _start(
-    model: mujoco.MjModel, arm: mujoco.MjModel, joints: np.ndarray, commands: np.ndarray, mount_offset: float
+    model: mujoco.MjModel,
+    arm: mujoco.MjModel,
+    joints: np.ndarray,
+    commands: np.ndarray,
+    mount_offset: float,
+    lean: Rotation,
 ) -> np.ndarray:
     """The composed model's pose (nq,) with the arm at rest."""
     flange = mount_pose(joints[None], mount_offset)[1][0]
-    gravity = (flange @ np.diag([1.0, -1.0, -1.0])).T @ [0.0, 0.0, -STANDARD_GRAVITY]
+    gravity = lean.inv().apply((flange @ np.diag([1.0, -1.0, -1.0])).T @ GRAVITY[0])
     rest = settle(arm, commands[None], gravity).qpos[0]
     pose = model.qpos0.copy()
     pose[model.jnt_qposadr[panda_joints(model)]] = joints

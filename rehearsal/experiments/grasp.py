@@ -115,9 +115,7 @@ def grasp(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed)
     ending, frames, _ = rehearse(session, operator.grasp(beside(bench, object), s.accept, s.hold))
-    result = Result(
-        "grasp", seed, False, seconds=session.now, object=object.name, package=session.package.digest[:12]
-    )
+    result = Result("grasp", seed, False, seconds=session.now, object=object.name, package=session.package.digest[:12])
     if not isinstance(ending, Ending):
         result.cause = "stopped: the run did not end"
         return result, frames

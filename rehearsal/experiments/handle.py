@@ -31,9 +31,7 @@ def handle(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     below = thing.half_height + thing.grip[2] if thing.shape == "basket" else thing.diameter / 2
     spot = session.seen(np.array(table.top)) + [0.0, 0.0, below + s.drop]
     ending, frames, _ = rehearse(session, operator.handle(beside(bench, object), spot, s.accept, s.calm))
-    result = Result(
-        "handle", seed, False, seconds=session.now, object=object.name, package=session.package.digest[:12]
-    )
+    result = Result("handle", seed, False, seconds=session.now, object=object.name, package=session.package.digest[:12])
     if not isinstance(ending, Ending):
         result.cause = "stopped: the run did not end"
         return result, frames
