@@ -85,6 +85,7 @@ class Session:
         self.previewed: np.ndarray | None = None
         self.now, self.rays, self.moved, self.began = 0.0, (None, None), False, 0.0
         self.foreseen: Foreseen | None = None
+        self.grasped: Foreseen | None = None  # of the grasp of what the arm holds
         self.straight: list[np.ndarray] = []  # m, readings of the straight arm's tip in its base frame, (3,) each
         self.believed = ""  # digest of the newest plan of whose end the world tells
         self.tips: list[tuple[float, np.ndarray]] = []  # s since a plan began, and where its tip is seen, m
@@ -149,7 +150,7 @@ class Session:
     def _plan(self, intent: Intent) -> None:
         request = intent.request
         assert request is not None
-        self.foreseen, self.previewed = None, None
+        before, self.foreseen, self.previewed = self.foreseen, None, None
         try:
             here = self.executor.joints, self.executor.commands
             self.plan = self.planner.plan(request, self.world, *here, float(self.hangs[1]))
@@ -160,7 +161,14 @@ class Session:
         self.report = PlanReport(request.serial, plan.digest(), "", plan.package, plan.world)
         if request.targets.thing:
             thing = self.world.thing(request.targets.thing)
-            if self.foresight is not None and thing.support != "held":
+            if self.foresight is not None and thing.support == "held":
+                self.grasped = self.grasped or before
+                assert self.grasped is not None
+                self.foreseen = self.foresight.bring(
+                    plan, request.targets, thing, self.world, self.hangs, self.grasped, request.serial
+                )
+            elif self.foresight is not None:
+                self.grasped = None
                 self.foreseen = self.foresight.grasp(
                     plan, request.targets, thing, self.world, self.hangs, request.serial
                 )

@@ -68,9 +68,11 @@ def compose_twin(
     commands: np.ndarray,
     settings: Previewing,
     lean: Rotation,
+    left: np.ndarray | None = None,
 ) -> Twin:
     """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands;
-    `lean` is how its arm is turned on its mount."""
+    `lean` is how its arm is turned on its mount. With a thing in the arm all is as an earlier preview `left` it:
+    the pose (nq,) at its end, of a model with a string or without."""
     robot = replace(known.robot, ready=joints.tolist())
     place, turn = np.array(thing.position), thing.quaternion
     surfaces = {box.name: _surface(box) for box in world.boxes}
@@ -83,7 +85,10 @@ def compose_twin(
     if thing.support == "hanging":
         hang(spec, place, thing.diameter / 2, settings.string)
     model, arm = spec.compile(), known.arm.copy().compile()
-    return Twin(model, arm, _start(model, arm, joints, commands, robot.mount_offset, lean)).stepped(settings.step)
+    start = _start(model, arm, joints, commands, robot.mount_offset, lean)
+    if left is not None:
+        start = left[: model.nq].copy()  # a string, which comes last, is left out
+    return Twin(model, arm, start).stepped(settings.step)
 
 
 def _start(

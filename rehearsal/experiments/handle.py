@@ -4,7 +4,7 @@ import numpy as np
 
 from rehearsal import settings
 from rehearsal.experiments.bench import Bench, Seen, rehearse
-from rehearsal.experiments.grasp import TABLE, beside, failure, held_after, offered, session_of
+from rehearsal.experiments.grasp import TABLE, beside, failure, held_after, offered, session_of, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.robot.scene import Scene, Surface
@@ -37,9 +37,7 @@ def handle(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
         return result, frames
     result.cause = why_not(ending, frames, session.robot.scene, s)
     result.success = not result.cause
-    result.plans, result.probability = ending.plans, ending.probability
-    if np.isfinite(ending.probability):
-        result.agreed = float((ending.probability >= 0.5) == result.success)
+    tell(result, ending, session)
     return result, frames
 
 

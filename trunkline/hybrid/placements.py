@@ -1,7 +1,7 @@
 """How an arm is placed to grasp something: where the mount is, whence it comes, what the cables do before and to close.
 
 A `Grip` knows that for one way of grasping. The mount's own place is the user's: a grip says what belongs to it, and
-which places nearby may hold more surely. All places are about what the arm wraps: an object's centre, or a basket's bar.
+which places nearby may hold more surely. Places are about what the arm wraps: an object's centre, or a basket's bar.
 """
 
 from dataclasses import dataclass
@@ -76,8 +76,8 @@ class SideSettings:
 
 @dataclass(frozen=True)
 class SideGrip:
-    """Of what hangs, and of a basket by its bar: the straight arm comes from the side, towards the object, so that what it
-    may push aside it does not turn, and curls round it."""
+    """Of what hangs, and of a basket by its bar: the straight arm comes from the side, towards the object, so that what
+    it may push aside it does not turn, and curls round it."""
 
     settings: SideSettings
     geometry: ChainGeometry

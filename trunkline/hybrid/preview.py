@@ -8,7 +8,7 @@ true the model is.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Protocol
 
 import numpy as np
 from pydantic import Field
@@ -19,6 +19,14 @@ from trunkline.hybrid.shares import wilson
 
 Metres = Annotated[float, Field(gt=0, le=1)]
 WITHIN = 0.9  # share of futures whose tips are within the spread
+
+
+class Outcome(Protocol):
+    """What is asked of a plan: `Holding`, or `trunkline.hybrid.resting.Resting`."""
+
+    def holds(self, motion: Piece) -> np.ndarray:
+        """In which futures it comes true. Shape (B,)."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,7 @@ class Preview:
         nominal: the motion of the twin as it is believed, B = 1.
         motion: of the B futures.
         draws: what each future has.
-        held: which of them hold the object; None if nobody asked. Shape (B,).
+        held: which of them hold the object, or do what else was asked; None if nobody asked. Shape (B,).
     """
 
     nominal: Piece
@@ -102,7 +110,7 @@ def preview(
     twin: Twin,
     way: Way,
     doubts: Doubts,
-    holding: Holding | None = None,
+    holding: Outcome | None = None,
     count: int = 32,
     seed: int = 0,
     show: Callable[[Piece], None] = lambda piece: None,
@@ -110,7 +118,7 @@ def preview(
     """Try a plan in `count` futures.
 
     Args:
-        holding: what counts as held; None where nothing is grasped.
+        holding: what is asked of the plan; None where nothing is grasped.
         show: called with each piece of the nominal motion, before any future is simulated.
     """
     begun = []

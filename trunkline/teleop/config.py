@@ -14,7 +14,8 @@ from trunkline.teleop.trajectory import MotorLimits
 
 @settings
 class Config:
-    """`hanging`, `basket`: how what hangs and what has a handle is grasped. `mount_offset`: m, from the Panda's flange to the soft arm's mount."""
+    """`hanging`, `basket`: how what hangs and what has a handle is grasped. `mount_offset`: m, from the Panda's flange
+    to the soft arm's mount."""
 
     core: Teleop
     motors: MotorLimits

@@ -13,7 +13,7 @@ from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.messages import Targets, Thing, World
 from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.things import below_grip, grip_of, way_of_grasping
+from trunkline.teleop.things import below_grip, beneath, grip_of, way_of_grasping
 from trunkline.teleop.vectors import DOWN, Vector, conjugate, rotate
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -163,10 +163,10 @@ def _require_ground(thing: Thing, place: Vector, world: World, most: float) -> N
         InputError: telling what is missing.
     """
     x, y, z = place[0], place[1], place[2] - below_grip(thing)
-    under = [box for box in world.boxes if box.low[0] <= x <= box.high[0] and box.low[1] <= y <= box.high[1]]
-    gaps = [z - box.high[2] for box in under if box.high[2] <= z]
-    if not gaps or min(gaps) > most:
-        found = f"{1e3 * min(gaps):.0f} mm" if gaps else "nothing"
+    box = beneath((x, y, z), world)
+    gap = np.inf if box is None else z - box.high[2]
+    if gap > most:
+        found = "nothing" if box is None else f"{1e3 * gap:.0f} mm"
         raise InputError(
             f"release: found {found} between {thing.name} and what is beneath it, expected at most {1e3 * most:.0f} mm"
         )

@@ -36,7 +36,8 @@ def place(
 ) -> Targets:
     """Both targets (base frame, m) with their reach under the gravity that the arm will have there.
 
-    A tip target that marks a thing is where the arm grips it. Whether it can be grasped no map tells: plan and preview do.
+    A tip target that marks a thing is where the arm grips it. Whether it can be grasped no map tells: plan and preview
+    do.
     """
     thing = marked(tip, world, settings.mark)
     tip = tip if thing is None else grip_of(thing)

@@ -4,7 +4,7 @@ import numpy as np
 
 from trunkline.frames import rotation_from_wxyz
 from trunkline.hybrid.basket import Part, bar_height, parts_of
-from trunkline.teleop.messages import Thing
+from trunkline.teleop.messages import Box, Thing, World
 from trunkline.teleop.vectors import Vector, add, rotate
 
 WHOLE = np.eye(3)
@@ -31,6 +31,13 @@ def below_grip(thing: Thing) -> float:
     turn = rotation_from_wxyz(np.array(thing.quaternion)).as_matrix()
     lowest = min(float(turn[2] @ part.place) - _half_extent(part, turn) for part in _parts(thing))
     return grip_of(thing)[2] - thing.position[2] - lowest
+
+
+def beneath(place: Vector, world: World) -> Box | None:
+    """The highest solid that is beneath `place`, m; None where there is none."""
+    x, y, z = place
+    under = [box for box in world.boxes if box.low[0] <= x <= box.high[0] and box.low[1] <= y <= box.high[1]]
+    return max((box for box in under if box.high[2] <= z), key=lambda box: box.high[2], default=None)
 
 
 def _parts(thing: Thing) -> list[Part]:
