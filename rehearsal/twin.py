@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from rehearsal.settings import Previewing
 from trunkline.errors import InputError
-from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz, wxyz_from_rotation
+from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.hybrid.compose import Placed, compose, panda_joints
 from trunkline.hybrid.doubts import Contact, Doubts
 from trunkline.hybrid.futures import Twin
@@ -20,7 +20,7 @@ from trunkline.hybrid.worlds import World as Room
 from trunkline.panda.kinematics import mount_pose
 from trunkline.simulation.rest import settle
 from trunkline.teleop.messages import Box, Thing, World
-from trunkline.teleop.vectors import Quaternion, least_rotation, unit
+from trunkline.teleop.vectors import Quaternion, unit
 from trunkline.unity import unpacked
 
 GRAVITY = np.array([[0.0, 0.0, -STANDARD_GRAVITY]])  # m/s², where the arm hangs straight down
@@ -39,11 +39,8 @@ class Believed:
         base frame."""
         arm = self.arm.copy().compile()
         straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
-        x, y, z = (float(value) for value in settle(arm, straight[None], GRAVITY).position[0])
-        a, b, c = (float(value) for value in hangs)
-        seen, own = np.linalg.norm((a, b, c)), np.linalg.norm((x, y, z))
-        turn = least_rotation((x / own, y / own, z / own), (a / seen, b / seen, c / seen))
-        return rotation_from_wxyz(np.array(turn))
+        own = settle(arm, straight[None], GRAVITY).position[0]
+        return Rotation.align_vectors(hangs[None], own[None])[0]  # of one pair the least
 
 
 def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
