@@ -1,6 +1,7 @@
 """What a client shows of a plan for a grasp or a hand-over before it is confirmed: a preview, and perhaps an offer.
 
-Futures begin where the approach ends: until then nothing is touched.
+Futures of a grasp begin where the approach ends: until then nothing is touched. Those of a hand-over begin with the arm
+and the thing as the nominal preview of its grasp left them, and end when the arm is gone.
 """
 
 from dataclasses import dataclass, replace
@@ -11,12 +12,17 @@ from rehearsal.settings import Previewing
 from rehearsal.twin import Believed, compose_twin
 from trunkline.frames import rotation_from_wxyz
 from trunkline.hybrid.assistant import best, try_places
+from trunkline.hybrid.doubts import Contact
 from trunkline.hybrid.futures import Twin, Way
 from trunkline.hybrid.placements import Grip
 from trunkline.hybrid.preview import Holding, Preview, preview
+from trunkline.hybrid.resting import Resting
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.messages import Offer, Targets, Thing, World
 from trunkline.teleop.plan import Plan
+from trunkline.teleop.things import beneath, grip_of, way_of_grasping
+
+NOWHERE = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -37,26 +43,43 @@ class Foreseen:
 
 @dataclass(frozen=True)
 class Foresight:
-    """grips: those of the planner, by what supports a thing."""
+    """grips: those of the planner, by the way of grasping."""
 
     known: Believed
     grips: dict[str, Grip]
     settings: Previewing
 
-    def grasp(self, plan: Plan, targets: Targets, thing: Thing, world: World, beside: float, seed: int) -> Foreseen:
+    def grasp(self, plan: Plan, targets: Targets, thing: Thing, world: World, hangs: np.ndarray, seed: int) -> Foreseen:
         """Futures of a plan to grasp; where they are not sure to hold, the assistant looks for a better place.
 
         Args:
-            beside: m, for which the plan's mount makes up (`Grasping.grasp`); the twin's arm is straight.
+            hangs: where the straight arm's tip is seen in its base frame, (3,), m: the twin leans likewise.
         """
         s, way, begins = self.settings, *self.way(plan, "curl")
-        x, y, z = (float(value) for value in thing.position - beside * _rotation(targets)[:, 1])
-        twin = compose_twin(self.known, world, replace(thing, position=(x, y, z)), way.joints[0], way.commands[0], s)
+        lean = self.known.lean(hangs)
+        twin = compose_twin(self.known, world, thing, way.joints[0], way.commands[0], s, lean)
         holding = Holding(way.duration - s.hold, s.sag, s.slip, s.lifted)
         found = Foreseen(preview(twin, way, self.known.doubts, holding, s.futures, seed), begins)
         if found.probability >= s.sure or s.assistant == 0:
             return found
         return replace(found, offer=self._offer(twin, way, holding, targets, thing, found.probability, seed))
+
+    def bring(
+        self, plan: Plan, targets: Targets, thing: Thing, world: World, hangs: np.ndarray, before: Foreseen, seed: int
+    ) -> Foreseen:
+        """Futures of a plan to bring what is held elsewhere: whether it rests there.
+
+        Args:
+            before: of the grasp. What is not known of the thing's place is none of a thing in the arm.
+        """
+        s, way, begins = self.settings, *self.way(plan, "transfer")
+        lean, pose = self.known.lean(hangs), before.preview.nominal.qpos[0, -1]
+        twin = compose_twin(self.known, world, thing, way.joints[0], way.commands[0], s, lean, pose)
+        doubts = replace(self.known.doubts, contact=Contact(self.known.doubts.contact.friction, NOWHERE, 0.0))
+        board = beneath(targets.tip.position, world)
+        assert board is not None  # else the planner refuses
+        resting = Resting(plan.step * dict(plan.phases)["release"], np.array(board.low), np.array(board.high))
+        return Foreseen(preview(twin, way, doubts, resting, s.futures, seed), begins)
 
     def way(self, plan: Plan, first: str) -> tuple[Way, float]:
         """The plan from the phase `first` on, held for a while at its end, and when that phase begins, s."""
@@ -69,9 +92,9 @@ class Foresight:
     def _offer(
         self, twin: Twin, way: Way, holding: Holding, targets: Targets, thing: Thing, own: float, seed: int
     ) -> Offer | None:
-        s, centre = self.settings, np.array(thing.position)
+        s, centre = self.settings, np.array(grip_of(thing))
         mount = np.array(targets.rigid.position) - centre
-        places = self.grips[thing.support].near(_rotation(targets), mount, thing.diameter)
+        places = self.grips[way_of_grasping(thing)].near(_rotation(targets), mount, thing.diameter)
         shares = try_places(twin, way, self.known.doubts, holding, places - mount, s.assistant, seed + 1)
         chosen = best(places - mount, shares)
         if shares[chosen] <= own:

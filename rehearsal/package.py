@@ -10,7 +10,7 @@ import numpy as np
 
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.hybrid.placements import Grip, HangingGrip
+from trunkline.hybrid.placements import Grip, SideGrip
 from trunkline.hybrid.touch import read_geometry
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain, read_chain
@@ -55,8 +55,8 @@ class Package:
         )  # fmt: skip
 
     def grips(self, config: Config) -> dict[str, Grip]:
-        """How things are grasped, by what supports them."""
-        return {"hanging": HangingGrip(config.hanging, self.geometry)}
+        """The ways of grasping things, by their names."""
+        return {"hanging": SideGrip(config.hanging, self.geometry), "basket": SideGrip(config.basket, self.geometry)}
 
     @cached_property
     def period(self) -> float:

@@ -85,7 +85,8 @@ class Session:
         self.previewed: np.ndarray | None = None
         self.now, self.rays, self.moved, self.began = 0.0, (None, None), False, 0.0
         self.foreseen: Foreseen | None = None
-        self.offs: list[float] = []  # m, readings of how far the straight arm's tip is beside its bending plane
+        self.grasped: Foreseen | None = None  # of the grasp of what the arm holds
+        self.straight: list[np.ndarray] = []  # m, readings of the straight arm's tip in its base frame, (3,) each
         self.believed = ""  # digest of the newest plan of whose end the world tells
         self.tips: list[tuple[float, np.ndarray]] = []  # s since a plan began, and where its tip is seen, m
         self.refusals: list[tuple[float, str]] = []  # times at which targets were not followed, and why
@@ -95,9 +96,10 @@ class Session:
         return self.robot.instruments.turn.apply(place) + self.robot.instruments.shift
 
     @property
-    def beside(self) -> float:
-        """m, by which the straight arm's tip was seen beside its bending plane, before the robot moved."""
-        return float(np.mean(self.offs))
+    def hangs(self) -> np.ndarray:
+        """Where the straight arm's tip was seen before the robot moved, in the frame of the arm's base, m. Shape (3,).
+        Its y is how far it is beside the bending plane."""
+        return np.mean(self.straight, axis=0)
 
     def frame(self) -> View:
         """Let a frame pass."""
@@ -110,7 +112,7 @@ class Session:
             self._believe(seen)
         if not self.moved:
             mount, flange = (found[0] for found in mount_pose(seen.joints[None], self.config.mount_offset))
-            self.offs.append(float((seen.tip - mount) @ -flange[:, 1]))  # the base's y is opposite to the flange's
+            self.straight.append((seen.tip - mount) @ flange * [1, -1, -1])  # y and z are opposite to the flange's
         given = Input(
             self.now, left, right, REFERENCE, joints, self.world, self.package.digest, self.report, self.shown,
             executor, self.foreseen.offer if self.foreseen is not None else None,
@@ -148,10 +150,10 @@ class Session:
     def _plan(self, intent: Intent) -> None:
         request = intent.request
         assert request is not None
-        self.foreseen, self.previewed = None, None
+        before, self.foreseen, self.previewed = self.foreseen, None, None
         try:
             here = self.executor.joints, self.executor.commands
-            self.plan = self.planner.plan(request, self.world, *here, self.beside)
+            self.plan = self.planner.plan(request, self.world, *here, float(self.hangs[1]))
         except InputError as error:
             self.report = PlanReport(request.serial, refused=str(error))
             return
@@ -159,9 +161,16 @@ class Session:
         self.report = PlanReport(request.serial, plan.digest(), "", plan.package, plan.world)
         if request.targets.thing:
             thing = self.world.thing(request.targets.thing)
-            if self.foresight is not None and thing.support != "held":
+            if self.foresight is not None and thing.support == "held":
+                self.grasped = self.grasped or before
+                assert self.grasped is not None
+                self.foreseen = self.foresight.bring(
+                    plan, request.targets, thing, self.world, self.hangs, self.grasped, request.serial
+                )
+            elif self.foresight is not None:
+                self.grasped = None
                 self.foreseen = self.foresight.grasp(
-                    plan, request.targets, thing, self.world, self.beside, request.serial
+                    plan, request.targets, thing, self.world, self.hangs, request.serial
                 )
             return
         mount, _ = mount_pose(plan.joints[-1:], self.config.mount_offset)

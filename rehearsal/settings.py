@@ -43,22 +43,29 @@ class Free:
 
 
 @dataclass
-class Grasped:
-    """Grasping what hangs, and handing it over: see conf/rehearse/experiments/grasp.yaml."""
+class Sizes:
+    """Between which an object of a shape is drawn: see conf/rehearse/experiments/grasp.yaml."""
 
-    shapes: Annotated[list[Literal["cylinder", "sphere"]], Field(min_length=1)]
     thin: Positive
     wide: Positive
     light: Positive
     heavy: Positive
     height: Positive
+    low: Metres
+    high: Metres
+
+
+@dataclass
+class Grasped:
+    """Grasping what hangs or stands, and handing it over: see conf/rehearse/experiments/grasp.yaml."""
+
+    shapes: Annotated[dict[Literal["cylinder", "sphere", "basket"], Sizes], Field(min_length=1)]
     string: Positive
+    stand: Annotated[list[Positive], Field(min_length=3, max_length=3)]
     yaw_deg: Zero
     near: Positive
     far: Positive
     side_deg: Positive
-    low: Metres
-    high: Metres
     hold: Positive
     slip: Positive
     lifted: Positive

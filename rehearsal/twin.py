@@ -4,10 +4,11 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rehearsal.settings import Previewing
 from trunkline.errors import InputError
-from trunkline.frames import STANDARD_GRAVITY
+from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.hybrid.compose import Placed, compose, panda_joints
 from trunkline.hybrid.doubts import Contact, Doubts
 from trunkline.hybrid.futures import Twin
@@ -19,7 +20,12 @@ from trunkline.hybrid.worlds import World as Room
 from trunkline.panda.kinematics import mount_pose
 from trunkline.simulation.rest import settle
 from trunkline.teleop.messages import Box, Thing, World
+from trunkline.teleop.vectors import Quaternion, unit
 from trunkline.unity import unpacked
+
+GRAVITY = np.array([[0.0, 0.0, -STANDARD_GRAVITY]])  # m/s², where the arm hangs straight down
+
+LEANS = 4  # times that it is corrected: each leaves a tenth or less
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,17 @@ class Believed:
     arm: mujoco.MjSpec
     doubts: Doubts
     robot: PandaRobot
+
+    def lean(self, hangs: np.ndarray) -> Rotation:
+        """How the arm is turned on its mount, by the least turns, so that its tip, straight down, comes to rest in the
+        direction of `hangs` (3,), m, in the base frame: what leans sags back a little."""
+        arm = self.arm.copy().compile()
+        straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
+        found = Rotation.identity()
+        for _ in range(LEANS):
+            own = settle(arm, straight[None], found.inv().apply(GRAVITY)).position
+            found = Rotation.align_vectors(hangs[None], found.apply(own))[0] * found  # of one pair the least
+        return found
 
 
 def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
@@ -46,26 +63,47 @@ def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
 
 
 def compose_twin(
-    known: Believed, world: World, thing: Thing, joints: np.ndarray, commands: np.ndarray, settings: Previewing
+    known: Believed,
+    world: World,
+    thing: Thing,
+    joints: np.ndarray,
+    commands: np.ndarray,
+    settings: Previewing,
+    lean: Rotation,
+    left: np.ndarray | None = None,
 ) -> Twin:
-    """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands."""
+    """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands;
+    `lean` is how its arm is turned on its mount. With a thing in the arm all is as an earlier preview `left` it:
+    the pose (nq,) at its end, of a model with a string or without."""
     robot = replace(known.robot, ready=joints.tolist())
-    place = np.array(thing.position)
-    room = Room(None, {box.name: _surface(box) for box in world.boxes}, None)
-    shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material)
-    spec = compose(known.arm, robot, room, Placed(shaped, place, thing.quaternion))
+    place, turn = np.array(thing.position), thing.quaternion
+    surfaces = {box.name: _surface(box) for box in world.boxes}
+    shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material, thing.basket)
+    if thing.support == "standing":
+        turn = _upright(turn)
+        _stand(place, shaped.half_height, list(surfaces.values()))
+    spec = compose(known.arm, robot, Room(None, surfaces, None), Placed(shaped, place, turn))
+    spec.body("base").quat = wxyz_from_rotation(lean)
     if thing.support == "hanging":
         hang(spec, place, thing.diameter / 2, settings.string)
     model, arm = spec.compile(), known.arm.copy().compile()
-    return Twin(model, arm, _start(model, arm, joints, commands, robot.mount_offset)).stepped(settings.step)
+    start = _start(model, arm, joints, commands, robot.mount_offset, lean)
+    if left is not None:
+        start = left[: model.nq].copy()  # a string, which comes last, is left out
+    return Twin(model, arm, start).stepped(settings.step)
 
 
 def _start(
-    model: mujoco.MjModel, arm: mujoco.MjModel, joints: np.ndarray, commands: np.ndarray, mount_offset: float
+    model: mujoco.MjModel,
+    arm: mujoco.MjModel,
+    joints: np.ndarray,
+    commands: np.ndarray,
+    mount_offset: float,
+    lean: Rotation,
 ) -> np.ndarray:
     """The composed model's pose (nq,) with the arm at rest."""
     flange = mount_pose(joints[None], mount_offset)[1][0]
-    gravity = (flange @ np.diag([1.0, -1.0, -1.0])).T @ [0.0, 0.0, -STANDARD_GRAVITY]
+    gravity = lean.inv().apply((flange @ np.diag([1.0, -1.0, -1.0])).T @ GRAVITY[0])
     rest = settle(arm, commands[None], gravity).qpos[0]
     pose = model.qpos0.copy()
     pose[model.jnt_qposadr[panda_joints(model)]] = joints
@@ -74,6 +112,20 @@ def _start(
         if name:
             pose[model.joint(name).qposadr[0]] = rest[arm.jnt_qposadr[number]]
     return pose
+
+
+def _upright(quaternion: Quaternion) -> Quaternion:
+    """Its turn about the vertical alone."""
+    w, _, _, z = quaternion
+    return unit((w, 0.0, 0.0, z))
+
+
+def _stand(place: np.ndarray, half_height: float, surfaces: list[Surface]) -> None:
+    """Put the board under `place` (3,), m, to where what stands there says that it is: both are seen not quite true."""
+    under = [board for board in surfaces if (np.abs(place[:2] - board.top[:2]) <= np.array(board.size[:2]) / 2).all()]
+    if under:
+        highest = max((board for board in under if board.top[2] < place[2]), key=lambda board: board.top[2])
+        highest.top[2] = float(place[2] - half_height)
 
 
 def _surface(box: Box) -> Surface:

@@ -44,7 +44,7 @@ def tell(bench: Bench, runs: int) -> None:
     print("|---|" + "---:|" * len(SHARES), flush=True)
     rows = []
     for seed in range(runs):
-        _, frames, session = run(bench, seed)
+        _, _, frames, session = run(bench, seed)
         if session.foreseen is None or not session.tips:
             continue
         rows.append(100 * np.array(shares(session, frames)) / bench.package.geometry.length)

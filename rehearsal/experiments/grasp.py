@@ -1,4 +1,7 @@
-"""Grasp what hangs: success is that it is lifted and held for some seconds, without slip or drop."""
+"""Grasp what hangs, or a basket that stands: success is that it is lifted and held, without slip or drop.
+
+For some seconds it must touch nothing but the arm.
+"""
 
 from dataclasses import dataclass
 
@@ -19,84 +22,106 @@ from trunkline.teleop.messages import Box, Thing
 from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.vectors import DOWN
 
-NAME = "the object"
+NAME, TABLE, STAND = "the object", "the table", "the stand"
 
 
 @dataclass
-class Hung:
-    """An object that hangs, and the horizontal direction from the arm to it that suits it, (3,)."""
+class Offered:
+    """An object that hangs or stands, what it `stands` on, and the horizontal direction from the arm to it that suits
+    it, (3,)."""
 
     thing: Object
     towards: np.ndarray
+    stands: Surface | None
+
+    @property
+    def name(self) -> str:
+        return f"{'standing' if self.stands else 'hanging'} {self.thing.shape}"
+
+    @property
+    def way(self) -> str:
+        """By which it is grasped: `trunkline.teleop.things.way_of_grasping`."""
+        return "basket" if self.thing.shape == "basket" else "hanging"
 
 
-def hung(bench: Bench, s: settings.Grasped, rng: np.random.Generator) -> Hung:
-    """A random object at a random place, no heavier than what may be grasped at its width."""
-    shape = s.shapes[rng.integers(len(s.shapes))]
-    diameter = float(rng.uniform(s.thin, s.wide))
-    heaviest = min(s.heavy, bench.config.handling.heaviest(diameter))
+def offered(bench: Bench, s: settings.Grasped, rng: np.random.Generator) -> Offered:
+    """A random object at a random place, no heavier than what may be grasped at its width. What is gripped of it is at
+    that place: a basket's bar."""
+    shape = list(s.shapes)[rng.integers(len(s.shapes))]
+    of, stands = s.shapes[shape], shape == "basket"
+    diameter = float(rng.uniform(of.thin, of.wide))
+    heaviest = min(of.heavy, bench.config.handling.heaviest("basket" if stands else "hanging", diameter))
     radius, azimuth = np.sqrt(rng.uniform(s.near**2, s.far**2)), np.radians(rng.uniform(-s.side_deg, s.side_deg))
-    place = [radius * np.cos(azimuth), radius * np.sin(azimuth), float(rng.uniform(s.low, s.high))]
-    yaw = azimuth + (np.radians(rng.uniform(-s.yaw_deg, s.yaw_deg)) if shape == "cylinder" else 0.0)
+    place = np.array([radius * np.cos(azimuth), radius * np.sin(azimuth), rng.uniform(of.low, of.high)])
+    yaw = azimuth + (np.radians(rng.uniform(-s.yaw_deg, s.yaw_deg)) if shape != "sphere" else 0.0)
     towards = np.array([np.cos(yaw), np.sin(yaw), 0.0])
-    level = Rotation.from_euler("z", yaw) * Rotation.from_euler("x", np.pi / 2)  # its axis level, across `towards`
-    mass = float(rng.uniform(s.light, heaviest))
-    turn = wxyz_from_rotation(level).tolist()
-    return Hung(Object(shape, diameter, s.height, mass, [float(x) for x in place], turn, hanging=True), towards)
+    level = Rotation.from_euler("x", 0.0 if stands else np.pi / 2)  # a cylinder's axis, as a basket's bar already is
+    turn = wxyz_from_rotation(Rotation.from_euler("z", yaw) * level).tolist()  # across `towards`
+    mass = float(rng.uniform(of.light, heaviest))
+    thing = Object(shape, diameter, of.height, mass, place.tolist(), turn, hanging=not stands)
+    if not stands:
+        return Offered(thing, towards, None)
+    thing.position = (place - thing.grip).tolist()
+    return Offered(thing, towards, Surface([*thing.position[:2], thing.position[2] - thing.half_height], list(s.stand)))
 
 
 def session_of(
-    bench: Bench, s: settings.Grasped, hung: Hung, operator: Operator, seed: int, table: Surface | None = None
+    bench: Bench, s: settings.Grasped, object: Offered, operator: Operator, seed: int, table: Surface | None = None
 ) -> Session:
-    """The stand-in at its ready pose, the object on its string, the client's world as it is seen at first."""
+    """The stand-in at its ready pose, the object on its string or its stand, the client's world as it is seen at
+    first."""
     x, y, z = bench.settings.mount_ready
-    ready, thing = RigidIK(bench.config.mount_offset).solve(START, (x, y, z), DOWN, 0.0), hung.thing
+    ready, thing = RigidIK(bench.config.mount_offset).solve(START, (x, y, z), DOWN, 0.0), object.thing
     hook = [thing.position[0], thing.position[1], thing.position[2] + thing.diameter / 2 + s.string]
-    surfaces = {} if table is None else {"table": table}
-    robot = StandInRobot(bench.arm, Scene(FLOOR, thing, surfaces, hook), bench.stand_in, ready, seed)
-    boxes = (FLOOR_BOX,) if table is None else (FLOOR_BOX, box_of(table))
+    surfaces = {name: board for name, board in ((TABLE, table), (STAND, object.stands)) if board is not None}
+    scene = Scene(FLOOR, thing, surfaces, None if object.stands else hook)
+    robot = StandInRobot(bench.arm, scene, bench.stand_in, ready, seed)
+    boxes = (FLOOR_BOX, *(box_of(name, board) for name, board in surfaces.items()))
     seen = robot.seen()
-    assert thing.shape != "basket"  # `Grasped.shapes` has none
     a, b, c = (float(value) for value in seen.thing)
     d, e, f, g = (float(value) for value in seen.thing_quaternion)
-    told = Thing(NAME, thing.shape, thing.diameter, thing.height, thing.mass, (a, b, c), (d, e, f, g))
+    told = Thing(
+        NAME, thing.shape, thing.diameter, thing.height, thing.mass, (a, b, c), (d, e, f, g),
+        "standing" if object.stands else "hanging", thing.basket,
+    )  # fmt: skip
     foresight = None
     if bench.judged:
         assert bench.known is not None
         foresight = Foresight(bench.known, bench.package.grips(bench.config), bench.previewing)
     return Session(
         bench.package, bench.config, robot, (operator.left, operator.right), make_world(boxes, (told,)),
-        lambda now: robot.truth().thing, foresight,
+        lambda now: robot.truth().grip, foresight,
     )  # fmt: skip
 
 
-def box_of(table: Surface) -> Box:
+def box_of(name: str, board: Surface) -> Box:
     """As the client is told of it."""
-    half, top = np.array(table.size) / 2, np.array(table.top)
+    half, top = np.array(board.size) / 2, np.array(board.top)
     (a, b, c), (d, e, f) = ((float(v) for v in corner) for corner in (top - half * [1, 1, 2], top + half * [1, 1, 0]))
-    return Box("the table", (a, b, c), (d, e, f))
+    return Box(name, (a, b, c), (d, e, f))
 
 
-def beside(bench: Bench, hung: Hung) -> np.ndarray:
-    """Where the operator means the mount to be, less the object's centre, (3,), m: the grasp frame."""
-    centre = object_in_base(bench.package.geometry, hung.thing.diameter, bench.config.hanging.grasp, "dorsal")
-    return -centre[0] * hung.towards - [0.0, 0.0, centre[2]]
+def beside(bench: Bench, object: Offered) -> np.ndarray:
+    """Where the operator means the mount to be, less what is gripped, (3,), m: the grasp frame."""
+    frame = bench.config.basket.grasp if object.way == "basket" else bench.config.hanging.grasp
+    centre = object_in_base(bench.package.geometry, object.thing.diameter, frame, "dorsal")
+    return -centre[0] * object.towards - [0.0, 0.0, centre[2]]
 
 
-def run(bench: Bench, seed: int) -> tuple[object, list[Seen], Session]:
-    """One run: how it ended, its frames from where the robot began to move, and the session."""
+def run(bench: Bench, seed: int) -> tuple[Offered, object, list[Seen], Session]:
+    """One run: what was offered, how it ended, its frames from where the robot began to move, and the session."""
     rng, s = np.random.default_rng([seed, 2]), settings.grasped()
-    object = hung(bench, s, rng)
+    object = offered(bench, s, rng)
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed)
     ending, frames, _ = rehearse(session, operator.grasp(beside(bench, object), s.accept, s.hold))
-    return ending, frames, session
+    return object, ending, frames, session
 
 
 def grasp(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     """One run, and its frames from where the robot began to move."""
-    s, (ending, frames, session) = settings.grasped(), run(bench, seed)
-    result = Result("grasp", seed, False, seconds=session.now, package=session.package.digest[:12])
+    s, (object, ending, frames, session) = settings.grasped(), run(bench, seed)
+    result = Result("grasp", seed, False, seconds=session.now, object=object.name, package=session.package.digest[:12])
     if not isinstance(ending, Ending):
         result.cause = "stopped: the run did not end"
         return result, frames
@@ -146,6 +171,8 @@ def failure(ending: Ending, frames: list[Seen], s: settings.Grasped) -> str:
         if early is None:
             return "aim: the arm never touched it"
         return f"slip: it was lifted by {1e3 * lifted:.0f} mm" + (", and hangs" if done.truth.hanging else "")
+    if last.truth.thing_world.any():
+        return "slip: it touches more than the arm as it is held"
     moved = in_arm(done, last)
     return "" if moved < s.slip else f"slip: it moved by {1e3 * moved:.0f} mm in the arm as it was held"
 

@@ -1,16 +1,16 @@
-"""Grasp what hangs, bring it to a table and let it go: success is that it rests there."""
+"""Grasp what hangs or stands, bring it to a table and let it go: success is that it rests there."""
 
 import numpy as np
 
 from rehearsal import settings
 from rehearsal.experiments.bench import Bench, Seen, rehearse
-from rehearsal.experiments.grasp import beside, failure, held_after, hung, session_of
+from rehearsal.experiments.grasp import TABLE, beside, failure, held_after, offered, session_of, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
-from rehearsal.robot.scene import Surface
+from rehearsal.robot.scene import Scene, Surface
+from trunkline.frames import STANDARD_GRAVITY
 
-STILL = 0.03  # m/s
-LYING = 0.01  # m by which the object's height over the table may be off half its width
+STILL, BORNE = 0.03, 0.5  # m/s; of its weight, by the table
 
 
 def table_for(s: settings.Grasped, place: list[float], rng: np.random.Generator) -> Surface:
@@ -23,34 +23,32 @@ def table_for(s: settings.Grasped, place: list[float], rng: np.random.Generator)
 def handle(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     """One run, and its frames from where the robot began to move."""
     rng, s = np.random.default_rng([seed, 3]), settings.grasped()
-    object = hung(bench, s, rng)
+    object = offered(bench, s, rng)
     table = table_for(s, object.thing.position, rng)
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed, table)
-    above = object.thing.diameter / 2 + s.drop
-    spot = session.seen(np.array(table.top)) + [0.0, 0.0, above]
+    thing = object.thing
+    below = thing.half_height + thing.grip[2] if thing.shape == "basket" else thing.diameter / 2
+    spot = session.seen(np.array(table.top)) + [0.0, 0.0, below + s.drop]
     ending, frames, _ = rehearse(session, operator.handle(beside(bench, object), spot, s.accept, s.calm))
-    result = Result("handle", seed, False, seconds=session.now, package=session.package.digest[:12])
+    result = Result("handle", seed, False, seconds=session.now, object=object.name, package=session.package.digest[:12])
     if not isinstance(ending, Ending):
         result.cause = "stopped: the run did not end"
         return result, frames
-    result.cause = why_not(ending, frames, table, object.thing.diameter, s)
+    result.cause = why_not(ending, frames, session.robot.scene, s)
     result.success = not result.cause
-    result.plans, result.probability = ending.plans, ending.probability
-    if np.isfinite(ending.probability):
-        result.agreed = float((ending.probability >= 0.5) == result.success)
+    tell(result, ending, session)
     return result, frames
 
 
-def why_not(ending: Ending, frames: list[Seen], table: Surface, diameter: float, s: settings.Grasped) -> str:
+def why_not(ending: Ending, frames: list[Seen], scene: Scene, s: settings.Grasped) -> str:
     """Why the object does not rest on the table, "" if it does."""
     grasped = held_after(frames)
     if grasped is None or not ending.done:
         return failure(ending, frames, s)
-    last = frames[-1]
-    off = last.thing - np.array(table.top)
-    on = bool((np.abs(off[:2]) <= np.array(table.size[:2]) / 2).all())
-    if on and abs(off[2] - diameter / 2) < LYING and np.linalg.norm(last.truth.speed) < STILL:
+    last, table = frames[-1], scene.surfaces[TABLE]
+    borne = last.truth.thing_world[scene.names().index(TABLE), 2] > BORNE * scene.object.mass * STANDARD_GRAVITY
+    if borne and np.linalg.norm(last.truth.speed) < STILL:
         return "" if not np.linalg.norm(last.truth.arm_thing) else "stopped: the arm still touches it"
     second = [frame for frame in frames if frame.mode == "execute" and frame.now > grasped.now]
     if not second:

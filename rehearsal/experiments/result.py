@@ -22,7 +22,7 @@ class Result:
     wanted it then: what is left when the operator's own lag and aim are taken out. probability: that the preview gave
     to the plan that was confirmed. agreed: 1 if it was at least a half for a success, or less for a failure, else 0.
     path_pct: median distance between the robot's tip and the nominal preview's, % of the arm's length. seconds: of the
-    whole run.
+    whole run. object: what was grasped, in words.
 
     variant: of an ablation, "" for none. package, code: digests of what the run was made of: `rehearsal.runs.Source`.
     """
@@ -42,6 +42,7 @@ class Result:
     agreed: float = float("nan")
     path_pct: float = float("nan")
     seconds: float = 0.0
+    object: str = ""
     variant: str = ""
     package: str = ""
     code: str = ""
@@ -115,10 +116,13 @@ def causes(results: list[Result]) -> dict[str, int]:
 
 def summary(results: list[Result]) -> dict:
     """metrics.json: by experiment, and in it by variant, runs, successes, rate, its interval from `low` to `high`,
-    causes, and of every distance that was measured median and 95th percentile over runs."""
+    causes, and of every distance that was measured median and 95th percentile over runs; of experiments with several
+    kinds of objects the same of each kind, in `objects`."""
     found: dict = {}
     for (experiment, variant), rows in grouped(results).items():
-        told = _told(rows)
+        told, kinds = _told(rows), sorted({row.object for row in rows})
+        if len(kinds) > 1:
+            told["objects"] = {kind: _told([row for row in rows if row.object == kind]) for kind in kinds}
         if variant:
             found.setdefault(experiment, {}).setdefault("variants", {})[variant] = told
         else:

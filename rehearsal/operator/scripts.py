@@ -137,7 +137,8 @@ class Operator:
         return ending
 
     def handle(self, beside: np.ndarray, spot: np.ndarray, accept: float, watch: float) -> Script:
-        """Grasp, aim so that the thing will be at `spot` (3,), m, as it appears, confirm, look on for `watch` s."""
+        """Grasp, aim so that the thing will be at `spot` (3,), m, as it appears, confirm what is sure enough to rest
+        there, look on for `watch` s."""
         view = yield from self._until(lambda view: view.intent.mode == "aim")
         hung = view.thing
         ending = yield from self.grasp(beside, accept, CALM)
@@ -146,16 +147,22 @@ class Operator:
             ending.why = ending.why or "slip: it was not lifted"
             ending.done = False
             return ending
-        ending.done = False
-        view, ending.why = yield from self._place_thing(view, spot)
-        if ending.why:
-            return ending
-        ending.plans += 1
-        view = yield from self._ask(view)
-        if view.intent.mode != "ready":
-            ending.why = view.intent.notice or "aim: no plan was asked for"
-            return ending
-        return (yield from self._confirm(view, ending, watch))
+        ending.done, ending.probability = False, np.nan  # what was said of the grasp has come true
+        while not ending.why and ending.plans < self.person.patience:
+            view, ending.why = yield from self._place_thing(view, spot)
+            if ending.why:
+                break
+            ending.plans += 1
+            view = yield from self._ask(view)
+            if view.intent.mode != "ready":
+                ending.why = view.intent.notice or "aim: no plan was asked for"
+            elif view.probability is None or view.probability >= accept:
+                ending.probability = np.nan if view.probability is None else view.probability
+                return (yield from self._confirm(view, ending, watch))
+            else:
+                view = yield from self._drop(view)
+        ending.why = ending.why or "aim: no preview was sure enough to rest"
+        return ending
 
     def _place_thing(self, view: View, spot: np.ndarray):
         """The rigid target to where the thing that is held will be at `spot`; why not, "" if it is there."""

@@ -49,7 +49,7 @@ class Object:
     position: Place
     quaternion: Quaternion = field(default_factory=lambda: [1.0, 0.0, 0.0, 0.0])
     hanging: bool = False
-    basket: Basket = field(default_factory=Basket)
+    basket: Basket = Basket()
 
     def __post_init__(self):
         if self.shape == "basket":

@@ -213,6 +213,19 @@ def test_less_sure_friction_makes_outcomes_differ_more(incline):
     assert more > 2 * some > 0.01
 
 
+def test_what_stands_is_elsewhere_with_its_board(incline):
+    twin, way = incline
+    model = copy.copy(twin.model)
+    model.opt.gravity[:] = [0, 0, -STANDARD_GRAVITY]
+    contact = Contact(0.0, (0.02, 0.0, 0.02))
+    found = preview(Twin(model, twin.arm), way, Doubts(contact=contact), Holding(0.0, sag=0.01, slip=1.0), count=4)
+    begun = found.motion.object[:, :1, :3]
+    np.testing.assert_allclose(begun[:, 0] - found.nominal.object[0, 0, :3], found.draws.offsets, atol=1e-4)
+    assert np.ptp(found.draws.offsets[:, 2]) > 0.01
+    assert np.abs(found.motion.object[:, :, :3] - begun).max() < 1e-3
+    assert found.probability == 1.0
+
+
 def test_wilsons_interval_solves_its_equation():
     """Its ends are the shares p from which what was found is 1.96 standard errors, of p, away."""
     for found, count in ((0, 32), (7, 32), (32, 32)):

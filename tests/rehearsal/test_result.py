@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from rehearsal.experiments.follow import Path as Way
-from rehearsal.experiments.result import Result, append_result, causes, rate, read_results
+from rehearsal.experiments.result import Result, append_result, causes, rate, read_results, summary
 from trunkline.errors import InputError
+from trunkline.pipeline.rehearsal_table import rehearsal_table
 
 
 def runs(successes: int, failures: int) -> list[Result]:
@@ -38,6 +39,18 @@ def test_rows_are_read_back(tmp_path):
     ]  # fmt: skip
     assert found[0].aimed_mm == pytest.approx(12.25, abs=0.1)
     assert np.isnan(found[1].aimed_mm)
+
+
+def test_kinds_of_objects_are_told_apart_where_there_are_several(tmp_path):
+    mixed = [Result("grasp", seed, seed > 1, object="ab"[seed % 2]) for seed in range(6)]
+    told = summary([*mixed, *runs(2, 1)])
+    assert {kind: (one["runs"], one["successes"]) for kind, one in told["grasp"]["objects"].items()} == {
+        "a": (3, 2), "b": (3, 2)
+    }  # fmt: skip
+    assert told["grasp"]["runs"] == 6
+    assert "objects" not in told["reach"]
+    table = rehearsal_table(told, {}, "of a test", variants=True)
+    assert [line.split(" | ")[0] for line in table.splitlines()[2:]] == ["| reach", "| grasp", "| … a", "| … b"]
 
 
 def test_a_table_of_other_columns_is_refused(tmp_path):

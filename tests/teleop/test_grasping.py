@@ -9,7 +9,7 @@ from tests.support.operator import DT, PACKAGE, Operator, config
 from tests.teleop.test_plan import LENGTH, LIMITS, MOUNT, NETWORK, OFFSET, START, STRAIGHT
 from trunkline.arm.spiral import spiral_chain
 from trunkline.errors import InputError
-from trunkline.hybrid.placements import HangingGrip
+from trunkline.hybrid.placements import SideGrip
 from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.grasping import Grasping
 from trunkline.teleop.messages import (
@@ -28,11 +28,12 @@ from trunkline.teleop.messages import (
 )
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
+from trunkline.teleop.things import below_grip, grip_of
 from trunkline.teleop.trajectory import gentle
-from trunkline.teleop.vectors import DOWN
+from trunkline.teleop.vectors import DOWN, subtract
 
 GEOMETRY = spiral_chain(length=LENGTH, base_width=0.080, tip_width=0.012, units=24)
-GRIP = HangingGrip(config().hanging, GEOMETRY)
+GRIP, BY_THE_BAR = SideGrip(config().hanging, GEOMETRY), SideGrip(config().basket, GEOMETRY)
 HANDLING = config().handling
 BALL = Thing("the ball", "sphere", 0.05, 0.05, 0.1, (0.55, 0.1, 0.15))
 
@@ -40,7 +41,7 @@ BALL = Thing("the ball", "sphere", 0.05, 0.05, 0.1, (0.55, 0.1, 0.15))
 @pytest.fixture(scope="module")
 def planner():
     rigid = RigidIK(OFFSET)
-    grasping = Grasping(rigid, OFFSET, STRAIGHT, {"hanging": GRIP}, HANDLING)
+    grasping = Grasping(rigid, OFFSET, STRAIGHT, {"hanging": GRIP, "basket": BY_THE_BAR}, HANDLING)
     return Planner(rigid, NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.01, grasping=grasping)
 
 
@@ -60,7 +61,7 @@ def test_a_grasp_comes_from_the_side_closes_and_lifts(planner):
     mounts = mount_pose(plan.joints, OFFSET)[0]
     at = mounts[starts["curl"]]
     np.testing.assert_allclose(at, MOUNT, atol=1e-3)
-    np.testing.assert_allclose(mounts[starts["lift"]] - at, [0, 0, -HANDLING.sink], atol=1e-3)
+    np.testing.assert_allclose(mounts[starts["lift"]] - at, [0, 0, -config().hanging.sink], atol=1e-3)
     np.testing.assert_allclose(mounts[-1] - at, [0, 0, HANDLING.lift], atol=1e-3)
     last = mounts[: starts["curl"]][-100:]  # heading 0: the object is at +x
     assert (last[:, 0] < MOUNT[0] + 1e-3).all()
@@ -99,6 +100,31 @@ def test_an_arm_before_the_object_pulls_the_other_cables(planner):
     np.testing.assert_allclose(STRAIGHT - plan.commands[-1], [loose, pull, pull], atol=1e-9)
 
 
+BASKET = Thing("the basket", "basket", 0.03, 0.06, 0.2, (0.55, 0.1, -0.03), support="standing")
+
+
+def test_a_basket_is_gripped_by_its_bar_wherever_it_is(planner):
+    grip = grip_of(BASKET)
+    assert grip[:2] == BASKET.position[:2]
+    mount = (0.49, 0.1, grip[2] + 0.36)
+    for thing in (BASKET, replace(BASKET, support="hanging")):
+        plan = planner.plan(request(thing, mount, grip), world(thing), START, STRAIGHT)
+        at = mount_pose(plan.joints[[dict(plan.phases)["curl"]]], OFFSET)[0][0]
+        np.testing.assert_allclose(at, mount, atol=1e-3)
+        pull, loose = config().basket.pull, -config().basket.loose
+        np.testing.assert_allclose(STRAIGHT - plan.commands[-1], [pull, loose, loose], atol=1e-9)
+
+
+def test_a_basket_that_is_let_go_must_be_near_the_board_with_its_box(planner):
+    held = replace(BASKET, support="held", position=(0.35, 0.05, 0.1))
+    below = below_grip(held)
+    rooms = world(held, TABLE)
+    near, far = ((0.5, -0.2, 0.1 + below + gap) for gap in (0.03, 0.09))
+    assert planner.plan(request(held, MOUNT, near), rooms, START, STRAIGHT).phases[-1][0] == "release"
+    with pytest.raises(InputError, match="release: found 90 mm between the basket and"):
+        planner.plan(request(held, MOUNT, far), rooms, START, STRAIGHT)
+
+
 TABLE = Box("the table", (0.3, -0.4, -0.4), (0.7, 0.0, 0.1))
 
 
@@ -114,7 +140,7 @@ def test_what_is_held_is_brought_down_and_let_go(planner):
     speed = np.linalg.norm(np.diff(mounts[:release], axis=0), axis=1).max() / plan.step
     assert speed < 3 * HANDLING.carry
     assert (STRAIGHT - plan.commands[-1]).max() <= 1e-9
-    np.testing.assert_allclose(mounts[-1] - goal, [0, 0, HANDLING.rise], atol=1e-3)
+    np.testing.assert_allclose(mounts[-1] - goal, [0, 0, config().hanging.rise], atol=1e-3)
 
 
 REFUSED = {
@@ -158,6 +184,17 @@ def test_a_tip_target_near_a_thing_marks_it():
     targets = operator.step(world=World("elsewhere", (), (far,))).targets
     assert targets.thing == ""
     assert aiming().intents[-1].targets.thing == ""
+
+
+def test_a_tip_target_near_a_bar_marks_the_basket_and_goes_to_the_bar():
+    operator = aiming()
+    x, y, z = operator.intents[-1].targets.tip.position
+    dx, dy, dz = subtract(grip_of(BASKET), BASKET.position)
+    near, beside = ((x + gap - dx, y - dy, z - dz) for gap in (0.04, 0.4))
+    targets = operator.step(world=World("bar", (), (replace(BASKET, position=near),))).targets
+    assert targets.thing == BASKET.name
+    np.testing.assert_allclose(targets.tip.position, (x + 0.04, y, z), atol=1e-9)
+    assert operator.step(world=World("far", (), (replace(BASKET, position=beside),))).targets.thing == ""
 
 
 def ready(operator: Operator) -> None:

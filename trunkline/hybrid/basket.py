@@ -16,7 +16,7 @@ UPRIGHT = np.eye(3)
 LEVEL = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # turns z to y
 
 
-@dataclass
+@dataclass(frozen=True)
 class Basket:
     """Sizes beside the bar's diameter and the box's height.
 
@@ -59,6 +59,22 @@ class Part:
         return np.abs(self.turn) @ own
 
 
+def centre_height(basket: Basket, height: float) -> float:
+    """m, of the centre of mass above that of a box of `height` m."""
+    rod, top = _rod(basket), height / 2
+    return rod * (basket.length * (top + basket.rise) + 2 * basket.rise * (top + basket.rise / 2))
+
+
+def bar_height(basket: Basket, height: float) -> float:
+    """m, of the bar's axis above the centre of mass."""
+    return height / 2 + basket.rise - centre_height(basket, height)
+
+
+def _rod(basket: Basket) -> float:
+    """Share of the mass in a metre of bar or post."""
+    return HANDLE / (basket.length + 2 * basket.rise)
+
+
 def parts_of(basket: Basket, diameter: float, height: float) -> dict[str, Part]:
     """Bar, posts and box in the frame of the centre of mass, z up.
 
@@ -66,12 +82,11 @@ def parts_of(basket: Basket, diameter: float, height: float) -> dict[str, Part]:
         diameter: of the bar, m. height: of the box, m.
     """
     width, length, rise = basket.width, basket.length, basket.rise
-    rod = HANDLE / (length + 2 * rise)  # share of a metre of bar or post
+    rod, centre = _rod(basket), centre_height(basket, height)
     bar, post = np.array([diameter, diameter, length]) / 2, np.array([POST, POST, rise / 2])
     box, aside, top = np.array([width, length, height]) / 2, length / 2 - POST, height / 2
-    centre = rod * (length * (top + rise) + 2 * rise * (top + rise / 2))  # above the box's, m
     return {
-        "bar": Part("cylinder", bar, np.array([0, 0, top + rise - centre]), LEVEL, rod * length),
+        "bar": Part("cylinder", bar, np.array([0, 0, bar_height(basket, height)]), LEVEL, rod * length),
         "post_1": Part("cylinder", post, np.array([0, -aside, top + rise / 2 - centre]), UPRIGHT, rod * rise),
         "post_2": Part("cylinder", post, np.array([0, aside, top + rise / 2 - centre]), UPRIGHT, rod * rise),
         "box": Part("box", box, np.array([0, 0, -centre]), UPRIGHT, 1 - HANDLE),

@@ -94,7 +94,8 @@ class Piece:
         qpos: of the composed model. Shape (B, F, nq).
         tip, mount: of the arm. Shape (B, F, 3).
         object: position and quaternion of what is grasped. Shape (B, F, 7); NaN where there is none.
-        away: from the middle of what the arm wraps of it to the centre of the nearest unit, m. Shape (B, F).
+        grip: the middle of what the arm wraps of it, likewise. Shape (B, F, 3).
+        away: from there to the centre of the nearest unit, m. Shape (B, F).
         sound: whether MuJoCo has not warned. A future that is not sound stands still. Shape (B,).
     """
 
@@ -103,6 +104,7 @@ class Piece:
     tip: np.ndarray
     mount: np.ndarray
     object: np.ndarray
+    grip: np.ndarray
     away: np.ndarray
     sound: np.ndarray
 
@@ -240,6 +242,8 @@ def _place(batch: Batch, model: mujoco.MjModel, start: np.ndarray | None, way: W
     if tie >= 0:  # the hook moves along
         arms = rotation_from_wxyz(pose[:, 3:]).apply(model.eq_data[tie, :3])
         batch.expand("eq_data")[:, tie, 3:6] = pose[:, :3] + arms
+    if string < 0 and tie < 0:  # what it stands on moves along
+        batch.expand("geom_pos")[:, model.geom_bodyid == 0] += draws.offsets[:, None]
 
 
 def _number(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
@@ -253,10 +257,13 @@ def _piece(twin: Twin, batch: Batch, time: np.ndarray, found: dict[str, np.ndarr
     count, number = found["qpos"].shape[:2]
     thing = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "object")
     pose, away = np.full((count, number, 7), np.nan), np.full((count, number), np.nan)
+    grip = pose[:, :, :3]
     if thing >= 0:
         pose = np.concatenate([found["xpos"][:, :, thing], found["xquat"][:, :, thing]], axis=2)
         sites = found["site_xpos"]
-        gaps = sites[:, :, twin.centers] - sites[:, :, model.site(GRIP).id, None]
+        grip = sites[:, :, model.site(GRIP).id]
+        gaps = sites[:, :, twin.centers] - grip[:, :, None]
         away = np.linalg.norm(gaps, axis=3).min(axis=2)
     sound = ~batch.warning.any(axis=(1, 2))
-    return Piece(time, found["qpos"], found["site_xpos"][:, :, tip], found["xpos"][:, :, mount], pose, away, sound)
+    tips, mounts = found["site_xpos"][:, :, tip], found["xpos"][:, :, mount]
+    return Piece(time, found["qpos"], tips, mounts, pose, grip, away, sound)

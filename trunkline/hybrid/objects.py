@@ -5,7 +5,7 @@ whose contacts give way four times as slowly: it does not change its shape. A ba
 the arm wraps the bar: see `trunkline/hybrid/basket.py`.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 from typing import Annotated, Literal
 
@@ -48,7 +48,7 @@ class Thing:
     height: Annotated[float, Field(ge=0.005, le=1)]
     mass: Annotated[float, Field(gt=0, le=20)]
     material: Material
-    basket: Basket = field(default_factory=Basket)
+    basket: Basket = Basket()
 
     def __post_init__(self):
         if self.shape == "basket":

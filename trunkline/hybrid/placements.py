@@ -1,7 +1,7 @@
 """How an arm is placed to grasp something: where the mount is, whence it comes, what the cables do before and to close.
 
-A `Grip` knows that for one kind of support. The mount's own place is the user's: a grip says what belongs to it, and
-which places nearby may hold more surely.
+A `Grip` knows that for one way of grasping. The mount's own place is the user's: a grip says what belongs to it, and
+which places nearby may hold more surely. Places are about what the arm wraps: an object's centre, or a basket's bar.
 """
 
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ Offset = Annotated[float, Field(ge=-0.2, le=0.2)]
 
 @dataclass(frozen=True)
 class Placement:
-    """Positions are in the world, less the object's centre, m.
+    """Positions are in the world, less that of what the arm wraps, m.
 
     Attributes:
         rotation: of the arm's base frame in the world. Shape (3, 3).
@@ -27,6 +27,7 @@ class Placement:
         come: where the mount is before, its rotation the same. Shape (3,).
         opened, closed: how much shorter than in the straight arm each cable is commanded before and after closing, m;
             negative is paid out. Shape (K,).
+        sink: m, by which the mount goes down as the cables close.
     """
 
     rotation: np.ndarray
@@ -34,42 +35,56 @@ class Placement:
     come: np.ndarray
     opened: np.ndarray
     closed: np.ndarray
+    sink: float
 
 
 class Grip(Protocol):
     """A way of grasping."""
+
+    @property
+    def rise(self) -> float:
+        """m, by which the mount rises as the arm opens again, to let go."""
+        ...
 
     def placed(self, rotation: np.ndarray, mount: np.ndarray) -> Placement:
         """With the mount where the user has it."""
         ...
 
     def near(self, rotation: np.ndarray, mount: np.ndarray, diameter: float) -> np.ndarray:
-        """Places of the mount of the same rotation that may hold an object of `diameter` m more surely, less the
-        object's centre, m. Shape (P, 3)."""
+        """Places of the mount of the same rotation that may hold an object of `diameter` m more surely, less what
+        the arm wraps of it, m. Shape (P, 3)."""
         ...
 
 
 @dataclass
-class HangingSettings:
+class SideSettings:
     """grasp: the grasp frame. pull: m, of the cables that close; the motors' force ends it sooner. loose: m, by which
-    the others are paid out. aside: m, from which the mount comes. along, beside: m, places
-    that the assistant tries about the grasp frame, along the arm and away from the object."""
+    the others are paid out. sink: m, by which the mount goes down meanwhile, as a coil that closes rises, so that what
+    supports a thing bears it until the end. rise: m, by which the mount rises as the arm opens again, to let it go.
+    aside: m, from which the mount comes. along, beside: m, places that the
+    assistant tries about the grasp frame, along the arm and away from the object."""
 
     grasp: Grasp
     pull: Metres
     loose: Metres
+    sink: Metres
+    rise: Metres
     aside: Metres
     along: Annotated[list[Offset], Field(min_length=1, max_length=9)]
     beside: Annotated[list[Offset], Field(min_length=1, max_length=9)]
 
 
 @dataclass(frozen=True)
-class HangingGrip:
-    """Of what hangs: the straight arm comes from the side, towards the object, so that what it may push aside it does
-    not turn, and curls round it."""
+class SideGrip:
+    """Of what hangs, and of a basket by its bar: the straight arm comes from the side, towards the object, so that what
+    it may push aside it does not turn, and curls round it."""
 
-    settings: HangingSettings
+    settings: SideSettings
     geometry: ChainGeometry
+
+    @property
+    def rise(self) -> float:
+        return self.settings.rise
 
     def placed(self, rotation: np.ndarray, mount: np.ndarray) -> Placement:
         front = _in_front(rotation, mount)
@@ -77,7 +92,7 @@ class HangingGrip:
         closed = pulls_of("dorsal" if front else "ventral", self.settings.pull)
         loose = -self.settings.loose
         opened, closed = np.where(closed > 0, 0.0, loose), np.where(closed > 0, closed, loose)
-        return Placement(rotation, mount, mount - self.settings.aside * towards, opened, closed)
+        return Placement(rotation, mount, mount - self.settings.aside * towards, opened, closed, self.settings.sink)
 
     def near(self, rotation: np.ndarray, mount: np.ndarray, diameter: float) -> np.ndarray:
         s = self.settings

@@ -8,7 +8,7 @@ true the model is.
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Protocol
 
 import numpy as np
 from pydantic import Field
@@ -21,13 +21,21 @@ Metres = Annotated[float, Field(gt=0, le=1)]
 WITHIN = 0.9  # share of futures whose tips are within the spread
 
 
+class Outcome(Protocol):
+    """What is asked of a plan: `Holding`, or `trunkline.hybrid.resting.Resting`."""
+
+    def holds(self, motion: Piece) -> np.ndarray:
+        """In which futures it comes true. Shape (B,)."""
+        ...
+
+
 @dataclass(frozen=True)
 class Holding:
     """What counts as held, from the time `since`, s, when the object loses its support or is lifted, to the end.
 
     Attributes:
-        sag: m, by which the object may move against the mount, which the arm bears: it gives way and swings. What is
-            lifted must be lifted by more.
+        sag: m, by which what the arm wraps of the object may move against the mount, which the arm bears: it gives way
+            and swings. What is lifted must be lifted by more.
         slip: m, by which it may move away from the nearest unit.
         lifted: m, by which it must be higher then than at first.
     """
@@ -40,12 +48,12 @@ class Holding:
     def holds(self, motion: Piece) -> np.ndarray:
         """Which futures hold the object. Shape (B,)."""
         first = int(np.argmin(np.abs(motion.time - self.since)))
-        beside = motion.object[:, :, :3] - motion.mount
+        beside = motion.grip - motion.mount
         with np.errstate(invalid="ignore"):
             stays = np.linalg.norm(beside[:, -1] - beside[:, first], axis=1) < self.sag
             stays &= motion.away[:, -1] < motion.away[:, first] + self.slip
             if self.lifted is not None:
-                stays &= motion.object[:, first, 2] - motion.object[:, 0, 2] > self.lifted
+                stays &= motion.grip[:, first, 2] - motion.grip[:, 0, 2] > self.lifted
         return stays & motion.sound
 
 
@@ -57,7 +65,7 @@ class Preview:
         nominal: the motion of the twin as it is believed, B = 1.
         motion: of the B futures.
         draws: what each future has.
-        held: which of them hold the object; None if nobody asked. Shape (B,).
+        held: which of them hold the object, or do what else was asked; None if nobody asked. Shape (B,).
     """
 
     nominal: Piece
@@ -102,7 +110,7 @@ def preview(
     twin: Twin,
     way: Way,
     doubts: Doubts,
-    holding: Holding | None = None,
+    holding: Outcome | None = None,
     count: int = 32,
     seed: int = 0,
     show: Callable[[Piece], None] = lambda piece: None,
@@ -110,7 +118,7 @@ def preview(
     """Try a plan in `count` futures.
 
     Args:
-        holding: what counts as held; None where nothing is grasped.
+        holding: what is asked of the plan; None where nothing is grasped.
         show: called with each piece of the nominal motion, before any future is simulated.
     """
     begun = []
@@ -125,5 +133,5 @@ def preview(
 def joined(pieces: list[Piece]) -> Piece:
     """Pieces one after the other; sound is what is so at last."""
     along = {name: np.concatenate([getattr(piece, name) for piece in pieces], axis=1)
-             for name in ("qpos", "tip", "mount", "object", "away")}  # fmt: skip
+             for name in ("qpos", "tip", "mount", "object", "grip", "away")}  # fmt: skip
     return Piece(time=np.concatenate([piece.time for piece in pieces]), sound=pieces[-1].sound, **along)

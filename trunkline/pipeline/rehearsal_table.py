@@ -10,7 +10,7 @@ DISTANCES = {"reach": "nearest_mm", "follow": "tip_mm", "grasp": "", "handle": "
 
 
 def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], package: str, variants: bool) -> str:
-    """A row an experiment, and with `variants` one for each of its variants below it.
+    """A row an experiment, and with `variants` one for each kind of its objects and each of its variants below it.
 
     Args:
         metrics: as `rehearsal.experiments.result.summary` makes them.
@@ -29,6 +29,7 @@ def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], pack
         if "runs" in told:
             lines.append(_row(name, name, told, "" if goal is None or goal.min is None else f"≥ {_percent(goal.min)}"))
         if variants:
+            lines += [_row(name, f"… {kind}", row, "") for kind, row in told.get("objects", {}).items()]
             lines += [_row(name, f"… {variant}", row, "") for variant, row in told.get("variants", {}).items()]
     return "\n".join(lines)
 

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from trunkline.hybrid.placements import HangingSettings
+from trunkline.hybrid.placements import SideSettings
 from trunkline.settings import settings
 from trunkline.teleop.grasping import Handling
 from trunkline.teleop.settings import Teleop
@@ -14,11 +14,13 @@ from trunkline.teleop.trajectory import MotorLimits
 
 @settings
 class Config:
-    """`hanging`: how what hangs is grasped. `mount_offset`: m, from the Panda's flange to the soft arm's mount."""
+    """`hanging`, `basket`: how what hangs and what has a handle is grasped. `mount_offset`: m, from the Panda's flange
+    to the soft arm's mount."""
 
     core: Teleop
     motors: MotorLimits
     shaping: Shaping
     handling: Handling
-    hanging: HangingSettings
+    hanging: SideSettings
+    basket: SideSettings
     mount_offset: Annotated[float, Field(ge=0, le=0.5)]

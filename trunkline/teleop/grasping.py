@@ -13,44 +13,44 @@ from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.messages import Targets, Thing, World
 from trunkline.teleop.rigid_ik import RigidIK
+from trunkline.teleop.things import below_grip, beneath, grip_of, way_of_grasping
 from trunkline.teleop.vectors import DOWN, Vector, conjugate, rotate
 
 UP = np.array([0.0, 0.0, 1.0])
 Seconds = Annotated[float, Field(ge=0, le=30)]
 Metres = Annotated[float, Field(gt=0, le=1)]
+Mass = Annotated[float, Field(gt=0, le=20)]
 
 
 @dataclass
 class Handling:
     """How things are grasped and brought elsewhere.
 
-    close: s, at least, for the cables to close. sink: m by which the mount goes down meanwhile, as a coil that closes
-    rises, so that what supports a thing bears it until the end. calm: s for which all waits before it and after it.
+    close: s, at least, for the cables to close. calm: s for which all waits before it and after it.
     lift: m. carry: m/s, of the mount with something in the arm, on the average. above: m over its place from which a
-    thing comes down. rise: m by which the mount rises as the arm opens, in `open` s at least. beneath: m, at most, that
-    a thing may fall as it is let go. payload: rows of diameter, m, and the heaviest mass, kg, that is grasped, linear
-    between.
+    thing comes down. open: s, at least, in which the arm opens while the mount rises. beneath: m, at most, that a
+    thing may fall as it is let go. payload: of each way of grasping, rows of diameter, m, and the heaviest mass, kg,
+    that is grasped, linear between.
     """
 
     close: Seconds
-    sink: Annotated[float, Field(ge=0, le=0.5)]
     calm: Seconds
     lift: Metres
     carry: Metres
     above: Metres
-    rise: Metres
     open: Seconds
     beneath: Metres
-    payload: Annotated[list[tuple[Metres, Annotated[float, Field(gt=0, le=20)]]], Field(min_length=1, max_length=50)]
+    payload: dict[str, Annotated[list[tuple[Metres, Mass]], Field(min_length=1, max_length=50)]]
 
     def __post_init__(self):
-        diameters = [diameter for diameter, _ in self.payload]
-        if diameters != sorted(set(diameters)):
-            raise ValueError(f"payload: found diameters {diameters}, expected them rising")
+        for name, rows in self.payload.items():
+            diameters = [diameter for diameter, _ in rows]
+            if diameters != sorted(set(diameters)):
+                raise ValueError(f"payload.{name}: found diameters {diameters}, expected them rising")
 
-    def heaviest(self, diameter: float) -> float:
-        """kg, of an object of `diameter` m; none wider than the last row's can be held."""
-        diameters, masses = zip(*self.payload, strict=True)
+    def heaviest(self, way: str, diameter: float) -> float:
+        """kg, of an object of `diameter` m that is grasped this way; none wider than the last row's can be held."""
+        diameters, masses = zip(*self.payload[way], strict=True)
         return float(np.interp(diameter, diameters, masses, right=0.0))
 
 
@@ -75,7 +75,7 @@ class Leg:
 
 @dataclass(frozen=True)
 class Grasping:
-    """grips: by what supports a thing. straight (K,): m, commands of the straight arm."""
+    """grips: by the way of grasping. straight (K,): m, commands of the straight arm."""
 
     rigid: RigidIK
     mount_offset: float
@@ -93,16 +93,17 @@ class Grasping:
         Raises:
             InputError: the thing is too heavy, nobody knows how to grasp it, or the rigid robot cannot be there.
         """
-        h, most = self.handling, self.handling.heaviest(thing.diameter)
+        h, name = self.handling, way_of_grasping(thing)
+        if name not in self.grips:
+            raise InputError(f"grasp: {thing.name} is {thing.support}, expected {' or '.join(self.grips)}")
+        most = h.heaviest(name, thing.diameter)
         if thing.mass > most:
             raise InputError(
                 f"payload: {thing.name} weighs {thing.mass:g} kg, expected at most {most:.3g} kg "
                 f"at a diameter of {1e3 * thing.diameter:.0f} mm"
             )
-        if thing.support not in self.grips:
-            raise InputError(f"grasp: {thing.name} is {thing.support}, expected {' or '.join(self.grips)}")
         placement = self.placement(targets, thing)
-        centre = np.array(thing.position) - beside * placement.rotation[:, 1]
+        centre = np.array(grip_of(thing)) - beside * placement.rotation[:, 1]
         opened = self.straight - placement.opened
         closed, still, gravity = self.straight - placement.closed, np.zeros(len(opened)), _gravity(targets)
 
@@ -111,8 +112,8 @@ class Grasping:
 
         come = at(joints, placement.come)
         there = at(come, placement.mount)
-        sunk = at(there, placement.mount - h.sink * UP)
-        up = h.lift + h.sink
+        sunk = at(there, placement.mount - placement.sink * UP)
+        up = h.lift + placement.sink
         return [
             Leg("approach", come, opened, gravity, still),
             Leg("approach", there, opened, gravity, still, calm=h.calm),
@@ -122,9 +123,9 @@ class Grasping:
 
     def placement(self, targets: Targets, thing: Thing) -> Placement:
         """Of the user's own targets."""
-        centre = np.array(thing.position)
+        centre = np.array(grip_of(thing))
         rotation = rotation_from_wxyz(np.array(base_quaternion(targets.pointing, targets.heading))).as_matrix()
-        return self.grips[thing.support].placed(rotation, np.array(targets.rigid.position) - centre)
+        return self.grips[way_of_grasping(thing)].placed(rotation, np.array(targets.rigid.position) - centre)
 
     def bring(
         self, targets: Targets, thing: Thing, world: World, joints: np.ndarray, commands: np.ndarray
@@ -136,14 +137,14 @@ class Grasping:
         """
         h, place = self.handling, np.array(targets.rigid.position)
         _require_ground(thing, targets.tip.position, world, h.beneath)
-        opened = np.maximum(commands, self.straight)
+        opened, rise = np.maximum(commands, self.straight), self.grips[way_of_grasping(thing)].rise
         above = self._solve(joints, place + h.above * UP, targets)
         there = self._solve(above, place, targets)
         away = np.linalg.norm(place + h.above * UP - mount_pose(joints[None], self.mount_offset)[0][0])
         return [
             Leg("transfer", above, commands, seconds=float(away) / h.carry, calm=h.calm, gentle=True),
             Leg("transfer", there, commands, seconds=h.above / h.carry, calm=h.calm, gentle=True),
-            Leg("release", self._solve(there, place + h.rise * UP, targets), opened, seconds=h.open),
+            Leg("release", self._solve(there, place + rise * UP, targets), opened, seconds=h.open),
         ]
 
     def _solve(self, start: np.ndarray, mount: np.ndarray, targets: Targets) -> np.ndarray:
@@ -161,11 +162,11 @@ def _require_ground(thing: Thing, place: Vector, world: World, most: float) -> N
     Raises:
         InputError: telling what is missing.
     """
-    x, y, z = place
-    under = [box for box in world.boxes if box.low[0] <= x <= box.high[0] and box.low[1] <= y <= box.high[1]]
-    gaps = [z - thing.diameter / 2 - box.high[2] for box in under if box.high[2] <= z]
-    if not gaps or min(gaps) > most:
-        found = f"{1e3 * min(gaps):.0f} mm" if gaps else "nothing"
+    x, y, z = place[0], place[1], place[2] - below_grip(thing)
+    box = beneath((x, y, z), world)
+    gap = np.inf if box is None else z - box.high[2]
+    if gap > most:
+        found = "nothing" if box is None else f"{1e3 * gap:.0f} mm"
         raise InputError(
             f"release: found {found} between {thing.name} and what is beneath it, expected at most {1e3 * most:.0f} mm"
         )

@@ -11,6 +11,7 @@ from typing import Annotated, Literal, TypeVar
 from pydantic import BeforeValidator, ConfigDict, TypeAdapter, ValidationError
 
 from trunkline.errors import InputError
+from trunkline.hybrid.basket import Basket
 
 STRICT = ConfigDict(extra="forbid", ser_json_inf_nan="null")
 # JSON has no NaN: it is written as null, and read back, so that recorded faults are vectors too.
@@ -64,19 +65,21 @@ class Box:
 class Thing:
     """Something to grasp, as the client believes it: `position` of its centre, m, and `quaternion`, in the base frame.
 
-    `diameter`: m, of a box its width along x and y; `height`: m, along z, idle for a sphere; `mass`: kg. `support`:
-    what holds it: a hook, a surface, or the arm.
+    `diameter`: m, of a box its width along x and y, of a basket its bar's; `height`: m, along z, idle for a sphere, of
+    a basket its box's; `mass`: kg. `support`: what holds it: a hook, a surface, or the arm. `basket`: a basket's other
+    sizes, idle for other shapes.
     """
 
     __pydantic_config__ = STRICT
     name: str
-    shape: Literal["cylinder", "box", "sphere", "toy"]
+    shape: Literal["cylinder", "box", "sphere", "toy", "basket"]
     diameter: Number
     height: Number
     mass: Number
     position: Vector
     quaternion: Quaternion = (1.0, 0.0, 0.0, 0.0)
     support: Literal["hanging", "standing", "held"] = "hanging"
+    basket: Basket = Basket()
 
 
 @dataclass(frozen=True)

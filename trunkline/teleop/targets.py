@@ -7,6 +7,7 @@ from trunkline.teleop.alignment import Aligned, Wrist, align, base_quaternion, c
 from trunkline.teleop.messages import Offer, Target, Targets, Thing, World
 from trunkline.teleop.reach import Reach, Reading
 from trunkline.teleop.settings import Orientation, Teleop
+from trunkline.teleop.things import grip_of
 from trunkline.teleop.vectors import (
     DOWN,
     Vector,
@@ -35,10 +36,11 @@ def place(
 ) -> Targets:
     """Both targets (base frame, m) with their reach under the gravity that the arm will have there.
 
-    A tip target that marks a thing is in its centre. Whether it can be grasped no map tells: plan and preview do.
+    A tip target that marks a thing is where the arm grips it. Whether it can be grasped no map tells: plan and preview
+    do.
     """
     thing = marked(tip, world, settings.mark)
-    tip = tip if thing is None else thing.position
+    tip = tip if thing is None else grip_of(thing)
     aligned = align(tip, rigid, pointing, wrist, last, settings.bending_plane)
     turn = base_quaternion(pointing, aligned.heading)
     back = conjugate(turn)
@@ -69,11 +71,11 @@ def bring(
     reach: Reach,
 ) -> Targets:
     """Targets of an arm that holds a thing: the mount goes to `rigid`, the wrist as joint 1 carries it, and the tip
-    target is where the thing comes to."""
+    target is where what it grips comes to."""
     heading = carried_heading(rigid, wrist)
     there = base_quaternion(pointing, heading)
     here = base_quaternion(wrist.pointing, wrist.heading)
-    beside = rotate(conjugate(here), subtract(held.position, wrist.position))
+    beside = rotate(conjugate(here), subtract(grip_of(held), wrist.position))
     tip = add(rigid, rotate(there, beside))
     return Targets(
         _target(rigid, reach.rigid(rigid, pointing), world),
@@ -89,8 +91,8 @@ def bring(
 
 def marked(tip: Vector, world: World, within: float) -> Thing | None:
     """The thing nearest to the tip target, at most `within` m from it."""
-    near = [thing for thing in world.things if distance(tip, thing.position) <= within]
-    return min(near, key=lambda thing: distance(tip, thing.position), default=None)
+    near = [thing for thing in world.things if distance(tip, grip_of(thing)) <= within]
+    return min(near, key=lambda thing: distance(tip, grip_of(thing)), default=None)
 
 
 def offered(targets: Targets, offer: Offer | None) -> Targets:

@@ -1,0 +1,48 @@
+"""Objects of the experiments: each where it can be, standing or hanging as its shape asks."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rehearsal import settings
+from rehearsal.experiments.grasp import Offered, offered
+from tests.support.operator import config
+
+BENCH = SimpleNamespace(config=config())
+
+
+@pytest.fixture(scope="module")
+def objects() -> list[Offered]:
+    return [offered(BENCH, settings.grasped(), np.random.default_rng(seed)) for seed in range(60)]  # type: ignore[arg-type]
+
+
+def test_some_hang_and_some_stand(objects):
+    names = [one.name for one in objects]
+    assert set(names) == {"hanging cylinder", "standing basket"}
+    assert 15 < names.count("standing basket") < 45
+
+
+def test_what_stands_does_so_on_its_stand_and_what_hangs_has_none(objects):
+    for one in objects:
+        thing = one.thing
+        assert thing.hanging == (one.stands is None)
+        if one.stands is not None:
+            np.testing.assert_allclose(thing.position, np.add(one.stands.top, [0, 0, thing.half_height]), atol=1e-12)
+            assert min(one.stands.size[:2]) > np.hypot(thing.basket.width, thing.basket.length)
+
+
+def test_what_is_gripped_is_level_across_the_way_of_the_arm_and_within_bounds(objects):
+    s = settings.grasped()
+    for one in objects:
+        of, thing = s.shapes[one.thing.shape], one.thing
+        turn = Rotation.from_quat(thing.quaternion, scalar_first=True)
+        grip = np.array(thing.position) + turn.apply(thing.grip)
+        assert of.low <= grip[2] <= of.high
+        assert s.near <= np.hypot(*grip[:2]) <= s.far
+        assert of.thin <= thing.diameter <= of.wide
+        assert of.light <= thing.mass <= min(of.heavy, config().handling.heaviest(one.way, thing.diameter))
+        axis = turn.apply([0, 1, 0] if thing.shape == "basket" else [0, 0, 1])
+        assert abs(axis @ one.towards) < 1e-9
+        assert abs(axis[2]) < 1e-9

@@ -1,0 +1,78 @@
+"""The twin that plans are tried on: it leans as the robot does, and what stands does so on its board."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rehearsal import settings
+from rehearsal.twin import Believed, compose_twin
+from tests.hybrid.conftest import hybrid_settings, rubbing_arm
+from trunkline.arm.spiral import spiral_chain
+from trunkline.hybrid.doubts import Doubts, nominal_draw
+from trunkline.hybrid.futures import Way, futures
+from trunkline.hybrid.preview import joined
+from trunkline.panda.kinematics import mount_pose
+from trunkline.teleop.messages import Box, Thing, World
+
+READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
+BASKET = Thing("the basket", "basket", 0.03, 0.06, 0.2, (0.5, 0.4, 0.05), support="standing")
+WORLD = World("w", (Box("floor", (-3, -3, -2), (3, 3, -0.75)), Box("stand", (0.4, 0.3, -0.03), (0.6, 0.5, 0.0))))
+
+
+@pytest.fixture(scope="module")
+def known() -> Believed:
+    arm = rubbing_arm(spiral_chain(length=0.2, base_width=0.05, tip_width=0.02, units=6), 3)
+    return Believed(arm, Doubts(), hybrid_settings(robot="panda").robot)
+
+
+def composed(known: Believed, thing: Thing, lean: Rotation, left=None):
+    arm = known.arm.copy().compile()
+    straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
+    return compose_twin(known, WORLD, thing, READY, straight, settings.previewing(), lean, left), straight
+
+
+def tip_of(twin, known: Believed) -> np.ndarray:
+    """In the frame of the mount without its lean, m."""
+    data = mujoco.MjData(twin.model)
+    data.qpos[:] = twin.start
+    mujoco.mj_kinematics(twin.model, data)
+    place, turn = (found[0] for found in mount_pose(READY[None], known.robot.mount_offset))
+    return (data.site("tip").xpos - place) @ turn * [1, -1, -1]
+
+
+def test_the_twin_hangs_as_the_robot_was_seen_to(known):
+    twin, _ = composed(known, BASKET, Rotation.identity())
+    plain = tip_of(twin, known)
+    seen = plain + [0.004, -0.002, 0.0]
+    lean = known.lean(seen)
+    assert 0.01 < lean.magnitude() < 0.05
+    leaning, _ = composed(known, BASKET, lean)
+    np.testing.assert_allclose(tip_of(leaning, known)[:2], seen[:2], atol=2e-4)
+
+
+@pytest.mark.parametrize("high", [-0.004, 0.0, 0.006])
+def test_what_stands_stays_where_it_is_seen(known, high):
+    """On a board that the client takes for higher or lower than it is; its bar seen not quite level."""
+    x, y, _ = BASKET.position
+    turn = Rotation.from_euler("zx", [0.3, 0.005]).as_quat(scalar_first=True)
+    thing = replace(BASKET, position=(x, y, BASKET.position[2] + high), quaternion=tuple(map(float, turn)))
+    twin, straight = composed(known, thing, Rotation.identity())
+    way = Way(0.1, np.tile(READY, (6, 1)), np.tile(straight, (6, 1)))
+    motion = joined(list(futures(twin, way, nominal_draw())))
+    assert np.abs(motion.object[0, :, :3] - thing.position).max() < 1e-3
+    upright = Rotation.from_quat(motion.object[0, -1, 3:], scalar_first=True).as_matrix()[2, 2]
+    assert upright > 1 - 1e-5
+
+
+def test_a_hand_over_begins_as_the_grasp_ended(known):
+    hanging = replace(BASKET, shape="cylinder", diameter=0.04, support="hanging", position=(0.5, 0.4, 0.3))
+    first, straight = composed(known, hanging, Rotation.identity())
+    pose = first.start + np.linspace(0.0, 0.01, first.model.nq)
+    then, _ = composed(known, replace(hanging, support="held"), Rotation.identity(), pose)
+    assert then.model.nq < first.model.nq  # there is no string
+    names = [then.model.joint(number).name for number in range(then.model.njnt)]
+    assert names == [first.model.joint(number).name for number in range(then.model.njnt)]
+    np.testing.assert_array_equal(then.start, pose[: then.model.nq])
