@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial.distance import directed_hausdorff
+from point_cloud_utils import signed_distance_to_mesh
 
 from trunkline.live.scene import MOST_TRIANGLES, SHELL_TRIANGLES, drawn, shells
 from trunkline.panda.shipped import shipped_panda
@@ -60,11 +60,13 @@ def test_geoms_are_those_that_are_seen_each_on_its_body(model):
 def test_meshes_are_decimated_to_what_may_be_drawn_and_stay_where_they_are():
     panda = shipped_panda(0.05).compile()
     whole, small = drawn(panda, most_triangles=10**7).scene, drawn(panda).scene
-    assert sum(len(mesh["faces"]) for mesh in whole["meshes"]) == 3 * panda.mesh_facenum.sum()
+    assert sum(len(mesh["faces"]) for mesh in whole["meshes"]) > 3 * 5 * MOST_TRIANGLES
     assert sum(len(mesh["faces"]) for mesh in small["meshes"]) <= 3 * MOST_TRIANGLES
     for before, after in zip(whole["meshes"], small["meshes"], strict=True):
         corners, kept = (np.reshape(mesh["vertices"], (-1, 3)) for mesh in (before, after))
-        assert directed_hausdorff(kept, corners)[0] < 0.005
+        away, _, _ = signed_distance_to_mesh(kept, corners, np.reshape(before["faces"], (-1, 3)))
+        assert np.quantile(np.abs(away), 0.99) < 0.002
+        assert np.abs(away).max() < 0.005
 
 
 def test_reach_of_the_mount_is_in_the_base_frame():
