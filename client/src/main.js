@@ -13,10 +13,11 @@ import { Playback } from "./playback.js";
 import { Recording } from "./recording.js";
 import { RobotScene } from "./scene.js";
 import { HANDS, MARKERS } from "./wire_table.js";
-import { STRIDE, Wire, clock } from "./wire.js";
+import { STRIDE, Wire, clock, noHand } from "./wire.js";
 
 const KEPT = "trunkline.token"; // of this tab, so that a reload need not pair again
 const RIGID_HAND = "left"; // the core's own choice is `core.rigid_hand`, of which the markers tell
+const INPUT_RATE = 72; // Hz
 const STILL = 0.3; // s without a grip, after which the core's targets are taken over
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
@@ -54,6 +55,9 @@ class Page {
     this.resize();
     addEventListener("resize", () => this.resize());
     this.before = clock();
+    this.hands = { left: noHand(), right: noHand() };
+    // At a desk, hands do not wait for the picture: slow drawing is no silent client.
+    setInterval(() => this.immersive.session || this.send(this.atDesk(clock()), false, clock()), 1000 / INPUT_RATE);
     this.renderer.setAnimationLoop((_, frame) => this.draw(frame));
   }
 
@@ -239,10 +243,9 @@ class Page {
     const now = clock(), dt = Math.min(now - this.before, 0.1);
     this.before = now;
     const immersed = Boolean(frame && this.immersive.session && this.immersive.space);
-    const hands = immersed ? this.inHeadset(now, frame) : this.atDesk(now);
-    this.send(hands, immersed, now);
+    if (immersed) this.send(this.inHeadset(now, frame), true, now);
     this.play(dt);
-    this.mark(hands, immersed);
+    this.mark(this.hands, immersed);
     this.tell(immersed, dt);
     if (!immersed) this.orbit.update();
     this.drawn.scene.background = immersed ? null : (this.ground ??= new Color(BACK));
@@ -287,6 +290,7 @@ class Page {
   }
 
   send(hands, immersed, now) {
+    this.hands = hands;
     if (!this.wire?.controls) return;
     const visible = immersed ? this.immersive.visible : !document.hidden;
     this.wire.input(hands, visible, now);

@@ -45,19 +45,18 @@ async function drag(page, kind, dx, dy) {
 
 const target = (page, kind) => page.evaluate((name) => globalThis.trunkline.state?.targets?.[name]?.position ?? null, kind);
 
-test("the page loads with no error and asks nothing of other hosts", async () => {
-  const { page, wrongs, context } = await open(browser, server);
+test("the page loads with no error and asks nothing of other hosts", async (t) => {
+  const { page, wrongs } = await open(t, browser, server);
   await loaded(page);
   await page.waitForTimeout(500);
   assert.deepEqual(wrongs, []);
   const { calls, triangles } = await page.evaluate(() => globalThis.trunkline.renderer.info.render);
   assert.ok(calls <= 60, `${calls} draw calls`);
   assert.ok(triangles > 5_000 && triangles <= 100_000, `${triangles} triangles`);
-  await context.close();
 });
 
-test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done", async () => {
-  const { page, wrongs, context } = await open(browser, server);
+test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done", async (t) => {
+  const { page, wrongs } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
   await drag(page, "rigid", 40, -30);
@@ -89,11 +88,10 @@ test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done"
     ["aim", "plan", "preview", "ready", "delay", "execute", "aim"]);
   assert.equal(log.filter((line) => line === "shown").length, 1);
   assert.deepEqual(wrongs, []);
-  await context.close();
 });
 
-test("keys move the chosen target by a step, and the grip let go holds the robot", async () => {
-  const { page, context } = await open(browser, server);
+test("keys move the chosen target by a step, and the grip let go holds the robot", async (t) => {
+  const { page } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
   for (const [key, kind] of [["Digit1", "rigid"], ["Digit2", "tip"]]) {
@@ -115,11 +113,10 @@ test("keys move the chosen target by a step, and the grip let go holds the robot
   await inMode(page, "execute");
   await page.keyboard.up("KeyG");
   await inMode(page, "hold");
-  await context.close();
 });
 
-test("out of reach is told in words, by a ring and by an offer that R takes", async () => {
-  const { page, context } = await open(browser, server);
+test("out of reach is told in words, by a ring and by an offer that R takes", async (t) => {
+  const { page } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
   await drag(page, "rigid", 10, 0);
@@ -134,11 +131,10 @@ test("out of reach is told in words, by a ring and by an offer that R takes", as
   await picture(page, "4-out-of-reach");
   await page.keyboard.press("KeyR");
   await until(page, () => globalThis.trunkline.state.targets?.rigid.reach === "inside");
-  await context.close();
 });
 
-test("space stops, and R goes on", async () => {
-  const { page, context } = await open(browser, server);
+test("space stops, and R goes on", async (t) => {
+  const { page } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
   await page.keyboard.press("Space");
@@ -146,11 +142,10 @@ test("space stops, and R goes on", async () => {
   await picture(page, "5-stopped");
   await page.keyboard.press("KeyR");
   await inMode(page, "aim");
-  await context.close();
 });
 
-test("a lost connection is said, the robot turns grey, and it comes back under the same id", async () => {
-  const { page, context } = await open(browser, server);
+test("a lost connection is said, the robot turns grey, and it comes back under the same id", async (t) => {
+  const { page } = await open(t, browser, server);
   await loaded(page);
   const id = await page.evaluate(() => globalThis.trunkline.wire.id);
   await server.tell("drop");
@@ -159,38 +154,33 @@ test("a lost connection is said, the robot turns grey, and it comes back under t
   await until(page, () => globalThis.trunkline.wire.up && globalThis.trunkline.state && true);
   assert.equal(await page.evaluate(() => globalThis.trunkline.wire.id), id);
   await until(page, () => !globalThis.trunkline.drawn.faded);
-  await context.close();
 });
 
-test("a robot that is not heard of is old, and grey", async () => {
-  const { page, context } = await open(browser, server);
+test("a robot that is not heard of is old, and grey", async (t) => {
+  const { page } = await open(t, browser, server);
   await loaded(page);
   await server.tell("silent");
   await until(page, () => /OLD/.test(document.querySelector("#facts").textContent) && globalThis.trunkline.drawn.faded);
   await server.tell("speak");
   await until(page, () => !/OLD/.test(document.querySelector("#facts").textContent));
-  await context.close();
 });
 
-test("without its token the page asks for the six digits, and a wrong token is said", async () => {
-  const { page, context } = await open(browser, server, { url: `${server.origin}/` });
+test("without its token the page asks for the six digits, and a wrong token is said", async (t) => {
+  const { page } = await open(t, browser, server, { url: `${server.origin}/` });
   await until(page, () => !document.querySelector("#pairing").hidden);
   await page.fill("#code", server.code);
   await page.click("#pairing button");
   await loaded(page);
   assert.ok(await page.evaluate(() => document.querySelector("#pairing").hidden));
-  await context.close();
-  const wrong = await open(browser, server, { url: `${server.origin}/#token=${"0".repeat(32)}` });
+  const wrong = await open(t, browser, server, { url: `${server.origin}/#token=${"0".repeat(32)}` });
   await until(wrong.page, () => /token/.test(document.querySelector("#why").textContent));
-  await wrong.context.close();
 });
 
-test("axe finds nothing against the page", async () => {
-  const { page, context } = await open(browser, server);
+test("axe finds nothing against the page", async (t) => {
+  const { page } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
   await page.evaluate(AXE); // by the debugger's protocol, which the page's rules do not bind
   const { violations } = await page.evaluate(() => globalThis.axe.run(document));
   assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.target).join(", ")}`), []);
-  await context.close();
 });

@@ -43,9 +43,10 @@ export async function serve() {
 
 export const launch = () => chromium.launch({ executablePath: BROWSER, args: FLAGS });
 
-/** A page at `url` of `server`; `wrongs` collects console errors, exceptions and requests elsewhere. */
-export async function open(browser, server, { url = server.url, headset = false, width = 1280, height = 720 } = {}) {
+/** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. */
+export async function open(t, browser, server, { url = server.url, headset = false, width = 900, height = 560 } = {}) {
   const context = await browser.newContext({ viewport: { width, height } });
+  t.after(() => context.close());
   const page = await context.newPage();
   const wrongs = [];
   page.on("console", (message) => ["error", "warning"].includes(message.type()) && !isOfDriver(message.text()) && wrongs.push(`${message.type()}: ${message.text()}`));
@@ -56,7 +57,7 @@ export async function open(browser, server, { url = server.url, headset = false,
   });
   if (headset) await page.addInitScript({ content: await emulator() });
   await page.goto(url);
-  return { page, wrongs, context };
+  return { page, wrongs };
 }
 
 /** What software drawing says of itself, which is no fault of the page. */
