@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rehearsal.settings import Previewing
-from rehearsal.twin import Believed, compose_twin
+from trunkline.foresight.settings import Previewing
+from trunkline.foresight.twin import Believed, compose_twin
 from trunkline.frames import rotation_from_wxyz
 from trunkline.hybrid.assistant import best, try_places
 from trunkline.hybrid.futures import Twin, Way

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from rehearsal.settings import Previewing
 from trunkline.errors import InputError
+from trunkline.foresight.settings import Previewing
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.hybrid.compose import Placed, compose, panda_joints
 from trunkline.hybrid.doubts import Contact, Doubts
@@ -41,7 +41,7 @@ def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
     contact = Contact(settings.friction, (x, y, z), float(np.radians(settings.turn_deg)))
     robot = unpacked.robot_of(files)
     if not isinstance(robot, PandaRobot):
-        raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: the rehearsal moves that")
+        raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
     return Believed(unpacked.arm_of(files), unpacked.doubts_of(files, contact), robot)
 
 
