@@ -61,8 +61,11 @@ class Channel:
 
 @dataclass(frozen=True)
 class Standing:
-    """What the robot does at `time`, s: `joints` (7,), rad, `commands` (K,), m, `thing` (7,) and `bodies` (N, 7), poses.
-    held: s at which it was last commanded to hold. NaN in what is not there."""
+    """What the robot does at `time`, s.
+
+    `joints` (7,), rad, `commands` (K,), m, and poses of the `thing` (7,), NaN where there is none, and of the `bodies`
+    (N, 7). held: s at which it was last commanded to hold.
+    """
 
     time: float
     held: float

@@ -7,6 +7,7 @@ that bear the arm. So what was previewed is what happens.
 import copy
 import os
 import time
+from contextlib import suppress
 from dataclasses import dataclass
 from queue import Empty
 
@@ -168,10 +169,8 @@ class Loop:
 def run(channel: Channel, simulation: Simulation) -> None:
     """The process: until its parent is gone."""
     os.environ["TRUNKLINE_THREADS"] = "1"
-    try:
+    with suppress(OSError):
         os.nice(NICE)
-    except OSError:
-        pass
     parent = os.getppid()
     loop = Loop(channel, simulation, Plant(simulation))
     due = time.monotonic()
