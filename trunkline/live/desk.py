@@ -12,7 +12,7 @@ import numpy as np
 
 from trunkline.live import foreseer, talk
 from trunkline.live.believing import believe
-from trunkline.live.controllers import NOWHERE, controllers, stops
+from trunkline.live.controllers import NOWHERE, controllers
 from trunkline.live.robot import Standing
 from trunkline.live.wire import MARKERS, Received
 from trunkline.live.words import next_action
@@ -63,20 +63,19 @@ class Desk:
         self.pieces: list[foreseer.Shown] = []
         self.intent: Intent | None = None
         self._heard: deque[Heard] = deque(maxlen=MOST_INPUTS)
-        self._last = Heard(0.0, NOWHERE, NOWHERE)
+        self._last, self._fresh = self._nobody, True
         self._stop, self._fault, self._shown, self._since, self._believed = False, "", "", 0.0, ""
-        self._asked = 0
+        self._asked, self._ordered, self._started, self._ran = 0, False, "", False
 
     # --- what is heard
 
     def hear(self, received: Received) -> str:
         """An input of whom controls; why it does not count, "" where it does."""
         last = self._heard[-1] if self._heard else self._last
-        if received.stamp <= last.stamp and last is not self._nobody:
+        if received.stamp <= last.stamp and not self._fresh:
             return f"input: stamp {received.stamp:.6g} s is not after {last.stamp:.6g} s: heard before"
+        self._fresh = False
         self._heard.append(Heard(received.stamp, *controllers(received)))
-        if stops(received):
-            self.stop()
         return ""
 
     def stop(self) -> None:
@@ -87,7 +86,7 @@ class Desk:
     def control(self, alignment: Pose | None) -> None:
         """Somebody else controls now, or nobody, who is aligned so."""
         self._heard.clear()
-        self._last, self.alignment = self._nobody, alignment
+        self._last, self._fresh, self.alignment = self._nobody, True, alignment
         self.robot.stop()
 
     def shown(self, digest: str, now: float) -> str:
@@ -151,6 +150,11 @@ class Desk:
         return intent
 
     @property
+    def _rigid(self) -> int:
+        """Which hand holds the rigid target."""
+        return ("left", "right").index(self.core.settings.rigid_hand)
+
+    @property
     def _nobody(self) -> Heard:
         """Nothing heard, at the stamp of the last step."""
         stamp = self.state.stamp if self.state.stamp is not None else 0.0
@@ -161,29 +165,30 @@ class Desk:
         if request is not None and request.serial != self._asked:
             self._asked, self.report, self.plan, self.preview = request.serial, None, None, None
             self.foreseen, self.pieces, self._shown = None, [], ""
+            self._ordered = True
             self.planning.order(foreseer.Order(request, self.world, standing.joints, standing.commands))
-        elif intent.mode in ("hold", "stopped", "aim") and self._shown:
-            self._shown = ""
+        elif self._ordered and intent.mode in ("hold", "stopped", "aim", "execute"):
+            self._ordered = False
+            self.planning.leave()
 
     def _drive(self, intent: Intent) -> None:
         running = self.robot.state()
-        if intent.motion == "execute":
-            if running.digest != intent.execute or running.mode == "idle":
-                self._begin(intent)
-            if not self._fault:
-                self.robot.permit()
-        else:
-            self._fault = "" if intent.mode != "stopped" else self._fault
-            self._started = ""
+        if intent.motion != "execute":
+            self._fault = self._fault if intent.mode == "stopped" else ""
+            self._started, self._ran = "", False
             if running.mode == "running":
                 self.robot.stop()
-
-    _started = ""
+            return
+        if self._started != intent.execute:
+            self._begin(intent)
+        self._ran = self._ran or running.mode == "running"
+        if self._ran and running.mode == "idle":
+            self._fault = "it has come to rest by itself"
+        if not self._fault:
+            self.robot.permit()
 
     def _begin(self, intent: Intent) -> None:
         """Start the plan that was confirmed, once."""
-        if self._started == intent.execute:
-            return
         self._started = intent.execute
         if self.plan is None or self.plan.digest() != intent.execute:
             self._fault = "the plan that was confirmed is not there"
@@ -212,7 +217,7 @@ class Desk:
             turn = base_quaternion(targets.pointing, targets.heading)
             found[2], found[3] = (*targets.rigid.position, *turn), (*targets.tip.position, *turn)
         else:
-            for row, hand in ((2, self.core._rigid), (3, 1 - self.core._rigid)):
+            for row, hand in ((2, self._rigid), (3, 1 - self._rigid)):
                 target = self.state.hands[hand].target
                 if target is not None:
                     found[row] = (*target, 1.0, 0.0, 0.0, 0.0)
@@ -223,8 +228,7 @@ class Desk:
         intent, robot = self.intent, self.robot.state()
         assert intent is not None
         hands = self.state.hands
-        rigid = ("left", "right").index(self.core.settings.rigid_hand)
-        touched = hands[rigid].target is not None, hands[1 - rigid].target is not None
+        touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
         return talk.State(
             intent.mode, intent.motion, intent.notice, words, round(intent.countdown, 2), intent.preview,

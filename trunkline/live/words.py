@@ -18,11 +18,7 @@ NEXT: dict[Mode, str] = {
 def next_action(mode: Mode, targets: Targets | None, holder: str, aligned: bool, touched: tuple[bool, bool]) -> str:
     """touched: whether the rigid and the tip target have been set."""
     if not holder:
-        return (
-            "ask for control; anybody may stop the robot"
-            if mode != "stopped"
-            else "ask for control, then press primary"
-        )
+        return "ask for control" + (", then press primary" if mode == "stopped" else "; anybody may stop the robot")
     if not aligned:
         return "align the base"
     if mode != "aim":
