@@ -8,7 +8,7 @@ REQUIREMENTS := requirements.lock requirements-torch.txt
 PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: demo rehearse test types gate baseline lock readme pull push setup stale requirements clean
+.PHONY: demo rehearse live test types gate baseline lock readme pull push setup stale requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
@@ -18,6 +18,9 @@ demo: setup          ## run the whole pipeline, from recording the demo logs to 
 RUNS ?= 10
 rehearse: setup      ## rehearse the experiments on the stand-in robot: make rehearse RUNS=20; resumes where it was stopped
 	python -m rehearsal --runs $(RUNS)
+
+live: setup          ## a live session with the demo package, in a browser: the address is printed
+	python -m trunkline.live artifacts/package_unity/*.tgz
 
 test: setup          ## run every test, then lint
 	python -m pytest -n auto --dist loadgroup

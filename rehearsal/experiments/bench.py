@@ -12,12 +12,12 @@ from demo.rig import Config as Lab
 from rehearsal import settings
 from rehearsal.operator.hands import Person, RayHand
 from rehearsal.operator.scripts import Operator, Script, offset_of
-from rehearsal.package import Package, read_package
 from rehearsal.robot.scene import Object, Scene
 from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
 from rehearsal.settings import Free
 from trunkline.errors import InputError
+from trunkline.foresight.package import Package, read_package
 from trunkline.pipeline.config import PROJECT, load_config, load_folder
 from trunkline.teleop.config import Config
 from trunkline.teleop.messages import Box, World

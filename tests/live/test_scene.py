@@ -6,10 +6,9 @@ import pytest
 import trimesh
 from point_cloud_utils import signed_distance_to_mesh
 
-from trunkline.live.scene import MOST_TRIANGLES, SHELL_TRIANGLES, drawn, shells
+from trunkline.live.bodies import drawn
+from trunkline.live.scene import MOST_TRIANGLES, SHELL_TRIANGLES, scene
 from trunkline.panda.shipped import shipped_panda
-from trunkline.unity.frame import unity_obj
-from trunkline.unity.twin import MANIFEST
 
 XML = """
 <mujoco>
@@ -37,20 +36,23 @@ def model() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(XML)
 
 
-def test_bodies_are_those_that_are_seen_in_the_models_order(model):
-    found = drawn(model)
-    assert found.scene["bodies"] == ["foot", "link", "cup"]
-    assert [model.body(int(body)).name for body in found.ids] == found.scene["bodies"]
+@pytest.fixture(scope="module")
+def found(model) -> dict:
+    return scene(model, drawn(model), empty(), 0.5)
 
 
-def test_geoms_are_those_that_are_seen_each_on_its_body(model):
-    geoms = drawn(model).scene["geoms"]
-    assert [(geom["body"], geom["shape"]) for geom in geoms] == [
-        (-1, "box"),
-        (0, "cylinder"),
-        (1, "capsule"),
-        (2, "box"),
-    ]
+def empty() -> dict[str, np.ndarray]:
+    """Maps of a robot that reaches nothing."""
+    return {"rigid": np.ones((4, 4, 4)), "rigid_origin": np.zeros(3), "rigid_spacing": np.array(0.1)}
+
+
+def test_bodies_are_those_with_geoms_in_the_models_order(found):
+    assert found["bodies"] == ["foot", "link", "cup"]
+
+
+def test_geoms_are_those_that_are_seen_each_on_its_body(found):
+    geoms = found["geoms"]
+    assert [(one["body"], one["shape"]) for one in geoms] == [(-1, "box"), (0, "cylinder"), (1, "capsule"), (2, "box")]
     assert geoms[0]["position"] == [1, 0, -0.1]
     assert geoms[0]["rgba"] == [1, 0, 0, 1]
     assert geoms[1]["rgba"] == [0, 1, 0, 1]  # of its material
@@ -59,29 +61,39 @@ def test_geoms_are_those_that_are_seen_each_on_its_body(model):
 
 def test_meshes_are_decimated_to_what_may_be_drawn_and_stay_where_they_are():
     panda = shipped_panda(0.05).compile()
-    whole, small = drawn(panda, most_triangles=10**7).scene, drawn(panda).scene
-    assert sum(len(mesh["faces"]) for mesh in whole["meshes"]) > 3 * 5 * MOST_TRIANGLES
-    assert sum(len(mesh["faces"]) for mesh in small["meshes"]) <= 3 * MOST_TRIANGLES
-    for before, after in zip(whole["meshes"], small["meshes"], strict=True):
-        corners, kept = (np.reshape(mesh["vertices"], (-1, 3)) for mesh in (before, after))
-        away, _, _ = signed_distance_to_mesh(kept, corners, np.reshape(before["faces"], (-1, 3)))
+    meshes = scene(panda, drawn(panda), empty(), 0.5)["meshes"]
+    assert panda.mesh_facenum.sum() > 5 * MOST_TRIANGLES
+    assert sum(len(mesh["faces"]) for mesh in meshes) <= 3 * MOST_TRIANGLES
+    assert len(meshes) == panda.nmesh
+    for number, mesh in enumerate(meshes):
+        corners = panda.mesh_vert[panda.mesh_vertadr[number] :][: panda.mesh_vertnum[number]].astype(float)
+        faces = panda.mesh_face[panda.mesh_faceadr[number] :][: panda.mesh_facenum[number]]
+        kept = np.reshape(mesh["vertices"], (-1, 3))
+        away, _, _ = signed_distance_to_mesh(kept, corners, faces.astype(np.int64))
         assert np.quantile(np.abs(away), 0.99) < 0.002
         assert np.abs(away).max() < 0.005
 
 
-def test_reach_of_the_mount_is_in_the_base_frame():
-    ball = trimesh.creation.icosphere(subdivisions=5, radius=0.8).apply_translation([0.1, 0.2, 0.3])
-    files = {
-        "rigid.obj": unity_obj(np.asarray(ball.vertices), np.asarray(ball.faces)),
-        MANIFEST: b'{"meshes": {"rigid": {"file": "rigid.obj"}}, "reach": {"sheets": {"around": 5, "along": 7}}}',
-    }
-    found = shells(files)
-    assert found["shell"] == {"around": 5, "along": 7}
-    reach = trimesh.Trimesh(*(np.reshape(found["reach"][name], (-1, 3)) for name in ("vertices", "faces")))
-    assert len(reach.faces) <= SHELL_TRIANGLES < len(ball.faces)
-    np.testing.assert_allclose(reach.center_mass, [0.1, 0.2, 0.3], atol=1e-3)
-    assert reach.volume == pytest.approx(4 / 3 * np.pi * 0.8**3, rel=0.01)
+def test_a_small_mesh_is_left_as_it_is():
+    spec = mujoco.MjSpec()
+    spec.add_mesh(name="wedge", uservert=[0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1])
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname="wedge")
+    model = spec.compile()
+    assert len(scene(model, (), empty(), 0.5)["meshes"][0]["faces"]) == 3 * 4
 
 
-def test_a_package_without_maps_has_no_shells():
-    assert shells({MANIFEST: b'{"meshes": {}, "reach": {}}'}) == {"shell": None, "reach": None}
+def test_reach_of_the_mount_is_a_surface_in_the_base_frame():
+    axis = -1.0 + 0.05 * np.arange(41)
+    x, y, z = np.meshgrid(axis, axis, axis, indexing="ij")
+    ball = np.sqrt((x - 0.1) ** 2 + y**2 + (z - 0.2) ** 2) - 0.6
+    maps = {"rigid": ball, "rigid_origin": np.full(3, -1.0), "rigid_spacing": np.array(0.05)}
+    reach = scene(mujoco.MjSpec().compile(), (), maps, 0.5)["reach"]
+    surface = trimesh.Trimesh(*(np.reshape(reach[name], (-1, 3)) for name in ("vertices", "faces")))
+    assert len(surface.faces) <= SHELL_TRIANGLES
+    np.testing.assert_allclose(surface.center_mass, [0.1, 0, 0.2], atol=2e-3)
+    assert surface.volume == pytest.approx(4 / 3 * np.pi * 0.6**3, rel=0.02)
+
+
+def test_a_package_without_maps_has_no_reach(found):
+    assert found["shell"] is None
+    assert found["reach"] is None

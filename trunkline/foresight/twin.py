@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
-from rehearsal.settings import Previewing
 from trunkline.errors import InputError
+from trunkline.foresight.settings import Previewing
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.hybrid.compose import Placed, compose, panda_joints
 from trunkline.hybrid.doubts import Contact, Doubts
@@ -41,21 +41,22 @@ def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
     contact = Contact(settings.friction, (x, y, z), float(np.radians(settings.turn_deg)))
     robot = unpacked.robot_of(files)
     if not isinstance(robot, PandaRobot):
-        raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: the rehearsal moves that")
+        raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
     return Believed(unpacked.arm_of(files), unpacked.doubts_of(files, contact), robot)
 
 
 def compose_twin(
-    known: Believed, world: World, thing: Thing, joints: np.ndarray, commands: np.ndarray, settings: Previewing
+    known: Believed, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray, settings: Previewing
 ) -> Twin:
     """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands."""
     robot = replace(known.robot, ready=joints.tolist())
-    place = np.array(thing.position)
-    room = Room(None, {box.name: _surface(box) for box in world.boxes}, None)
-    shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material)
-    spec = compose(known.arm, robot, room, Placed(shaped, place, thing.quaternion))
-    if thing.support == "hanging":
-        hang(spec, place, thing.diameter / 2, settings.string)
+    room, placed = Room(None, {box.name: _surface(box) for box in world.boxes}, None), None
+    if thing is not None:
+        shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material)
+        placed = Placed(shaped, np.array(thing.position), thing.quaternion)
+    spec = compose(known.arm, robot, room, placed)
+    if thing is not None and thing.support == "hanging":
+        hang(spec, np.array(thing.position), thing.diameter / 2, settings.string)
     model, arm = spec.compile(), known.arm.copy().compile()
     return Twin(model, arm, _start(model, arm, joints, commands, robot.mount_offset)).stepped(settings.step)
 

@@ -3,20 +3,50 @@
 Futures begin where the approach ends: until then nothing is touched.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rehearsal.settings import Previewing
-from rehearsal.twin import Believed, compose_twin
+from trunkline.foresight.settings import Previewing
+from trunkline.foresight.twin import Believed, compose_twin
 from trunkline.frames import rotation_from_wxyz
 from trunkline.hybrid.assistant import best, try_places
-from trunkline.hybrid.futures import Twin, Way
+from trunkline.hybrid.doubts import Doubts, draw
+from trunkline.hybrid.futures import Piece, Twin, Way, futures
 from trunkline.hybrid.placements import Grip
-from trunkline.hybrid.preview import Holding, Preview, preview
+from trunkline.hybrid.preview import Holding, Preview, joined, nominal
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.messages import Offer, Targets, Thing, World
 from trunkline.teleop.plan import Plan
+
+Go = Callable[[], None]
+
+
+def _always() -> None:
+    pass
+
+
+def foresee(
+    twin: Twin, way: Way, doubts: Doubts, holding: Holding | None, count: int, seed: int, go_on: Go = _always
+) -> Preview:
+    """As `hybrid.preview.preview`, which it may leave within.
+
+    Args:
+        go_on: called before each quarter of a second that is simulated; what it raises ends it.
+    """
+    begun, draws = _asked(nominal(twin, way), go_on), draw(doubts, twin.arm, count, seed)
+    motion = joined(_asked(futures(twin, way, draws), go_on))
+    return Preview(joined(begun), motion, draws, holding.holds(motion) if holding is not None else None)
+
+
+def _asked(pieces: Iterator[Piece], go_on: Go) -> list[Piece]:
+    found = []
+    go_on()
+    for piece in pieces:
+        found.append(piece)
+        go_on()
+    return found
 
 
 @dataclass(frozen=True)
@@ -43,17 +73,20 @@ class Foresight:
     grips: dict[str, Grip]
     settings: Previewing
 
-    def grasp(self, plan: Plan, targets: Targets, thing: Thing, world: World, beside: float, seed: int) -> Foreseen:
+    def grasp(
+        self, plan: Plan, targets: Targets, thing: Thing, world: World, beside: float, seed: int, go_on: Go = _always
+    ) -> Foreseen:
         """Futures of a plan to grasp; where they are not sure to hold, the assistant looks for a better place.
 
         Args:
             beside: m, for which the plan's mount makes up (`Grasping.grasp`); the twin's arm is straight.
+            go_on: as `foresee`.
         """
         s, way, begins = self.settings, *self.way(plan, "curl")
         x, y, z = (float(value) for value in thing.position - beside * _rotation(targets)[:, 1])
         twin = compose_twin(self.known, world, replace(thing, position=(x, y, z)), way.joints[0], way.commands[0], s)
         holding = Holding(way.duration - s.hold, s.sag, s.slip, s.lifted)
-        found = Foreseen(preview(twin, way, self.known.doubts, holding, s.futures, seed), begins)
+        found = Foreseen(foresee(twin, way, self.known.doubts, holding, s.futures, seed, go_on), begins)
         if found.probability >= s.sure or s.assistant == 0:
             return found
         return replace(found, offer=self._offer(twin, way, holding, targets, thing, found.probability, seed))
