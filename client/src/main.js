@@ -18,6 +18,7 @@ import { STRIDE, Wire, clock, noHand } from "./wire.js";
 const KEPT = "trunkline.token"; // of this tab, so that a reload need not pair again
 const RIGID_HAND = "left"; // the core's own choice is `core.rigid_hand`, of which the markers tell
 const INPUT_RATE = 72; // Hz
+const WIDE = 1200; // pixels of a page on which the keys do not cover the robot
 const STILL = 0.3; // s without a grip, after which the core's targets are taken over
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
@@ -54,6 +55,7 @@ class Page {
     this.stand(DESKTOP);
     this.resize();
     addEventListener("resize", () => this.resize());
+    find("help").open = innerWidth >= WIDE;
     this.before = clock();
     this.hands = { left: noHand(), right: noHand() };
     // At a desk, hands do not wait for the picture: slow drawing is no silent client.

@@ -25,10 +25,12 @@ export function words(page) {
   if (state?.fault) facts.Fault = state.fault;
   let title = TITLES[mode];
   if (mode === "delay" && Number.isFinite(state.countdown)) title = `Moves in ${state.countdown.toFixed(1)} s`;
-  let next = mine ? (state?.next ?? "") : "You watch. Take control to aim.";
+  let next = mine || !lease?.holder ? sentence(state?.next ?? "") : "You watch. Ask for control to aim.";
   if (!up) next = reason === null ? "Waiting for the server." : `The connection is lost${reason ? `: ${reason}` : ""}. Trying again.`;
   return { mode, title, next, notice: (up && state?.notice) || "", facts };
 }
+
+const sentence = (text) => (text ? `${text[0].toUpperCase()}${text.slice(1)}.` : "");
 
 /** What the batch of futures says, in one line. */
 export function foreseenWords(told) {

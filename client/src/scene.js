@@ -10,6 +10,8 @@ import { mergedGeoms } from "./geoms.js";
 import { STRIDE } from "./wire.js";
 
 const ONE = new Vector3(1, 1, 1);
+const WIDEST = 4; // m, of a solid that is drawn as one; the floor's box is wider
+const OBJECT = "object"; // the body of the thing, where the model has one
 const FADED = 0.35; // of a live robot that is not heard of
 const WOOD = [0.55, 0.47, 0.38, 1], THING = [0.35, 0.7, 0.9, 1];
 
@@ -17,8 +19,8 @@ export class RobotScene {
   constructor() {
     this.scene = new Scene();
     this.base = new Group(); // all of the robot's base frame, z up; where it is in the room an alignment says
-    this.scene.add(this.base, new HemisphereLight(0xffffff, 0x8a8f99, 2.1));
-    const sun = new DirectionalLight(0xffffff, 1.6);
+    this.scene.add(this.base, new HemisphereLight(0xffffff, 0x6d747e, 1.35));
+    const sun = new DirectionalLight(0xffffff, 1.5);
     sun.position.set(1.5, 3, 2);
     this.scene.add(sun);
     this.floor = new GridHelper(4, 16, 0x4a5663, 0x343e49);
@@ -33,6 +35,7 @@ export class RobotScene {
     this.count = bodies.length;
     this.bodies = bodies;
     const moving = mergedGeoms(geoms.filter(({ body }) => body >= 0), meshes);
+    this.still = this.reach = this.tipReach = null;
     const still = mergedGeoms(geoms.filter(({ body }) => body < 0), meshes);
     if (moving) {
       this.live = skinned(moving, new MeshLambertMaterial({ vertexColors: true }), bodies.length);
@@ -57,6 +60,7 @@ export class RobotScene {
       this.base.add(this.tipReach);
     }
     this.showReach(this.reachShown);
+    if (this.known) this.world(this.known);
   }
 
   /** The robot as it is: rows of poses, of which the first are the bodies'. */
@@ -104,9 +108,14 @@ export class RobotScene {
     if (this.tipReach) this.tipReach.visible = shown && Boolean(this.tipReach.filled);
   }
 
-  /** Solids and things as they are believed. */
-  world({ boxes, things }) {
+  /** Solids and things as they are believed, but for those that the model has. */
+  world(world) {
+    this.known = world;
     this.believed?.removeFromParent();
+    const things = this.bodies?.includes(OBJECT) ? [] : world.things;
+    const wide = (box) => box.high[0] - box.low[0] > WIDEST;
+    this.floor.position.z = Math.min(0, ...world.boxes.map((box) => (wide(box) ? box.high[2] : box.low[2])));
+    const boxes = this.still ? [] : world.boxes.filter((box) => !wide(box));
     const geoms = boxes.map(({ low, high }) => ({
       body: -1, shape: "box", quaternion: [1, 0, 0, 0], rgba: WOOD,
       position: low.map((x, axis) => (x + high[axis]) / 2), size: low.map((x, axis) => (high[axis] - x) / 2),
@@ -158,7 +167,8 @@ function setPoses({ skeleton }, rows, start) {
     const at = start + index * STRIDE;
     place.fromArray(rows, at);
     turn.set(rows[at + 4], rows[at + 5], rows[at + 6], rows[at + 3]);
-    bone.matrixWorld.compose(place, turn, ONE);
+    if (Number.isFinite(place.x)) bone.matrixWorld.compose(place, turn, ONE);
+    else bone.matrixWorld.makeScale(0, 0, 0); // a body that is not there
   });
 }
 

@@ -19,20 +19,20 @@ const PICTURES = process.env.TRUNKLINE_PICTURES ?? "";
 const LONGEST = 30_000; // ms that anything may take; drawing by software on a shared core is slow
 const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-background-networking"];
 
-/** A scripted server: `url`, `tell(word)` which gives its log. */
+/** The server, round a plain robot: `url`, `tell(word)` which gives its log. */
 export async function serve() {
-  const child = spawn(PYTHON, ["-m", "tests.live.scripted", "0"], { cwd: root, stdio: ["pipe", "pipe", "inherit"] });
+  const child = spawn(PYTHON, ["-m", "tests.live.page_server"], { cwd: root, stdio: ["pipe", "pipe", "inherit"] });
   const lines = createInterface({ input: child.stdout })[Symbol.asyncIterator]();
   const first = (await lines.next()).value ?? "";
   const [word, port, token, code] = first.split(" ");
-  assert.equal(word, "ready", "the scripted server did not start");
+  assert.equal(word, "ready", "the server did not start");
   return {
     origin: `http://127.0.0.1:${port}`,
     url: `http://127.0.0.1:${port}/#token=${token}`,
     code,
     async tell(text = "log") {
       child.stdin.write(`${text}\n`);
-      return (await lines.next()).value.replace("log ", "").split(",");
+      return JSON.parse((await lines.next()).value);
     },
     async close() {
       child.stdin.end();
