@@ -217,6 +217,7 @@ class Server:
         """
         async for message in client.socket:
             if message.type not in (WSMsgType.BINARY, WSMsgType.TEXT):
+                self.house.log(f"refused {client.id}: {message.data or 'the connection broke'}")
                 break
             now = self.now()
             client.count(now)
@@ -232,8 +233,6 @@ class Server:
                 self._refuse(client, f"rate: more than {PER_SECOND:g} messages a second; they are left out")
             if client.left < -FLOOD:
                 raise InputError(f"rate: {FLOOD:g} messages too many")
-        if client.socket.close_code == WSCloseCode.MESSAGE_TOO_BIG:
-            self.house.log(f"refused {client.id}: message: more than {LARGEST} bytes")
 
     def _heed(self, client: Client, received: wire.Received) -> None:
         """The stop, of everybody and always: a message of its own, or a secondary button."""
