@@ -57,8 +57,13 @@ def compose_twin(
     spec = compose(known.arm, robot, room, placed)
     if thing is not None and thing.support == "hanging":
         hang(spec, np.array(thing.position), thing.diameter / 2, settings.string)
-    model, arm = spec.compile(), known.arm.copy().compile()
-    return Twin(model, arm, _start(model, arm, joints, commands, robot.mount_offset)).stepped(settings.step)
+    twin = Twin(spec.compile(), known.arm.copy().compile()).stepped(settings.step)
+    return at_rest(twin, joints, commands, robot.mount_offset)
+
+
+def at_rest(twin: Twin, joints: np.ndarray, commands: np.ndarray, mount_offset: float) -> Twin:
+    """The same twin, its arm at rest at other `joints` (7,), rad, and `commands` (K,), m."""
+    return replace(twin, start=_start(twin.model, twin.arm, joints, commands, mount_offset))
 
 
 def _start(

@@ -20,7 +20,7 @@ from trunkline.errors import InputError
 from trunkline.foresight.foresight import Foreseen, Foresight, foresee
 from trunkline.foresight.package import Package, read_package
 from trunkline.foresight.settings import Previewing
-from trunkline.foresight.twin import Believed, believed, compose_twin
+from trunkline.foresight.twin import Believed, at_rest, believed, compose_twin
 from trunkline.hybrid.futures import FRAME, Twin, Way
 from trunkline.hybrid.preview import WITHIN, Preview, nominal
 from trunkline.live import talk
@@ -95,6 +95,7 @@ class Foreseer:
         self.planner: Planner = package.planner(config)
         self.known: Believed = believed(previewing, package.files)
         self.foresight = Foresight(self.known, package.grips(config), previewing)
+        self._kept: tuple[tuple, Twin | None] = ((), None)
 
     def answers(self, order: Order, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
         """All that comes of an order, each as soon as it is known. `go_on` raises where it need not be."""
@@ -108,13 +109,23 @@ class Foreseer:
         yield Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan)
         way, _ = self.foresight.way(plan, plan.phases[0][0]) if plan.phases else (_still(plan), 0.0)
         thing = _beside(order)
-        twin = compose_twin(self.known, order.world, thing, way.joints[0], way.commands[0], self.previewing)
+        twin = self._twin(order.world, thing, way.joints[0], way.commands[0])
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
         step = twin.model.opt.timestep * max(round(FRAME / twin.model.opt.timestep), 1)
         yield Begun(serial, talk.Preview(digest, step, way.duration, step, phases))
         go_on()
         yield from self._shown(serial, twin, way, go_on)
         yield Told(serial, self._told(order, plan, twin, way, digest, go_on))
+
+    def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> Twin:
+        """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
+        kept, twin = self._kept
+        if twin is not None and kept == (world.boxes, thing):
+            twin = at_rest(twin, joints, commands, self.known.robot.mount_offset)
+        else:
+            twin = compose_twin(self.known, world, thing, joints, commands, self.previewing)
+        self._kept = (world.boxes, thing), twin
+        return twin
 
     def _shown(self, serial: int, twin: Twin, way: Way, go_on: Callable[[], None]) -> Iterator[Answer]:
         poses, first, held = Poses(twin.model, self.bodies), 0, None

@@ -30,7 +30,7 @@ from trunkline.teleop.vectors import DOWN, conjugate, rotate
 
 HELLO = 3.0  # s for the first message
 LARGEST = 64 * 1024  # bytes of a message
-PER_SECOND, BURST = 400.0, 400.0  # messages of a client
+PER_SECOND, BURST, FLOOD = 400.0, 400.0, 4000.0  # messages of a client; of too many, those that end it
 MOST_CLIENTS = 64
 HEARTBEAT = 20.0  # s
 STATES = 0.1  # s between states that tell no new mode
@@ -56,11 +56,10 @@ class Client:
     refused: dict[str, float] = field(default_factory=dict)
     stopping: bool = False
 
-    def allowed(self, now: float) -> bool:
-        """Whether one more message is within its rate."""
+    def count(self, now: float) -> None:
+        """One more message: `left` of its rate, below 0 beyond it."""
         self.left = min(self.left + PER_SECOND * (now - self.counted), BURST) - 1
         self.counted = now
-        return self.left >= 0
 
 
 @dataclass(frozen=True)
@@ -218,21 +217,22 @@ class Server:
         """
         async for message in client.socket:
             if message.type not in (WSMsgType.BINARY, WSMsgType.TEXT):
+                self.house.log(f"refused {client.id}: {message.data or 'the connection broke'}")
                 break
             now = self.now()
-            allowed = client.allowed(now)
+            client.count(now)
             if message.type is WSMsgType.BINARY:
                 received = wire.read(message.data)
                 self._heed(client, received)
                 client.outbox.acknowledge(received.received)
-                if received.kind == "input":
+                if received.kind == "input" and client.left >= 0:
                     self._input(client, received, now)
-            elif allowed:
+            elif client.left >= 0:
                 self._said_by(client, talk.hear(message.data), now)
-            if not allowed:
-                raise InputError(f"rate: more than {PER_SECOND:g} messages a second")
-        if client.socket.close_code == WSCloseCode.MESSAGE_TOO_BIG:
-            self.house.log(f"refused {client.id}: message: more than {LARGEST} bytes")
+            if client.left < 0:
+                self._refuse(client, f"rate: more than {PER_SECOND:g} messages a second; they are left out")
+            if client.left < -FLOOD:
+                raise InputError(f"rate: {FLOOD:g} messages too many")
 
     def _heed(self, client: Client, received: wire.Received) -> None:
         """The stop, of everybody and always: a message of its own, or a secondary button."""

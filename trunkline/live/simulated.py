@@ -73,7 +73,7 @@ class Plant:
         self._winches, self._rub = Winches(self.batch, controls[:, self._motors]), rubbing(self.batch)
         if self._rub is not None:
             self._rub.begin(np.arange(1))
-        self.poses = self._poses({name: self.batch.bind(name)[:, None] for name in ("xpos", "xquat")})
+        self.move(simulation.joints, simulation.commands)
 
     def move(self, joints: np.ndarray, commands: np.ndarray) -> None:
         """One tick with the axes on their way to `joints` (7,), rad, and `commands` (K,), m."""

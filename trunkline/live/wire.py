@@ -71,7 +71,7 @@ BY_NUMBER = {kind.number: name for name, kind in FROM_CLIENT.items()}
 @dataclass(frozen=True)
 class Received:
     """A client's binary message: `kind` of FROM_CLIENT, its `flags` that are set, `received` by the client so far,
-    `stamp` s of its clock, and `hands` (2, 14), float64, of an input."""
+    `stamp` s of its clock, and `hands` (2, 14), float64, of an input, else (0, 14)."""
 
     kind: str
     flags: frozenset[str]
@@ -110,5 +110,5 @@ def read(message: bytes) -> Received:
     if bits >> len(kind.flags):
         raise InputError(f"{name}: found flags {bits:#x}, expected {len(kind.flags)} bits")
     flags = frozenset(flag for bit, flag in enumerate(kind.flags) if bits >> bit & 1)
-    hands = np.frombuffer(message, "<f4", offset=HEAD_BYTES).astype(float).reshape(rows, len(kind.row))
+    hands = np.frombuffer(message, "<f4", offset=HEAD_BYTES).astype(float).reshape(-1, len(HAND))
     return Received(name, flags, received, stamp, hands)
