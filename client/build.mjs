@@ -1,4 +1,4 @@
-// Builds the page: one script and one HTML file, which are committed, so that users need no Node.
+// Builds the page: one script, one HTML file and an icon, which are committed, so that users need no Node.
 //
 //   node build.mjs            writes trunkline/live/page/
 //   node build.mjs --check    compares it with what is there; ends with 1 where a byte differs
@@ -14,7 +14,7 @@ const here = dirname(fileURLToPath(import.meta.url));
 const page = join(here, "..", "trunkline", "live", "page");
 
 /** Files of the page by name, as bytes. */
-export async function pageFiles() {
+async function pageFiles() {
   const { outputFiles } = await build({
     absWorkingDir: here,
     entryPoints: ["src/main.js"],
@@ -31,6 +31,7 @@ export async function pageFiles() {
   return {
     "app.js": Buffer.from(outputFiles[0].contents),
     "index.html": readFileSync(join(here, "src", "index.html")),
+    "icon.svg": readFileSync(join(here, "src", "icon.svg")),
   };
 }
 

@@ -293,7 +293,7 @@ class Page {
 
   send(hands, immersed, now) {
     this.hands = hands;
-    if (!this.wire?.controls) return;
+    if (!this.wire?.controls || this.wire.offset === null) return; // before the clocks have met, input does not count
     const visible = immersed ? this.immersive.visible : !document.hidden;
     this.wire.input(hands, visible, now);
   }
@@ -346,7 +346,7 @@ class Page {
     this.panel.show(spoken);
     const mine = Boolean(wire?.controls);
     setText(find("control"), mine ? "Release control" : lease?.holder ? "Ask for control" : "Take control");
-    find("control").disabled = !wire?.up;
+    find("control").disabled = !wire?.up || wire.offset === null;
     const ready = state?.mode === "ready";
     setText(find("plan").firstChild, ready ? "Confirm " : "Ask for a plan ");
     find("plan").disabled = !mine || !["aim", "ready"].includes(state?.mode);

@@ -16,7 +16,7 @@ export const root = join(here, "..", "..");
 const PYTHON = process.env.TRUNKLINE_PYTHON ?? join(root, ".venv", "bin", "python");
 const BROWSER = process.env.TRUNKLINE_BROWSER ?? "/usr/bin/chromium";
 const PICTURES = process.env.TRUNKLINE_PICTURES ?? "";
-const LONGEST = 30_000; // ms that anything may take; drawing by software on a shared core is slow
+const LONGEST = 60_000; // ms that anything may take; drawing by software on a shared core is slow
 const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-background-networking"];
 
 /** The server, round a plain robot: `url`, `tell(word)` which gives its log. */
@@ -44,7 +44,7 @@ export async function serve() {
 export const launch = () => chromium.launch({ executablePath: BROWSER, args: FLAGS });
 
 /** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. */
-export async function open(t, browser, server, { url = server.url, headset = false, width = 900, height = 560 } = {}) {
+export async function open(t, browser, server, { url = server.url, headset = false, width = 640, height = 420 } = {}) {
   const context = await browser.newContext({ viewport: { width, height } });
   t.after(() => context.close());
   const page = await context.newPage();
