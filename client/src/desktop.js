@@ -10,6 +10,7 @@ const NEAR = 42; // pixels within which a marker is taken
 const STEP = 0.01, FINE = 0.001, TILT = MathUtils.degToRad(2); // of an arrow
 const WHEEL = 0.0006; // m a pixel of the wheel
 const PRESS = 0.12; // s for which a key's press is held, so that no frame misses it
+const SETTLES = 0.7; // s for which a target keeps its grip after a step, until the core's filter is there; while aiming alone
 const DOWN = new Vector3(0, 0, -1);
 const ARROWS = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
 
@@ -26,6 +27,7 @@ export class DesktopHands {
     this.pointing = DOWN.clone();
     this.chosen = this.rigid;
     this.dragging = false;
+    this.aiming = false; // whether the core aims
     this.dead = false; // the dead man's key or button
     this.until = { trigger: 0, primary: 0, stick_pressed: 0, grip: 0, tilt: 0 };
     this.listen();
@@ -54,8 +56,8 @@ export class DesktopHands {
     this.acts.held(on);
   }
 
-  press(button) {
-    this.until[button] = performance.now() / 1000 + PRESS;
+  press(button, seconds = PRESS) {
+    this.until[button] = performance.now() / 1000 + seconds;
   }
 
   /** Where both targets begin: at the robot's own mount and tip, so that they are seen. */
@@ -95,7 +97,7 @@ export class DesktopHands {
   }
 
   drop() {
-    if (this.dragging) this.press("grip"); // the last place is still heard with the grip
+    if (this.dragging) this.press("grip", SETTLES);
     this.dragging = false;
     this.orbit.enabled = true;
   }
@@ -139,7 +141,7 @@ export class DesktopHands {
     const step = event.shiftKey ? FINE : STEP;
     this.wanted[this.chosen].addScaledVector(across, step * right).addScaledVector(forth, step * away);
     this.wanted[this.chosen].z += step * up;
-    this.press("grip");
+    this.press("grip", SETTLES);
   }
 
   /** The end effector's direction turned about the view's axes; the core limits it. */
@@ -147,7 +149,7 @@ export class DesktopHands {
     const across = this.directionInBase(new Vector3(1, 0, 0).transformDirection(this.camera.matrixWorld)).setZ(0).normalize();
     const forth = new Vector3().crossVectors(new Vector3(0, 0, 1), across);
     this.pointing.applyAxisAngle(across, -TILT * up).applyAxisAngle(forth, -TILT * right).normalize();
-    this.press("tilt");
+    this.press("tilt", SETTLES);
   }
 
   /** Both hands now, in the base frame. */
@@ -160,13 +162,13 @@ export class DesktopHands {
       hands[side] = hand;
       const wanted = this.wanted[index];
       if (!wanted) return;
-      const tilting = down("tilt") && index === this.rigid;
+      const tilting = this.aiming && down("tilt") && index === this.rigid;
       const turn = this.turn(index);
       const start = wanted.clone().addScaledVector(new Vector3(0, 0, -1).applyQuaternion(turn), -this.length);
       hand.tracked = true;
       hand.position = start.toArray();
       hand.quaternion = [turn.w, turn.x, turn.y, turn.z];
-      const mine = this.dragging || down("grip");
+      const mine = this.dragging || (this.aiming && down("grip")); // no grip lasts beyond the hand where a robot may move
       hand.grip = this.dead || tilting || (mine && index === this.chosen);
       hand.primary = down("primary") || tilting;
       hand.trigger = down("trigger") && index === this.rigid;

@@ -265,6 +265,7 @@ class Page {
   atDesk(now) {
     const { desktop } = this;
     if (this.frame && !desktop.wanted[0]) this.beginAt(this.frame.rows);
+    desktop.aiming = this.state?.mode === "aim";
     const hands = desktop.hands();
     if (HANDS.some((side) => hands[side].grip)) this.gripped = now;
     else if (now - (this.gripped ?? 0) > STILL) this.adopt();

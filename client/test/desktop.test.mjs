@@ -28,10 +28,12 @@ async function takeControl(page) {
 
 /** Drags a target's marker by `dx`, `dy` pixels, with the true mouse. */
 async function drag(page, kind, dx, dy) {
-  const [x, y] = await page.evaluate((index) => {
-    const { desktop } = globalThis.trunkline;
-    const hand = index === "rigid" ? desktop.rigid : 1 - desktop.rigid;
-    return desktop.toScreen(desktop.wanted[hand]);
+  const [x, y] = await until(page, (name) => {
+    const { desktop, marks } = globalThis.trunkline;
+    const hand = name === "rigid" ? desktop.rigid : 1 - desktop.rigid;
+    if (!desktop.wanted[hand]) return null;
+    const [u, v] = desktop.toScreen(desktop.wanted[hand]);
+    return marks.nearest((point) => desktop.toScreen(point), u, v, 15) === hand ? [u, v] : null; // once it is drawn there
   }, kind);
   await page.mouse.move(x, y);
   await page.mouse.down();
@@ -39,9 +41,9 @@ async function drag(page, kind, dx, dy) {
     await page.mouse.move(x + (dx * step) / 8, y + (dy * step) / 8);
     await page.waitForTimeout(40);
   }
-  await page.waitForTimeout(600);
+  await page.waitForTimeout(300);
   await page.mouse.up();
-  await page.waitForTimeout(500);
+  await page.waitForTimeout(1200);
 }
 
 const target = (page, kind) => page.evaluate((name) => globalThis.trunkline.state?.targets?.[name]?.position ?? null, kind);
@@ -60,10 +62,9 @@ test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done"
   const { page, wrongs } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
-  await drag(page, "rigid", 40, -30);
-  await drag(page, "tip", -60, -20);
-  const [rigid, tip] = [await target(page, "rigid"), await target(page, "tip")];
-  assert.ok(rigid && tip, "both targets are set");
+  await drag(page, "rigid", 16, -12);
+  await drag(page, "tip", -20, -14);
+  await until(page, () => globalThis.trunkline.state.targets && true);
   await picture(page, "1-aim");
   await page.keyboard.press("Enter");
   await inMode(page, "preview");
@@ -98,12 +99,12 @@ test("keys move the chosen target by a step, and the grip let go holds the robot
   for (const [key, kind] of [["Digit1", "rigid"], ["Digit2", "tip"]]) {
     await page.keyboard.press(key);
     await page.keyboard.press("ArrowUp");
-    await page.waitForTimeout(500);
+    await page.waitForTimeout(1500);
     if (kind === "tip") await until(page, () => globalThis.trunkline.state.targets);
   }
   const before = await target(page, "tip");
   for (let n = 0; n < 5; n++) await page.keyboard.press("ArrowUp");
-  await page.waitForTimeout(900);
+  await page.waitForTimeout(1500);
   const after = await target(page, "tip");
   assert.ok(Math.abs(after[2] - before[2] - 0.05) < 0.004, `rose by ${after[2] - before[2]} m`);
   await page.keyboard.press("Enter");

@@ -16,12 +16,13 @@ export const root = join(here, "..", "..");
 const PYTHON = process.env.TRUNKLINE_PYTHON ?? join(root, ".venv", "bin", "python");
 const BROWSER = process.env.TRUNKLINE_BROWSER ?? "/usr/bin/chromium";
 const PICTURES = process.env.TRUNKLINE_PICTURES ?? "";
-const LONGEST = 60_000; // ms that anything may take; drawing by software on a shared core is slow
+const LONGEST = 120_000; // ms that anything may take; drawing by software on a shared core is slow
+const DRAWN = 10; // Hz at most at which tests draw, so that they also pass beside other work
 const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-background-networking"];
 
 /** The server, round a plain robot: `url`, `tell(word)` which gives its log. */
 export async function serve() {
-  const child = spawn(PYTHON, ["-m", "tests.live.page_server"], { cwd: root, stdio: ["pipe", "pipe", "inherit"] });
+  const child = spawn(PYTHON, ["-m", "tests.live.page_server", ...(PICTURES ? [] : ["--light"])], { cwd: root, stdio: ["pipe", "pipe", "inherit"] });
   const lines = createInterface({ input: child.stdout })[Symbol.asyncIterator]();
   const first = (await lines.next()).value ?? "";
   const [word, port, token, code] = first.split(" ");
@@ -44,7 +45,7 @@ export async function serve() {
 export const launch = () => chromium.launch({ executablePath: BROWSER, args: FLAGS });
 
 /** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. */
-export async function open(t, browser, server, { url = server.url, headset = false, width = 640, height = 420 } = {}) {
+export async function open(t, browser, server, { url = server.url, headset = false, width = PICTURES ? 1280 : 720, height = PICTURES ? 720 : 480 } = {}) {
   const context = await browser.newContext({ viewport: { width, height } });
   t.after(() => context.close());
   const page = await context.newPage();
@@ -55,9 +56,25 @@ export async function open(t, browser, server, { url = server.url, headset = fal
     const { origin, protocol } = new URL(request.url());
     if (protocol !== "data:" && protocol !== "blob:" && origin !== server.origin) wrongs.push(`request: ${request.url()}`);
   });
+  await page.addInitScript(calmly, DRAWN);
   if (headset) await page.addInitScript({ content: await emulator() });
+  page.setDefaultTimeout(LONGEST);
   await page.goto(url);
   return { page, wrongs };
+}
+
+/** In the page: frames come at most `rate` times a second. */
+function calmly(rate) {
+  const request = globalThis.requestAnimationFrame.bind(globalThis);
+  let last = 0;
+  globalThis.requestAnimationFrame = (draw) => {
+    const wait = Math.max(last + 1000 / rate - performance.now(), 0);
+    return setTimeout(() => request((time) => {
+      last = performance.now();
+      draw(time);
+    }), wait);
+  };
+  globalThis.cancelAnimationFrame = (handle) => clearTimeout(handle);
 }
 
 /** What software drawing says of itself, which is no fault of the page. */

@@ -1,10 +1,11 @@
 """The true server for tests of the page, round a robot without physics and a planner that answers at once.
 
-    python -m tests.live.page_server [PORT]
+    python -m tests.live.page_server [--light]
 
 prints `ready PORT TOKEN CODE` and serves until its input ends. A line on its input is a fault to be shown: `silent` and
 `speak` (the robot tells nothing new), `drop` (all connections end), `fault` (the robot reports one); the modes that
-there were, and what else the server logged, come back as a line of JSON.
+there were, and what else the server logged, come back as a line of JSON. With `--light` meshes have few triangles. It
+is patient with clients that draw by software beside other work: PATIENCE.
 """
 
 import asyncio
@@ -26,13 +27,13 @@ from trunkline.arm.spiral import spiral_chain
 from trunkline.errors import InputError
 from trunkline.hybrid.compose import compose, panda_joints
 from trunkline.hybrid.robots import PandaRobot
-from trunkline.live import foreseer, talk
+from trunkline.live import foreseer, lease, talk
+from trunkline.live import scene as pictured
 from trunkline.live.access import Origins, make_token
 from trunkline.live.believing import make_world
 from trunkline.live.bodies import drawn
 from trunkline.live.desk import Desk
 from trunkline.live.robot import Standing
-from trunkline.live.scene import scene
 from trunkline.live.server import House, Server
 from trunkline.pipeline.config import PROJECT
 from trunkline.teleop.core import Teleoperation
@@ -44,6 +45,7 @@ from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.vectors import add, distance, scale, subtract
 
 RATE, LENGTH, UNITS = 72.0, 0.5, 24  # Hz, m
+PATIENCE = 5.0  # s for which a client may be silent
 CENTRE, REACH = (0.0, 0.0, 0.333), 0.85  # m, of the ball in which the mount can be
 AROUND, ALONG = 32, 10
 TABLE = Box("the table", (0.35, -0.5, -0.05), (0.95, 0.5, -0.02))
@@ -163,7 +165,7 @@ def drawing(figure: Figure) -> dict:
     maps = {"rigid": np.ones((4, 4, 4)), "rigid_origin": np.zeros(3), "rigid_spacing": np.array(0.1)}
     ball = icosphere(subdivisions=3, radius=REACH).apply_translation(CENTRE)
     reach = {"vertices": ball.vertices.ravel().tolist(), "faces": ball.faces.ravel().tolist()}
-    found = scene(figure.model, figure.bodies, maps, LENGTH)
+    found = pictured.scene(figure.model, figure.bodies, maps, LENGTH)
     return found | {"reach": reach, "shell": {"around": AROUND, "along": ALONG}}
 
 
@@ -181,9 +183,12 @@ async def obey(server: Server, robot: Robot, log: list[str]) -> None:
 
 
 async def serve(port: int) -> None:
+    lease.SILENCE = PATIENCE
     figure, token, log = Figure(), make_token(), []
     robot, planning = Robot(figure), Planning(figure)
-    settings = replace(config().core, delay=0.3)
+    core = config().core
+    safety = replace(core.safety, silence=PATIENCE, plan_wait=PATIENCE, start_wait=PATIENCE)
+    settings = replace(core, delay=0.3, safety=safety)
     core = Teleoperation(settings, Balls(), PACKAGE, OFFSET)
     desk = Desk(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
     page, origins = PROJECT / "trunkline/live/page", Origins.of(["127.0.0.1"], port, tls=False)
@@ -206,4 +211,6 @@ async def serve(port: int) -> None:
 
 
 if __name__ == "__main__":
-    asyncio.run(serve(int(sys.argv[1]) if len(sys.argv) > 1 else unused_port()))
+    if sys.argv[1:] == ["--light"]:
+        pictured.MOST_TRIANGLES = 2000
+    asyncio.run(serve(unused_port()))
