@@ -6,14 +6,14 @@ import { css } from "./colours.js";
 const WIDTH = 512, HEIGHT = 96; // pixels
 
 export class Label {
-  /** `size`: height in m. */
-  constructor(colour, size = 0.032) {
+  /** `size`: height in m as it is at 1 m; it looks as large from further away. */
+  constructor(colour, size = 0.036) {
     this.canvas = document.createElement("canvas");
     [this.canvas.width, this.canvas.height] = [WIDTH, HEIGHT];
     this.texture = new CanvasTexture(this.canvas);
     this.texture.colorSpace = SRGBColorSpace;
     this.texture.minFilter = LinearFilter;
-    this.sprite = new Sprite(new SpriteMaterial({ map: this.texture, transparent: true, depthTest: false }));
+    this.sprite = new Sprite(new SpriteMaterial({ map: this.texture, transparent: true, depthTest: false, sizeAttenuation: false }));
     this.sprite.scale.set((size * WIDTH) / HEIGHT, size, 1);
     this.sprite.center.set(0, 0); // the text stands right of its place, and above it
     this.sprite.renderOrder = 10;

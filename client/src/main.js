@@ -325,7 +325,7 @@ class Page {
     });
     this.marks.update(rows, this.drawn.count, starts, this.state?.targets);
     this.drawn.placeShell(rows, this.drawn.count + MARKERS.indexOf("rigid_target"));
-    const eye = this.drawn.base.worldToLocal(new Vector3().setFromMatrixPosition(this.camera.matrixWorld));
+    const eye = new Vector3().setFromMatrixPosition((immersed ? this.renderer.xr.getCamera() : this.camera).matrixWorld);
     for (const target of Object.values(this.marks.targets)) target.face(eye);
   }
 

@@ -62,7 +62,7 @@ class Ray {
     this.group = new Group();
     this.line = new Mesh(new CylinderGeometry(RAY_RADIUS, RAY_RADIUS, 1, 8), new MeshBasicMaterial({ color: colour }));
     this.end = new Mesh(new SphereGeometry(0.008, 12, 8), this.line.material);
-    this.label = new Label(colour, 0.026);
+    this.label = new Label(colour);
     this.group.add(this.line, this.end, this.label.sprite);
     this.group.visible = false;
   }
@@ -121,9 +121,8 @@ class Target {
     }
   }
 
-  /** Rings face the viewer, who is at `eye` in the base frame. */
+  /** Rings face the viewer, who is at `eye` in the room. */
   face(eye) {
-    this.ring.up.set(0, 0, 1);
     this.ring.lookAt(eye);
     this.offer.lookAt(eye);
   }

@@ -58,6 +58,7 @@ export class RobotScene {
       this.tipReach = shellMesh(new Float32Array(3 * around * along), lattice(around, along), REACH, 0.14);
       this.tipReach.visible = false;
       this.base.add(this.tipReach);
+      if (this.shellPoints) this.shell(this.shellPoints);
     }
     this.showReach(this.reachShown);
     if (this.known) this.world(this.known);
@@ -86,7 +87,8 @@ export class RobotScene {
 
   /** The tip's reach for gravity as it is at the target: points in the frame of the mount's target. */
   shell(points) {
-    if (!this.tipReach) return;
+    this.shellPoints = points; // it may come before the scene
+    if (this.tipReach?.geometry.attributes.position.array.length !== points.length) return;
     this.tipReach.geometry.attributes.position.copyArray(points).needsUpdate = true;
     this.tipReach.filled = true;
   }

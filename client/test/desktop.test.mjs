@@ -63,7 +63,7 @@ test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done"
   await loaded(page);
   await takeControl(page);
   await drag(page, "rigid", 16, -12);
-  await drag(page, "tip", -20, -14);
+  await drag(page, "tip", -30, -45);
   await until(page, () => globalThis.trunkline.state.targets && true);
   await picture(page, "1-aim");
   await page.keyboard.press("Enter");
