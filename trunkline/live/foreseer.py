@@ -20,7 +20,7 @@ from trunkline.errors import InputError
 from trunkline.foresight.foresight import Foreseen, Foresight, foresee
 from trunkline.foresight.package import Package, read_package
 from trunkline.foresight.settings import Previewing
-from trunkline.foresight.twin import Believed, at_rest, believed, compose_twin
+from trunkline.foresight.twin import at_rest, believed, compose_twin
 from trunkline.hybrid.futures import FRAME, Twin, Way
 from trunkline.hybrid.preview import WITHIN, Preview, nominal
 from trunkline.live import talk
@@ -88,14 +88,22 @@ class Overtaken(Exception):
 
 
 class Foreseer:
-    """Plans and previews by a package alone. `bodies`: names of those whose poses are told."""
+    """Plans and previews. `bodies`: names of those whose poses are told."""
 
-    def __init__(self, package: Package, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> None:
-        self.previewing, self.bodies = previewing, bodies
-        self.planner: Planner = package.planner(config)
-        self.known: Believed = believed(previewing, package.files)
-        self.foresight = Foresight(self.known, package.grips(config), previewing)
+    def __init__(self, planner: Planner, foresight: Foresight, bodies: tuple[str, ...]) -> None:
+        self.planner, self.foresight, self.bodies = planner, foresight, bodies
+        self.known, self.previewing = foresight.known, foresight.settings
         self._kept: tuple[tuple, Twin | None] = ((), None)
+
+    @classmethod
+    def of(cls, package: Package, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> "Foreseer":
+        """By a package alone.
+
+        Raises:
+            InputError: it has nothing to preview with.
+        """
+        foresight = Foresight(believed(previewing, package.files), package.grips(config), previewing)
+        return cls(package.planner(config), foresight, bodies)
 
     def answers(self, order: Order, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
         """All that comes of an order, each as soon as it is known. `go_on` raises where it need not be."""
@@ -229,7 +237,7 @@ def run(answers, orders, newest, path: Path, config: Config, previewing: Preview
     with suppress(OSError):
         os.nice(NICE)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    serve(answers, orders, newest, Foreseer(read_package(path), config, previewing, bodies))
+    serve(answers, orders, newest, Foreseer.of(read_package(path), config, previewing, bodies))
 
 
 def serve(answers, orders, newest, foreseer: Foreseer) -> None:

@@ -18,6 +18,7 @@ from trunkline.elements import actuators
 from trunkline.hybrid.compose import panda_joints
 from trunkline.hybrid.futures import Twin
 from trunkline.hybrid.torques import servo_commands
+from trunkline.live.bodies import Poses
 from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, Channel
 from trunkline.panda.shipped import JOINTS
 from trunkline.simulation.motion import batch_of, hold
@@ -63,42 +64,41 @@ class Plant:
             off.mjDSBL_CONTACT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY | off.mjDSBL_LIMIT
         )
         self._data = mujoco.MjData(self._bare)
-        self._rows = [model.body(name).id for name in simulation.bodies]
-        self._thing = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "object")
+        self._poses, self._thing = Poses(model, simulation.bodies), Poses(model, ("object",))
         self._last = np.tile(simulation.joints, (2, 1))
         controls = np.zeros((1, model.nu))
-        controls[:, self._motors] = simulation.commands
-        controls[:, self._servos] = self._sent(simulation.joints)
+        controls[:, self._motors] = self._commands = simulation.commands
+        controls[:, self._servos] = self._servo = self._sent(simulation.joints)
         hold(self.batch, model, controls)
         self._winches, self._rub = Winches(self.batch, controls[:, self._motors]), rubbing(self.batch)
         if self._rub is not None:
             self._rub.begin(np.arange(1))
-        self.move(simulation.joints, simulation.commands)
 
     def move(self, joints: np.ndarray, commands: np.ndarray) -> None:
-        """One tick with the axes on their way to `joints` (7,), rad, and `commands` (K,), m."""
-        model = self.model
-        controls = np.zeros((1, self.steps, model.nu))
-        controls[:, :, self._servos] = self._sent(joints)
-        sent = np.repeat(np.asarray(commands)[None, None], self.steps, axis=1)
+        """One tick with the axes on their way to `joints` (7,), rad, and `commands` (K,), m: each step is sent where
+        they are as it begins."""
+        servo, share = self._sent(joints), (np.arange(self.steps) / self.steps)[:, None]
+        controls = np.zeros((1, self.steps, self.model.nu))
+        controls[0][:, self._servos] = self._servo + share * (servo - self._servo)
+        sent = (self._commands + share * (commands - self._commands))[None]
         controls[:, :, self._motors] = self._winches.deliver(sent, self._own)
+        self._servo, self._commands = servo, np.array(commands)
         if self._rub is not None:
             self._rub.refresh(np.arange(1))
-        found = self.batch.rollout(self.steps, control=controls, record=("xpos", "xquat"))
-        self.poses = self._poses(found)
+        self.batch.rollout(self.steps, control=controls)
 
     @property
     def sound(self) -> bool:
         """Whether MuJoCo has not warned."""
         return not self.batch.warning.any()
 
-    def thing(self) -> np.ndarray:
-        """Pose of what may be grasped, (7,); NaN where there is none."""
-        return self._whole[self._thing] if self._thing >= 0 else np.full(7, np.nan)
+    def poses(self) -> np.ndarray:
+        """Of the bodies, (N, 7)."""
+        return self._poses.of(self.batch.bind("qpos")[0])
 
-    def _poses(self, found: dict) -> np.ndarray:
-        self._whole = np.concatenate([found["xpos"][0, -1], found["xquat"][0, -1]], axis=1)
-        return self._whole[self._rows]
+    def thing(self) -> np.ndarray:
+        """Of what may be grasped, (7,); NaN where there is none."""
+        return self._thing.of(self.batch.bind("qpos")[0])[0]
 
     def _sent(self, joints: np.ndarray) -> np.ndarray:
         """What the servos are sent so that they are at `joints`, bearing the arm as it hangs now. Shape (7,)."""
@@ -148,7 +148,7 @@ class Loop:
         state = self.robot.state()
         mode = "fault" if self.fault else state.mode
         head = [now, MODES.index(mode), self.serial, self.held, 1.0]
-        poses = [self.plant.thing(), self.plant.poses.ravel()]
+        poses = [self.plant.thing(), self.plant.poses().ravel()]
         self.channel.tell(np.concatenate([head, self.robot.joints, self.robot.commands, *poses]), self.fault)
 
     def _begin(self) -> None:
