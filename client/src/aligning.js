@@ -17,8 +17,8 @@ export class Aligning {
   begin() {
     this.step = "place"; // place, tip, touch, check, done
     this.place = null;
-    this.turn = 0;
     this.byEye = true;
+    this.kept = false; // whether an anchor's place has stood the check
     this.tip = new Vector3();
     this.room = [];
     this.base = [];
@@ -44,7 +44,7 @@ export class Aligning {
       place: "Hold both grips to carry the robot to its place. A: it stands there. Stick pressed: touch it instead.",
       tip: "Rest the controller’s tip in a dent, and turn the controller about it.",
       touch: `Hold the tip still on the flange’s mark, touch ${this.room.length + 1} of ${TOUCHES}. Move the robot between touches.`,
-      check: "Hold the tip still on the flange’s mark once: it says whether the base still is where it was. Stick pressed: align anew.",
+      check: "Hold the tip still on the flange’s mark once: it says whether the base still is where it was. Stick pressed: align anew. A: put it there by eye.",
       done: "",
     }[this.step];
   }
@@ -59,7 +59,10 @@ export class Aligning {
     if (this.step === "place") {
       this.carry(left, right);
       if (right?.pressed.has("stick_pressed")) this.step = "tip";
-      else if (right?.pressed.has("primary") || left?.pressed.has("primary")) this.step = "done";
+      else if (right?.pressed.has("primary") || left?.pressed.has("primary")) {
+        this.step = "done";
+        this.said = "Put there by eye: good enough for a simulated robot alone.";
+      }
       return;
     }
     if (!right) return void (this.dwell.hear(time, null));
@@ -69,6 +72,7 @@ export class Aligning {
       return;
     }
     if (this.step === "check" && right.pressed.has("stick_pressed")) return void (this.step = "tip");
+    if (this.step === "check" && right.pressed.has("primary")) return void ([this.step, this.byEye] = ["place", true]);
     if (this.step !== "touch" && this.step !== "check") return;
     const point = this.tip.clone().applyQuaternion(right.quaternion).add(right.position);
     const touched = this.dwell.hear(time, point);
@@ -79,7 +83,7 @@ export class Aligning {
     if (this.step === "check") {
       const off = inBase(inverse(this.place), point).distanceTo(flange);
       this.said = `The base is within ${mm(off)} of where it was.`;
-      if (off <= LIMIT) return void (this.step = "done");
+      if (off <= LIMIT) return void ([this.step, this.kept] = ["done", true]);
       this.said = `The touch is ${mm(off)} off, more than ${mm(LIMIT)}: align again.`;
       return void (this.step = "tip");
     }
@@ -101,13 +105,13 @@ export class Aligning {
     this.step = "done";
   }
 
-  /** Before the viewer, on the floor's level of the room. */
+  /** Before the viewer, as high as a table. */
   put(eye) {
     const ahead = new Vector3(0, 0, -1).applyQuaternion(eye.quaternion).setY(0).normalize();
-    this.turn = Math.atan2(ahead.x, ahead.z); // the base's x towards the viewer: its -x looks ahead
     const position = eye.position.clone().addScaledVector(ahead, AHEAD);
     position.y = Math.max(eye.position.y - 0.9, 0);
-    this.set(position);
+    const yaw = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), Math.atan2(ahead.x, ahead.z) + Math.PI / 2);
+    this.place = { position, quaternion: yaw.multiply(UPWARDS) }; // its x towards the viewer
   }
 
   /** Both grips carry it: along with their middle, and turned about the vertical with them. */
@@ -117,16 +121,11 @@ export class Aligning {
     const angle = Math.atan2(right.position.x - left.position.x, right.position.z - left.position.z);
     if (this.carried) {
       const turned = angle - this.carried.angle;
-      this.turn += turned;
-      const arm = this.place.position.clone().sub(this.carried.middle).applyAxisAngle(new Vector3(0, 1, 0), turned);
-      this.set(arm.add(middle));
+      const about = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), turned);
+      const position = this.place.position.clone().sub(this.carried.middle).applyQuaternion(about).add(middle);
+      this.place = { position, quaternion: about.multiply(this.place.quaternion) };
     }
     this.carried = { middle, angle };
-  }
-
-  set(position) {
-    const yaw = new Quaternion().setFromAxisAngle(new Vector3(0, 1, 0), this.turn + Math.PI / 2);
-    this.place = { position, quaternion: yaw.multiply(UPWARDS) };
   }
 }
 

@@ -4,11 +4,12 @@ import { Quaternion, Vector3 } from "three";
 import { HANDS } from "./wire_table.js";
 import { Aligning, inverse } from "./aligning.js";
 import { fasten, placeOf, restore } from "./anchor.js";
-import { noHand } from "./wire.js";
+import { clock, noHand } from "./wire.js";
 
 const BUTTONS = { trigger: 0, grip: 1, stick_pressed: 3, primary: 4, secondary: 5 }; // of WebXR's xr-standard mapping
 const STICK = [2, 3]; // its axes
 const LEAST_RATE = 72, MOST_RATE = 120; // Hz
+const PATIENCE = 10; // s that a restored anchor may stay lost
 const TICK = [0.6, 30]; // strength and ms
 const CREEP = 0.002, CREEP_TURN = 0.002; // m and rad by which an anchor may creep: a new alignment voids a plan
 
@@ -32,6 +33,7 @@ export class Immersive {
     this.session = session;
     this.aligning.begin();
     this.anchor = null;
+    this.restoring = false;
     this.sent = null;
     this.lost = "";
     session.addEventListener("end", () => {
@@ -45,7 +47,7 @@ export class Immersive {
     this.space = this.renderer.xr.getReferenceSpace();
     this.space.addEventListener("reset", () => this.recentred());
     this.anchor = await restore(session);
-    if (this.anchor) this.restoring = true;
+    [this.restoring, this.until] = [Boolean(this.anchor), clock() + PATIENCE];
   }
 
   leave() {
@@ -68,7 +70,7 @@ export class Immersive {
     const seen = this.controllers(frame);
     const viewer = frame.getViewerPose(this.space);
     const { aligning } = this;
-    if (this.anchor) this.follow(frame);
+    if (this.anchor) this.follow(frame, time);
     if (viewer && !aligning.done && !this.restoring) {
       const { position, orientation } = viewer.transform;
       const eye = { position: vector(position), quaternion: quaternion(orientation) };
@@ -80,7 +82,9 @@ export class Immersive {
 
   aligned(frame) {
     this.tell(inverse(this.aligning.place));
-    if (this.anchor) return;
+    if (this.anchor && this.aligning.kept) return;
+    this.anchor?.delete?.();
+    this.anchor = null;
     const session = this.session;
     fasten(frame, this.space, this.aligning.place).then((anchor) => {
       if (session === this.session) this.anchor = anchor;
@@ -88,8 +92,12 @@ export class Immersive {
   }
 
   /** The base's place by its anchor. */
-  follow(frame) {
+  follow(frame, time) {
     const place = placeOf(frame, this.space, this.anchor);
+    if (!place && this.restoring && time > this.until) {
+      [this.anchor, this.restoring, this.lost] = [null, false, ""]; // it is not found again: align anew
+      return;
+    }
     if (!place) {
       if (this.aligning.done && !this.lost) this.tell(null);
       this.lost = "The headset has lost the robot’s place. Look around; the robot holds until it is found.";

@@ -90,6 +90,8 @@ async function emulator() {
   })).outputFiles[0].text + `
     globalThis.headset = new iwer.XRDevice(iwer.metaQuest3, { stereoEnabled: false });
     headset.installRuntime({ forceInstall: true }); // else it leaves Chromium's own navigator.xr
+    globalThis.guessed = false; // a true controller's position is not emulated, this one's would be
+    Object.defineProperty(globalThis.XRPose.prototype, "emulatedPosition", { configurable: true, get: () => globalThis.guessed });
     headset.position.set(0, 1.5, 0);
     for (const side of ["left", "right"]) headset.controllers[side].position.set(side === "left" ? -0.2 : 0.2, 1.2, -0.3);
   `;

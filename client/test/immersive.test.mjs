@@ -124,6 +124,10 @@ test("the hand that moves to the edge of reach feels a tick, once", async (t) =>
 
 test("a controller that is lost or only guessed holds the robot, and it is said", async (t) => {
   const { page } = await aligned(t);
+  await page.evaluate(() => (globalThis.guessed = true));
+  await inMode(page, "hold");
+  await page.evaluate(() => (globalThis.guessed = false));
+  await inMode(page, "aim");
   await page.evaluate(() => {
     globalThis.headset.controllers.right.connected = false;
   });
