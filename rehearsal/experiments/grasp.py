@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 from rehearsal import settings
 from rehearsal.experiments.bench import FLOOR, FLOOR_BOX, START, Bench, Seen, rehearse
 from rehearsal.experiments.result import Result
-from rehearsal.foresight import Foresight
 from rehearsal.operator.scripts import Ending, Operator
 from rehearsal.robot.scene import Object, Scene, Surface
 from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import Session, make_world
+from trunkline.foresight.foresight import Foresight
 from trunkline.frames import wxyz_from_rotation
 from trunkline.hybrid.grasps import object_in_base
 from trunkline.teleop.messages import Box, Thing

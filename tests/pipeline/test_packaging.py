@@ -19,7 +19,8 @@ OWN = {"trunkline", "stages", "demo", "benchmarks", "studies", "examples", "rehe
 UNSEEN = {"absl-py", "daqp", "dm-robotics-panda", "plotly", "pyright", "ruff", "setuptools"}
 NEEDS_EXTRA = (
     "trunkline/pipeline", "trunkline/evaluate", "trunkline/figures", "trunkline/ik/learn.py", "trunkline/ik/network.py",
-    "trunkline/ik/onnx.py", "trunkline/ik/tip_loss.py", "trunkline/ik/training.py", "trunkline/teleop",
+    "trunkline/ik/onnx.py", "trunkline/ik/tip_loss.py", "trunkline/ik/training.py", "trunkline/live",
+    "trunkline/teleop",
 )  # fmt: skip
 
 
@@ -72,7 +73,7 @@ def test_the_library_needs_its_dependencies_alone():
 @pytest.mark.parametrize(
     ("extra", "folders"),
     [
-        ("pipeline,teleop", ["trunkline", "stages", "demo", "examples/asl_trunk"]),
+        ("pipeline,teleop,live", ["trunkline", "stages", "demo", "examples/asl_trunk"]),
         ("teleop", ["rehearsal"]),
         ("bench", ["benchmarks", "studies"]),
         ("test", ["tests"]),

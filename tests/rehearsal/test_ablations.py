@@ -9,13 +9,13 @@ from rehearsal import settings
 from rehearsal.experiments.ablations import SURE, VARIANTS, _cad_grasp, varied
 from rehearsal.experiments.bench import Bench
 from rehearsal.experiments.lookup import lookup, tensions_of
-from rehearsal.package import Package
-from rehearsal.twin import Believed
 from tests.rehearsal.arm import settings as stand_in
 from tests.rehearsal.arm import stranger
 from tests.support.bent_chain import hardening_stump, stump_spec
 from tests.support.operator import config
 from trunkline.errors import InputError
+from trunkline.foresight.package import Package
+from trunkline.foresight.twin import Believed
 from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.hybrid.doubts import Contact, Doubts, draw
 from trunkline.hybrid.friction import TPU_ON

@@ -8,9 +8,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
-from rehearsal.twin import Believed, compose_twin
 from tests.hybrid.conftest import hybrid_settings, rubbing_arm
 from trunkline.arm.spiral import spiral_chain
+from trunkline.foresight.twin import Believed, compose_twin
 from trunkline.hybrid.doubts import Doubts, nominal_draw
 from trunkline.hybrid.futures import Way, futures
 from trunkline.hybrid.preview import joined

@@ -4,18 +4,19 @@ Futures of a grasp begin where the approach ends: until then nothing is touched.
 and the thing as the nominal preview of its grasp left them, and end when the arm is gone.
 """
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from rehearsal.settings import Previewing
-from rehearsal.twin import Believed, compose_twin
+from trunkline.foresight.settings import Previewing
+from trunkline.foresight.twin import Believed, compose_twin
 from trunkline.frames import rotation_from_wxyz
 from trunkline.hybrid.assistant import best, try_places
-from trunkline.hybrid.doubts import Contact
-from trunkline.hybrid.futures import Twin, Way
+from trunkline.hybrid.doubts import Contact, Doubts, draw
+from trunkline.hybrid.futures import Piece, Twin, Way, futures
 from trunkline.hybrid.placements import Grip
-from trunkline.hybrid.preview import Holding, Preview, preview
+from trunkline.hybrid.preview import Holding, Outcome, Preview, joined, nominal
 from trunkline.hybrid.resting import Resting
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.messages import Offer, Targets, Thing, World
@@ -23,6 +24,34 @@ from trunkline.teleop.plan import Plan
 from trunkline.teleop.things import beneath, grip_of, way_of_grasping
 
 NOWHERE = (0.0, 0.0, 0.0)
+
+Go = Callable[[], None]
+
+
+def _always() -> None:
+    pass
+
+
+def foresee(
+    twin: Twin, way: Way, doubts: Doubts, outcome: Outcome | None, count: int, seed: int, go_on: Go = _always
+) -> Preview:
+    """As `hybrid.preview.preview`, which it may leave within.
+
+    Args:
+        go_on: called before each quarter of a second that is simulated; what it raises ends it.
+    """
+    begun, draws = _asked(nominal(twin, way), go_on), draw(doubts, twin.arm, count, seed)
+    motion = joined(_asked(futures(twin, way, draws), go_on))
+    return Preview(joined(begun), motion, draws, outcome.holds(motion) if outcome is not None else None)
+
+
+def _asked(pieces: Iterator[Piece], go_on: Go) -> list[Piece]:
+    found = []
+    go_on()
+    for piece in pieces:
+        found.append(piece)
+        go_on()
+    return found
 
 
 @dataclass(frozen=True)
@@ -49,23 +78,41 @@ class Foresight:
     grips: dict[str, Grip]
     settings: Previewing
 
-    def grasp(self, plan: Plan, targets: Targets, thing: Thing, world: World, hangs: np.ndarray, seed: int) -> Foreseen:
+    def grasp(
+        self,
+        plan: Plan,
+        targets: Targets,
+        thing: Thing,
+        world: World,
+        hangs: np.ndarray | None,
+        seed: int,
+        go_on: Go = _always,
+    ) -> Foreseen:
         """Futures of a plan to grasp; where they are not sure to hold, the assistant looks for a better place.
 
         Args:
-            hangs: where the straight arm's tip is seen in its base frame, (3,), m: the twin leans likewise.
+            hangs: where the straight arm's tip is seen in its base frame, (3,), m: the twin leans likewise. None where
+                nobody has seen it.
+            go_on: as `foresee`.
         """
         s, way, begins = self.settings, *self.way(plan, "curl")
         lean = self.known.lean(hangs)
         twin = compose_twin(self.known, world, thing, way.joints[0], way.commands[0], s, lean)
         holding = Holding(way.duration - s.hold, s.sag, s.slip, s.lifted)
-        found = Foreseen(preview(twin, way, self.known.doubts, holding, s.futures, seed), begins)
+        found = Foreseen(foresee(twin, way, self.known.doubts, holding, s.futures, seed, go_on), begins)
         if found.probability >= s.sure or s.assistant == 0:
             return found
         return replace(found, offer=self._offer(twin, way, holding, targets, thing, found.probability, seed))
 
     def bring(
-        self, plan: Plan, targets: Targets, thing: Thing, world: World, hangs: np.ndarray, before: Foreseen, seed: int
+        self,
+        plan: Plan,
+        targets: Targets,
+        thing: Thing,
+        world: World,
+        hangs: np.ndarray | None,
+        before: Foreseen,
+        seed: int,
     ) -> Foreseen:
         """Futures of a plan to bring what is held elsewhere: whether it rests there.
 
@@ -79,7 +126,7 @@ class Foresight:
         board = beneath(targets.tip.position, world)
         assert board is not None  # else the planner refuses
         resting = Resting(plan.step * dict(plan.phases)["release"], np.array(board.low), np.array(board.high))
-        return Foreseen(preview(twin, way, doubts, resting, s.futures, seed), begins)
+        return Foreseen(foresee(twin, way, doubts, resting, s.futures, seed), begins)
 
     def way(self, plan: Plan, first: str) -> tuple[Way, float]:
         """The plan from the phase `first` on, held for a while at its end, and when that phase begins, s."""

@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rehearsal.settings import Previewing
 from trunkline.errors import InputError
+from trunkline.foresight.settings import Previewing
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.hybrid.compose import Placed, compose, panda_joints
 from trunkline.hybrid.doubts import Contact, Doubts
@@ -36,9 +36,11 @@ class Believed:
     doubts: Doubts
     robot: PandaRobot
 
-    def lean(self, hangs: np.ndarray) -> Rotation:
+    def lean(self, hangs: np.ndarray | None) -> Rotation | None:
         """How the arm is turned on its mount, by the least turns, so that its tip, straight down, comes to rest in the
-        direction of `hangs` (3,), m, in the base frame: what leans sags back a little."""
+        direction of `hangs` (3,), m, in the base frame: what leans sags back a little. None where that is not seen."""
+        if hangs is None:
+            return None
         arm = self.arm.copy().compile()
         straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
         found = Rotation.identity()
@@ -58,39 +60,49 @@ def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
     contact = Contact(settings.friction, (x, y, z), float(np.radians(settings.turn_deg)))
     robot = unpacked.robot_of(files)
     if not isinstance(robot, PandaRobot):
-        raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: the rehearsal moves that")
+        raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
     return Believed(unpacked.arm_of(files), unpacked.doubts_of(files, contact), robot)
 
 
 def compose_twin(
     known: Believed,
     world: World,
-    thing: Thing,
+    thing: Thing | None,
     joints: np.ndarray,
     commands: np.ndarray,
     settings: Previewing,
-    lean: Rotation,
+    lean: Rotation | None = None,
     left: np.ndarray | None = None,
 ) -> Twin:
     """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands;
-    `lean` is how its arm is turned on its mount. With a thing in the arm all is as an earlier preview `left` it:
-    the pose (nq,) at its end, of a model with a string or without."""
+    `lean` is how its arm is turned on its mount, None where nobody has seen that. With a thing in the arm all is as an
+    earlier preview `left` it: the pose (nq,) at its end, of a model with a string or without."""
     robot = replace(known.robot, ready=joints.tolist())
-    place, turn = np.array(thing.position), thing.quaternion
-    surfaces = {box.name: _surface(box) for box in world.boxes}
-    shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material, thing.basket)
-    if thing.support == "standing":
-        turn = _upright(turn)
-        _stand(place, shaped.half_height, list(surfaces.values()))
-    spec = compose(known.arm, robot, Room(None, surfaces, None), Placed(shaped, place, turn))
+    boards, placed = {box.name: _surface(box) for box in world.boxes}, None
+    if thing is not None:
+        place, turn = np.array(thing.position), thing.quaternion
+        shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material, thing.basket)
+        if thing.support == "standing":
+            turn = _upright(turn)
+            _stand(place, shaped.half_height, list(boards.values()))
+        placed = Placed(shaped, place, turn)
+    spec = compose(known.arm, robot, Room(None, boards, None), placed)
+    lean = lean or Rotation.identity()
     spec.body("base").quat = wxyz_from_rotation(lean)
-    if thing.support == "hanging":
-        hang(spec, place, thing.diameter / 2, settings.string)
-    model, arm = spec.compile(), known.arm.copy().compile()
-    start = _start(model, arm, joints, commands, robot.mount_offset, lean)
-    if left is not None:
-        start = left[: model.nq].copy()  # a string, which comes last, is left out
-    return Twin(model, arm, start).stepped(settings.step)
+    if thing is not None and thing.support == "hanging":
+        hang(spec, np.array(thing.position), thing.diameter / 2, settings.string)
+    twin = Twin(spec.compile(), known.arm.copy().compile()).stepped(settings.step)
+    if left is None:
+        return at_rest(twin, joints, commands, robot.mount_offset, lean)
+    return replace(twin, start=left[: twin.model.nq].copy())  # a string, which comes last, is left out
+
+
+def at_rest(
+    twin: Twin, joints: np.ndarray, commands: np.ndarray, mount_offset: float, lean: Rotation | None = None
+) -> Twin:
+    """The same twin, its arm at rest at other `joints` (7,), rad, and `commands` (K,), m."""
+    start = _start(twin.model, twin.arm, joints, commands, mount_offset, lean or Rotation.identity())
+    return replace(twin, start=start)
 
 
 def _start(

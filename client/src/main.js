@@ -1,0 +1,370 @@
+// The page: one connection, one scene, and hands from a headset or from mouse and keyboard. The server decides.
+
+import { ACESFilmicToneMapping, Color, PerspectiveCamera, Quaternion, SRGBColorSpace, Vector3, WebGLRenderer } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+import styles from "./page.css";
+import { BACK } from "./colours.js";
+import { DesktopHands } from "./desktop.js";
+import { Immersive, canImmerse } from "./immersive.js";
+import { inverse, markOf } from "./aligning.js";
+import { Marks } from "./rays.js";
+import { PagePanel, RoomPanel, foreseenWords, words } from "./panel.js";
+import { Playback } from "./playback.js";
+import { Recording } from "./recording.js";
+import { RobotScene } from "./scene.js";
+import { HANDS, MARKERS } from "./wire_table.js";
+import { STRIDE, Wire, clock, noHand } from "./wire.js";
+
+const KEPT = "trunkline.token"; // of this tab, so that a reload need not pair again
+const RIGID_HAND = "left"; // the core's own choice is `core.rigid_hand`, of which the markers tell
+const INPUT_RATE = 72; // Hz
+const WIDE = 1200; // pixels of a page on which the keys do not cover the robot
+const STILL = 0.3; // s without a grip, after which the core's targets are taken over
+const SHOWN_IN = new Set(["preview", "ready", "delay"]);
+const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
+
+const find = (id) => document.getElementById(id);
+const sheet = new CSSStyleSheet(); // the page's rules allow no style but what comes with its own script
+sheet.replaceSync(styles);
+document.adoptedStyleSheets = [sheet];
+
+class Page {
+  constructor() {
+    this.renderer = new WebGLRenderer({ canvas: find("view"), antialias: true, alpha: true });
+    this.renderer.outputColorSpace = SRGBColorSpace;
+    this.renderer.xr.enabled = true;
+    this.camera = new PerspectiveCamera(45, 1, 0.02, 30);
+    this.camera.position.set(1.9, 1.25, 1.5);
+    this.orbit = new OrbitControls(this.camera, this.renderer.domElement);
+    this.orbit.target.set(0.25, 0.35, 0);
+    this.drawn = new RobotScene();
+    this.marks = new Marks(this.drawn.base, RIGID_HAND);
+    this.board = new RoomPanel(this.drawn.scene);
+    this.panel = new PagePanel(find);
+    this.desktop = new DesktopHands(this.renderer.domElement, this.camera, this.orbit, this.drawn.base, this.marks, RIGID_HAND, {
+      stop: () => this.wire.stop(),
+      reach: () => this.drawn.showReach(!this.drawn.reachShown),
+      held: (on) => find("grip").setAttribute("aria-pressed", String(on)),
+    });
+    this.immersive = new Immersive(this.renderer, (pose) => this.tellAlignment(pose), () => this.leftHeadset());
+    Object.assign(this, { state: null, lease: null, reason: null, frame: null, playback: null, told: null, recording: null });
+    this.alignment = null; // of the room in the base frame, as it is told to the server
+    this.reaches = { rigid: null, tip: null };
+    this.connect();
+    this.buttons();
+    this.stand(DESKTOP);
+    this.resize();
+    addEventListener("resize", () => this.resize());
+    find("help").open = innerWidth >= WIDE;
+    this.before = clock();
+    this.hands = { left: noHand(), right: noHand() };
+    // At a desk, hands do not wait for the picture: slow drawing is no silent client.
+    setInterval(() => this.immersive.session || this.send(this.atDesk(clock()), false, clock()), 1000 / INPUT_RATE);
+    this.renderer.setAnimationLoop((_, frame) => this.draw(frame));
+  }
+
+  connect() {
+    const token = new URLSearchParams(location.hash.slice(1)).get("token") ?? sessionStorage.getItem(KEPT) ?? "";
+    if (!token) return void this.pair("This page was opened without its token.");
+    this.wire = new Wire(this.heard(), { token });
+  }
+
+  pair(why) {
+    find("why").textContent = why;
+    find("pairing").hidden = false;
+    find("code").focus();
+  }
+
+  heard() {
+    return {
+      welcome: (message) => this.welcome(message),
+      closed: (reason, final) => {
+        this.reason = reason;
+        this.wire.controls = false;
+        this.state = this.lease = null;
+        this.show(null);
+        if (!final) return;
+        sessionStorage.removeItem(KEPT);
+        this.pair(reason);
+      },
+      lease: (message) => {
+        const before = this.wire.controls;
+        this.lease = message;
+        this.wire.controls = message.holder === this.wire.id;
+        if (this.wire.controls && !before && this.immersive.session) this.tellAlignment(this.alignment);
+      },
+      state: (message) => this.changed(message),
+      world: ({ world }) => this.drawn.world(world),
+      robot: (message) => this.robot(message),
+      shell: ({ rows }) => this.drawn.shell(rows),
+      preview: (message) => (message.kind ? this.piece(message) : this.show(message)),
+      foreseen: (message) => {
+        this.told = message;
+        this.drawn.foreseen(message);
+      },
+      error: ({ reason, closing }) => closing || this.warn(reason),
+    };
+  }
+
+  async welcome({ token, package: digest }) {
+    sessionStorage.setItem(KEPT, token);
+    find("pairing").hidden = true;
+    this.reason = null;
+    if (this.immersive.session) this.ask();
+    if (this.loaded === digest) return;
+    const answer = await fetch("scene.json", { headers: { Authorization: `Bearer ${token}` } });
+    if (!answer.ok) return this.warn(`The scene was refused: ${answer.status}.`);
+    this.drawn.load(await answer.json());
+    this.loaded = digest;
+  }
+
+  /** One line that the server says about what was just sent; it stands for a while. */
+  warn(text) {
+    this.warning = { text, until: clock() + 6 };
+  }
+
+  changed(state) {
+    this.state = state;
+    if (!state.preview && !SHOWN_IN.has(state.mode) && state.mode !== "execute") this.show(null);
+    for (const kind of ["rigid", "tip"]) {
+      const reach = state.targets?.[kind]?.reach ?? null;
+      const edge = this.reaches[kind] && reach && reach !== this.reaches[kind];
+      if (edge && this.immersive.session) this.immersive.tick(this.marks.names[0] === (kind === "rigid" ? "mount" : "tip") ? "left" : "right");
+      this.reaches[kind] = reach;
+    }
+  }
+
+  robot(frame) {
+    if (!this.loaded) return;
+    this.frame = frame;
+    this.drawn.pose(frame.rows);
+  }
+
+  /** A preview begins; null ends it. */
+  show(message) {
+    this.digest = message?.digest ?? "";
+    this.playback = message && new Playback({ ...message, width: this.drawn.count * STRIDE });
+    this.phases = message?.phases ?? [];
+    this.begins = message?.begins ?? 0;
+    if (!message || this.told?.digest !== message.digest) {
+      this.told = null;
+      this.drawn.foreseen(null);
+    }
+    if (!message) this.drawn.pretend(null);
+    find("playing").hidden = !message;
+  }
+
+  piece({ sequence, rows, flags }) {
+    this.playback?.add(sequence, rows, flags.has("last"));
+  }
+
+  buttons() {
+    find("control").addEventListener("click", () => {
+      if (this.wire?.controls) this.wire.say("lease", { action: "release" });
+      else this.ask();
+    });
+    find("stop").addEventListener("click", () => this.wire?.stop());
+    find("plan").addEventListener("click", () => this.desktop.press("trigger"));
+    const grip = find("grip");
+    grip.addEventListener("pointerdown", (event) => {
+      grip.setPointerCapture(event.pointerId);
+      this.desktop.hold(true);
+    });
+    for (const kind of ["pointerup", "pointercancel", "lostpointercapture"]) grip.addEventListener(kind, () => this.desktop.hold(false));
+    const scrub = find("scrub");
+    scrub.addEventListener("input", () => this.playing?.hold(Number(scrub.value)));
+    for (const kind of ["change", "pointerup", "keyup"]) scrub.addEventListener(kind, () => this.playing && (this.playing.held = false));
+    find("pairing").addEventListener("submit", (event) => {
+      event.preventDefault();
+      const code = find("code").value;
+      if (this.wire) this.wire.again({ code, token: "" });
+      else this.wire = new Wire(this.heard(), { code });
+    });
+    find("recording").addEventListener("change", async ({ target }) => {
+      const [file] = target.files;
+      this.recording = file ? new Recording(await file.arrayBuffer()) : null;
+      find("playing").hidden = !this.playing;
+    });
+    find("immerse").addEventListener("click", () => this.enterHeadset());
+    canImmerse().then((can) => (find("immerse").hidden = !can));
+  }
+
+  ask() {
+    this.wire?.say("lease", { action: "ask" });
+  }
+
+  get playing() {
+    return this.recording?.playback ?? this.playback;
+  }
+
+  async enterHeadset() {
+    try {
+      await this.immersive.enter();
+    } catch (error) {
+      return this.warn(`The headset did not start: ${error.message}`);
+    }
+    this.alignment = null;
+    this.drawn.floor.visible = false;
+    this.wire?.again({ space: "room" });
+  }
+
+  leftHeadset() {
+    this.alignment = null;
+    this.drawn.floor.visible = true;
+    this.board.hide();
+    this.stand(DESKTOP);
+    this.resize();
+    this.wire?.again({ space: "base" });
+  }
+
+  /** The pose of the room in the base frame, to the server. */
+  tellAlignment(pose) {
+    this.alignment = pose;
+    if (!this.wire?.controls) return;
+    const { position, quaternion: q } = pose ?? {};
+    this.wire.say("alignment", { pose: pose && { position: position.toArray(), quaternion: [q.w, q.x, q.y, q.z] } });
+  }
+
+  /** Puts the base at `place`, its pose in the room. */
+  stand({ position, quaternion }) {
+    this.drawn.base.position.copy(position);
+    this.drawn.base.quaternion.copy(quaternion);
+    this.drawn.base.updateMatrixWorld(true);
+  }
+
+  resize() {
+    if (this.renderer.xr.isPresenting) return;
+    const { innerWidth: width, innerHeight: height } = window;
+    this.renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    this.renderer.setSize(width, height, false);
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+  }
+
+  draw(frame) {
+    const now = clock(), dt = Math.min(now - this.before, 0.1);
+    this.before = now;
+    const immersed = Boolean(frame && this.immersive.session && this.immersive.space);
+    if (immersed) this.send(this.inHeadset(now, frame), true, now);
+    this.play(dt);
+    this.mark(this.hands, immersed);
+    this.tell(immersed, dt);
+    if (!immersed) this.orbit.update();
+    this.drawn.scene.background = immersed ? null : (this.ground ??= new Color(BACK));
+    this.renderer.render(this.drawn.scene, this.camera);
+  }
+
+  inHeadset(now, frame) {
+    const flange = markOf(this.drawn.bodies, this.frame?.rows, STRIDE);
+    const hands = this.immersive.frame(now, frame, flange);
+    const { place } = this.immersive.aligning;
+    if (place) this.stand(place);
+    return hands;
+  }
+
+  atDesk(now) {
+    const { desktop } = this;
+    if (this.frame && !desktop.wanted[0]) this.beginAt(this.frame.rows);
+    desktop.aiming = this.state?.mode === "aim";
+    const hands = desktop.hands();
+    if (HANDS.some((side) => hands[side].grip)) this.gripped = now;
+    else if (now - (this.gripped ?? 0) > STILL) this.adopt();
+    return hands;
+  }
+
+  /** Both hands' targets to where the robot's own mount and tip are. */
+  beginAt(rows) {
+    const units = this.drawn.bodies.map((name, index) => (/^unit_/.test(name) ? index : -1)).filter((index) => index >= 0);
+    const base = this.drawn.bodies.indexOf("base");
+    const at = (index) => new Vector3().fromArray(rows, index * STRIDE);
+    const mount = base >= 0 ? at(base) : units.length ? at(units[0]) : new Vector3(0.5, 0, 0.6);
+    this.desktop.begin(mount, units.length ? at(units.at(-1)) : new Vector3(0.5, 0, 0.2));
+  }
+
+  /** The core's targets where they differ from the hands': an offer was taken, or a plan has pinned them. */
+  adopt() {
+    const { rows } = this.frame ?? {};
+    if (!rows || this.desktop.dragging) return;
+    ["rigid_target", "tip_target"].forEach((name, index) => {
+      const at = (this.drawn.count + MARKERS.indexOf(name)) * STRIDE;
+      const hand = index === 0 ? this.desktop.rigid : 1 - this.desktop.rigid;
+      if (Number.isFinite(rows[at]) && this.desktop.wanted[hand]) this.desktop.wanted[hand].fromArray(rows, at);
+    });
+  }
+
+  send(hands, immersed, now) {
+    this.hands = hands;
+    if (!this.wire?.controls || this.wire.offset === null) return; // before the clocks have met, input does not count
+    const visible = immersed ? this.immersive.visible : !document.hidden;
+    this.wire.input(hands, visible, now);
+  }
+
+  play(dt) {
+    const { playing } = this;
+    if (!playing) return;
+    if (playing.advance(dt) && playing === this.playback) this.wire.say("shown", { digest: this.digest });
+    const executes = this.state?.mode === "execute" && !this.recording;
+    this.drawn.pretend(playing.frames && !executes ? playing.rows : null, playing.index * playing.width);
+    const scrub = find("scrub"), at = playing.at.toFixed(2);
+    if (scrub.max !== String(playing.duration)) scrub.max = String(playing.duration);
+    if (!playing.held && scrub.value !== at) scrub.value = at;
+    const phase = this.phases.findLast(([, since]) => since <= this.begins + playing.at)?.[0];
+    const text = `${playing.at.toFixed(1)} of ${playing.duration.toFixed(1)} s${phase && !this.recording ? `, ${phase}` : ""}`;
+    if (find("played").textContent !== text) find("played").textContent = text;
+    const sure = this.recording ? "A recording." : foreseenWords(this.told);
+    if (find("foreseen").textContent !== sure) find("foreseen").textContent = sure;
+  }
+
+  mark(hands, immersed) {
+    const rows = this.frame?.rows;
+    if (!rows || !this.loaded) return this.marks.hide();
+    const starts = HANDS.map((side) => {
+      if (!hands[side].tracked) return null;
+      const start = new Vector3(...hands[side].position);
+      return immersed ? this.drawn.base.worldToLocal(start) : start;
+    });
+    this.marks.update(rows, this.drawn.count, starts, this.state?.targets);
+    this.drawn.placeShell(rows, this.drawn.count + MARKERS.indexOf("rigid_target"));
+    const eye = new Vector3().setFromMatrixPosition((immersed ? this.renderer.xr.getCamera() : this.camera).matrixWorld);
+    for (const target of Object.values(this.marks.targets)) target.face(eye);
+  }
+
+  tell(immersed, dt) {
+    const { wire, state, lease, reason } = this;
+    const age = this.frame && wire ? wire.age(this.frame.time) : null;
+    const stale = !wire?.up || (this.frame?.flags.has("stale") ?? false) || (age ?? 0) > 1;
+    this.drawn.fade(stale);
+    const spoken = words({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, stale });
+    if (this.warning && this.warning.until > clock()) spoken.notice ||= this.warning.text;
+    if (immersed) {
+      const { aligning, lost } = this.immersive;
+      if (!aligning.done && wire?.up) [spoken.title, spoken.next] = ["Where is the robot?", aligning.next];
+      if (lost) [spoken.mode, spoken.title, spoken.next] = ["lost", "Robot’s place lost", lost];
+      const eye = this.renderer.xr.getCamera();
+      this.board.show(spoken, foreseenWords(this.told) || aligning.said, eye, dt);
+      return;
+    }
+    this.panel.show(spoken);
+    const mine = Boolean(wire?.controls);
+    setText(find("control"), mine ? "Release control" : lease?.holder ? "Ask for control" : "Take control");
+    find("control").disabled = !wire?.up || wire.offset === null;
+    const ready = state?.mode === "ready";
+    setText(find("plan").firstChild, ready ? "Confirm " : "Ask for a plan ");
+    find("plan").disabled = !mine || !["aim", "ready"].includes(state?.mode);
+    find("grip").disabled = !mine;
+  }
+
+  /** The age of the live robot, so that its number does not dance: it is written four times a second. */
+  rounded(age) {
+    if (age === null) return null;
+    if (clock() - (this.agedAt ?? 0) > 0.25) [this.aged, this.agedAt] = [Math.max(age, 0), clock()];
+    return this.aged;
+  }
+}
+
+function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+// For tests, which look and never act by it.
+globalThis.trunkline = new Page();

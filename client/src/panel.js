@@ -1,0 +1,172 @@
+// The state in words, once for both: as text of the page, and on a board in the room.
+
+import { CanvasTexture, LinearFilter, Mesh, MeshBasicMaterial, PlaneGeometry, SRGBColorSpace, Vector3 } from "three";
+import { GHOST, MOUNT, OFFER, REACH, WRONG, css } from "./colours.js";
+
+const TITLES = {
+  hold: "Holding", aim: "Aiming", plan: "Planning", preview: "Preview", ready: "Ready to confirm", delay: "About to move",
+  execute: "Moving", follow: "Following", stopped: "Stopped", lost: "No connection", connecting: "Connecting",
+};
+const COLOURS = {
+  aim: MOUNT, plan: REACH, preview: REACH, ready: GHOST, delay: OFFER, execute: OFFER, follow: OFFER, stopped: WRONG, lost: WRONG,
+};
+const OLD = 0.25; // s beyond which a pose of the robot is called old
+
+/** What there is to say of `page`: `mode`, `title`, `next`, `notice`, and facts by name. */
+export function words(page) {
+  const { state, lease, id, age, up, reason, stale } = page;
+  const mode = !up ? (reason === null ? "connecting" : "lost") : (state?.mode ?? "connecting");
+  const mine = lease?.holder === id && id !== "";
+  const holder = lease?.clients?.find((one) => one.id === lease.holder);
+  const facts = {};
+  if (up && lease) facts.Control = mine ? "you" : holder ? holder.name || "somebody else" : "nobody";
+  if (up && lease?.asking?.length && mine) facts.Asked = `${lease.asking.length} would like to take over`;
+  if (age !== null) facts.Robot = `seen ${age < 0.001 ? "now" : `${Math.round(1000 * age)} ms ago`}${stale || age > OLD ? ", OLD" : ""}`;
+  if (state?.fault) facts.Fault = state.fault;
+  let title = TITLES[mode];
+  if (mode === "delay" && Number.isFinite(state.countdown)) title = `Moves in ${state.countdown.toFixed(1)} s`;
+  let next = mine || !lease?.holder ? sentence(state?.next ?? "") : "You watch. Ask for control to aim.";
+  if (!up) next = reason === null ? "Waiting for the server." : `The connection is lost${reason ? `: ${reason}` : ""}. Trying again.`;
+  return { mode, title, next, notice: (up && state?.notice) || "", facts };
+}
+
+const sentence = (text) => (text ? `${text[0].toUpperCase()}${text.slice(1)}.` : "");
+
+/** What the batch of futures says, in one line. */
+export function foreseenWords(told) {
+  if (!told) return "";
+  const spread = told.spread.length ? Math.round(1000 * told.spread[told.spread.length - 1]) : null;
+  const parts = [];
+  if (told.probability !== null)
+    parts.push(`Grasp holds in ${percent(told.probability)} of ${told.futures} futures (${percent(told.low)} to ${percent(told.high)})`);
+  if (spread !== null) parts.push(`the tip ends within ${spread} mm in ${percent(told.within)} of them`);
+  return parts.length ? `${parts.join("; ")}.` : "";
+}
+
+const percent = (share) => `${Math.round(100 * share)} %`;
+
+/** Writes into the page; only what has changed, so that a screen reader says it once. */
+export class PagePanel {
+  constructor(find) {
+    this.parts = Object.fromEntries(["mode", "next", "notice", "facts"].map((id) => [id, find(id)]));
+    this.facts = "";
+  }
+
+  show({ mode, title, next, notice, facts }) {
+    setText(this.parts.mode, title);
+    if (this.parts.mode.dataset.mode !== mode) this.parts.mode.dataset.mode = mode;
+    setText(this.parts.next, next);
+    setText(this.parts.notice, notice === next ? "" : notice);
+    const key = JSON.stringify(facts);
+    if (key === this.facts) return;
+    this.facts = key;
+    this.parts.facts.replaceChildren(
+      ...Object.entries(facts).flatMap(([name, value]) => [element("dt", name), element("dd", value)]),
+    );
+  }
+}
+
+function element(tag, text) {
+  const made = document.createElement(tag);
+  made.textContent = text;
+  return made;
+}
+
+function setText(node, text) {
+  if (node.textContent !== text) node.textContent = text;
+}
+
+const WIDTH = 1024, HEIGHT = 460; // pixels of the board
+const AWAY = 1.1, ASIDE = 0.5, BELOW = 0.12; // m from the eyes
+const LOOSE = 0.3; // m by which it may be elsewhere before it comes along
+const EASE = 4; // per s
+
+/** The board in the room: it comes along when the viewer turns, and stands still otherwise. */
+export class RoomPanel {
+  constructor(scene) {
+    this.canvas = document.createElement("canvas");
+    [this.canvas.width, this.canvas.height] = [WIDTH, HEIGHT];
+    this.texture = new CanvasTexture(this.canvas);
+    this.texture.colorSpace = SRGBColorSpace;
+    this.texture.minFilter = LinearFilter;
+    const material = new MeshBasicMaterial({ map: this.texture, transparent: true });
+    this.board = new Mesh(new PlaneGeometry(0.62, (0.62 * HEIGHT) / WIDTH), material);
+    this.board.renderOrder = 9;
+    this.board.visible = false;
+    this.drawn = "";
+    scene.add(this.board);
+  }
+
+  /** `eye`: the viewer's camera. Every word is drawn again when one changes. */
+  show({ mode, title, next, notice, facts }, extra, eye, dt) {
+    this.board.visible = true;
+    this.comeAlong(eye, dt);
+    const key = JSON.stringify([mode, title, next, notice, facts.Control, facts.Fault, extra]);
+    if (key === this.drawn) return;
+    this.drawn = key;
+    const pen = this.canvas.getContext("2d");
+    pen.clearRect(0, 0, WIDTH, HEIGHT);
+    pen.fillStyle = "rgba(20, 24, 29, 0.9)";
+    pen.beginPath();
+    pen.roundRect(0, 0, WIDTH, HEIGHT, 36);
+    pen.fill();
+    pen.fillStyle = css(COLOURS[mode] ?? 0x9aa5b1);
+    pen.fillRect(0, 40, 14, HEIGHT - 80);
+    const write = wrapped(pen, 50, WIDTH - 90);
+    write(title, "650 66px system-ui, sans-serif", "#ffffff", 84, 1);
+    write(next, "46px system-ui, sans-serif", "#ffffff", 56, 3);
+    write(notice === next ? "" : notice, "38px system-ui, sans-serif", css(GHOST), 48, 2);
+    write(extra, "34px system-ui, sans-serif", "#c4ccd4", 42, 2);
+    write(Object.entries(facts).filter(([name]) => name !== "Robot").map(([name, value]) => `${name}: ${value}`).join("   "),
+      "34px system-ui, sans-serif", "#c4ccd4", 42, 1);
+    this.texture.needsUpdate = true;
+  }
+
+  comeAlong(eye, dt) {
+    const ahead = new Vector3(0, 0, -1).transformDirection(eye.matrixWorld).setY(0).normalize();
+    const left = new Vector3(ahead.z, 0, -ahead.x);
+    const wanted = new Vector3().setFromMatrixPosition(eye.matrixWorld);
+    wanted.addScaledVector(ahead, AWAY).addScaledVector(left, ASIDE);
+    wanted.y -= BELOW;
+    const away = this.board.position.distanceTo(wanted);
+    if (this.placed && away < LOOSE && !this.coming) return this.faceEye(eye);
+    this.coming = away > 0.03;
+    this.board.position.lerp(wanted, this.placed ? 1 - Math.exp(-EASE * dt) : 1);
+    this.placed = true;
+    this.faceEye(eye);
+  }
+
+  faceEye(eye) {
+    this.board.lookAt(new Vector3().setFromMatrixPosition(eye.matrixWorld));
+  }
+
+  hide() {
+    this.board.visible = this.placed = false;
+  }
+}
+
+/** Writes lines one below the other, broken at words, at most `most` of each text. */
+function wrapped(pen, x, width) {
+  let y = 24;
+  return (text, font, colour, height, most) => {
+    if (!text) return;
+    pen.font = font;
+    pen.fillStyle = colour;
+    pen.textBaseline = "top";
+    let line = "", lines = 0;
+    const put = (words) => {
+      if (lines++ >= most) return;
+      pen.fillText(words, x, y, width);
+      y += height;
+    };
+    for (const word of text.split(" ")) {
+      const longer = line ? `${line} ${word}` : word;
+      if (line && pen.measureText(longer).width > width) {
+        put(line);
+        line = word;
+      } else line = longer;
+    }
+    put(line);
+    y += 10;
+  };
+}

@@ -1,0 +1,216 @@
+// What is drawn in the robot's base frame: robot, ghost, world, reach. A robot is one skinned mesh, a bone a body.
+
+import {
+  Bone, BufferAttribute, BufferGeometry, Color, DoubleSide, GridHelper, Group, HemisphereLight, DirectionalLight, Mesh,
+  MeshBasicMaterial, MeshLambertMaterial, Scene, Skeleton, SkinnedMesh, Line, LineBasicMaterial, CatmullRomCurve3,
+  TubeGeometry, Vector3, Quaternion, FrontSide,
+} from "three";
+import { GHOST, MOUNT, REACH, TIP } from "./colours.js";
+import { mergedGeoms } from "./geoms.js";
+import { STRIDE } from "./wire.js";
+
+const ONE = new Vector3(1, 1, 1);
+const WIDEST = 4; // m, of a solid that is drawn as one; the floor's box is wider
+const OBJECT = "object"; // the body of the thing, where the model has one
+const FADED = 0.35; // of a live robot that is not heard of
+const WOOD = [0.55, 0.47, 0.38, 1], THING = [0.35, 0.7, 0.9, 1];
+
+export class RobotScene {
+  constructor() {
+    this.scene = new Scene();
+    this.base = new Group(); // all of the robot's base frame, z up; where it is in the room an alignment says
+    this.scene.add(this.base, new HemisphereLight(0xffffff, 0x6d747e, 1.35));
+    const sun = new DirectionalLight(0xffffff, 1.5);
+    sun.position.set(1.5, 3, 2);
+    this.scene.add(sun);
+    this.floor = new GridHelper(4, 16, 0x4a5663, 0x343e49);
+    this.floor.rotation.x = Math.PI / 2; // three's lies across y, the base's z is up
+    this.base.add(this.floor);
+    this.reachShown = true;
+  }
+
+  /** The scene as the server has it, anew. */
+  load({ bodies, geoms, meshes, shell, reach }) {
+    for (const old of [this.live, this.ghost, this.veil, this.still, this.reach, this.tipReach]) old?.removeFromParent();
+    this.count = bodies.length;
+    this.bodies = bodies;
+    const moving = mergedGeoms(geoms.filter(({ body }) => body >= 0), meshes);
+    this.still = this.reach = this.tipReach = null;
+    const still = mergedGeoms(geoms.filter(({ body }) => body < 0), meshes);
+    if (moving) {
+      this.live = skinned(moving, new MeshLambertMaterial({ vertexColors: true }), bodies.length);
+      const glass = new MeshLambertMaterial({ color: GHOST, transparent: true, opacity: 0.45, depthWrite: false });
+      this.ghost = skinned(moving, glass, bodies.length);
+      // First its depth alone, so that what is behind its own surface does not shine through.
+      const depth = new MeshBasicMaterial({ colorWrite: false });
+      this.veil = new SkinnedMesh(moving, depth);
+      this.veil.bindMode = "detached";
+      this.veil.bind(this.ghost.skeleton, this.ghost.bindMatrix);
+      this.veil.frustumCulled = false;
+      [this.live.renderOrder, this.veil.renderOrder, this.ghost.renderOrder] = [0, 1, 2];
+      this.ghost.visible = this.veil.visible = this.live.visible = false;
+      this.base.add(this.live, this.veil, this.ghost);
+    }
+    if (still) this.base.add((this.still = new Mesh(still, new MeshLambertMaterial({ vertexColors: true }))));
+    if (reach) this.base.add((this.reach = shellMesh(new Float32Array(reach.vertices), reach.faces, MOUNT, 0.05)));
+    if (shell) {
+      const { around, along } = shell;
+      this.tipReach = shellMesh(new Float32Array(3 * around * along), lattice(around, along), REACH, 0.14);
+      this.tipReach.visible = false;
+      this.base.add(this.tipReach);
+      if (this.shellPoints) this.shell(this.shellPoints);
+    }
+    this.showReach(this.reachShown);
+    if (this.known) this.world(this.known);
+  }
+
+  /** The robot as it is: rows of poses, of which the first are the bodies'. */
+  pose(rows) {
+    if (!this.live) return;
+    setPoses(this.live, rows, 0);
+    this.live.visible = true;
+  }
+
+  /** Grey, where it is not known how the robot is. */
+  fade(stale) {
+    if (!this.live || this.faded === stale) return;
+    this.faded = stale;
+    this.live.material.color = new Color(stale ? FADED : 1, stale ? FADED : 1, stale ? FADED : 1);
+  }
+
+  /** The preview's robot by the poses from number `start` of `rows` on; null hides it. */
+  pretend(rows, start = 0) {
+    if (!this.ghost) return;
+    this.ghost.visible = this.veil.visible = rows !== null;
+    if (rows) setPoses(this.ghost, rows, start);
+  }
+
+  /** The tip's reach for gravity as it is at the target: points in the frame of the mount's target. */
+  shell(points) {
+    this.shellPoints = points; // it may come before the scene
+    if (this.tipReach?.geometry.attributes.position.array.length !== points.length) return;
+    this.tipReach.geometry.attributes.position.copyArray(points).needsUpdate = true;
+    this.tipReach.filled = true;
+  }
+
+  /** Where the mount's target is, as a row of a frame; NaN hides what is about it. */
+  placeShell(rows, row) {
+    if (!this.tipReach) return;
+    const at = row * STRIDE;
+    const there = Number.isFinite(rows[at]) && this.tipReach.filled;
+    this.tipReach.visible = there && this.reachShown;
+    if (!there) return;
+    this.tipReach.position.fromArray(rows, at);
+    this.tipReach.quaternion.set(rows[at + 4], rows[at + 5], rows[at + 6], rows[at + 3]);
+  }
+
+  showReach(shown) {
+    this.reachShown = shown;
+    if (this.reach) this.reach.visible = shown;
+    if (this.tipReach) this.tipReach.visible = shown && Boolean(this.tipReach.filled);
+  }
+
+  /** Solids and things as they are believed, but for those that the model has. */
+  world(world) {
+    this.known = world;
+    this.believed?.removeFromParent();
+    const things = this.bodies?.includes(OBJECT) ? [] : world.things;
+    const wide = (box) => box.high[0] - box.low[0] > WIDEST;
+    this.floor.position.z = Math.min(0, ...world.boxes.map((box) => (wide(box) ? box.high[2] : box.low[2])));
+    const boxes = this.still ? [] : world.boxes.filter((box) => !wide(box));
+    const geoms = boxes.map(({ low, high }) => ({
+      body: -1, shape: "box", quaternion: [1, 0, 0, 0], rgba: WOOD,
+      position: low.map((x, axis) => (x + high[axis]) / 2), size: low.map((x, axis) => (high[axis] - x) / 2),
+    }));
+    for (const { shape, diameter, height, position, quaternion } of things) {
+      const [radius, half] = [diameter / 2, height / 2];
+      const size = shape === "sphere" ? [radius] : shape === "cylinder" ? [radius, half] : [radius, radius, half];
+      const known = shape === "sphere" || shape === "cylinder" ? shape : "box";
+      geoms.push({ body: -1, shape: known, size, position, quaternion, rgba: THING });
+    }
+    const merged = mergedGeoms(geoms, []);
+    this.believed = merged && new Mesh(merged, new MeshLambertMaterial({ vertexColors: true }));
+    if (this.believed) this.base.add(this.believed);
+  }
+
+  /** The median path of the tip, and how far most futures are from it; null hides both. */
+  foreseen(told) {
+    for (const old of this.future ?? []) {
+      old.removeFromParent();
+      old.geometry.dispose();
+    }
+    this.future = [];
+    if (!told || told.tip.length < 2) return;
+    const points = told.tip.map((point) => new Vector3(...point));
+    const path = new Line(new BufferGeometry().setFromPoints(points), new LineBasicMaterial({ color: TIP }));
+    const band = new MeshBasicMaterial({ color: TIP, transparent: true, opacity: 0.16, depthWrite: false, side: FrontSide });
+    const tube = new Mesh(spreadTube(points, told.spread), band);
+    tube.renderOrder = 3;
+    this.future = [path, tube];
+    this.base.add(...this.future);
+  }
+}
+
+/** A mesh whose bones are in the frame of its parent, not in the room's: `detached`, bound by the identity. */
+function skinned(geometry, material, count) {
+  const mesh = new SkinnedMesh(geometry, material);
+  const bones = Array.from({ length: count }, () => new Bone());
+  for (const bone of bones) bone.matrixAutoUpdate = bone.matrixWorldAutoUpdate = false;
+  mesh.bindMode = "detached";
+  mesh.bind(new Skeleton(bones), mesh.matrix.clone());
+  mesh.frustumCulled = false; // its bounds are those of the bodies' own frames
+  return mesh;
+}
+
+const place = new Vector3(), turn = new Quaternion();
+
+function setPoses({ skeleton }, rows, start) {
+  skeleton.bones.forEach((bone, index) => {
+    const at = start + index * STRIDE;
+    place.fromArray(rows, at);
+    turn.set(rows[at + 4], rows[at + 5], rows[at + 6], rows[at + 3]);
+    if (Number.isFinite(place.x)) bone.matrixWorld.compose(place, turn, ONE);
+    else bone.matrixWorld.makeScale(0, 0, 0); // a body that is not there
+  });
+}
+
+/** A surface that one looks through, and that hides nothing. */
+function shellMesh(points, faces, color, opacity) {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute("position", new BufferAttribute(points, 3));
+  geometry.setIndex(faces);
+  const mesh = new Mesh(geometry, new MeshBasicMaterial({ color, opacity, transparent: true, depthWrite: false, side: DoubleSide }));
+  mesh.frustumCulled = false;
+  mesh.renderOrder = 4;
+  return mesh;
+}
+
+/** Triangles of `around` × `along` points, along fastest, the way around closed. */
+function lattice(around, along) {
+  const faces = [];
+  for (let i = 0; i < around; i++)
+    for (let j = 0; j + 1 < along; j++) {
+      const [a, b] = [i * along + j, ((i + 1) % around) * along + j];
+      faces.push(a, b, b + 1, a, b + 1, a + 1);
+    }
+  return faces;
+}
+
+/** A tube about a path whose radius is the spread at each of its points. */
+function spreadTube(points, spread, sides = 12) {
+  const segments = Math.min(points.length - 1, 80);
+  const geometry = new TubeGeometry(new CatmullRomCurve3(points), segments, 1, sides);
+  const { position, normal } = geometry.attributes;
+  const curve = new CatmullRomCurve3(points), centre = new Vector3();
+  for (let ring = 0; ring <= segments; ring++) {
+    curve.getPointAt(ring / segments, centre);
+    const at = curve.getUtoTmapping(ring / segments) * (points.length - 1), before = Math.floor(at);
+    const after = Math.min(before + 1, points.length - 1);
+    const radius = spread[before] + (spread[after] - spread[before]) * (at - before);
+    for (let side = 0; side <= sides; side++) {
+      const i = ring * (sides + 1) + side;
+      position.setXYZ(i, centre.x + radius * normal.getX(i), centre.y + radius * normal.getY(i), centre.z + radius * normal.getZ(i));
+    }
+  }
+  return geometry;
+}

@@ -1,0 +1,186 @@
+// The page in an ordinary browser: mouse and keyboard, reconnecting, what it asks of the network, its accessibility.
+
+import assert from "node:assert/strict";
+import { readFileSync } from "node:fs";
+import { createRequire } from "node:module";
+import { after, before, test } from "node:test";
+import { inMode, launch, open, picture, serve, until } from "./harness.mjs";
+
+const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
+let browser, server;
+
+before(async () => {
+  [browser, server] = await Promise.all([launch(), serve()]);
+});
+after(async () => {
+  await browser?.close();
+  await server?.close();
+});
+
+const loaded = (page) => until(page, () => globalThis.trunkline.loaded && globalThis.trunkline.frame && true);
+
+async function takeControl(page) {
+  await until(page, () => !document.querySelector("#control").disabled);
+  await page.click("#control");
+  await until(page, () => globalThis.trunkline.wire.controls);
+  await inMode(page, "aim");
+}
+
+/** Drags a target's marker by `dx`, `dy` pixels, with the true mouse. */
+async function drag(page, kind, dx, dy) {
+  const [x, y] = await until(page, (name) => {
+    const { desktop, marks } = globalThis.trunkline;
+    const hand = name === "rigid" ? desktop.rigid : 1 - desktop.rigid;
+    if (!desktop.wanted[hand]) return null;
+    const [u, v] = desktop.toScreen(desktop.wanted[hand]);
+    return marks.nearest((point) => desktop.toScreen(point), u, v, 15) === hand ? [u, v] : null; // once it is drawn there
+  }, kind);
+  await page.mouse.move(x, y);
+  await page.mouse.down();
+  for (let step = 1; step <= 8; step++) {
+    await page.mouse.move(x + (dx * step) / 8, y + (dy * step) / 8);
+    await page.waitForTimeout(40);
+  }
+  await page.waitForTimeout(300);
+  await page.mouse.up();
+  await page.waitForTimeout(1200);
+}
+
+const target = (page, kind) => page.evaluate((name) => globalThis.trunkline.state?.targets?.[name]?.position ?? null, kind);
+
+test("the page loads with no error and asks nothing of other hosts", async (t) => {
+  const { page, wrongs } = await open(t, browser, server);
+  await loaded(page);
+  await page.waitForTimeout(500);
+  assert.deepEqual(wrongs, []);
+  const { calls, triangles } = await page.evaluate(() => globalThis.trunkline.renderer.info.render);
+  assert.ok(calls <= 60, `${calls} draw calls`);
+  assert.ok(triangles > 5_000 && triangles <= 100_000, `${triangles} triangles`);
+});
+
+test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done", async (t) => {
+  const { page, wrongs } = await open(t, browser, server);
+  await loaded(page);
+  await takeControl(page);
+  await drag(page, "rigid", 16, -12);
+  await drag(page, "tip", -30, -45);
+  await until(page, () => globalThis.trunkline.state.targets && true);
+  await picture(page, "1-aim");
+  await page.keyboard.press("Enter");
+  await inMode(page, "preview");
+  await until(page, () => globalThis.trunkline.drawn.ghost.visible && globalThis.trunkline.playback.at > 0.9);
+  const { calls, triangles } = await page.evaluate(() => globalThis.trunkline.renderer.info.render);
+  assert.ok(calls <= 60, `${calls} draw calls with the ghost`);
+  assert.ok(triangles <= 100_000, `${triangles} triangles with the ghost`);
+  await picture(page, "2-preview");
+  await inMode(page, "ready");
+  await page.keyboard.press("Enter"); // without the grip nothing is confirmed
+  await page.waitForTimeout(500);
+  assert.equal(await page.evaluate(() => globalThis.trunkline.state.mode), "ready");
+  await page.keyboard.down("KeyG");
+  await page.waitForTimeout(300);
+  await page.keyboard.press("Enter");
+  await inMode(page, "execute");
+  await page.waitForTimeout(400);
+  await picture(page, "3-execute");
+  await inMode(page, "aim");
+  await page.keyboard.up("KeyG");
+  const log = await server.tell();
+  assert.deepEqual(log.filter((line) => line.startsWith("mode")).slice(-7).map((line) => line.slice(5)),
+    ["aim", "plan", "preview", "ready", "delay", "execute", "aim"]);
+  assert.equal(log.filter((line) => line === "shown").length, 1);
+  assert.deepEqual(wrongs, []);
+});
+
+test("keys move the chosen target by a step, and the grip let go holds the robot", async (t) => {
+  const { page } = await open(t, browser, server);
+  await loaded(page);
+  await takeControl(page);
+  for (const [key, kind] of [["Digit1", "rigid"], ["Digit2", "tip"]]) {
+    await page.keyboard.press(key);
+    await page.keyboard.press("ArrowUp");
+    await page.waitForTimeout(1500);
+    if (kind === "tip") await until(page, () => globalThis.trunkline.state.targets);
+  }
+  const before = await target(page, "tip");
+  for (let n = 0; n < 5; n++) await page.keyboard.press("ArrowUp");
+  await page.waitForTimeout(1500);
+  const after = await target(page, "tip");
+  assert.ok(Math.abs(after[2] - before[2] - 0.05) < 0.004, `rose by ${after[2] - before[2]} m`);
+  await page.keyboard.press("Enter");
+  await inMode(page, "ready");
+  await page.keyboard.down("KeyG");
+  await page.waitForTimeout(300);
+  await page.keyboard.press("Enter");
+  await inMode(page, "execute");
+  await page.keyboard.up("KeyG");
+  await inMode(page, "hold");
+});
+
+test("out of reach is told in words, by a ring and by an offer that R takes", async (t) => {
+  const { page } = await open(t, browser, server);
+  await loaded(page);
+  await takeControl(page);
+  await drag(page, "rigid", 10, 0);
+  await drag(page, "tip", 0, 0);
+  await page.keyboard.press("Digit1");
+  for (let n = 0; n < 40; n++) await page.keyboard.press("ArrowUp");
+  await until(page, () => globalThis.trunkline.state.targets?.rigid.reach === "outside");
+  await page.waitForTimeout(400);
+  assert.ok(await page.evaluate(() => globalThis.trunkline.marks.targets.rigid.ring.visible));
+  await page.keyboard.press("Enter");
+  await until(page, () => /out of reach/.test(document.querySelector("#notice").textContent));
+  await picture(page, "4-out-of-reach");
+  await page.keyboard.press("KeyR");
+  await until(page, () => globalThis.trunkline.state.targets?.rigid.reach === "inside");
+});
+
+test("space stops, and R goes on", async (t) => {
+  const { page } = await open(t, browser, server);
+  await loaded(page);
+  await takeControl(page);
+  await page.keyboard.press("Space");
+  await inMode(page, "stopped");
+  await picture(page, "5-stopped");
+  await page.keyboard.press("KeyR");
+  await inMode(page, "aim");
+});
+
+test("a lost connection is said, the robot turns grey, and it comes back", async (t) => {
+  const { page } = await open(t, browser, server);
+  await loaded(page);
+  await server.tell("drop");
+  await until(page, () => document.querySelector("#mode").dataset.mode === "lost", null, "words on the lost connection");
+  assert.ok(await page.evaluate(() => globalThis.trunkline.drawn.faded));
+  await until(page, () => globalThis.trunkline.wire.up && globalThis.trunkline.state && true);
+  await until(page, () => !globalThis.trunkline.drawn.faded);
+});
+
+test("a robot that is not heard of is old, and grey", async (t) => {
+  const { page } = await open(t, browser, server);
+  await loaded(page);
+  await server.tell("silent");
+  await until(page, () => /OLD/.test(document.querySelector("#facts").textContent) && globalThis.trunkline.drawn.faded);
+  await server.tell("speak");
+  await until(page, () => !/OLD/.test(document.querySelector("#facts").textContent));
+});
+
+test("without its token the page asks for the six digits, and a wrong token is said", async (t) => {
+  const { page } = await open(t, browser, server, { url: `${server.origin}/` });
+  await until(page, () => !document.querySelector("#pairing").hidden);
+  await page.fill("#code", server.code);
+  await page.click("#pairing button");
+  await loaded(page);
+  assert.ok(await page.evaluate(() => document.querySelector("#pairing").hidden));
+  const wrong = await open(t, browser, server, { url: `${server.origin}/#token=${"0".repeat(32)}` });
+  await until(wrong.page, () => /token/.test(document.querySelector("#why").textContent));
+});
+
+test("axe finds nothing against the page", async (t) => {
+  const { page } = await open(t, browser, server);
+  await loaded(page);
+  await takeControl(page);
+  await page.evaluate(AXE); // by the debugger's protocol, which the page's rules do not bind
+  const { violations } = await page.evaluate(() => globalThis.axe.run(document));
+  assert.deepEqual(violations.map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.target).join(", ")}`), []);
+});

@@ -1,0 +1,122 @@
+// What the browser tests share: a server, a headless Chromium, an emulated Quest 3, and polling.
+//
+// The page's rules forbid `eval`, so nothing here bypasses them: what is asked is asked by `evaluate`, again and again.
+
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { mkdirSync } from "node:fs";
+import { dirname, join } from "node:path";
+import { createInterface } from "node:readline";
+import { fileURLToPath } from "node:url";
+import { build } from "esbuild";
+import { chromium } from "playwright-core";
+
+const here = dirname(fileURLToPath(import.meta.url));
+export const root = join(here, "..", "..");
+const PYTHON = process.env.TRUNKLINE_PYTHON ?? join(root, ".venv", "bin", "python");
+const BROWSER = process.env.TRUNKLINE_BROWSER ?? "/usr/bin/chromium";
+const PICTURES = process.env.TRUNKLINE_PICTURES ?? "";
+const LONGEST = 120_000; // ms that anything may take; drawing by software on a shared core is slow
+const DRAWN = 10; // Hz at most at which tests draw, so that they also pass beside other work
+const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-background-networking"];
+
+/** The server, round a plain robot: `url`, `tell(word)` which gives its log. */
+export async function serve() {
+  const child = spawn(PYTHON, ["-m", "tests.live.page_server", ...(PICTURES ? [] : ["--light"])], { cwd: root, stdio: ["pipe", "pipe", "inherit"] });
+  const lines = createInterface({ input: child.stdout })[Symbol.asyncIterator]();
+  const first = (await lines.next()).value ?? "";
+  const [word, port, token, code] = first.split(" ");
+  assert.equal(word, "ready", "the server did not start");
+  return {
+    origin: `http://127.0.0.1:${port}`,
+    url: `http://127.0.0.1:${port}/#token=${token}`,
+    code,
+    async tell(text = "log") {
+      child.stdin.write(`${text}\n`);
+      return JSON.parse((await lines.next()).value);
+    },
+    async close() {
+      child.stdin.end();
+      await new Promise((done) => child.once("exit", done));
+    },
+  };
+}
+
+export const launch = () => chromium.launch({ executablePath: BROWSER, args: FLAGS });
+
+/** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. */
+export async function open(t, browser, server, { url = server.url, headset = false, width = PICTURES ? 1280 : 720, height = PICTURES ? 720 : 480 } = {}) {
+  const context = await browser.newContext({ viewport: { width, height } });
+  t.after(() => context.close());
+  const page = await context.newPage();
+  const wrongs = [];
+  page.on("console", (message) => ["error", "warning"].includes(message.type()) && !isOfDriver(message.text()) && wrongs.push(`${message.type()}: ${message.text()}`));
+  page.on("pageerror", (error) => wrongs.push(`exception: ${error.message}`));
+  page.on("request", (request) => {
+    const { origin, protocol } = new URL(request.url());
+    if (protocol !== "data:" && protocol !== "blob:" && origin !== server.origin) wrongs.push(`request: ${request.url()}`);
+  });
+  await page.addInitScript(calmly, DRAWN);
+  if (headset) await page.addInitScript({ content: await emulator() });
+  page.setDefaultTimeout(LONGEST);
+  await page.goto(url);
+  return { page, wrongs };
+}
+
+/** In the page: frames come at most `rate` times a second. */
+function calmly(rate) {
+  const request = globalThis.requestAnimationFrame.bind(globalThis);
+  let last = 0;
+  globalThis.requestAnimationFrame = (draw) => {
+    const wait = Math.max(last + 1000 / rate - performance.now(), 0);
+    return setTimeout(() => request((time) => {
+      last = performance.now();
+      draw(time);
+    }), wait);
+  };
+  globalThis.cancelAnimationFrame = (handle) => clearTimeout(handle);
+}
+
+/** What software drawing says of itself, which is no fault of the page. */
+const isOfDriver = (text) => /GPU stall due to ReadPixels|GL Driver Message|swiftshader|WebGL-/i.test(text);
+
+let emulated;
+
+/** The emulated headset as one script; the product's page never loads it. */
+async function emulator() {
+  emulated ??= (await build({
+    stdin: { contents: 'export { XRDevice, metaQuest3 } from "iwer";', resolveDir: here },
+    bundle: true, write: false, format: "iife", globalName: "iwer", logLevel: "error",
+  })).outputFiles[0].text + `
+    globalThis.headset = new iwer.XRDevice(iwer.metaQuest3, { stereoEnabled: false });
+    headset.installRuntime({ forceInstall: true }); // else it leaves Chromium's own navigator.xr
+    globalThis.guessed = false; // a true controller's position is not emulated, this one's would be
+    Object.defineProperty(globalThis.XRPose.prototype, "emulatedPosition", { configurable: true, get: () => globalThis.guessed });
+    headset.position.set(0, 1.5, 0);
+    for (const side of ["left", "right"]) headset.controllers[side].position.set(side === "left" ? -0.2 : 0.2, 1.2, -0.3);
+  `;
+  return emulated;
+}
+
+/** Until `test` (run in the page with `given`) is truthy; then what it gave. */
+export async function until(page, test, given, what = test.toString()) {
+  const end = Date.now() + LONGEST;
+  for (;;) {
+    const found = await page.evaluate(test, given);
+    if (found) return found;
+    if (Date.now() > end) {
+      const state = await page.evaluate(() => ({ state: globalThis.trunkline?.state, text: document.querySelector("#status")?.textContent }));
+      assert.fail(`waited ${LONGEST / 1000} s for ${what}; page: ${JSON.stringify(state)}`);
+    }
+    await page.waitForTimeout(50);
+  }
+}
+
+export const inMode = (page, mode) => until(page, (wanted) => globalThis.trunkline.state?.mode === wanted, mode, `mode ${mode}`);
+
+/** A picture for whoever looks, where TRUNKLINE_PICTURES names a folder. */
+export async function picture(page, name) {
+  if (!PICTURES) return;
+  mkdirSync(PICTURES, { recursive: true });
+  await page.screenshot({ path: join(PICTURES, `${name}.png`) });
+}

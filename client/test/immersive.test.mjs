@@ -1,0 +1,169 @@
+// The page in an emulated Quest 3: the full cycle with two controllers, lost tracking, a lost anchor, recentring.
+
+import assert from "node:assert/strict";
+import { after, before, test } from "node:test";
+import { inMode, launch, open, picture, serve, until } from "./harness.mjs";
+
+let browser, server;
+
+before(async () => {
+  [browser, server] = await Promise.all([launch(), serve()]);
+});
+after(async () => {
+  await browser?.close();
+  await server?.close();
+});
+
+/** A page that has entered the headset, controls, and whose base has been put in place by A. */
+async function aligned(t) {
+  const opened = await open(t, browser, server, { headset: true });
+  const { page } = opened;
+  await until(page, () => globalThis.trunkline.loaded && globalThis.trunkline.frame && true);
+  await until(page, () => !document.querySelector("#immerse").hidden);
+  await page.click("#immerse");
+  await until(page, () => globalThis.trunkline.immersive.session && globalThis.trunkline.wire.controls);
+  await until(page, () => globalThis.trunkline.immersive.aligning.place && true);
+  await press(page, "right", "a-button");
+  await until(page, () => globalThis.trunkline.immersive.aligning.done && globalThis.trunkline.alignment && true);
+  await inMode(page, "aim");
+  return opened;
+}
+
+const set = (page, side, button, value) =>
+  page.evaluate(([hand, name, amount]) => globalThis.headset.controllers[hand].updateButtonValue(name, amount), [side, button, value]);
+
+/** Waits until the page has drawn `count` frames, so that it has heard of what was done. */
+async function frames(page, count = 3) {
+  const first = await page.evaluate(() => globalThis.trunkline.renderer.info.render.frame);
+  await until(page, (least) => globalThis.trunkline.renderer.info.render.frame >= least, first + count);
+}
+
+async function press(page, side, button) {
+  await set(page, side, button, 1);
+  await frames(page);
+  await set(page, side, button, 0);
+  await frames(page);
+}
+
+/** Puts a controller so that its ray, straight down and `length` m long, ends at a point of the base frame. */
+async function point(page, side, place, length = 0.6) {
+  await page.evaluate(([hand, [x, y, z], up]) => {
+    const { drawn } = globalThis.trunkline;
+    const end = drawn.base.localToWorld(drawn.base.position.clone().set(x, y, z));
+    const controller = globalThis.headset.controllers[hand];
+    controller.position.set(end.x, end.y + up, end.z);
+    controller.quaternion.set(-Math.SQRT1_2, 0, 0, Math.SQRT1_2); // its -z looks down
+  }, [side, place, length]);
+  await frames(page);
+}
+
+/** Both targets set with their grips, as a user does. */
+async function aim(page) {
+  for (const [side, place] of [["left", [0.5, 0.1, 0.5]], ["right", [0.72, 0.1, 0.13]]]) {
+    await point(page, side, place);
+    await page.waitForTimeout(300); // the filter's
+    await set(page, side, "squeeze", 1);
+  }
+  await page.waitForTimeout(600);
+  await until(page, () => globalThis.trunkline.state.targets && true);
+}
+
+test("it asks for passthrough with local-floor and anchors, and draws nothing behind the robot", async (t) => {
+  const { page, wrongs } = await aligned(t);
+  const found = await page.evaluate(() => {
+    const { session } = globalThis.trunkline.immersive;
+    return { blend: session.environmentBlendMode, features: [...session.enabledFeatures], ground: globalThis.trunkline.drawn.scene.background, rate: session.frameRate };
+  });
+  assert.equal(found.blend, "alpha-blend");
+  assert.ok(found.features.includes("local-floor") && found.features.includes("anchors"));
+  assert.equal(found.ground, null);
+  assert.ok(found.rate >= 72 && found.rate <= 120, `${found.rate} Hz`);
+  const { calls, triangles } = await page.evaluate(() => globalThis.trunkline.renderer.info.render);
+  assert.ok(calls <= 60 && triangles <= 100_000, `${calls} calls, ${triangles} triangles`);
+  assert.deepEqual(wrongs, []);
+});
+
+test("a cycle with two controllers: aim, plan, preview, confirm, execute, done", async (t) => {
+  const { page } = await aligned(t);
+  await aim(page);
+  await picture(page, "6-headset-aim");
+  await set(page, "left", "squeeze", 0);
+  await set(page, "right", "squeeze", 0);
+  await frames(page);
+  await press(page, "right", "trigger");
+  await inMode(page, "preview");
+  await frames(page, 5);
+  await picture(page, "7-headset-preview");
+  await inMode(page, "ready");
+  await set(page, "left", "squeeze", 1);
+  await frames(page);
+  await press(page, "right", "trigger");
+  await inMode(page, "execute");
+  await inMode(page, "aim");
+  await set(page, "left", "squeeze", 0);
+  const modes = (await server.tell()).filter((line) => line.startsWith("mode ")).map((line) => line.slice(5));
+  assert.deepEqual(modes.slice(-6), ["plan", "preview", "ready", "delay", "execute", "aim"]);
+});
+
+test("the hand that moves to the edge of reach feels a tick, once", async (t) => {
+  const { page } = await aligned(t);
+  await page.evaluate(() => {
+    globalThis.ticks = [];
+    const { immersive } = globalThis.trunkline, tick = immersive.tick.bind(immersive);
+    immersive.tick = (side) => {
+      globalThis.ticks.push(side);
+      tick(side);
+    };
+  });
+  await aim(page);
+  await point(page, "left", [0.5, 0.1, 1.4]);
+  await until(page, () => globalThis.trunkline.state.targets?.rigid.reach === "outside");
+  await until(page, () => globalThis.ticks.includes("left"));
+  assert.equal((await page.evaluate(() => globalThis.ticks)).filter((side) => side === "left").length, 1);
+});
+
+test("a controller that is lost or only guessed holds the robot, and it is said", async (t) => {
+  const { page } = await aligned(t);
+  await page.evaluate(() => (globalThis.guessed = true));
+  await inMode(page, "hold");
+  await page.evaluate(() => (globalThis.guessed = false));
+  await inMode(page, "aim");
+  await page.evaluate(() => {
+    globalThis.headset.controllers.right.connected = false;
+  });
+  await inMode(page, "hold");
+  await until(page, () => /not tracked/.test(globalThis.trunkline.state.notice));
+  await page.evaluate(() => {
+    globalThis.headset.controllers.right.connected = true;
+  });
+  await inMode(page, "aim");
+});
+
+test("a lost anchor holds the robot until it is found again", async (t) => {
+  const { page } = await aligned(t);
+  await until(page, () => globalThis.trunkline.immersive.anchor && true);
+  await page.evaluate(() => {
+    const { prototype } = globalThis.XRFrame;
+    globalThis.truly = Object.getOwnPropertyDescriptor(prototype, "trackedAnchors");
+    Object.defineProperty(prototype, "trackedAnchors", { configurable: true, get: () => new Set() });
+  });
+  await inMode(page, "hold");
+  await until(page, () => /not aligned/.test(globalThis.trunkline.state.notice) && globalThis.trunkline.immersive.lost && true);
+  await picture(page, "8-headset-lost");
+  await page.evaluate(() => Object.defineProperty(globalThis.XRFrame.prototype, "trackedAnchors", globalThis.truly));
+  await inMode(page, "aim");
+});
+
+test("an anchor of the session before is restored, and one touch is asked for", async (t) => {
+  const { page } = await aligned(t);
+  await until(page, () => localStorage.getItem("trunkline.base") && true);
+  const before = await page.evaluate(() => globalThis.trunkline.immersive.aligning.place.position.toArray());
+  await page.evaluate(() => globalThis.trunkline.immersive.leave());
+  await until(page, () => !globalThis.trunkline.immersive.session);
+  await until(page, () => globalThis.trunkline.wire.up && globalThis.trunkline.wire.offset !== null);
+  await page.click("#immerse");
+  await until(page, () => globalThis.trunkline.immersive.aligning.step === "check");
+  const now = await page.evaluate(() => globalThis.trunkline.immersive.aligning.place.position.toArray());
+  assert.ok(Math.hypot(...now.map((x, axis) => x - before[axis])) < 1e-4);
+  assert.equal(await page.evaluate(() => globalThis.trunkline.alignment), null);
+});

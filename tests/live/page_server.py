@@ -1,0 +1,216 @@
+"""The true server for tests of the page, round a robot without physics and a planner that answers at once.
+
+    python -m tests.live.page_server [--light]
+
+prints `ready PORT TOKEN CODE` and serves until its input ends. A line on its input is a fault to be shown: `silent` and
+`speak` (the robot tells nothing new), `drop` (all connections end), `fault` (the robot reports one); the modes that
+there were, and what else the server logged, come back as a line of JSON. With `--light` meshes have few triangles. It
+is patient with clients that draw by software beside other work: PATIENCE.
+"""
+
+import asyncio
+import json
+import sys
+import time
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+from aiohttp import web
+from aiohttp.test_utils import unused_port
+from trimesh.creation import icosphere
+
+from tests.hybrid.conftest import SIZE, rubbing_arm
+from tests.support.operator import PACKAGE, READY_JOINTS, config
+from tests.teleop.test_plan import LIMITS, NETWORK, OFFSET, RADIUS, STRAIGHT
+from trunkline.arm.spiral import spiral_chain
+from trunkline.errors import InputError
+from trunkline.hybrid.compose import compose, panda_joints
+from trunkline.hybrid.robots import PandaRobot
+from trunkline.live import foreseer, lease, talk
+from trunkline.live import scene as pictured
+from trunkline.live.access import Origins, make_token
+from trunkline.live.believing import make_world
+from trunkline.live.bodies import drawn
+from trunkline.live.desk import Desk
+from trunkline.live.robot import Standing
+from trunkline.live.server import House, Server
+from trunkline.pipeline.config import PROJECT
+from trunkline.teleop.core import Teleoperation
+from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.messages import Box, ExecutorReport, PlanReport, Thing
+from trunkline.teleop.planner import Planner
+from trunkline.teleop.reading import Reading
+from trunkline.teleop.rigid_ik import RigidIK
+from trunkline.teleop.vectors import add, distance, scale, subtract
+
+RATE, LENGTH, UNITS = 72.0, 0.5, 24  # Hz, m
+PATIENCE = 5.0  # s for which a client may be silent
+CENTRE, REACH = (0.0, 0.0, 0.333), 0.85  # m, of the ball in which the mount can be
+AROUND, ALONG = 32, 10
+TABLE = Box("the table", (0.35, -0.5, -0.05), (0.95, 0.5, -0.02))
+CUP = Thing("the cup", "cylinder", 0.05, 0.12, 0.1, (0.65, 0.3, 0.04), support="standing")
+
+
+class Balls:
+    """Reach: of the mount a ball about the shoulder, of the tip one about the mount."""
+
+    def rigid(self, mount, pointing) -> Reading:
+        return _in_ball(mount, CENTRE, REACH)
+
+    def soft(self, tip, gravity) -> Reading:
+        return _in_ball(tip, (0.0, 0.0, 0.0), LENGTH)
+
+
+def _in_ball(point, centre, radius) -> Reading:
+    away = distance(point, centre)
+    if away <= radius:
+        return Reading("inside")
+    return Reading("outside", away - radius, add(centre, scale(subtract(point, centre), 0.98 * radius / away)))
+
+
+class Bowl:
+    """Where the tip can be, the same under any gravity, in place of `scene.Shells`."""
+
+    def at(self, down) -> np.ndarray:
+        angle = np.linspace(0, 2 * np.pi, AROUND, endpoint=False)[:, None]
+        polar = np.linspace(0.02, 2.0, ALONG)[None]
+        side = np.sin(polar)
+        points = [side * np.cos(angle), side * np.sin(angle), -np.cos(polar) + 0 * angle]
+        return 0.8 * LENGTH * np.stack(points, axis=-1).reshape(-1, 3)
+
+
+class Figure:
+    """The hybrid robot as it is drawn, its arm of constant curvature."""
+
+    def __init__(self) -> None:
+        robot = PandaRobot("panda", OFFSET, 1.5, 0.0, list(READY_JOINTS))
+        self.model = compose(rubbing_arm(spiral_chain(**SIZE), 8), robot).compile()
+        self.data, self.bodies = mujoco.MjData(self.model), drawn(self.model)
+        self.ids = [self.model.body(name).id for name in self.bodies]
+        self.rigid = self.model.jnt_qposadr[panda_joints(self.model)]
+        units = [self.model.body(f"unit_{number:02d}") for number in range(1, UNITS + 1)]
+        self.soft = [self.model.jnt_qposadr[unit.jntadr[0]] for unit in units]
+
+    def poses(self, joints: np.ndarray, commands: np.ndarray) -> np.ndarray:
+        """Of all that is drawn. Shape (B, 7)."""
+        self.data.qpos[self.rigid] = joints
+        self.data.qpos[self.soft] = -(STRAIGHT[0] - commands[0]) / RADIUS / UNITS
+        mujoco.mj_kinematics(self.model, self.data)
+        return np.column_stack([self.data.xpos[self.ids], self.data.xquat[self.ids]])
+
+
+class Robot:
+    """Where its plan says, in real time."""
+
+    def __init__(self, figure: Figure) -> None:
+        self.figure, self.robot = figure, SimulatedRobot(np.array(READY_JOINTS), STRAIGHT, LIMITS, PACKAGE)
+        self.start, self.stop, self.last, self.fault = self.robot.start, self.robot.stop, time.monotonic(), ""
+        self.kept: Standing | None = None
+        self.is_silent = False
+
+    def permit(self) -> None:
+        pass
+
+    def state(self) -> ExecutorReport:
+        return ExecutorReport("fault", "", self.fault) if self.fault else self.robot.state()
+
+    def standing(self) -> Standing:
+        if self.is_silent and self.kept is not None:
+            return self.kept
+        now = time.monotonic()
+        self.robot.advance(now - self.last)
+        self.last = now
+        poses = self.figure.poses(self.robot.joints, self.robot.commands)
+        self.kept = Standing(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), poses)
+        return self.kept
+
+
+class Planning:
+    """Plans at once; its previews are the plan itself."""
+
+    def __init__(self, figure: Figure) -> None:
+        self.figure, self.heard = figure, None
+        self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
+
+    def order(self, order: foreseer.Order) -> None:
+        serial = order.request.serial
+        try:
+            plan = self.planner.plan(order.request, order.world, order.joints, order.commands)
+        except InputError as error:
+            self.heard(foreseer.Planned(PlanReport(serial, refused=str(error))))
+            return
+        digest, step = plan.digest(), 1 / RATE
+        times = np.arange(0.0, plan.duration, step)
+        poses = np.array([self.figure.poses(*plan.at(time)) for time in times], dtype=np.float32)
+        tips, shares = poses[::9, -1, :3].astype(float), np.linspace(0, 1, len(times[::9]))
+        self.heard(foreseer.Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan))
+        phases = tuple((name, plan.step * row) for name, row in plan.phases)
+        preview = talk.Preview(digest, step, float(times[-1]), 0.0, phases)
+        self.heard(foreseer.Begun(serial, preview))
+        for first in range(0, len(times), 18):
+            piece = poses[first : first + 18]
+            self.heard(foreseer.Shown(serial, first, float(times[first]), piece, first + 18 >= len(times)))
+        spread = tuple(float(share) for share in 0.004 + 0.018 * shares)
+        path = tuple(tuple(map(float, tip)) for tip in tips)
+        told = talk.Foreseen(digest, 0.84, 0.68, 0.93, tuple(map(float, times[::9])), path, spread, 0.9, 32)
+        self.heard(foreseer.Told(serial, told))
+
+    def leave(self) -> None:
+        pass
+
+
+def drawing(figure: Figure) -> dict:
+    """As /scene.json has it."""
+    maps = {"rigid": np.ones((4, 4, 4)), "rigid_origin": np.zeros(3), "rigid_spacing": np.array(0.1)}
+    ball = icosphere(subdivisions=3, radius=REACH).apply_translation(CENTRE)
+    reach = {"vertices": ball.vertices.ravel().tolist(), "faces": ball.faces.ravel().tolist()}
+    found = pictured.scene(figure.model, figure.bodies, maps, LENGTH)
+    return found | {"reach": reach, "shell": {"around": AROUND, "along": ALONG}}
+
+
+async def obey(server: Server, robot: Robot, log: list[str]) -> None:
+    """Lines of the input, until it ends; the log goes out for each."""
+    loop = asyncio.get_running_loop()
+    while line := await loop.run_in_executor(None, sys.stdin.readline):
+        word = line.strip()
+        robot.is_silent = word == "silent" or (robot.is_silent and word != "speak")
+        robot.fault = {"fault": "joint 4: torque", "well": ""}.get(word, robot.fault)
+        if word == "drop":
+            for client in list(server.clients.values()):
+                await client.socket.close()
+        print(json.dumps(log), flush=True)
+
+
+async def serve(port: int) -> None:
+    lease.SILENCE = PATIENCE
+    figure, token, log = Figure(), make_token(), []
+    robot, planning = Robot(figure), Planning(figure)
+    core = config().core
+    safety = replace(core.safety, silence=PATIENCE, plan_wait=PATIENCE, start_wait=PATIENCE)
+    settings = replace(core, delay=0.3, safety=safety)
+    core = Teleoperation(settings, Balls(), PACKAGE, OFFSET)
+    desk = Desk(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
+    page, origins = PROJECT / "trunkline/live/page", Origins.of(["127.0.0.1"], port, tls=False)
+    server = Server(House(desk, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append))
+    planning.heard, tick = server.foreseen, server.tick
+
+    def watched(now: float, dt: float) -> None:
+        before = desk.intent.mode if desk.intent else ""
+        tick(now, dt)
+        if desk.intent.mode != before:
+            log.append(f"mode {desk.intent.mode}")
+
+    server.tick = watched
+    runner = web.AppRunner(server.app())
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", port).start()
+    print(f"ready {port} {token} {server.code.renew(time.monotonic())}", flush=True)
+    await obey(server, robot, log)
+    await runner.cleanup()
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--light"]:
+        pictured.MOST_TRIANGLES = 2000
+    asyncio.run(serve(unused_port()))

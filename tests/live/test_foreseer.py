@@ -1,0 +1,126 @@
+"""Plans and previews: what comes of an order, in which order, and how soon a newer one ends it."""
+
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.live.test_robot import simulation
+from tests.support.operator import config
+from tests.support.small_arm import small_spec
+from tests.teleop.test_plan import LIMITS, MOUNT, NETWORK, OFFSET, TIP, request
+from trunkline.foresight.foresight import Foresight
+from trunkline.foresight.twin import Believed
+from trunkline.hybrid.doubts import Contact, Doubts
+from trunkline.hybrid.placements import HangingGrip
+from trunkline.hybrid.settings import HybridSettings
+from trunkline.hybrid.touch import read_geometry
+from trunkline.live import foreseer
+from trunkline.live.believing import make_world
+from trunkline.live.foreseer import Foreseer, Order, Overtaken
+from trunkline.live.settings import Config
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.teleop.grasping import Grasping
+from trunkline.teleop.messages import Thing
+from trunkline.teleop.planner import Planner
+from trunkline.teleop.rigid_ik import RigidIK
+
+FUTURES = 3
+
+
+@cache
+def made() -> Foreseer:
+    s, spec = simulation(), small_spec()
+    live, robot = load_folder(Config, PROJECT / "conf/live"), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
+    grips = {"hanging": HangingGrip(config().hanging, read_geometry(spec))}
+    rigid = RigidIK(OFFSET)
+    grasping = Grasping(rigid, OFFSET, s.commands, grips, config().handling)
+    bends = lambda poses: {k: v - 0.5 + s.commands if k != "tip" else v for k, v in NETWORK.ask(poses).items()}  # noqa: E731
+    planner = Planner(rigid, replace(NETWORK, ask=bends), s.commands, LIMITS, OFFSET, step=0.01, grasping=grasping)
+    known = Believed(spec, Doubts(contact=Contact()), robot)
+    return Foreseer(planner, Foresight(known, grips, replace(live.preview, futures=FUTURES)), s.bodies)
+
+
+def order(serial=1, thing="", tip=TIP) -> Order:
+    s, asked = simulation(), request(MOUNT, tip)
+    things = (Thing(thing, "cylinder", 0.045, 0.12, 0.1, TIP),) if thing else ()
+    targets = replace(asked.targets, thing=thing)
+    return Order(replace(asked, serial=serial, targets=targets), make_world((), things), s.joints, s.commands)
+
+
+def test_a_plan_then_its_preview_in_pieces_then_the_batch():
+    answers = list(made().answers(order(7)))
+    planned, begun, *pieces, told = answers
+    assert [type(one) for one in (planned, begun, told)] == [foreseer.Planned, foreseer.Begun, foreseer.Told]
+    assert planned.report.digest == planned.plan.digest() == begun.preview.digest == told.foreseen.digest
+    assert {one.report.serial if isinstance(one, foreseer.Planned) else one.serial for one in answers} == {7}
+    assert [piece.last for piece in pieces] == [False] * (len(pieces) - 1) + [True]
+    frames = np.cumsum([0] + [len(piece.poses) for piece in pieces])
+    assert [piece.first for piece in pieces] == list(frames[:-1])
+    assert abs(frames[-1] * begun.preview.step - begun.preview.duration) < 2 * begun.preview.step
+    assert begun.preview.duration == pytest.approx(planned.plan.duration + made().previewing.hold, abs=0.02)
+    poses = np.concatenate([piece.poses for piece in pieces])
+    assert np.isfinite(poses).all()
+    mount = simulation().bodies.index("base")
+    assert np.linalg.norm(poses[-1, mount, :3] - np.array(MOUNT)) < 0.03
+    assert (told.foreseen.futures, told.foreseen.probability) == (FUTURES, None)
+    assert len(told.foreseen.times) == len(told.foreseen.tip) == len(told.foreseen.spread)
+
+
+def test_of_a_grasp_the_batch_tells_how_surely_it_holds():
+    planned, *_, told = made().answers(order(8, "the cylinder"))
+    assert planned.report.refused == ""
+    assert 0 <= told.foreseen.probability <= 1
+    assert told.foreseen.low <= told.foreseen.probability <= told.foreseen.high
+    curl = planned.plan.step * dict(planned.plan.phases)["curl"]
+    assert curl < told.foreseen.times[0] < curl + 0.1
+
+
+def test_a_refusal_is_one_answer():
+    answers = list(made().answers(order(9, tip=(0.5, 0.1, -0.6))))
+    assert len(answers) == 1
+    assert answers[0].plan is None
+    assert answers[0].report.refused.startswith("out of reach")
+
+
+def test_a_newer_order_ends_the_one_before_within_a_piece():
+    newest, sent = SimpleNamespace(value=1), []
+
+    class Pipe:
+        def send(self, answer):
+            sent.append(answer)
+            if sum(isinstance(one, foreseer.Shown) for one in sent) == 2:
+                newest.value = 2
+
+    given = [(1, order(1)), (2, order(2, tip=(0.5, 0.1, -0.6)))]
+    orders = SimpleNamespace(get=lambda: given.pop(0))
+    with pytest.raises(IndexError):  # there is no third
+        foreseer.serve(Pipe(), orders, newest, made())
+    assert sum(isinstance(one, foreseer.Shown) for one in sent) == 2
+    assert isinstance(sent[-1], foreseer.Planned)
+    assert sent[-1].report.serial == 2
+
+
+def test_what_breaks_a_preview_refuses_its_plan_and_not_the_next():
+    class Broken(Foreseer):
+        def _shown(self, *given):
+            raise ValueError("two\nlines")
+
+    broken, sent, given = Broken(made().planner, made().foresight, made().bodies), [], [(1, order(1))]
+    orders = SimpleNamespace(get=lambda: given.pop(0))
+    with pytest.raises(IndexError):
+        foreseer.serve(SimpleNamespace(send=sent.append), orders, SimpleNamespace(value=1), broken)
+    assert sent[-1].report.refused == "preview: ValueError: two"
+
+
+def test_an_order_that_is_left_goes_no_further():
+    def go_on():
+        raise Overtaken
+
+    answers = made().answers(order(1), go_on)
+    assert isinstance(next(answers), foreseer.Planned)
+    assert isinstance(next(answers), foreseer.Begun)
+    with pytest.raises(Overtaken):
+        next(answers)

@@ -1,0 +1,158 @@
+"""The simulated robot: what was previewed is what it does, and it holds whenever nobody says that it may go on."""
+
+import time
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from tests.support.operator import PACKAGE, config
+from tests.support.small_arm import small_spec
+from trunkline.foresight.twin import Believed, compose_twin
+from trunkline.hybrid.doubts import Doubts
+from trunkline.hybrid.futures import Way
+from trunkline.hybrid.preview import joined, nominal
+from trunkline.hybrid.settings import HybridSettings
+from trunkline.live import simulated
+from trunkline.live.believing import make_world
+from trunkline.live.bodies import Poses, drawn
+from trunkline.live.house import SEARCH
+from trunkline.live.robot import DEAD_MAN, RobotProcess
+from trunkline.live.settings import Config
+from trunkline.live.simulated import Plant, Simulation
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.teleop.executor import BRAKE
+from trunkline.teleop.plan import Plan
+from trunkline.teleop.trajectory import gentle, limits_of, point_to_point
+
+LATE = 0.1  # s that a busy machine may take to schedule a process
+
+
+@cache
+def simulation():
+    live, robot = load_folder(Config, PROJECT / "conf/live"), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
+    spec = small_spec()
+    arm = spec.compile()
+    straight, known = arm.tendon_length0[arm.actuator_trnid[:, 0]], Believed(spec, Doubts(), robot)
+    twin = compose_twin(known, make_world(()), None, SEARCH, straight, live.preview)
+    return Simulation(twin, SEARCH, straight, drawn(twin.model), limits_of(config().motors), PACKAGE)
+
+
+@cache
+def plan():
+    """The first joint turns by 0.5 rad, then the first cable is pulled by 30 mm, as calmly as a hand-over."""
+    s = simulation()
+    here = np.append(s.joints, s.commands)
+    turned, pulled = here + np.eye(10)[0] * 0.5, here + np.eye(10)[0] * 0.5 - np.eye(10)[7] * 0.03
+    first, second = (gentle(a, b, s.limits, 0.002, 2.0) for a, b in ((here, turned), (turned, pulled)))
+    rows = np.concatenate([first, second[1:], np.tile(pulled, (250, 1))])
+    return Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0), ("curl", len(first) - 1)), PACKAGE, "world")
+
+
+def test_the_robot_does_what_the_preview_shows():
+    s, plant = simulation(), Plant(simulation())
+    shown = joined(list(nominal(s.twin, Way(plan().step, plan().joints, plan().commands))))
+    poses, tip = Poses(s.twin.model, s.bodies), s.bodies.index("unit_08")
+    time, away = 0.0, []
+    for row, until in enumerate(shown.time + s.twin.model.opt.timestep):  # of the step that ends with a frame
+        while time < until - plant.tick / 2:
+            time += plant.tick
+            plant.move(*plan().at(time))
+        away.append(np.linalg.norm(plant.poses()[tip, :3] - poses.of(shown.qpos[0, row])[tip, :3]))
+    travelled = np.linalg.norm(np.diff(shown.tip[0], axis=0), axis=1).sum()
+    assert travelled > 0.1
+    assert np.median(away) < 1e-3
+    assert max(away) < 2e-3
+
+
+@pytest.fixture(scope="module")
+def robot():
+    s = simulation()
+    found = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
+    until(lambda: found.ready, 60.0)
+    yield found
+    found.close()
+
+
+def until(happens, seconds=5.0, each=lambda: None):
+    end = time.monotonic() + seconds
+    while not happens():
+        assert time.monotonic() < end, "it did not happen"
+        each()
+        time.sleep(0.005)
+
+
+def back(robot):
+    """A plan from where the robot is to where it began, and it runs."""
+    s, now = simulation(), robot.standing()
+    here, there = np.append(now.joints, now.commands), np.append(s.joints, s.commands)
+    rows = point_to_point(
+        here, there + np.eye(10)[0] * (0.0 if abs(here[0] - there[0]) > 0.2 else 0.5), s.limits, 0.002
+    )
+    found = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
+    assert robot.start(found, found.digest()) == ""
+    until(lambda: robot.state().mode == "running", 10.0, robot.permit)
+    return found
+
+
+def test_it_runs_a_plan_to_its_end_while_it_is_permitted(robot):
+    found = back(robot)
+    until(lambda: robot.state().mode == "done", 20.0, robot.permit)
+    assert robot.state().digest == found.digest()
+    np.testing.assert_allclose(robot.standing().joints, found.joints[-1], atol=1e-9)
+    link = simulation().bodies.index("link_7")
+    assert np.isfinite(robot.standing().bodies[link]).all()
+
+
+def test_it_holds_when_it_is_stopped_and_goes_on_by_no_permit(robot):
+    back(robot)
+    pressed = time.monotonic()
+    robot.stop()
+    until(lambda: robot.standing().held >= pressed)
+    assert robot.standing().held - pressed < LATE
+    until(lambda: robot.state().mode == "idle", 3.0, robot.permit)
+    kept = robot.standing().joints
+    for _ in range(40):
+        robot.permit()
+        time.sleep(0.01)
+    np.testing.assert_array_equal(robot.standing().joints, kept)
+
+
+def test_it_holds_when_nobody_says_that_it_may_go_on(robot):
+    back(robot)
+    silent = time.monotonic()
+    until(lambda: robot.state().mode == "idle")
+    assert robot.standing().held - silent + 0.02 >= DEAD_MAN
+    assert robot.standing().held - silent < DEAD_MAN + BRAKE + LATE
+
+
+def test_a_stop_before_a_plan_has_come_counts(robot):
+    s, now = simulation(), robot.standing()
+    here = np.append(now.joints, now.commands)
+    rows = point_to_point(here, here + np.eye(10)[0] * 0.2, s.limits, 0.002)
+    found = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
+    assert robot.start(found, found.digest()) == ""
+    robot.stop()
+    until(lambda: robot.state().mode in ("fault", "idle") and robot.channel.hear()[0][2] == robot._serial)
+    np.testing.assert_allclose(robot.standing().joints, now.joints, atol=2e-3)
+
+
+def test_another_digest_or_package_does_not_run(robot):
+    now = robot.standing()
+    rows = np.tile(now.joints, (3, 1)), np.tile(now.commands, (3, 1))
+    found = Plan(0.002, *rows, (("approach", 0),), PACKAGE, "world")
+    assert robot.start(found, "b" * 64).startswith("digest: found")
+    other = replace(found, package="b" * 64)
+    assert robot.start(other, other.digest()).startswith("package: found")
+    assert robot.state().mode != "running"
+
+
+def test_a_process_that_ends_is_a_fault():
+    s = simulation()
+    found = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
+    until(lambda: found.ready, 60.0)
+    found._process.kill()
+    until(lambda: found.state().mode == "fault")
+    assert found.state().fault == "its process has ended"
+    found.close()

@@ -1,0 +1,196 @@
+"""A session over real sockets: from two hands to a robot that has arrived, and every way out."""
+
+import asyncio
+
+import numpy as np
+import pytest
+
+from tests.support.live import Hands, binary, controlling, hand, laid
+from tests.teleop.test_plan import MOUNT, TIP
+from trunkline.live import wire
+
+UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
+
+
+def grips(place, **buttons):
+    return hand(np.array(place) + UP, grip=1.0, **buttons)
+
+
+async def asked(here, guest):
+    """Both targets set, and a plan asked for; the state once its preview is there."""
+    await guest.hears("state", mode="aim")
+    guest.left, guest.right = grips(MOUNT), grips(TIP)
+    await asyncio.sleep(0.8)
+    guest.right = grips(TIP, trigger=1.0)
+    state = await guest.hears("state", mode="preview")
+    guest.right = grips(TIP)
+    return state
+
+
+async def executing(here, guest):
+    """A plan previewed, confirmed and running."""
+    state = await asked(here, guest)
+    await asyncio.sleep(0.4)
+    await guest.say(type="shown", digest=state["preview"])
+    await guest.hears("state", mode="ready")
+    guest.right = grips(TIP, trigger=1.0)
+    found = await guest.hears("state", mode="execute")
+    guest.right = grips(TIP)
+    await guest.hears("state", robot="running")
+    return found
+
+
+def test_from_hands_to_a_robot_that_has_arrived():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            before = here.robot.robot.joints.copy()
+            state = await executing(here, guest)
+            assert state["execute"] == here.planning.plans[0].digest()
+            assert any(frame[0] == 2 for frame in guest.frames)
+            assert (await guest.hears("foreseen"))["digest"] == state["execute"]
+            await guest.hears("state", 20.0, mode="aim", robot="done")
+            np.testing.assert_allclose(here.robot.robot.joints, here.planning.plans[0].joints[-1], atol=1e-9)
+            assert np.abs(here.robot.robot.joints - before).max() > 0.05
+
+    asyncio.run(session())
+
+
+def test_frames_tell_bodies_and_both_targets():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            await asked(here, guest)
+            frame = [frame for frame in guest.frames if frame[0] == 1][-1]
+            assert len(frame) == 16 + 28 * (3 + len(wire.MARKERS))
+            rows = np.frombuffer(frame, "<f4", offset=16).reshape(-1, 7)
+            np.testing.assert_allclose(rows[5, :3], MOUNT, atol=2e-3)
+            np.testing.assert_allclose(rows[6, :3], TIP, atol=2e-3)
+
+    asyncio.run(session())
+
+
+@pytest.mark.parametrize("way", ["watcher", "secondary", "grips", "gone", "released", "untracked", "hidden"])
+def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(way):
+    async def session():
+        async with laid() as here:
+            guest, watcher = await controlling(here), await here.come()
+            await executing(here, guest)
+            await asyncio.sleep(0.2)
+            assert here.robot.state().mode == "running"
+            if way == "watcher":
+                await watcher.stop()
+            elif way == "secondary":
+                guest.left = grips(MOUNT, secondary=1.0)
+            elif way == "grips":
+                guest.left, guest.right = hand(MOUNT), hand(TIP)
+            elif way == "gone":
+                guest.sending.cancel()
+                await guest.socket.close()
+            elif way == "released":
+                await guest.say(type="lease", action="release")
+            else:
+                guest.sending.cancel()
+                flags = {"untracked": 0b101, "hidden": 0b011}[way]
+                for _ in range(30):
+                    await guest.input(guest.left, guest.right, flags=flags)
+                    await asyncio.sleep(1 / 72)
+            await asyncio.sleep(0.3)
+            assert here.robot.stops
+            mode = "stopped" if way in ("watcher", "secondary") else "hold"
+            await watcher.hears("state", mode=mode, motion="hold")
+            await asyncio.sleep(0.2)
+            kept = here.robot.robot.joints.copy()
+            guest.left, guest.right = grips(MOUNT), grips(TIP, trigger=1.0)
+            await asyncio.sleep(0.5)
+            np.testing.assert_array_equal(here.robot.robot.joints, kept)
+            assert here.robot.state().mode != "running"
+
+    asyncio.run(session())
+
+
+def test_a_silent_holder_loses_the_lease_to_whoever_asked_and_the_robot_holds():
+    async def session():
+        async with laid() as here:
+            first = await controlling(here)
+            second = await here.come(Hands)
+            await second.say(type="lease", action="ask")
+            await second.hears("lease", holder=first.id, asking=[second.id])
+            first.sending.cancel()
+            await asyncio.sleep(0.8)
+            assert here.server.control.holder == first.id
+            await second.hears("lease", 1.0, holder=second.id, asking=[])
+            assert (await second.hears("state"))["motion"] == "hold"
+
+    asyncio.run(session())
+
+
+def test_the_lease_is_given_away_and_taken_by_nobody():
+    async def session():
+        async with laid() as here:
+            first, second = await controlling(here), await here.come(Hands)
+            await second.say(type="lease", action="give", to=second.id)
+            await second.refused("lease: you do not control")
+            await first.say(type="lease", action="give", to="nobody")
+            await first.refused("lease: found no client")
+            await first.say(type="lease", action="give", to=second.id)
+            await second.hears("lease", holder=second.id)
+
+    asyncio.run(session())
+
+
+def test_a_watcher_that_does_not_read_holds_three_frames_and_delays_nobody():
+    async def session():
+        async with laid() as here:
+            stalled, other = await here.come(reads=False), await here.come()
+            await asyncio.sleep(0.5)
+            before = len(other.frames)
+            await asyncio.sleep(2.0)
+            boxes = [client.outbox for client in here.server.clients.values()]
+            held = [box for box in boxes if box.received == 0]
+            assert [(box.sent, len(box.frames)) for box in held] == [(3, 1)]
+            assert len(other.frames) - before > 0.8 * 2.0 * 72
+            await stalled.socket.close()
+
+    asyncio.run(session())
+
+
+def test_who_comes_later_sees_the_plan_that_is_previewed():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            state = await asked(here, guest)
+            later = await here.come()
+            assert (await later.hears("preview"))["digest"] == state["preview"]
+            await later.hears("foreseen")
+            await asyncio.sleep(0.2)
+            assert sum(frame[0] == 2 for frame in later.frames) == 2
+
+    asyncio.run(session())
+
+
+def test_the_same_client_again_ends_the_older_connection_and_the_lease():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            again = await here.come(id=guest.id)
+            assert again.id == guest.id
+            await asyncio.wait_for(guest.closed.wait(), 2.0)
+            assert here.server.control.holder == ""
+            assert list(here.server.clients) == [guest.id]
+
+    asyncio.run(session())
+
+
+def test_a_stop_is_heard_beyond_the_rate_limit_too():
+    async def session():
+        async with laid() as here:
+            watcher = await here.come()
+            for _ in range(1000):
+                await watcher.socket.send_bytes(binary("ack", 0, 1.0))
+            await watcher.stop()
+            assert "left out" in await watcher.refused("rate")
+            await watcher.hears("state", mode="stopped")
+            assert here.robot.stops
+
+    asyncio.run(session())

@@ -1,0 +1,213 @@
+"""A session without physics: a robot that is where its plan says, a planner that answers at once, clients by real
+sockets."""
+
+import asyncio
+import struct
+import time
+from contextlib import asynccontextmanager, suppress
+from pathlib import Path
+
+import numpy as np
+from aiohttp import ClientSession, WSMsgType
+from aiohttp.test_utils import TestServer, unused_port
+
+from tests.support.operator import PACKAGE, Everywhere, config
+from tests.teleop.test_plan import LIMITS, NETWORK, OFFSET, START, STRAIGHT
+from trunkline.errors import InputError
+from trunkline.live import foreseer, talk, wire
+from trunkline.live.access import Origins
+from trunkline.live.believing import make_world
+from trunkline.live.desk import Desk
+from trunkline.live.robot import Standing
+from trunkline.live.server import House, Server
+from trunkline.teleop.core import Teleoperation
+from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.messages import PlanReport
+from trunkline.teleop.planner import Planner
+from trunkline.teleop.rigid_ik import RigidIK
+
+TOKEN, RATE, BODIES = "t" * 22, 72.0, 3
+PREVIEW = 0.3  # s that a preview lasts, whatever the plan
+
+
+class PlainRobot:
+    """Where its plan says, in real time; `stops` are the times at which it was told to stop."""
+
+    def __init__(self):
+        self.robot, self.last, self.stops, self.permits = SimulatedRobot(START, STRAIGHT, LIMITS, PACKAGE), 0.0, [], 0
+        self.silent = 0.0
+        self.start, self.state = self.robot.start, self.robot.state
+
+    def permit(self):
+        self.permits += 1
+
+    def stop(self):
+        self.stops.append(time.monotonic())
+        self.robot.stop()
+
+    def standing(self):
+        now = time.monotonic()
+        if self.last:
+            self.robot.advance(now - self.last)
+        self.last = now
+        bodies = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (BODIES, 1))
+        return Standing(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), bodies)
+
+
+class PlainPlanning:
+    """Plans at once, and previews with two pieces."""
+
+    def __init__(self):
+        self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
+        self.heard, self.left, self.plans = None, 0, []
+
+    def order(self, order):
+        serial = order.request.serial
+        try:
+            plan = self.planner.plan(order.request, order.world, order.joints, order.commands)
+        except InputError as error:
+            self.heard(foreseer.Planned(PlanReport(serial, refused=str(error))))
+            return
+        digest = plan.digest()
+        self.plans.append(plan)
+        poses = np.zeros((15, BODIES, 7), dtype=np.float32)
+        preview = talk.Preview(digest, 0.02, PREVIEW, 0.02, (("approach", 0.0),))
+        found = talk.Foreseen(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
+        for answer in (
+            foreseer.Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan),
+            foreseer.Begun(serial, preview), foreseer.Shown(serial, 0, 0.02, poses, False),
+            foreseer.Shown(serial, 15, 0.32, poses, True), foreseer.Told(serial, found),
+        ):  # fmt: skip
+            self.heard(answer)
+
+    def leave(self):
+        self.left += 1
+
+
+class Laid:
+    """A server, its parts, and its log."""
+
+    def __init__(self, port, page=Path("nowhere")):
+        self.robot, self.planning, self.log = PlainRobot(), PlainPlanning(), []
+        core = Teleoperation(config().core, Everywhere(), PACKAGE, OFFSET)
+        self.desk = Desk(core, self.robot, self.planning, make_world(()), 0.1)
+        scene = {"bodies": ["a", "b", "c"]}
+        origins = Origins.of(["127.0.0.1"], port, tls=False)
+        self.server = Server(House(self.desk, TOKEN, origins, PACKAGE, scene, None, RATE, page, self.log.append))
+        self.planning.heard = self.server.foreseen
+        self.url, self.origin = f"http://127.0.0.1:{port}", f"http://127.0.0.1:{port}"
+
+
+class Guest:
+    """A client: it answers pings, acknowledges, and keeps what it hears."""
+
+    def __init__(self, socket, reads=True):
+        self.socket, self.said, self.frames, self.received = socket, [], [], 0
+        self.task = asyncio.create_task(self._listen()) if reads else None
+        self.left = self.right = None
+        self.closed = asyncio.Event()
+
+    async def _listen(self):
+        async for message in self.socket:
+            if message.type is WSMsgType.TEXT:
+                told = message.json()
+                self.said.append(told)
+                if told["type"] == "ping":
+                    await self.say(type="pong", number=told["number"], stamp=self.now())
+            elif message.type is WSMsgType.BINARY:
+                self.received += 1
+                self.frames.append(message.data)
+                await self.socket.send_bytes(binary("ack", self.received, self.now()))
+        self.closed.set()
+
+    def now(self):
+        return time.monotonic() + 1000.0  # another clock than the server's
+
+    async def say(self, **message):
+        await self.socket.send_json(message)
+
+    async def hears(self, kind, seconds=5.0, **fields):
+        """The newest message of this type with these fields, once there is one."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            for told in reversed(self.said):
+                if told["type"] == kind:
+                    if all(told[name] == value for name, value in fields.items()):
+                        return told
+                    if kind in ("state", "lease"):
+                        break
+            await asyncio.sleep(0.005)
+        raise AssertionError(f"no {kind} with {fields}; heard {self.said[-5:]}")
+
+    async def refused(self, word, seconds=3.0):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            for told in self.said:
+                if told["type"] == "error" and word in told["reason"]:
+                    return told["reason"]
+            await asyncio.sleep(0.005)
+        raise AssertionError(f"no error with {word!r}; heard {self.said[-5:]}")
+
+    async def stop(self):
+        await self.socket.send_bytes(binary("stop", self.received, self.now()))
+
+    async def input(self, left, right, stamp=None, flags=0b111):
+        rows = np.array([left, right], dtype="<f4").tobytes()
+        head = struct.pack("<BBHId", 16, flags, 2, self.received, self.now() if stamp is None else stamp)
+        await self.socket.send_bytes(head + rows)
+
+
+class Hands(Guest):
+    """A client that sends input all the time, its hands where `left` and `right` are."""
+
+    def begin(self):
+        self.left, self.right = hand((0.5, 0.1, 1.1)), hand((0.5, 0.1, 1.1))
+        self.sending = asyncio.create_task(self._send())
+
+    async def _send(self):
+        with suppress(ConnectionError):
+            while not self.socket.closed:
+                await self.input(self.left, self.right)
+                await asyncio.sleep(1 / 72)
+
+
+def binary(kind, received, stamp):
+    return struct.pack("<BBHId", wire.FROM_CLIENT[kind].number, 0, 0, received, stamp)
+
+
+def hand(place, **buttons):
+    """A hand whose ray points straight down: its end, at its first length, is 0.6 m lower."""
+    row = dict.fromkeys(wire.HAND, 0.0) | dict(zip("xyz", place, strict=True)) | {"qw": 1.0} | buttons
+    return [float(row[name]) for name in wire.HAND]
+
+
+@asynccontextmanager
+async def laid(page=Path("nowhere")):
+    """A server that runs, and how to come to it."""
+    port = unused_port()
+    here = Laid(port, page)
+    served = TestServer(here.server.app(), host="127.0.0.1", port=port)
+    async with served, ClientSession() as session:
+
+        async def come(kind=Guest, hello=True, origin=None, reads=True, **says):
+            headers = {"Origin": here.origin if origin is None else origin}
+            socket = await session.ws_connect(f"{here.url}/ws", headers=headers, max_msg_size=0)
+            guest = kind(socket) if reads else kind(socket, reads=False)
+            if hello:
+                await guest.say(**{"type": "hello", "version": 1, "token": TOKEN} | says)
+                if reads:
+                    guest.id = (await guest.hears("welcome"))["id"]
+            return guest
+
+        here.come, here.session = come, session
+        yield here
+
+
+async def controlling(here):
+    """A client that controls, its clock known, its hands heard."""
+    guest = await here.come(Hands)
+    await guest.hears("clock")
+    await guest.say(type="lease", action="ask")
+    await guest.hears("lease", holder=guest.id)
+    guest.begin()
+    return guest

@@ -1,0 +1,1 @@
+"""A session over the network: page and robot on either side of a server that decides everything."""

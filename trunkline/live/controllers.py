@@ -1,0 +1,33 @@
+"""From a binary input to the core's two controllers."""
+
+import numpy as np
+
+from trunkline.live.wire import HAND, Received
+from trunkline.teleop.messages import Controller
+
+PRESSED = 0.5
+NOWHERE = Controller((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), tracked=False)
+STICK = HAND.index("stick_x")
+_AT = {name: place for place, name in enumerate(HAND)}
+
+
+def controllers(received: Received) -> tuple[Controller, Controller]:
+    """Left and right. What is no number is left for the core to refuse by name."""
+    left, right = (
+        _controller(hand, {f"{name}_tracked", "visible"} <= received.flags)
+        for name, hand in zip(("left", "right"), received.hands, strict=True)
+    )
+    return left, right
+
+
+def stops(received: Received) -> bool:
+    """Whether either secondary button is held, tracked or not."""
+    return bool((received.hands[:, _AT["secondary"]] >= PRESSED).any())
+
+
+def _controller(hand: np.ndarray, tracked: bool) -> Controller:
+    x, y, z, a, b, c, d = (float(value) for value in hand[:7])
+    stick_x, stick_y = (float(value) for value in hand[STICK : STICK + 2])
+    held = {name: bool(hand[_AT[name]] >= PRESSED) for name in ("trigger", "grip", "primary", "secondary")}
+    # the stick's press, which begins to follow, is not passed on: nothing here follows yet
+    return Controller((x, y, z), (a, b, c, d), tracked, stick=(stick_x, stick_y), **held)

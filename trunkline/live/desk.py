@@ -1,0 +1,236 @@
+"""What stands around the core: inputs in, and plans, previews and the robot's motion as it wants them.
+
+It has no sockets and no clock: the server calls it, with the time. Every decision that can move the robot is here or in
+the core. It holds wherever it does not know.
+"""
+
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from trunkline.live import foreseer, talk
+from trunkline.live.believing import believe
+from trunkline.live.controllers import NOWHERE, controllers
+from trunkline.live.robot import Standing
+from trunkline.live.wire import MARKERS, Received
+from trunkline.live.words import next_action
+from trunkline.teleop.alignment import base_quaternion
+from trunkline.teleop.core import Teleoperation
+from trunkline.teleop.messages import Controller, ExecutorReport, Input, Intent, Joints, PlanReport, Pose, World
+from trunkline.teleop.plan import Plan
+
+HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the base frame already
+MOST_INPUTS = 8  # of a tick; older ones than these are left out, presses and all
+
+
+class Robot(Protocol):
+    """An `Executor` that has to be permitted anew all the time."""
+
+    def start(self, plan: Plan, digest: str) -> str: ...
+    def permit(self) -> None: ...
+    def stop(self) -> None: ...
+    def state(self) -> ExecutorReport: ...
+    def standing(self) -> Standing: ...
+
+
+class Planning(Protocol):
+    """What answers orders, some time later, by `Desk.foreseen`."""
+
+    def order(self, order: foreseer.Order) -> None: ...
+    def leave(self) -> None: ...
+
+
+@dataclass(frozen=True)
+class Heard:
+    stamp: float
+    left: Controller
+    right: Controller
+
+
+class Desk:
+    """One robot, one core. `lift`: m by which a thing is lifted by a grasp."""
+
+    def __init__(self, core: Teleoperation, robot: Robot, planning: Planning, world: World, lift: float) -> None:
+        self.core, self.robot, self.planning, self.world, self.lift = core, robot, planning, world, lift
+        self.state = core.start()
+        self.alignment: Pose | None = None
+        self.plan: Plan | None = None
+        self.preview: talk.Preview | None = None
+        self.foreseen: talk.Foreseen | None = None
+        self.report: PlanReport | None = None
+        self.pieces: list[foreseer.Shown] = []
+        self.intent: Intent | None = None
+        self._heard: deque[Heard] = deque(maxlen=MOST_INPUTS)
+        self._last, self._fresh = self._nobody, True
+        self._stop, self._fault, self._shown, self._since, self._believed = False, "", "", 0.0, ""
+        self._asked, self._ordered, self._started, self._ran = 0, False, "", False
+
+    # --- what is heard
+
+    def hear(self, received: Received) -> str:
+        """An input of whom controls; why it does not count, "" where it does."""
+        last = self._heard[-1] if self._heard else self._last
+        if received.stamp <= last.stamp and not self._fresh:
+            return f"input: stamp {received.stamp:.6g} s is not after {last.stamp:.6g} s: heard before"
+        self._fresh = False
+        self._heard.append(Heard(received.stamp, *controllers(received)))
+        return ""
+
+    def stop(self) -> None:
+        """Of anybody: the robot is told at once, the core at its next step."""
+        self._stop = True
+        self.robot.stop()
+
+    def control(self, alignment: Pose | None) -> None:
+        """Somebody else controls now, or nobody, who is aligned so."""
+        self._heard.clear()
+        self._last, self._fresh, self.alignment = self._nobody, True, alignment
+        self.robot.stop()
+
+    def shown(self, digest: str, now: float) -> str:
+        """A preview has been shown to its end; why that does not count, "" where it does."""
+        preview = self.preview
+        expected = self.intent.preview if self.intent is not None else ""
+        if not expected or preview is None or preview.digest != expected:
+            return "shown: no plan is previewed"
+        if digest != expected:
+            return f"shown: found digest {digest[:12]!r}, expected {expected[:12]}"
+        if not self.pieces or not self.pieces[-1].last:
+            return "shown: its preview is not simulated to its end yet"
+        if now - self._since < preview.duration:
+            return f"shown: its preview lasts {preview.duration:.2f} s, found {now - self._since:.2f} s"
+        self._shown = digest
+        return ""
+
+    def answered(self, answer: foreseer.Answer | None, now: float) -> bool:
+        """An answer of `planning`, None if it has ended; whether it is of the plan that is wanted."""
+        if answer is None:
+            self.report = PlanReport(self._asked, refused="the process that plans has ended")
+            return False
+        serial = answer.report.serial if isinstance(answer, foreseer.Planned) else answer.serial
+        if serial != self._asked:
+            return False
+        if isinstance(answer, foreseer.Planned):
+            self.report, self.plan = answer.report, answer.plan
+        elif isinstance(answer, foreseer.Begun):
+            self.preview, self._since = answer.preview, now
+        elif isinstance(answer, foreseer.Shown):
+            self.pieces.append(answer)
+        else:
+            self.foreseen = answer.foreseen
+        return True
+
+    # --- what is done
+
+    def tick(self, dt: float) -> Intent:
+        """Let `dt` s pass; every input since the last tick is a step of the core."""
+        standing, executor = self.robot.standing(), self.robot.state()
+        if self.state.mode in ("hold", "aim"):
+            self._believe(standing, executor)
+        joints: Joints = tuple(float(q) for q in standing.joints)  # type: ignore[assignment]
+        steps = list(self._heard) or [self._last]
+        self._heard.clear()
+        for heard in steps:
+            executor = ExecutorReport("fault", "", self._fault) if self._fault else executor
+            offer = self.foreseen.offer if self.foreseen is not None else None
+            left, right = heard.left, heard.right
+            if self._stop:
+                left, self._stop = replace(left, secondary=True), False
+            given = Input(
+                heard.stamp, left, right, self.alignment, joints, self.world, self.core.package, self.report,
+                self._shown, executor, offer,
+            )  # fmt: skip
+            self.state, intent = self.core.step(self.state, given, dt / len(steps))
+            self._ask(intent, standing)
+            self._drive(intent)
+        self._last = steps[-1]
+        self.intent = intent
+        return intent
+
+    @property
+    def _rigid(self) -> int:
+        """Which hand holds the rigid target."""
+        return ("left", "right").index(self.core.settings.rigid_hand)
+
+    @property
+    def _nobody(self) -> Heard:
+        """Nothing heard, at the stamp of the last step."""
+        stamp = self.state.stamp if self.state.stamp is not None else 0.0
+        return Heard(stamp, NOWHERE, NOWHERE)
+
+    def _ask(self, intent: Intent, standing: Standing) -> None:
+        request = intent.request
+        if request is not None and request.serial != self._asked:
+            self._asked, self.report, self.plan, self.preview = request.serial, None, None, None
+            self.foreseen, self.pieces, self._shown = None, [], ""
+            self._ordered = True
+            self.planning.order(foreseer.Order(request, self.world, standing.joints, standing.commands))
+        elif self._ordered and intent.mode in ("hold", "stopped", "aim", "execute"):
+            self._ordered = False
+            self.planning.leave()
+
+    def _drive(self, intent: Intent) -> None:
+        running = self.robot.state()
+        if intent.motion != "execute":
+            self._fault = self._fault if intent.mode == "stopped" else ""
+            self._started, self._ran = "", False
+            if running.mode == "running":
+                self.robot.stop()
+            return
+        if self._started != intent.execute:
+            self._begin(intent)
+        self._ran = self._ran or running.mode == "running"
+        if self._ran and running.mode == "idle":
+            self._fault = "it has come to rest by itself"
+        if not self._fault:
+            self.robot.permit()
+
+    def _begin(self, intent: Intent) -> None:
+        """Start the plan that was confirmed, once."""
+        self._started = intent.execute
+        if self.plan is None or self.plan.digest() != intent.execute:
+            self._fault = "the plan that was confirmed is not there"
+            return
+        self._fault = self.robot.start(self.plan, intent.execute)
+
+    def _believe(self, standing: Standing, executor: ExecutorReport) -> None:
+        done = executor.mode == "done" and executor.digest != self._believed and self.plan is not None
+        phases = tuple(name for name, _ in self.plan.phases) if done and self.plan is not None else ()
+        if done:
+            self._believed = executor.digest
+        self.world = believe(self.world, standing.thing, phases, self.lift)
+
+    # --- what is told
+
+    def markers(self) -> np.ndarray:
+        """Poses of MARKERS, (4, 7); NaN where there are none."""
+        found = np.full((len(MARKERS), 7), np.nan)
+        if self.intent is None:
+            return found
+        for row, end in enumerate(self.intent.rays):
+            if end is not None:
+                found[row] = (*end, 1.0, 0.0, 0.0, 0.0)
+        targets = self.intent.targets
+        if targets is not None:
+            turn = base_quaternion(targets.pointing, targets.heading)
+            found[2], found[3] = (*targets.rigid.position, *turn), (*targets.tip.position, *turn)
+        else:
+            for row, hand in ((2, self._rigid), (3, 1 - self._rigid)):
+                target = self.state.hands[hand].target
+                if target is not None:
+                    found[row] = (*target, 1.0, 0.0, 0.0, 0.0)
+        return found
+
+    def told(self, holder: str) -> talk.State:
+        """The state for clients, `holder` controlling."""
+        intent, robot = self.intent, self.robot.state()
+        assert intent is not None
+        hands = self.state.hands
+        touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
+        words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
+        return talk.State(
+            intent.mode, intent.motion, intent.notice, words, round(intent.countdown, 2), intent.preview,
+            intent.execute, intent.targets, robot.mode, robot.fault,
+        )  # fmt: skip

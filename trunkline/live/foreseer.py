@@ -1,0 +1,265 @@
+"""Plans and their previews, in a process of its own: what takes longer than a frame.
+
+One order at a time; a newer one ends the one before within a quarter of a simulated second. An order is answered by
+`Planned`, then, if there is a plan, `Begun`, pieces of the nominal twin's motion, each as soon as it is simulated, and
+`Told`, what the batch of futures says.
+"""
+
+import itertools
+import multiprocessing
+import os
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.foresight.foresight import Foreseen, Foresight, foresee
+from trunkline.foresight.package import Package, read_package
+from trunkline.foresight.settings import Previewing
+from trunkline.foresight.twin import at_rest, believed, compose_twin
+from trunkline.hybrid.futures import FRAME, Twin, Way
+from trunkline.hybrid.preview import WITHIN, Preview, nominal
+from trunkline.live import talk
+from trunkline.live.bodies import Poses
+from trunkline.teleop.config import Config
+from trunkline.teleop.messages import PlanReport, Request, Thing, World
+from trunkline.teleop.plan import Plan
+from trunkline.teleop.planner import Planner
+from trunkline.threads import thread_count
+
+NICE = 5
+EVERY = 0.1  # s between the times at which a spread is told
+
+
+@dataclass(frozen=True)
+class Order:
+    """A plan that is asked for, from the robot at rest at `joints` (7,), rad, and `commands` (K,), m."""
+
+    request: Request
+    world: World
+    joints: np.ndarray
+    commands: np.ndarray
+
+
+@dataclass(frozen=True)
+class Planned:
+    """What became of it; `plan` is None where it was refused."""
+
+    report: PlanReport
+    plan: Plan | None = None
+
+
+@dataclass(frozen=True)
+class Begun:
+    """The preview of plan request `serial` begins."""
+
+    serial: int
+    preview: talk.Preview
+
+
+@dataclass(frozen=True)
+class Shown:
+    """Frames of the preview from the one numbered `first`, at `time` s of the plan: poses (F, N, 7), float32."""
+
+    serial: int
+    first: int
+    time: float
+    poses: np.ndarray
+    last: bool
+
+
+@dataclass(frozen=True)
+class Told:
+    """What the batch says."""
+
+    serial: int
+    foreseen: talk.Foreseen
+
+
+Answer = Planned | Begun | Shown | Told
+
+
+class Overtaken(Exception):
+    """A newer order has come."""
+
+
+class Foreseer:
+    """Plans and previews. `bodies`: names of those whose poses are told."""
+
+    def __init__(self, planner: Planner, foresight: Foresight, bodies: tuple[str, ...]) -> None:
+        self.planner, self.foresight, self.bodies = planner, foresight, bodies
+        self.known, self.previewing = foresight.known, foresight.settings
+        self._kept: tuple[tuple, Twin | None] = ((), None)
+
+    @classmethod
+    def of(cls, package: Package, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> "Foreseer":
+        """By a package alone.
+
+        Raises:
+            InputError: it has nothing to preview with.
+        """
+        foresight = Foresight(believed(previewing, package.files), package.grips(config), previewing)
+        return cls(package.planner(config), foresight, bodies)
+
+    def answers(self, order: Order, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
+        """All that comes of an order, each as soon as it is known. `go_on` raises where it need not be."""
+        request, serial = order.request, order.request.serial
+        try:
+            plan = self.planner.plan(request, order.world, order.joints, order.commands)
+        except InputError as error:
+            yield Planned(PlanReport(serial, refused=str(error)))
+            return
+        digest = plan.digest()
+        yield Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan)
+        way, _ = self.foresight.way(plan, plan.phases[0][0]) if plan.phases else (_still(plan), 0.0)
+        thing = _beside(order)
+        twin = self._twin(order.world, thing, way.joints[0], way.commands[0])
+        phases = tuple((name, plan.step * row) for name, row in plan.phases)
+        step = twin.model.opt.timestep * max(round(FRAME / twin.model.opt.timestep), 1)
+        yield Begun(serial, talk.Preview(digest, step, way.duration, step, phases))
+        go_on()
+        yield from self._shown(serial, twin, way, go_on)
+        yield Told(serial, self._told(order, plan, twin, way, digest, go_on))
+
+    def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> Twin:
+        """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
+        kept, twin = self._kept
+        if twin is not None and kept == (world.boxes, thing):
+            twin = at_rest(twin, joints, commands, self.known.robot.mount_offset)
+        else:
+            twin = compose_twin(self.known, world, thing, joints, commands, self.previewing)
+        self._kept = (world.boxes, thing), twin
+        return twin
+
+    def _shown(self, serial: int, twin: Twin, way: Way, go_on: Callable[[], None]) -> Iterator[Answer]:
+        poses, first, held = Poses(twin.model, self.bodies), 0, None
+        for piece in nominal(twin, way):
+            if held is not None:
+                yield held
+            frames = poses.of_piece(piece)
+            held = Shown(serial, first, float(piece.time[0]), frames, False)
+            first += len(frames)
+            if piece.time[-1] + 2 * FRAME < way.duration:  # not the last: it need not wait for the next
+                yield held
+                held = None
+            go_on()
+        if held is not None:
+            yield Shown(serial, held.first, held.time, held.poses, True)
+
+    def _told(
+        self, order: Order, plan: Plan, twin: Twin, way: Way, digest: str, go_on: Callable[[], None]
+    ) -> talk.Foreseen:
+        targets, serial = order.request.targets, order.request.serial
+        thing = order.world.thing(targets.thing) if targets.thing else None
+        if thing is not None and thing.support != "held":
+            found = self.foresight.grasp(plan, targets, thing, order.world, None, serial, go_on)
+        else:
+            tried = foresee(twin, way, self.known.doubts, None, self.previewing.futures, serial, go_on)
+            found = Foreseen(tried, 0.0)
+        return told(digest, found)
+
+
+def told(digest: str, found: Foreseen) -> talk.Foreseen:
+    """As clients hear it: times from the plan's beginning on."""
+    preview: Preview = found.preview
+    every = max(round(EVERY / FRAME), 1)
+    times, low_high = found.begins + preview.motion.time[::every], preview.interval or (None, None)
+    tips = tuple((float(x), float(y), float(z)) for x, y, z in preview.median[::every])
+    return talk.Foreseen(
+        digest, preview.probability, *low_high, tuple(map(float, times)), tips,
+        tuple(map(float, preview.spread[::every])), WITHIN, len(preview.draws), found.offer,
+    )  # fmt: skip
+
+
+def _beside(order: Order) -> Thing | None:
+    """What the twin may touch: one thing, the one that is meant, else any; none that the arm holds."""
+    things = [thing for thing in order.world.things if thing.support != "held"]
+    meant = [thing for thing in things if thing.name == order.request.targets.thing]
+    return (meant or things or [None])[0]
+
+
+def _still(plan: Plan) -> Way:
+    return Way(plan.step, plan.joints, plan.commands)
+
+
+class ForeseerProcess:
+    """The process, seen from the server. `heard` is called by a thread of its own with every answer, and with None if
+    the process has ended."""
+
+    def __init__(self, run: Callable, setup: tuple, heard: Callable[[Answer | None], None]) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._answers, theirs = context.Pipe(duplex=False)
+        self._orders, self._newest = context.Queue(), context.RawValue("Q", 0)
+        self._process = context.Process(
+            target=run, args=(theirs, self._orders, self._newest, *setup), daemon=True, name="foreseer"
+        )
+        self._process.start()
+        theirs.close()
+        threading.Thread(target=self._listen, args=(heard,), daemon=True).start()
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid
+
+    def order(self, order: Order) -> None:
+        """It does not wait; the order before is left."""
+        self._newest.value += 1
+        self._orders.put((self._newest.value, order))
+
+    def leave(self) -> None:
+        """What was ordered is not wanted any more."""
+        self._newest.value += 1
+
+    def close(self) -> None:
+        self._orders.cancel_join_thread()
+        self._process.terminate()
+        self._process.join(5.0)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+    def _listen(self, heard: Callable[[Answer | None], None]) -> None:
+        while True:
+            try:
+                heard(self._answers.recv())
+            except (EOFError, OSError):
+                heard(None)
+                return
+
+
+def run(answers, orders, newest, path: Path, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> None:
+    """The process: until its parent is gone."""
+    os.environ["TRUNKLINE_THREADS"] = str(max(thread_count() - 1, 1))  # the rest is the server's and the robot's
+    with suppress(OSError):
+        os.nice(NICE)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    serve(answers, orders, newest, Foreseer.of(read_package(path), config, previewing, bodies))
+
+
+def serve(answers, orders, newest, foreseer: Foreseer) -> None:
+    """Orders in, answers out."""
+    for number, order in (orders.get() for _ in itertools.count()):
+
+        def go_on(number: int = number) -> None:
+            if newest.value != number:
+                raise Overtaken
+
+        with suppress(Overtaken):
+            go_on()
+            try:
+                for answer in foreseer.answers(order, go_on):
+                    answers.send(answer)
+            except (InputError, ArithmeticError, ValueError) as error:  # a plan without a preview is never confirmed
+                refused = f"preview: {type(error).__name__}: {error}".splitlines()[0]
+                answers.send(Planned(PlanReport(order.request.serial, refused=refused)))
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)

@@ -1,0 +1,82 @@
+"""A session made of a package: core, processes, scene. Everything comes out of the package's file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from trunkline.foresight.package import Package, read_package
+from trunkline.foresight.twin import believed, compose_twin
+from trunkline.live import foreseer, simulated
+from trunkline.live.believing import make_world
+from trunkline.live.bodies import drawn
+from trunkline.live.desk import Desk
+from trunkline.live.foreseer import ForeseerProcess
+from trunkline.live.robot import RobotProcess
+from trunkline.live.scene import Shells, scene
+from trunkline.live.settings import Config
+from trunkline.live.simulated import Simulation
+from trunkline.teleop.config import Config as Teleop
+from trunkline.teleop.core import Teleoperation
+from trunkline.teleop.messages import Box
+from trunkline.teleop.rigid_ik import RigidIK
+from trunkline.teleop.trajectory import limits_of
+from trunkline.teleop.vectors import DOWN
+from trunkline.unity import unpacked
+
+SEARCH = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])  # rad, where the search for the ready pose begins
+BELOW, AROUND = 1.0, 3.0  # m, of the floor as a solid
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a server serves, and the processes behind it."""
+
+    desk: Desk
+    package: str
+    scene: dict
+    shells: Shells | None
+    robot: RobotProcess
+    planning: ForeseerProcess
+
+    def close(self) -> None:
+        self.planning.close()
+        self.robot.close()
+
+
+def make(path: Path, teleop: Teleop, config: Config, heard: Callable[[foreseer.Answer | None], None]) -> Made:
+    """Of the package at `path`, the robot simulated.
+
+    Args:
+        heard: called with every answer of the process that plans, by a thread of its own.
+
+    Raises:
+        InputError: there is no package, or it cannot be previewed with.
+    """
+    package = read_package(path)
+    joints = RigidIK(teleop.mount_offset).solve(SEARCH, config.ready, DOWN, 0.0)
+    simulation, maps = simulation_of(package, teleop, config, joints), unpacked.maps_of(package.files)
+    drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
+    world = make_world((_floor(config.floor),), () if config.thing is None else (config.thing,))
+    robot = RobotProcess(
+        simulated.run, (simulation,), len(package.straight), len(simulation.bodies), simulation.limits, package.digest
+    )
+    setup = path.resolve(), teleop, config.preview, simulation.bodies
+    planning = ForeseerProcess(foreseer.run, setup, heard)
+    core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
+    desk = Desk(core, robot, planning, world, teleop.handling.lift)
+    return Made(desk, package.digest, drawing, Shells.of(maps), robot, planning)
+
+
+def simulation_of(package: Package, teleop: Teleop, config: Config, joints: np.ndarray) -> Simulation:
+    """The simulated robot, at rest at `joints` (7,), rad, with its arm straight."""
+    known = believed(config.preview, package.files)
+    world = make_world((_floor(config.floor),))
+    twin = compose_twin(known, world, config.thing, joints, package.straight, config.preview)
+    limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
+    return Simulation(twin, joints, package.straight, drawn(twin.model), limits, package.digest)
+
+
+def _floor(height: float) -> Box:
+    return Box("the floor", (-AROUND, -AROUND, height - BELOW), (AROUND, AROUND, height))

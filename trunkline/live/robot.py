@@ -1,0 +1,153 @@
+"""A robot in a process of its own, seen from the server: the four calls of an `Executor`, none of which waits.
+
+What the robot does is read from shared memory, newest wins. It moves only while it is permitted to, which has to be
+said anew all the time: where the server is silent for DEAD_MAN s, or gone, the robot brakes by itself, and goes on by
+no permit, only by another start.
+"""
+
+import ctypes
+import multiprocessing
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.context import SpawnContext
+
+import numpy as np
+
+from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.messages import ExecutorReport
+from trunkline.teleop.plan import Plan
+from trunkline.teleop.trajectory import JOINTS, Limits
+
+DEAD_MAN = 0.08  # s without a permit
+STALE = 0.15  # s without a sign of the robot's process
+TEXT = 240  # bytes of a fault
+MODES = ("idle", "running", "done", "fault")
+TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before joints, commands, thing and bodies
+PERMIT, PERMITTED, STOPS, STOPPED = range(4)  # of what it is told
+POSE = 7
+
+
+class Channel:
+    """What both processes share. One writes `told` whole, with a number that is odd meanwhile; the other, `asked`."""
+
+    def __init__(self, context: SpawnContext, tendons: int, bodies: int) -> None:
+        self.tendons, self.bodies = tendons, bodies
+        self.size = 5 + JOINTS + tendons + POSE * (1 + bodies)
+        self._told, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
+        self._asked, self._fault = context.RawArray(ctypes.c_double, 4), context.RawArray(ctypes.c_char, TEXT)
+        self.plans, self.wake = context.Queue(), context.Semaphore(0)
+
+    @property
+    def asked(self) -> np.ndarray:
+        return np.frombuffer(self._asked)
+
+    def tell(self, numbers: np.ndarray, fault: str) -> None:
+        """Of the robot's process."""
+        self._number.value += 1
+        np.frombuffer(self._told)[:] = numbers
+        self._fault.value = fault.encode(errors="replace")[: TEXT - 1]
+        self._number.value += 1
+
+    def hear(self) -> tuple[np.ndarray, str]:
+        """The newest that was told whole."""
+        for _ in range(1000):
+            before = self._number.value
+            numbers, fault = np.frombuffer(self._told).copy(), self._fault.value
+            if before % 2 == 0 and self._number.value == before:
+                return numbers, fault.decode(errors="replace")
+        return numbers, fault.decode(errors="replace")  # its writer was killed within: the time in it is old
+
+
+@dataclass(frozen=True)
+class Standing:
+    """What the robot does at `time`, s.
+
+    `joints` (7,), rad, `commands` (K,), m, and poses of the `thing` (7,), NaN where there is none, and of the `bodies`
+    (N, 7). held: s at which it was last commanded to hold.
+    """
+
+    time: float
+    held: float
+    joints: np.ndarray
+    commands: np.ndarray
+    thing: np.ndarray
+    bodies: np.ndarray
+
+
+class RobotProcess:
+    """An `Executor` whose robot is another process, `run(channel, *setup)`."""
+
+    def __init__(self, run: Callable, setup: tuple, tendons: int, bodies: int, limits: Limits, package: str) -> None:
+        context = multiprocessing.get_context("spawn")
+        self.channel = Channel(context, tendons, bodies)
+        self._limits, self._package, self._serial, self._digest, self._begun = limits, package, 0, "", 0.0
+        self._process = context.Process(target=run, args=(self.channel, *setup), daemon=True, name="robot")
+        self._process.start()
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid
+
+    @property
+    def ready(self) -> bool:
+        """Whether it has told anything yet."""
+        return self.channel.hear()[0][READY] > 0
+
+    def standing(self) -> Standing:
+        """The newest."""
+        numbers, k, n = self.channel.hear()[0], self.channel.tendons, self.channel.bodies
+        joints, commands, thing, bodies = np.split(numbers[5:], np.cumsum([JOINTS, k, POSE]))
+        return Standing(numbers[TIME], numbers[HELD], joints, commands, thing, bodies.reshape(n, POSE))
+
+    def check(self, plan: Plan) -> str:
+        now = self.standing()
+        return SimulatedRobot(now.joints, now.commands, self._limits, self._package).check(plan)
+
+    def start(self, plan: Plan, digest: str) -> str:
+        """As `Executor.start`; what the robot's process finds besides is in its state."""
+        if self.state().mode == "running":
+            return "busy: another plan runs"
+        if plan.digest() != digest:
+            return f"digest: found {plan.digest()[:12]}, expected {digest[:12]}"
+        if reason := self.check(plan):
+            return reason
+        self._serial, self._digest, self._begun = self._serial + 1, digest, time.monotonic()
+        self.permit()
+        self.channel.plans.put((self._serial, digest, plan, self.channel.asked[STOPS]))
+        self.channel.wake.release()
+        return ""
+
+    def permit(self) -> None:
+        """The robot may go on with what was started last, for another DEAD_MAN s."""
+        asked = self.channel.asked
+        asked[PERMIT], asked[PERMITTED] = time.monotonic(), self._serial
+
+    def stop(self) -> None:
+        asked = self.channel.asked
+        asked[PERMITTED] = 0
+        asked[STOPPED] = time.monotonic()
+        asked[STOPS] += 1
+        self.channel.wake.release()
+
+    def state(self) -> ExecutorReport:
+        numbers, fault = self.channel.hear()
+        silent = time.monotonic() - numbers[TIME]
+        if not self._process.is_alive():
+            return ExecutorReport("fault", self._digest, "its process has ended")
+        if numbers[READY] > 0 and silent > STALE:
+            return ExecutorReport("fault", self._digest, f"its process is silent for {silent:.2f} s")
+        if numbers[SERIAL] < self._serial:  # the start is on its way
+            return ExecutorReport("idle", "")
+        mode = MODES[int(numbers[MODE])]
+        return ExecutorReport(mode, self._digest, fault if mode == "fault" else "")  # type: ignore[arg-type]
+
+    def close(self) -> None:
+        """End its process."""
+        self.stop()
+        self.channel.plans.cancel_join_thread()
+        self._process.terminate()
+        self._process.join(5.0)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()

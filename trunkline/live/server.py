@@ -1,0 +1,470 @@
+"""Routes, connections and the clockwork of a live session: one port, one origin, one event loop.
+
+Nothing here takes longer than a frame: plans, previews and the robot are processes of their own. The stop is heard
+before anything else of a message is looked at.
+"""
+
+import asyncio
+import json
+import secrets
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from aiohttp import WSCloseCode, WSMsgType, web
+
+from trunkline.errors import InputError
+from trunkline.live import controllers, foreseer, talk, wire
+from trunkline.live.access import HEADERS, Origins, PairingCode, same
+from trunkline.live.clock import EVERY, PINGS, ClientClock
+from trunkline.live.desk import HERE, Desk
+from trunkline.live.lease import Control
+from trunkline.live.outbox import Outbox
+from trunkline.live.robot import STALE
+from trunkline.live.scene import Shells
+from trunkline.teleop.alignment import base_quaternion
+from trunkline.teleop.messages import Pose
+from trunkline.teleop.vectors import DOWN, conjugate, rotate
+
+HELLO = 3.0  # s for the first message
+LARGEST = 64 * 1024  # bytes of a message
+PER_SECOND, BURST, FLOOD = 400.0, 400.0, 4000.0  # messages of a client; of too many, those that end it
+MOST_CLIENTS = 64
+HEARTBEAT = 20.0  # s
+STATES = 0.1  # s between states that tell no new mode
+PING_GAP = 0.03  # s
+TURNED = np.cos(np.radians(1.0))  # of gravity in the soft base, from which on there is a new shell
+TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
+ABSENT = b"<!doctype html><title>Trunkline</title><p>error: the page is not built: `client/` makes it</p>\n"
+
+
+@dataclass
+class Client:
+    """Who is connected."""
+
+    id: str
+    name: str
+    space: str
+    socket: web.WebSocketResponse
+    alignment: Pose | None
+    outbox: Outbox = field(default_factory=Outbox)
+    clock: ClientClock = field(default_factory=ClientClock)
+    left: float = BURST
+    counted: float = 0.0
+    refused: dict[str, float] = field(default_factory=dict)
+    stopping: bool = False
+
+    def count(self, now: float) -> None:
+        """One more message: `left` of its rate, below 0 beyond it."""
+        self.left = min(self.left + PER_SECOND * (now - self.counted), BURST) - 1
+        self.counted = now
+
+
+@dataclass(frozen=True)
+class House:
+    """What a server is made of. scene: as `scene.scene` has it. bodies: how many the robot tells of."""
+
+    desk: Desk
+    token: str
+    origins: Origins
+    package: str
+    scene: dict
+    shells: Shells | None
+    rate: float
+    page: Path
+    log: Callable[[str], None] = print
+
+
+class Server:
+    """The session's edge. `now` is its clock, s."""
+
+    def __init__(self, house: House, now: Callable[[], float] = time.monotonic) -> None:
+        self.house, self.desk, self.now = house, house.desk, now
+        self.control, self.code = Control(), PairingCode()
+        self.clients: dict[str, Client] = {}
+        self.frames = 0
+        self._scene = json.dumps(house.scene, separators=(",", ":")).encode()
+        self._page = read_page(house.page)
+        self._said: tuple[float, talk.State | None] = (0.0, None)
+        self._world, self._down, self._shell, self._ticking = None, None, b"", None
+        self._shelled = 0
+
+    # --- routes
+
+    def app(self) -> web.Application:
+        app = web.Application(middlewares=[self._guarded], client_max_size=LARGEST)
+        app.router.add_get("/ws", self._socket)
+        app.router.add_get("/scene.json", self._get_scene)
+        app.router.add_get("/{name:.*}", self._get_page)
+        app.cleanup_ctx.append(self._clockwork)
+        return app
+
+    @web.middleware
+    async def _guarded(self, request: web.Request, handler) -> web.StreamResponse:
+        reason = self.house.origins.fault(request.headers.get("Host"), request.headers.get("Origin"), False)
+        if reason:
+            self.house.log(f"refused {request.remote}: {reason}")
+            return web.Response(status=403, text=f"error: {reason}\n", headers=HEADERS)
+        try:
+            response = await handler(request)
+        except web.HTTPException as error:
+            return web.Response(status=error.status, text=f"error: {error.reason}\n", headers=HEADERS)
+        if not response.prepared:
+            response.headers.update(HEADERS)
+        return response
+
+    async def _get_page(self, request: web.Request) -> web.Response:
+        name = request.match_info["name"] or "index.html"
+        if not self._page:
+            return web.Response(status=503, body=ABSENT, content_type="text/html")
+        if name not in self._page:
+            raise web.HTTPNotFound
+        return web.Response(body=self._page[name], content_type=TYPES[Path(name).suffix], charset="utf-8")
+
+    async def _get_scene(self, request: web.Request) -> web.Response:
+        scheme, _, token = request.headers.get("Authorization", "").partition(" ")
+        if scheme != "Bearer" or not same(token, self.house.token):
+            raise web.HTTPUnauthorized
+        response = web.Response(body=self._scene, content_type="application/json")
+        response.enable_compression()
+        return response
+
+    async def _socket(self, request: web.Request) -> web.StreamResponse:
+        reason = self.house.origins.fault(request.headers.get("Host"), request.headers.get("Origin"), True)
+        if reason or len(self.clients) >= MOST_CLIENTS:
+            reason = reason or "server: too many clients"
+            self.house.log(f"refused {request.remote}: {reason}")
+            return web.Response(status=403, text=f"error: {reason}\n")
+        socket = web.WebSocketResponse(max_msg_size=LARGEST, compress=False, heartbeat=HEARTBEAT)
+        socket.headers.update(HEADERS)
+        await socket.prepare(request)
+        try:
+            client = await self._welcome(socket)
+        except InputError as error:
+            self.house.log(f"refused {request.remote}: {error}")
+            await _end(socket, str(error))
+            return socket
+        tasks = [asyncio.create_task(work) for work in (self._send(client), self._ping(client))]
+        try:
+            await self._hear(client)
+        except InputError as error:
+            self.house.log(f"refused {client.id}: {error}")
+            await _end(socket, str(error))
+        finally:
+            for task in tasks:
+                task.cancel()
+            self._leave(client)
+        return socket
+
+    # --- a connection
+
+    async def _welcome(self, socket: web.WebSocketResponse) -> Client:
+        """
+        Raises:
+            InputError: the first message is no hello that may come in.
+        """
+        try:
+            message = await socket.receive(timeout=HELLO)
+        except TimeoutError:
+            raise InputError(f"hello: found none within {HELLO:g} s") from None
+        if message.type is not WSMsgType.TEXT:
+            raise InputError("hello: found none")
+        hello = talk.hear(message.data)
+        if not isinstance(hello, talk.Hello):
+            raise InputError(f"hello: found {hello.type}")
+        if hello.token or not hello.code:
+            if not same(hello.token, self.house.token):
+                raise InputError("token: wrong")
+        elif reason := self.code.fault(hello.code, self.now()):
+            raise InputError(reason)
+        if hello.version != wire.VERSION:
+            raise InputError(f"version: found {hello.version}, expected {wire.VERSION}; load the page anew")
+        older = self.clients.get(hello.id)
+        if older is not None:
+            self._leave(older)
+            asyncio.create_task(_end(older.socket, "connection: the same client came again"))
+        id = hello.id if older is not None else secrets.token_hex(4)
+        client = Client(id, hello.name, hello.space, socket, HERE if hello.space == "base" else None)
+        client.counted = self.now()
+        self.clients[id] = client
+        self.house.log(f"{id} {hello.name!r} came, {len(self.clients)} here")
+        self._greet(client)
+        return client
+
+    def _greet(self, client: Client) -> None:
+        desk, say = self.desk, client.outbox.say
+        say(talk.tell(talk.Welcome(client.id, self.house.token, self.house.package, self.house.rate)))
+        say(talk.tell(talk.Around(desk.world)))
+        if desk.intent is not None:
+            say(talk.tell(desk.told(self.control.holder)))
+        if desk.preview is not None:
+            say(talk.tell(desk.preview))
+            for piece in desk.pieces:
+                client.outbox.piece(_piece(piece))
+        if desk.foreseen is not None:
+            say(talk.tell(desk.foreseen))
+        if self._shell:
+            client.outbox.show("shell", self._shell)
+        self._tell_lease()
+
+    async def _hear(self, client: Client) -> None:
+        """Until it leaves.
+
+        Raises:
+            InputError: it has said what ends a connection.
+        """
+        async for message in client.socket:
+            if message.type not in (WSMsgType.BINARY, WSMsgType.TEXT):
+                self.house.log(f"refused {client.id}: {message.data or 'the connection broke'}")
+                break
+            now = self.now()
+            client.count(now)
+            if message.type is WSMsgType.BINARY:
+                received = wire.read(message.data)
+                self._heed(client, received)
+                client.outbox.acknowledge(received.received)
+                if received.kind == "input" and client.left >= 0:
+                    self._input(client, received, now)
+            elif client.left >= 0:
+                self._said_by(client, talk.hear(message.data), now)
+            if client.left < 0:
+                self._refuse(client, f"rate: more than {PER_SECOND:g} messages a second; they are left out")
+            if client.left < -FLOOD:
+                raise InputError(f"rate: {FLOOD:g} messages too many")
+
+    def _heed(self, client: Client, received: wire.Received) -> None:
+        """The stop, of everybody and always: a message of its own, or a secondary button."""
+        stops = received.kind == "stop" or controllers.stops(received)
+        if stops:
+            self.desk.stop()
+            if received.kind == "stop" or not client.stopping:
+                self.house.log(f"{client.id} stopped the robot")
+        client.stopping = stops and received.kind == "input"
+
+    def _input(self, client: Client, received: wire.Received, now: float) -> None:
+        if client.id != self.control.holder:
+            self._refuse(client, "input: you do not control; ask for it")
+            return
+        reason = client.clock.fault(received.stamp, now) or self.desk.hear(received)
+        if reason:
+            self._refuse(client, reason)
+        else:
+            self.control.hear(client.id, now)
+
+    def _said_by(self, client: Client, said: talk.Said, now: float) -> None:
+        if isinstance(said, talk.Pong):
+            if client.clock.pong(said.number, said.stamp, now):
+                assert client.clock.offset is not None
+                client.outbox.say(talk.tell(talk.Clock(client.clock.offset, client.clock.round_trip)))
+        elif isinstance(said, talk.LeaseWish):
+            self._lease(client, said, now)
+        elif isinstance(said, talk.Alignment):
+            self._align(client, said)
+        elif isinstance(said, talk.Shown):
+            reason = "shown: you do not control" if client.id != self.control.holder else ""
+            if reason := reason or self.desk.shown(said.digest, now):
+                self._refuse(client, reason)
+        else:
+            self._refuse(client, "hello: was said before")
+
+    def _align(self, client: Client, said: talk.Alignment) -> None:
+        if client.space != "room":
+            self._refuse(client, "alignment: your poses are in the base frame")
+            return
+        client.alignment = said.pose
+        if client.id == self.control.holder:
+            self.desk.alignment = said.pose
+
+    def _lease(self, client: Client, wish: talk.LeaseWish, now: float) -> None:
+        before = self.control.holder
+        if wish.action == "ask":
+            self.control.ask(client.id, now)
+        elif wish.action == "release":
+            self.control.release(client.id, now)
+        elif wish.to not in self.clients:
+            self._refuse(client, f"lease: found no client {wish.to!r}")
+        elif not self.control.give(client.id, wish.to, now):
+            self._refuse(client, "lease: you do not control")
+        self._passed(before)
+        self._tell_lease()
+
+    def _leave(self, client: Client) -> None:
+        if self.clients.get(client.id) is not client:
+            return
+        del self.clients[client.id]
+        before = self.control.holder
+        self.control.release(client.id, self.now())
+        self._passed(before)
+        self.house.log(f"{client.id} left, {len(self.clients)} here")
+        self._tell_lease()
+
+    def _passed(self, before: str) -> None:
+        """The robot holds whenever somebody else controls."""
+        holder = self.control.holder
+        if holder == before:
+            return
+        self.house.log(f"{holder or 'nobody'} controls")
+        self.desk.control(self.clients[holder].alignment if holder in self.clients else None)
+
+    def _refuse(self, client: Client, reason: str) -> None:
+        """One line to whom it concerns, the same no oftener than once a second."""
+        now, kind = self.now(), reason.partition(":")[0]
+        if now - client.refused.get(kind, -np.inf) >= 1.0:
+            client.refused[kind] = now
+            client.outbox.say(talk.tell(talk.Refusal(reason)))
+            self.house.log(f"refused {client.id}: {reason}")
+
+    async def _send(self, client: Client) -> None:
+        socket, outbox = client.socket, client.outbox
+        while not socket.closed:
+            item = outbox.take()
+            if item is None:
+                await outbox.ready.wait()
+            elif isinstance(item, str):
+                await socket.send_str(item)
+            else:
+                await socket.send_bytes(item)
+
+    async def _ping(self, client: Client) -> None:
+        while not client.socket.closed:
+            for _ in range(PINGS):
+                client.outbox.say(talk.tell(talk.Ping(client.clock.ping(self.now()))))
+                await asyncio.sleep(PING_GAP)
+            await asyncio.sleep(EVERY)
+
+    # --- the clockwork
+
+    async def _clockwork(self, app: web.Application):
+        task = asyncio.create_task(self._run())
+        yield
+        task.cancel()
+        for client in list(self.clients.values()):
+            await client.socket.close(code=WSCloseCode.GOING_AWAY)
+
+    async def _run(self) -> None:
+        """Ticks at the house's rate; one that is late is not made up for."""
+        period, last = 1 / self.house.rate, self.now()
+        due = last + period
+        while True:
+            await asyncio.sleep(max(due - self.now(), 0.0))
+            now = self.now()
+            try:
+                self.tick(now, now - last)
+            except Exception as error:  # a session that goes on blindly could move the robot
+                self.desk.stop()
+                self.house.log(f"error: {type(error).__name__}: {error}; the robot holds")
+            last, due = now, max(due + period, now)
+
+    def tick(self, now: float, dt: float) -> None:
+        """A step of the core, and what all see of it."""
+        before = self.control.holder
+        if self.control.silent(now):
+            self.house.log(f"{before} was silent")
+            self._passed(before)
+            self._tell_lease()
+        self.desk.tick(dt)
+        self._show_robot(now)
+        self._tell_state(now)
+        if self.desk.world is not self._world:
+            self._world = self.desk.world
+            self._tell(talk.Around(self.desk.world))
+
+    def foreseen(self, answer: foreseer.Answer | None) -> None:
+        """An answer of the process that plans; called in the event loop."""
+        if not self.desk.answered(answer, self.now()):
+            return
+        if isinstance(answer, foreseer.Begun):
+            for client in self.clients.values():
+                client.outbox.forget_pieces()
+            self._tell(answer.preview)
+        elif isinstance(answer, foreseer.Shown):
+            message = _piece(answer)
+            for client in self.clients.values():
+                client.outbox.piece(message)
+        elif isinstance(answer, foreseer.Told):
+            self._tell(answer.foreseen)
+
+    def _show_robot(self, now: float) -> None:
+        desk, standing = self.desk, self.desk.robot.standing()
+        assert desk.intent is not None
+        self.frames += 1
+        rows = np.concatenate([standing.bodies, desk.markers()])
+        flags = {
+            name
+            for name, is_set in (
+                ("moving", desk.robot.state().mode == "running"),
+                ("stopped", desk.intent.mode == "stopped"),
+                ("stale", now - standing.time > STALE),
+            )
+            if is_set
+        }
+        frame = wire.frame("robot", flags, len(rows), self.frames & 0xFFFFFFFF, standing.time, rows)
+        shell = self._new_shell(now)
+        for client in self.clients.values():
+            client.outbox.show("robot", frame)
+            if shell:
+                client.outbox.show("shell", shell)
+
+    def _new_shell(self, now: float) -> bytes:
+        """Of the tip's reach, where gravity has turned; else nothing."""
+        intent, shells = self.desk.intent, self.house.shells
+        if shells is None or intent is None:
+            return b""
+        down = np.array(DOWN)
+        if intent.targets is not None:
+            turn = base_quaternion(intent.targets.pointing, intent.targets.heading)
+            down = np.array(rotate(conjugate(turn), DOWN))
+        if self._down is not None and down @ self._down > TURNED:
+            return b""
+        self._down, points = down, shells.at(down)
+        self._shelled += 1
+        self._shell = wire.frame("shell", set(), len(points), self._shelled, now, points)
+        return self._shell
+
+    def _tell_state(self, now: float) -> None:
+        state, (since, before) = self.desk.told(self.control.holder), self._said
+        if state == before:
+            return
+        urgent = before is None or (state.mode, state.robot, state.notice) != (before.mode, before.robot, before.notice)
+        if not urgent and now - since < STATES:
+            return
+        self._said = now, state
+        text = talk.tell(state)
+        for client in self.clients.values():
+            client.outbox.state("state", text)
+
+    def _tell_lease(self) -> None:
+        people = tuple(talk.Person(client.id, client.name) for client in self.clients.values())
+        self._tell(talk.Lease(self.control.holder, tuple(self.control.asking), people))
+
+    def _tell(self, answer: talk.Answer) -> None:
+        text = talk.tell(answer)
+        for client in list(self.clients.values()):
+            if not client.outbox.say(text):
+                self.house.log(f"refused {client.id}: it does not read")
+                self._leave(client)
+                asyncio.create_task(client.socket.close())
+
+
+def read_page(folder: Path) -> dict[str, bytes]:
+    """Contents by name of the files that a page may have; none where there is no index.html."""
+    files = [file for file in folder.glob("*") if file.suffix in TYPES and file.is_file() and not file.is_symlink()]
+    found = {file.name: file.read_bytes() for file in files}
+    return found if "index.html" in found else {}
+
+
+def _piece(piece: foreseer.Shown) -> bytes:
+    flags = {"last"} if piece.last else set()
+    return wire.frame("preview", flags, piece.poses.shape[1], piece.first, piece.time, piece.poses)
+
+
+async def _end(socket: web.WebSocketResponse, reason: str) -> None:
+    """Say why, and close."""
+    if not socket.closed:
+        try:
+            await socket.send_str(talk.tell(talk.Refusal(reason, closing=True)))
+        except ConnectionError:
+            return
+        await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=reason.encode()[:120])

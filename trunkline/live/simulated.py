@@ -1,0 +1,186 @@
+"""The simulated robot's process: the twin on the Panda, moved in real time by what the axes are sent.
+
+It steps as a preview does (`trunkline/hybrid/futures.py`): the same model, winches, friction of the cables and servos
+that bear the arm. So what was previewed is what happens.
+"""
+
+import copy
+import os
+import time
+from contextlib import suppress
+from dataclasses import dataclass
+from queue import Empty
+
+import mujoco
+import numpy as np
+
+from trunkline.elements import actuators
+from trunkline.hybrid.compose import panda_joints
+from trunkline.hybrid.futures import Twin
+from trunkline.hybrid.torques import servo_commands
+from trunkline.live.bodies import Poses
+from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, Channel
+from trunkline.panda.shipped import JOINTS
+from trunkline.simulation.motion import batch_of, hold
+from trunkline.simulation.rubbing import REFRESH, rubbing
+from trunkline.simulation.winch import Winches
+from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.plan import Plan
+from trunkline.teleop.trajectory import Limits
+
+BEHIND = 0.25  # s that real time may run ahead of the simulation before it is let go
+NICE = -5  # asked for; without the right to it, none
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """`twin`: at rest where all begins, its motors at `commands` (K,), m, the Panda at `joints` (7,), rad. `bodies`:
+    names of those whose poses are told."""
+
+    twin: Twin
+    joints: np.ndarray
+    commands: np.ndarray
+    bodies: tuple[str, ...]
+    limits: Limits
+    package: str
+
+
+class Plant:
+    """The twin moved by axes, a tick at a time."""
+
+    def __init__(self, simulation: Simulation) -> None:
+        model = simulation.twin.model
+        self.model, self.batch, self._own = model, batch_of(model, 1), np.zeros(1, dtype=np.int32)
+        self.steps = max(round(REFRESH / model.opt.timestep), 1)
+        self.tick = self.steps * model.opt.timestep
+        if simulation.twin.start is not None:
+            self.batch.bind("qpos")[:] = simulation.twin.start
+        self._joints, self._motors = panda_joints(model), actuators(model)
+        self._servos = [model.actuator(f"{name}_position").id for name in JOINTS]
+        self._ratio = -model.actuator_biasprm[self._servos, 2] / model.actuator_gainprm[self._servos, 0]
+        off = mujoco.mjtDisableBit
+        self._bare = copy.copy(model)  # the Panda bears the arm alone, as in `hybrid.torques.joint_torques`
+        self._bare.opt.disableflags |= (
+            off.mjDSBL_CONTACT | off.mjDSBL_FRICTIONLOSS | off.mjDSBL_EQUALITY | off.mjDSBL_LIMIT
+        )
+        self._data = mujoco.MjData(self._bare)
+        self._poses, self._thing = Poses(model, simulation.bodies), Poses(model, ("object",))
+        self._last = np.tile(simulation.joints, (2, 1))
+        controls = np.zeros((1, model.nu))
+        controls[:, self._motors] = self._commands = simulation.commands
+        controls[:, self._servos] = self._servo = self._sent(simulation.joints)
+        hold(self.batch, model, controls)
+        self._winches, self._rub = Winches(self.batch, controls[:, self._motors]), rubbing(self.batch)
+        if self._rub is not None:
+            self._rub.begin(np.arange(1))
+
+    def move(self, joints: np.ndarray, commands: np.ndarray) -> None:
+        """One tick with the axes on their way to `joints` (7,), rad, and `commands` (K,), m: each step is sent where
+        they are as it begins."""
+        servo, share = self._sent(joints), (np.arange(self.steps) / self.steps)[:, None]
+        controls = np.zeros((1, self.steps, self.model.nu))
+        controls[0][:, self._servos] = self._servo + share * (servo - self._servo)
+        sent = (self._commands + share * (commands - self._commands))[None]
+        controls[:, :, self._motors] = self._winches.deliver(sent, self._own)
+        self._servo, self._commands = servo, np.array(commands)
+        if self._rub is not None:
+            self._rub.refresh(np.arange(1))
+        self.batch.rollout(self.steps, control=controls)
+
+    @property
+    def sound(self) -> bool:
+        """Whether MuJoCo has not warned."""
+        return not self.batch.warning.any()
+
+    def poses(self) -> np.ndarray:
+        """Of the bodies, (N, 7)."""
+        return self._poses.of(self.batch.bind("qpos")[0])
+
+    def thing(self) -> np.ndarray:
+        """Of what may be grasped, (7,); NaN where there is none."""
+        return self._thing.of(self.batch.bind("qpos")[0])[0]
+
+    def _sent(self, joints: np.ndarray) -> np.ndarray:
+        """What the servos are sent so that they are at `joints`, bearing the arm as it hangs now. Shape (7,)."""
+        before, now = self._last
+        speed, gain = (joints - now) / self.tick, (joints - 2 * now + before) / self.tick**2
+        self._last = np.stack([now, joints])
+        data, dofs = self._data, self.model.jnt_dofadr[self._joints]
+        data.qpos[:] = self.batch.bind("qpos")[0]
+        data.qpos[self.model.jnt_qposadr[self._joints]] = joints
+        data.qvel[:], data.qacc[:] = 0.0, 0.0
+        data.qvel[dofs], data.qacc[dofs] = speed, gain
+        mujoco.mj_inverse(self._bare, data)
+        return servo_commands(self.model, joints, data.qfrc_inverse[dofs]) + self._ratio * speed
+
+
+class Loop:
+    """Plans in, motion out; what the process does at each turn."""
+
+    def __init__(self, channel: Channel, simulation: Simulation, plant: Plant) -> None:
+        self.channel, self.plant = channel, plant
+        self.robot = SimulatedRobot(
+            simulation.joints, simulation.commands, simulation.limits, simulation.package, self._move
+        )
+        self.serial, self.fault, self.held = 0, "", 0.0
+        self._stops = channel.asked[STOPS]
+
+    def turn(self, now: float) -> None:
+        """Obey what was asked since."""
+        asked = self.channel.asked
+        stopped = asked[STOPS] != self._stops
+        permitted = asked[PERMITTED] == self.serial and now - asked[PERMIT] <= DEAD_MAN
+        running = self.robot.state().mode == "running"
+        if stopped or (running and not permitted):
+            self._stops = asked[STOPS]
+            self.robot.stop()
+            self.held = now
+        self._begin()
+
+    def advance(self) -> None:
+        """One tick of the simulation."""
+        self.robot.advance(self.plant.tick)
+        if not self.plant.sound and not self.fault:
+            self.fault = "the simulation is not sound"
+
+    def tell(self, now: float) -> None:
+        """All that the server shall know."""
+        state = self.robot.state()
+        mode = "fault" if self.fault else state.mode
+        head = [now, MODES.index(mode), self.serial, self.held, 1.0]
+        poses = [self.plant.thing(), self.plant.poses().ravel()]
+        self.channel.tell(np.concatenate([head, self.robot.joints, self.robot.commands, *poses]), self.fault)
+
+    def _begin(self) -> None:
+        try:
+            serial, digest, plan, stops = self.channel.plans.get_nowait()
+        except Empty:
+            return
+        assert isinstance(plan, Plan)
+        self.serial = serial
+        overtaken = "a stop came before it began" if stops != self.channel.asked[STOPS] else ""
+        sick = "" if self.plant.sound else "the simulation is not sound"
+        self.fault = overtaken or sick or self.robot.start(plan, digest)
+
+    def _move(self, joints: np.ndarray, commands: np.ndarray, dt: float) -> None:
+        self.plant.move(joints, commands)
+
+
+def run(channel: Channel, simulation: Simulation) -> None:
+    """The process: until its parent is gone."""
+    os.environ["TRUNKLINE_THREADS"] = "1"
+    with suppress(OSError):
+        os.nice(NICE)
+    parent = os.getppid()
+    loop = Loop(channel, simulation, Plant(simulation))
+    due = time.monotonic()
+    while os.getppid() == parent:
+        channel.wake.acquire(timeout=max(due - time.monotonic(), 0.0))
+        now = time.monotonic()
+        loop.turn(now)
+        if now >= due:
+            loop.advance()
+            due += loop.plant.tick
+            if now - due > BEHIND:
+                due = now
+        loop.tell(time.monotonic())
