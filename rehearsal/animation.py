@@ -150,7 +150,7 @@ def _outlines(shot: Shot) -> list[np.ndarray]:
     else:
         rim = radius * np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0), (1, 1, 0)], dtype=float)
     up = np.array([0.0, 0.0, thing.half_height])
-    corners = rim[: -1 : (len(rim) - 1) // 4]
+    corners = rim[:-1:(len(rim) - 1) // 4]
     lines = [rim + up, rim - up, *(np.array([corner + up, corner - up]) for corner in corners)]
     return [turn.apply(line) + shot.thing for line in lines]
 

@@ -14,6 +14,7 @@ from trunkline.foresight.twin import Believed, compose_twin
 from trunkline.hybrid.doubts import Doubts, nominal_draw
 from trunkline.hybrid.futures import Way, futures
 from trunkline.hybrid.preview import joined
+from trunkline.hybrid.robots import PandaRobot
 from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.messages import Box, Thing, World
 
@@ -25,7 +26,9 @@ WORLD = World("w", (Box("floor", (-3, -3, -2), (3, 3, -0.75)), Box("stand", (0.4
 @pytest.fixture(scope="module")
 def known() -> Believed:
     arm = rubbing_arm(spiral_chain(length=0.2, base_width=0.05, tip_width=0.02, units=6), 3)
-    return Believed(arm, Doubts(), hybrid_settings(robot="panda").robot)
+    robot = hybrid_settings(robot="panda").robot
+    assert isinstance(robot, PandaRobot)
+    return Believed(arm, Doubts(), robot)
 
 
 def composed(known: Believed, thing: Thing, lean: Rotation, left=None):
@@ -70,6 +73,7 @@ def test_what_stands_stays_where_it_is_seen(known, high):
 def test_a_hand_over_begins_as_the_grasp_ended(known):
     hanging = replace(BASKET, shape="cylinder", diameter=0.04, support="hanging", position=(0.5, 0.4, 0.3))
     first, straight = composed(known, hanging, Rotation.identity())
+    assert first.start is not None
     pose = first.start + np.linspace(0.0, 0.01, first.model.nq)
     then, _ = composed(known, replace(hanging, support="held"), Rotation.identity(), pose)
     assert then.model.nq < first.model.nq  # there is no string

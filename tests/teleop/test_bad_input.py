@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from tests.support.operator import TABLE, Operator
-from trunkline.teleop.messages import Box, World
+from trunkline.teleop.messages import World
 from trunkline.teleop.recorder import FAULTS
 from trunkline.teleop.transitions import MODES
 
