@@ -206,12 +206,14 @@ class Page {
     }
     this.alignment = null;
     this.drawn.floor.visible = false;
+    document.body.dataset.immersed = "";
     this.wire?.again({ space: "room" });
   }
 
   leftHeadset() {
     this.alignment = null;
     this.drawn.floor.visible = true;
+    delete document.body.dataset.immersed;
     this.board.hide();
     this.stand(DESKTOP);
     this.resize();
@@ -305,6 +307,7 @@ class Page {
     if (!playing) return;
     const shows = this.recording || SHOWN_IN.has(this.state?.mode);
     if (shows && playing.advance(dt) && !this.recording) this.wire.say("shown", { digest: this.digest });
+    if (find("playing").hidden === Boolean(shows)) find("playing").hidden = !shows;
     this.drawn.pretend(playing.frames && shows ? playing.rows : null, playing.index * playing.width);
     const scrub = find("scrub"), at = playing.at.toFixed(2);
     if (scrub.max !== String(playing.duration)) scrub.max = String(playing.duration);
