@@ -82,7 +82,7 @@ test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done"
   await page.keyboard.press("Enter");
   await inMode(page, "execute");
   await picture(page, "3-execute");
-  await passed(page, server, ["plan", "preview", "ready", "delay", "execute", "aim"]);
+  await passed(page, server, ["preview", "ready", "delay", "execute", "aim"]);
   await page.keyboard.up("KeyG");
   assert.deepEqual(wrongs, []);
 });
@@ -119,7 +119,7 @@ test("out of reach is told in words, by a ring and by an offer that R takes", as
   await drag(page, "rigid", 10, 0);
   await drag(page, "tip", 0, 0);
   await page.keyboard.press("Digit1");
-  for (let n = 0; n < 40; n++) await page.keyboard.press("ArrowUp");
+  for (let n = 0; n < 65; n++) await page.keyboard.press("ArrowUp"); // beyond the ball of what the mount can reach
   await until(page, () => globalThis.trunkline.state.targets?.rigid.reach === "outside");
   await page.waitForTimeout(400);
   assert.ok(await page.evaluate(() => globalThis.trunkline.marks.targets.rigid.ring.visible));
