@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import fast_simplification
 import mujoco
 import numpy as np
 
@@ -17,6 +18,7 @@ SHAPES = {
     mujoco.mjtGeom.mjGEOM_CYLINDER: "cylinder", mujoco.mjtGeom.mjGEOM_BOX: "box", mujoco.mjtGeom.mjGEOM_MESH: "mesh",
 }  # fmt: skip
 SHELL_TRIANGLES = 4000
+MESH_TRIANGLES = 3000  # of a body's mesh, at most: the maker's have some 20 000, and a headset draws all of them
 DIGITS = 5  # after the decimal point of what is drawn, m
 
 
@@ -89,6 +91,10 @@ def _mesh(model: mujoco.MjModel, mesh: int) -> dict:
     vertex, face = model.mesh_vertadr[mesh], model.mesh_faceadr[mesh]
     vertices = model.mesh_vert[vertex : vertex + model.mesh_vertnum[mesh]]
     faces = model.mesh_face[face : face + model.mesh_facenum[mesh]]
+    if len(faces) > MESH_TRIANGLES:
+        vertices, faces = fast_simplification.simplify(
+            np.asarray(vertices, np.float32), np.asarray(faces, np.int32), target_count=MESH_TRIANGLES
+        )
     return {"vertices": _rounded(vertices), "faces": [int(value) for value in faces.ravel()]}
 
 
