@@ -60,7 +60,7 @@ async def serve(package: Path, watchers: int, stops: int) -> tuple[int, float, f
 
     teleop, config = load_folder(Teleop, PROJECT / "conf/teleop"), load_folder(Config, PROJECT / "conf/live")
     made = await asyncio.to_thread(make, package, teleop, config, heard)
-    while not made.robot.ready:
+    while not (made.robot.ready and made.planning.ready.is_set()):
         await asyncio.sleep(0.1)
     token = make_token()
     house = House(
