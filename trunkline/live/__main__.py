@@ -91,7 +91,7 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
             made.desk, token, origins, made.package, made.scene, made.shells, config.rate, PAGE, log
         )  # fmt: skip
         while not (made.robot.ready and made.planning.ready.is_set()):
-            if made.robot.state().mode == "fault" or not made.planning.alive:
+            if not (made.robot.alive and made.planning.alive):
                 raise InputError("a process of the session has ended before it began")
             await asyncio.sleep(0.05)
         server = Server(house)
