@@ -20,6 +20,7 @@ const RIGID_HAND = "left"; // the core's own choice is `core.rigid_hand`, of whi
 const INPUT_RATE = 72; // Hz
 const WIDE = 1200; // pixels of a page on which the keys do not cover the robot
 const STILL = 0.3; // s without a grip, after which the core's targets are taken over
+const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no plan is shown; it may come before its mode does
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
 
@@ -125,7 +126,7 @@ class Page {
 
   changed(state) {
     this.state = state;
-    if (!state.preview && !SHOWN_IN.has(state.mode) && state.mode !== "execute") this.show(null);
+    if (OVER.has(state.mode)) this.show(null);
     for (const kind of ["rigid", "tip"]) {
       const reach = state.targets?.[kind]?.reach ?? null;
       const edge = this.reaches[kind] && reach && reach !== this.reaches[kind];
@@ -205,12 +206,14 @@ class Page {
     }
     this.alignment = null;
     this.drawn.floor.visible = false;
+    document.body.dataset.immersed = "";
     this.wire?.again({ space: "room" });
   }
 
   leftHeadset() {
     this.alignment = null;
     this.drawn.floor.visible = true;
+    delete document.body.dataset.immersed;
     this.board.hide();
     this.stand(DESKTOP);
     this.resize();
@@ -302,9 +305,10 @@ class Page {
   play(dt) {
     const { playing } = this;
     if (!playing) return;
-    if (playing.advance(dt) && playing === this.playback) this.wire.say("shown", { digest: this.digest });
-    const executes = this.state?.mode === "execute" && !this.recording;
-    this.drawn.pretend(playing.frames && !executes ? playing.rows : null, playing.index * playing.width);
+    const shows = this.recording || SHOWN_IN.has(this.state?.mode);
+    if (shows && playing.advance(dt) && !this.recording) this.wire.say("shown", { digest: this.digest });
+    if (find("playing").hidden === Boolean(shows)) find("playing").hidden = !shows;
+    this.drawn.pretend(playing.frames && shows ? playing.rows : null, playing.index * playing.width);
     const scrub = find("scrub"), at = playing.at.toFixed(2);
     if (scrub.max !== String(playing.duration)) scrub.max = String(playing.duration);
     if (!playing.held && scrub.value !== at) scrub.value = at;

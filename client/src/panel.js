@@ -77,7 +77,8 @@ function setText(node, text) {
 }
 
 const WIDTH = 1024, HEIGHT = 460; // pixels of the board
-const AWAY = 1.1, ASIDE = 0.5, BELOW = 0.12; // m from the eyes
+const BROAD = 0.7; // m
+const AWAY = 1.1, ASIDE = 0.42, BELOW = 0.05; // m from the eyes
 const LOOSE = 0.3; // m by which it may be elsewhere before it comes along
 const EASE = 4; // per s
 
@@ -90,7 +91,7 @@ export class RoomPanel {
     this.texture.colorSpace = SRGBColorSpace;
     this.texture.minFilter = LinearFilter;
     const material = new MeshBasicMaterial({ map: this.texture, transparent: true });
-    this.board = new Mesh(new PlaneGeometry(0.62, (0.62 * HEIGHT) / WIDTH), material);
+    this.board = new Mesh(new PlaneGeometry(BROAD, (BROAD * HEIGHT) / WIDTH), material);
     this.board.renderOrder = 9;
     this.board.visible = false;
     this.drawn = "";
@@ -147,7 +148,7 @@ export class RoomPanel {
 
 /** Writes lines one below the other, broken at words, at most `most` of each text. */
 function wrapped(pen, x, width) {
-  let y = 24;
+  let y = 44;
   return (text, font, colour, height, most) => {
     if (!text) return;
     pen.font = font;

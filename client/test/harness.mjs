@@ -114,6 +114,17 @@ export async function until(page, test, given, what = test.toString()) {
 
 export const inMode = (page, mode) => until(page, (wanted) => globalThis.trunkline.state?.mode === wanted, mode, `mode ${mode}`);
 
+/** Until these were the newest modes of the server; a page that draws slowly may miss one. */
+export async function passed(page, server, modes) {
+  const end = Date.now() + LONGEST;
+  for (;;) {
+    const found = (await server.tell()).filter((line) => line.startsWith("mode ")).map((line) => line.slice(5)).slice(-modes.length);
+    if (found.join() === modes.join()) return;
+    if (Date.now() > end) assert.deepEqual(found, modes);
+    await page.waitForTimeout(100);
+  }
+}
+
 /** A picture for whoever looks, where TRUNKLINE_PICTURES names a folder. */
 export async function picture(page, name) {
   if (!PICTURES) return;

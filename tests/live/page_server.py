@@ -22,7 +22,7 @@ from trimesh.creation import icosphere
 
 from tests.hybrid.conftest import SIZE, rubbing_arm
 from tests.support.operator import PACKAGE, READY_JOINTS, config
-from tests.teleop.test_plan import LIMITS, NETWORK, OFFSET, RADIUS, STRAIGHT
+from tests.teleop.test_plan import LIMITS, NETWORK, OFFSET, RADIUS, STRAIGHT, arc
 from trunkline.arm.spiral import spiral_chain
 from trunkline.errors import InputError
 from trunkline.hybrid.compose import compose, panda_joints
@@ -36,13 +36,14 @@ from trunkline.live.desk import Desk
 from trunkline.live.robot import Standing
 from trunkline.live.server import House, Server
 from trunkline.pipeline.config import PROJECT
+from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.messages import Box, ExecutorReport, PlanReport, Thing
+from trunkline.teleop.messages import Box, ExecutorReport, PlanReport, Targets, Thing
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.reading import Reading
 from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.vectors import add, distance, scale, subtract
+from trunkline.teleop.vectors import add, conjugate, distance, rotate, scale, subtract
 
 RATE, LENGTH, UNITS = 72.0, 0.5, 24  # Hz, m
 PATIENCE = 5.0  # s for which a client may be silent
@@ -59,7 +60,7 @@ class Balls:
         return _in_ball(mount, CENTRE, REACH)
 
     def soft(self, tip, gravity) -> Reading:
-        return _in_ball(tip, (0.0, 0.0, 0.0), LENGTH)
+        return _in_ball(tip, (0.0, 0.0, 0.0), 1.1 * LENGTH)
 
 
 def _in_ball(point, centre, radius) -> Reading:
@@ -126,6 +127,16 @@ class Robot:
         return self.kept
 
 
+def within(targets: Targets) -> Targets:
+    """With the tip where the plain arm can have it: it has one bend, and a test points by pixels."""
+    turn = base_quaternion(targets.pointing, targets.heading)
+    x, _, z = rotate(conjugate(turn), subtract(targets.tip.position, targets.rigid.position))
+    places = arc(np.linspace(-2.5, 2.5, 501))
+    nearest = places[np.argmin(np.hypot(places[:, 0] - x, places[:, 2] - z))]
+    tip = add(targets.rigid.position, rotate(turn, tuple(map(float, nearest))))
+    return replace(targets, tip=replace(targets.tip, position=tip))
+
+
 class Planning:
     """Plans at once; its previews are the plan itself."""
 
@@ -136,7 +147,8 @@ class Planning:
     def order(self, order: foreseer.Order) -> None:
         serial = order.request.serial
         try:
-            plan = self.planner.plan(order.request, order.world, order.joints, order.commands)
+            request = replace(order.request, targets=within(order.request.targets))
+            plan = self.planner.plan(request, order.world, order.joints, order.commands)
         except InputError as error:
             self.heard(foreseer.Planned(PlanReport(serial, refused=str(error))))
             return

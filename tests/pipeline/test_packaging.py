@@ -75,7 +75,7 @@ def test_the_library_needs_its_dependencies_alone():
     [
         ("pipeline,teleop,live", ["trunkline", "stages", "demo", "examples/asl_trunk"]),
         ("teleop", ["rehearsal"]),
-        ("bench", ["benchmarks", "studies"]),
+        ("bench,live", ["benchmarks", "studies"]),
         ("test", ["tests"]),
     ],
 )

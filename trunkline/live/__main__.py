@@ -90,9 +90,9 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
         house = House(
             made.desk, token, origins, made.package, made.scene, made.shells, config.rate, PAGE, log
         )  # fmt: skip
-        while not made.robot.ready:
-            if made.robot.state().mode == "fault":
-                raise InputError("robot: its process has ended")
+        while not (made.robot.ready and made.planning.ready.is_set()):
+            if not (made.robot.alive and made.planning.alive):
+                raise InputError("a process of the session has ended before it began")
             await asyncio.sleep(0.05)
         server = Server(house)
         servers.append(server)

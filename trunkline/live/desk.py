@@ -18,10 +18,23 @@ from trunkline.live.wire import MARKERS, Received
 from trunkline.live.words import next_action
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.core import Teleoperation
-from trunkline.teleop.messages import Controller, ExecutorReport, Input, Intent, Joints, PlanReport, Pose, World
+from trunkline.teleop.messages import (
+    Controller,
+    ExecutorReport,
+    Input,
+    Intent,
+    Joints,
+    PlanReport,
+    Pose,
+    Target,
+    Targets,
+    Vector,
+    World,
+)
 from trunkline.teleop.plan import Plan
 
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the base frame already
+DIGITS = 4  # after the decimal point, of targets that are told
 MOST_INPUTS = 8  # of a tick; older ones than these are left out, presses and all
 
 
@@ -232,5 +245,27 @@ class Desk:
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
         return talk.State(
             intent.mode, intent.motion, intent.notice, words, round(intent.countdown, 2), intent.preview,
-            intent.execute, intent.targets, robot.mode, robot.fault,
+            intent.execute, _rounded(intent.targets), robot.mode, robot.fault,
         )  # fmt: skip
+
+
+def _rounded(targets: Targets | None) -> Targets | None:
+    """To 0.1 mm and 1e-4: what still changes by less is nothing new to tell."""
+    if targets is None:
+        return None
+
+    def vector(found: Vector) -> Vector:
+        x, y, z = (round(value, DIGITS) for value in found)
+        return x, y, z
+
+    def target(found: Target) -> Target:
+        offer, by = found.offer, found.outside_by
+        return replace(
+            found, position=vector(found.position), outside_by=round(by, DIGITS), offer=offer and vector(offer)
+        )
+
+    turned = None if targets.turned is None else round(targets.turned, DIGITS)
+    return replace(
+        targets, rigid=target(targets.rigid), tip=target(targets.tip), pointing=vector(targets.pointing),
+        heading=round(targets.heading, DIGITS), turned=turned,
+    )  # fmt: skip

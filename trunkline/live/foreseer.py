@@ -11,10 +11,11 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from trunkline.errors import InputError
 from trunkline.foresight.foresight import Foreseen, Foresight, foresee
@@ -25,13 +26,16 @@ from trunkline.hybrid.futures import FRAME, Twin, Way
 from trunkline.hybrid.preview import WITHIN, Preview, nominal
 from trunkline.live import talk
 from trunkline.live.bodies import Poses
+from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.config import Config
-from trunkline.teleop.messages import PlanReport, Request, Thing, World
+from trunkline.teleop.messages import PlanReport, Request, Target, Targets, Thing, World
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.planner import Planner
+from trunkline.teleop.vectors import DOWN
 from trunkline.threads import thread_count
 
 NICE = 5
+PULL = 0.03  # m of the first cable, for a plan that is thrown away
 EVERY = 0.1  # s between the times at which a spread is told
 
 
@@ -78,6 +82,11 @@ class Told:
 
     serial: int
     foreseen: talk.Foreseen
+
+
+@dataclass(frozen=True)
+class Ready:
+    """The process has compiled what it needs, and hears orders."""
 
 
 Answer = Planned | Begun | Shown | Told
@@ -199,11 +208,17 @@ class ForeseerProcess:
         )
         self._process.start()
         theirs.close()
+        self.ready = threading.Event()
         threading.Thread(target=self._listen, args=(heard,), daemon=True).start()
 
     @property
     def pid(self) -> int | None:
         return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether its process is there."""
+        return self._process.is_alive()
 
     def order(self, order: Order) -> None:
         """It does not wait; the order before is left."""
@@ -225,7 +240,11 @@ class ForeseerProcess:
     def _listen(self, heard: Callable[[Answer | None], None]) -> None:
         while True:
             try:
-                heard(self._answers.recv())
+                answer = self._answers.recv()
+                if isinstance(answer, Ready):
+                    self.ready.set()
+                else:
+                    heard(answer)
             except (EOFError, OSError):
                 heard(None)
                 return
@@ -236,8 +255,26 @@ def run(answers, orders, newest, path: Path, config: Config, previewing: Preview
     os.environ["TRUNKLINE_THREADS"] = str(max(thread_count() - 1, 1))  # the rest is the server's and the robot's
     with suppress(OSError):
         os.nice(NICE)
+    threadpool_limits(1)  # matrices are small; threads that wait for each other cost more than they bring
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    serve(answers, orders, newest, Foreseer.of(read_package(path), config, previewing, bodies))
+    package = read_package(path)
+    foreseer = Foreseer.of(package, config, previewing, bodies)
+    warm(foreseer, package)
+    answers.send(Ready())
+    serve(answers, orders, newest, foreseer)
+
+
+def warm(foreseer: Foreseer, package: Package) -> None:
+    """Plan and preview once for nothing: what is compiled on its first call would keep the first user waiting."""
+    robot, straight = foreseer.known.robot, package.straight
+    joints = np.array(robot.ready)
+    x, y, z = (float(value) for value in mount_pose(joints[None], robot.mount_offset)[0][0])
+    targets = Targets(Target((x, y, z)), Target((x, y, z)), DOWN, 0.0, 0, 0.0)
+    a, b, c = (float(value) for value in package.tip((x, y, z), targets, straight - PULL * np.eye(len(straight))[0]))
+    request = Request(0, replace(targets, tip=Target((a, b, c))), "", package.digest)
+    for answer in foreseer.answers(Order(request, World(""), joints, straight)):
+        if isinstance(answer, Shown):
+            return
 
 
 def serve(answers, orders, newest, foreseer: Foreseer) -> None:

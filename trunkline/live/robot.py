@@ -90,6 +90,11 @@ class RobotProcess:
         return self._process.pid
 
     @property
+    def alive(self) -> bool:
+        """Whether its process is there."""
+        return self._process.is_alive()
+
+    @property
     def ready(self) -> bool:
         """Whether it has told anything yet."""
         return self.channel.hear()[0][READY] > 0
@@ -133,7 +138,7 @@ class RobotProcess:
     def state(self) -> ExecutorReport:
         numbers, fault = self.channel.hear()
         silent = time.monotonic() - numbers[TIME]
-        if not self._process.is_alive():
+        if not self.alive:
             return ExecutorReport("fault", self._digest, "its process has ended")
         if numbers[READY] > 0 and silent > STALE:
             return ExecutorReport("fault", self._digest, f"its process is silent for {silent:.2f} s")

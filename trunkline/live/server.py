@@ -5,6 +5,7 @@ before anything else of a message is looked at.
 """
 
 import asyncio
+import gzip
 import json
 import secrets
 import time
@@ -86,6 +87,7 @@ class Server:
         self.clients: dict[str, Client] = {}
         self.frames = 0
         self._scene = json.dumps(house.scene, separators=(",", ":")).encode()
+        self._zipped = gzip.compress(self._scene)
         self._page = read_page(house.page)
         self._said: tuple[float, talk.State | None] = (0.0, None)
         self._world, self._down, self._shell, self._ticking = None, None, b"", None
@@ -127,9 +129,10 @@ class Server:
         scheme, _, token = request.headers.get("Authorization", "").partition(" ")
         if scheme != "Bearer" or not same(token, self.house.token):
             raise web.HTTPUnauthorized
-        response = web.Response(body=self._scene, content_type="application/json")
-        response.enable_compression()
-        return response
+        zipped = "gzip" in request.headers.get("Accept-Encoding", "")
+        encoding = {"Content-Encoding": "gzip"} if zipped else {}
+        body = self._zipped if zipped else self._scene
+        return web.Response(body=body, content_type="application/json", headers=encoding)
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         reason = self.house.origins.fault(request.headers.get("Host"), request.headers.get("Origin"), True)
@@ -427,7 +430,7 @@ class Server:
         state, (since, before) = self.desk.told(self.control.holder), self._said
         if state == before:
             return
-        urgent = before is None or (state.mode, state.robot, state.notice) != (before.mode, before.robot, before.notice)
+        urgent = before is None or (state.mode, state.robot, state.fault) != (before.mode, before.robot, before.fault)
         if not urgent and now - since < STATES:
             return
         self._said = now, state

@@ -13,6 +13,7 @@ from queue import Empty
 
 import mujoco
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from trunkline.elements import actuators
 from trunkline.hybrid.compose import panda_joints
@@ -171,6 +172,7 @@ def run(channel: Channel, simulation: Simulation) -> None:
     os.environ["TRUNKLINE_THREADS"] = "1"
     with suppress(OSError):
         os.nice(NICE)
+    threadpool_limits(1)
     parent = os.getppid()
     loop = Loop(channel, simulation, Plant(simulation))
     due = time.monotonic()
