@@ -4,11 +4,12 @@ import numpy as np
 
 from rehearsal import settings
 from rehearsal.experiments.bench import Bench, Seen, rehearse
-from rehearsal.experiments.grasp import TABLE, beside, failure, held_after, offered, session_of, tell
+from rehearsal.experiments.grasp import NAME, TABLE, beside, failure, held_after, offered, session_of, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.robot.scene import Scene, Surface
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.teleop.things import below_grip
 
 STILL, BORNE = 0.03, 0.5  # m/s; of its weight, by the table
 
@@ -27,9 +28,11 @@ def handle(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     table = table_for(s, object.thing.position, rng)
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed, table)
-    thing = object.thing
-    below = thing.half_height + thing.grip[2] if thing.shape == "basket" else thing.diameter / 2
-    spot = session.seen(np.array(table.top)) + [0.0, 0.0, below + s.drop]
+
+    def spot() -> np.ndarray:
+        """Where the grip is when the lowest point of the thing, as it hangs in the arm, is above the table."""
+        return session.seen(np.array(table.top)) + [0.0, 0.0, below_grip(session.world.thing(NAME)) + s.drop]
+
     ending, frames, _ = rehearse(session, operator.handle(beside(bench, object), spot, s.accept, s.calm))
     result = Result("handle", seed, False, seconds=session.now, object=object.name, package=session.package.digest[:12])
     if not isinstance(ending, Ending):

@@ -136,9 +136,9 @@ class Operator:
                 view, ending.why = yield from self._place_at(view, lambda view: view.thing + beside)
         return ending
 
-    def handle(self, beside: np.ndarray, spot: np.ndarray, accept: float, watch: float) -> Script:
-        """Grasp, aim so that the thing will be at `spot` (3,), m, as it appears, confirm what is sure enough to rest
-        there, look on for `watch` s."""
+    def handle(self, beside: np.ndarray, spot: Callable[[], np.ndarray], accept: float, watch: float) -> Script:
+        """Grasp, aim so that what is gripped will be at `spot`, as it appears with the thing as it then is in the arm,
+        (3,), m, confirm what is sure enough to rest there, look on for `watch` s."""
         view = yield from self._until(lambda view: view.intent.mode == "aim")
         hung = view.thing
         ending = yield from self.grasp(beside, accept, CALM)
@@ -149,7 +149,7 @@ class Operator:
             return ending
         ending.done, ending.probability = False, np.nan  # what was said of the grasp has come true
         while not ending.why and ending.plans < self.person.patience:
-            view, ending.why = yield from self._place_thing(view, spot)
+            view, ending.why = yield from self._place_thing(view, spot())
             if ending.why:
                 break
             ending.plans += 1
