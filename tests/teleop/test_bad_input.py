@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from tests.support.operator import TABLE, Operator
-from trunkline.teleop.messages import World
+from trunkline.teleop.messages import Box, World
 from trunkline.teleop.recorder import FAULTS
 from trunkline.teleop.transitions import MODES
 
@@ -117,7 +117,8 @@ def test_buttons_held_when_a_controller_appears_are_no_presses():
 def test_a_target_around_which_a_solid_comes_just_before_the_trigger_is_no_target():
     """What was judged before the press was judged in a world without it."""
     operator = Operator()
-    x, y, z = operator.to("aim").targets.tip.position
+    operator.wait(0.5)
+    x, y, z = operator.wait(0.3, left={"grip": True}, right={"grip": True}).targets.tip.position
     table = Box("the table", (x - 0.1, y - 0.1, z - 0.1), (x + 0.1, y + 0.1, z + 0.1))
     operator.step(world=World("a table was moved there", (table,)))
     intent = operator.step(right={"trigger": True})
