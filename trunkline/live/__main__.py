@@ -36,7 +36,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     Raises:
         InputError: an address that others reach, without TLS.
     """
-    parser = argparse.ArgumentParser(prog="python -m trunkline.live", description=__doc__.partition("\n")[0])
+    parser = argparse.ArgumentParser(prog="python -m trunkline.live", description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("package", type=Path)
     parser.add_argument("--host", default="127.0.0.1", help="an address of this machine")
     parser.add_argument("--port", type=int, default=PORT)

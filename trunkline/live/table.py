@@ -83,7 +83,7 @@ def _kind(kind: Kind) -> dict:
 
 
 def _type(kind: type) -> str:
-    return next(one.default for one in fields(kind) if one.name == "type")
+    return str(next(one.default for one in fields(kind) if one.name == "type"))
 
 
 def _fields(kind: type) -> dict:
