@@ -9,7 +9,7 @@ import { noHand } from "./wire.js";
 const NEAR = 42; // pixels within which a marker is taken
 const STEP = 0.01, FINE = 0.001, TILT = MathUtils.degToRad(2); // of an arrow
 const WHEEL = 0.0006; // m a pixel of the wheel
-const PRESS = 0.12; // s for which a key's press is held, so that no frame misses it
+const PRESS = 4; // inputs in which a key's press is held, so that it is heard however slowly they are sent
 const SETTLES = 0.7; // s for which a target keeps its grip after a step, until the core's filter is there; while aiming alone
 const DOWN = new Vector3(0, 0, -1);
 const ARROWS = { ArrowLeft: [-1, 0, 0], ArrowRight: [1, 0, 0], ArrowUp: [0, 1, 0], ArrowDown: [0, -1, 0], PageUp: [0, 0, 1], PageDown: [0, 0, -1] };
@@ -29,6 +29,7 @@ export class DesktopHands {
     this.dragging = false;
     this.aiming = false; // whether the core aims
     this.dead = false; // the dead man's key or button
+    this.left = {}; // inputs in which a button is still to be held
     this.until = { trigger: 0, primary: 0, stick_pressed: 0, grip: 0, tilt: 0 };
     this.listen();
   }
@@ -56,8 +57,9 @@ export class DesktopHands {
     this.acts.held(on);
   }
 
-  press(button, seconds = PRESS) {
+  press(button, seconds = 0) {
     this.until[button] = performance.now() / 1000 + seconds;
+    this.left[button] = PRESS;
   }
 
   /** Where both targets begin: at the robot's own mount and tip, so that they are seen. */
@@ -155,7 +157,7 @@ export class DesktopHands {
   /** Both hands now, in the base frame. */
   hands() {
     const now = performance.now() / 1000;
-    const down = (name) => now < this.until[name];
+    const down = (name) => now < this.until[name] || this.left[name] > 0;
     const hands = {};
     HANDS.forEach((side, index) => {
       const hand = noHand();
@@ -174,6 +176,7 @@ export class DesktopHands {
       hand.trigger = down("trigger") && index === this.rigid;
       hand.stick_pressed = down("stick_pressed") && index === this.rigid;
     });
+    for (const name of Object.keys(this.left)) this.left[name] = Math.max(this.left[name] - 1, 0);
     return hands;
   }
 

@@ -163,9 +163,13 @@ class Page {
     find("control").addEventListener("click", () => {
       if (this.wire?.controls) this.wire.say("lease", { action: "release" });
       else this.ask();
+      find("view").focus(); // else Enter, which asks for a plan, would press this button again
     });
     find("stop").addEventListener("click", () => this.wire?.stop());
-    find("plan").addEventListener("click", () => this.desktop.press("trigger"));
+    find("plan").addEventListener("click", () => {
+      this.desktop.press("trigger");
+      find("view").focus();
+    });
     const grip = find("grip");
     grip.addEventListener("pointerdown", (event) => {
       grip.setPointerCapture(event.pointerId);
