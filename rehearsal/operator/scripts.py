@@ -22,6 +22,7 @@ ASIDE = np.array([0.0, 0.0, 0.06])  # m by which the rigid ray is moved to drop 
 AGAIN = 0.5  # s after which the operator tries to follow again
 LIFTED = 0.05  # m from which on the operator sees that something is lifted
 GLANCE = 0.1  # s over which a velocity is seen
+HAND_OVERS = 2  # previews of a hand-over: how a thing lies in the arm does not change from one to the next
 CALM = 2.0  # s after an arrival that the operator looks on
 LONGEST = 30.0  # s that the operator waits for anything
 
@@ -148,20 +149,20 @@ class Operator:
             ending.done = False
             return ending
         ending.done, ending.probability = False, np.nan  # what was said of the grasp has come true
-        while not ending.why and ending.plans < self.person.patience:
+        for _ in range(HAND_OVERS):
             view, ending.why = yield from self._place_thing(view, spot())
             if ending.why:
-                break
+                return ending
             ending.plans += 1
             view = yield from self._ask(view)
             if view.intent.mode != "ready":
                 ending.why = view.intent.notice or "aim: no plan was asked for"
-            elif view.probability is None or view.probability >= accept:
+                return ending
+            if view.probability is None or view.probability >= accept:
                 ending.probability = np.nan if view.probability is None else view.probability
                 return (yield from self._confirm(view, ending, watch))
-            else:
-                view = yield from self._drop(view)
-        ending.why = ending.why or "aim: no preview was sure enough to rest"
+            view = yield from self._drop(view)
+        ending.why = "aim: no preview was sure enough to rest"
         return ending
 
     def _place_thing(self, view: View, spot: np.ndarray):
