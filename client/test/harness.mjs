@@ -42,7 +42,7 @@ export async function serve() {
   };
 }
 
-export const launch = () => chromium.launch({ executablePath: BROWSER, args: FLAGS });
+export const launch = () => chromium.launch({ executablePath: BROWSER, args: FLAGS, timeout: LONGEST });
 
 /** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. */
 export async function open(t, browser, server, { url = server.url, headset = false, width = PICTURES ? 1280 : 720, height = PICTURES ? 720 : 480 } = {}) {

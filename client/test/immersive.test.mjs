@@ -7,7 +7,8 @@ import { inMode, launch, open, passed, picture, serve, until } from "./harness.m
 let browser, server;
 
 before(async () => {
-  [browser, server] = await Promise.all([launch(), serve()]);
+  server = await serve();
+  browser = await launch();
 });
 after(async () => {
   await browser?.close();

