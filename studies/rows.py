@@ -45,7 +45,7 @@ class Rows:
         """
         if not self.path.is_file():
             return {}
-        table = pd.read_csv(self.path, dtype={self.key: str}, keep_default_na=False)
+        table = pd.read_csv(self.path, dtype={self.key: str, "made_of": str, "commit": str}, keep_default_na=False)
         if others := set(table["made_of"]) - {self.made_of}:
             raise InputError(
                 f"{self.path}: found rows of another arm, other trials or other settings ({', '.join(sorted(others))}),"

@@ -14,7 +14,7 @@ from tests.teleop.test_plan import LIMITS, MOUNT, NETWORK, OFFSET, TIP, request
 from trunkline.foresight.foresight import Foresight
 from trunkline.foresight.twin import Believed
 from trunkline.hybrid.doubts import Contact, Doubts
-from trunkline.hybrid.placements import HangingGrip
+from trunkline.hybrid.placements import SideGrip
 from trunkline.hybrid.settings import HybridSettings
 from trunkline.hybrid.touch import read_geometry
 from trunkline.live import foreseer
@@ -34,7 +34,7 @@ FUTURES = 3
 def made() -> Foreseer:
     s, spec = simulation(), small_spec()
     live, robot = load_folder(Config, PROJECT / "conf/live"), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
-    grips = {"hanging": HangingGrip(config().hanging, read_geometry(spec))}
+    grips = {"hanging": SideGrip(config().hanging, read_geometry(spec))}
     rigid = RigidIK(OFFSET)
     grasping = Grasping(rigid, OFFSET, s.commands, grips, config().handling)
     bends = lambda poses: {k: v - 0.5 + s.commands if k != "tip" else v for k, v in NETWORK.ask(poses).items()}  # noqa: E731
