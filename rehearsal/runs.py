@@ -3,8 +3,6 @@
 import hashlib
 import json
 import multiprocessing
-import os
-import threading
 import time
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -19,6 +17,7 @@ from rehearsal.experiments.bench import Bench, bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, append_result, read_results
 from trunkline.errors import InputError
+from trunkline.processes import end_with_parent
 from trunkline.unity.unpacked import package_digest
 from trunkline.unity.unpacked import read_package as read_files
 
@@ -127,17 +126,9 @@ _bench: Bench | None = None  # of a worker
 
 def _begin(package: Path) -> None:
     global _bench
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     threadpool_limits(1)
     _bench = bench_of(package)
-
-
-def _end_with_parent() -> None:
-    """A worker whose parent was killed would wait for ever for its next run."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)
 
 
 def _next(run: Run) -> tuple[Result, float]:

@@ -5,9 +5,8 @@ comes to rest, or what may come of a grasp, runs what the core says, and holds o
 things are.
 """
 
-import hashlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +14,7 @@ from rehearsal.operator.hands import RayHand
 from rehearsal.robot.sensors import Seen
 from rehearsal.robot.stand_in import StandInRobot
 from trunkline.errors import InputError
+from trunkline.foresight.believing import believe
 from trunkline.foresight.foresight import Foreseen, Foresight
 from trunkline.foresight.package import Package
 from trunkline.panda.kinematics import mount_pose
@@ -22,15 +22,13 @@ from trunkline.teleop.config import Config
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
 from trunkline.teleop.following import Follower
-from trunkline.teleop.messages import Box, ExecutorReport, Input, Intent, Joints, Offer, PlanReport, Pose, Thing, World
+from trunkline.teleop.messages import ExecutorReport, Input, Intent, Joints, Offer, PlanReport, Pose, World
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.targets import why_not
 
 RATE = 60.0  # Hz, of a headset's frames
 TICKS = 2  # in which the robot is commanded a frame
 REFERENCE = Pose((1.3, 0.0, 0.6), (0.5, 0.5, 0.5, 0.5))  # where the operator stands: y up, looking along the base's -x
-
-MOVED = 0.005  # m by which a thing must be seen elsewhere than believed
 
 Place = Callable[[float], np.ndarray]  # true position (3,), m, of the object in the Panda's base frame at a time, s
 
@@ -50,11 +48,6 @@ class View:
     previewed: np.ndarray | None
     probability: float | None = None
     offer: Offer | None = None
-
-
-def make_world(boxes: tuple[Box, ...], things: tuple[Thing, ...] = ()) -> World:
-    """With its digest."""
-    return World(hashlib.sha256(repr((boxes, things)).encode()).hexdigest(), boxes, things)
 
 
 class Session:
@@ -135,17 +128,11 @@ class Session:
 
     def _believe(self, seen: Seen) -> None:
         """The world as it is seen: where things are, and what holds them after a plan has been run."""
-        for thing in self.world.things:
-            x, y, z = (float(value) for value in seen.thing)
-            support, report = thing.support, self.executor.state()
-            if report.mode == "done" and report.digest != self.believed and self.plan is not None:
-                self.believed, phases = report.digest, dict(self.plan.phases)
-                lifted = z - thing.position[2] > self.config.handling.lift / 2
-                support = "standing" if "release" in phases else "held" if "lift" in phases and lifted else support
-            if support != thing.support or np.linalg.norm(seen.thing - thing.position) > MOVED:
-                a, b, c, d = (float(value) for value in seen.thing_quaternion)
-                now = replace(thing, position=(x, y, z), quaternion=(a, b, c, d), support=support)
-                self.world = make_world(self.world.boxes, (now,))
+        report, phases = self.executor.state(), ()
+        if report.mode == "done" and report.digest != self.believed and self.plan is not None:
+            self.believed, phases = report.digest, tuple(dict(self.plan.phases))
+        pose = np.append(seen.thing, seen.thing_quaternion)
+        self.world = believe(self.world, pose, phases, self.config.handling.lift)
 
     def _plan(self, intent: Intent) -> None:
         request = intent.request
@@ -169,7 +156,7 @@ class Session:
                 )
             elif self.foresight is not None:
                 self.grasped = None
-                self.foreseen = self.foresight.grasp(
+                *_, self.foreseen = self.foresight.grasp(
                     plan, request.targets, thing, self.world, self.hangs, request.serial
                 )
             return

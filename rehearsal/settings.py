@@ -42,6 +42,9 @@ class Free:
     interruption: Positive
 
 
+Shape = Literal["cylinder", "sphere", "basket"]
+
+
 @dataclass
 class Sizes:
     """Between which an object of a shape is drawn: see conf/rehearse/experiments/grasp.yaml."""
@@ -57,9 +60,9 @@ class Sizes:
 
 @dataclass
 class Grasped:
-    """Grasping what hangs or stands, and handing it over: see conf/rehearse/experiments/grasp.yaml."""
+    """Grasping what hangs or stands, and handing over what stands: see conf/rehearse/experiments/grasp.yaml."""
 
-    shapes: Annotated[dict[Literal["cylinder", "sphere", "basket"], Sizes], Field(min_length=1)]
+    shapes: Annotated[dict[Shape, Sizes], Field(min_length=1)]
     string: Positive
     stand: Annotated[list[Positive], Field(min_length=3, max_length=3)]
     yaw_deg: Zero

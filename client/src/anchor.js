@@ -1,29 +1,20 @@
-// One anchor at the robot's base, kept by the headset from one session to the next.
+// One anchor at the robot's base, kept by the headset from one session to the next; the server knows it by its id.
 
 import { Quaternion, Vector3 } from "three";
 
-const KEY = "trunkline.base"; // of an origin's storage: anchors of another port or address are others
-
-/** Fastens `base`, its pose in the room, to the room; null where the headset has no anchors. */
+/** Fastens `base`, its pose in the room, to the room: `{id, anchor}`; null where the headset has no anchors. */
 export async function fasten(frame, space, { position: p, quaternion: q }) {
   if (!frame.createAnchor) return null;
   const pose = new XRRigidTransform({ x: p.x, y: p.y, z: p.z }, { x: q.x, y: q.y, z: q.z, w: q.w });
   const anchor = await frame.createAnchor(pose, space);
-  try {
-    const handle = await anchor.requestPersistentHandle?.();
-    if (handle) localStorage.setItem(KEY, JSON.stringify({ handle, date: new Date().toISOString() }));
-  } catch {
-    localStorage.removeItem(KEY); // it lasts for this session
-  }
-  return anchor;
+  const id = await anchor.requestPersistentHandle?.().catch(() => null);
+  return { id: id ?? crypto.randomUUID(), anchor }; // without a handle it lasts for this session
 }
 
-/** The anchor of the session before; null where there is none, or the headset has lost it. */
-export async function restore(session) {
-  const kept = localStorage.getItem(KEY);
-  if (!kept || !session.restorePersistentAnchor) return null;
+/** The anchor `id` of a session before; null where the headset has lost it. */
+export async function restore(session, id) {
   try {
-    return await session.restorePersistentAnchor(JSON.parse(kept).handle);
+    return { id, anchor: await session.restorePersistentAnchor(id) };
   } catch {
     return null; // Quest throws where the room is not recognised
   }

@@ -62,6 +62,12 @@ export class DesktopHands {
     this.left[button] = PRESS;
   }
 
+  /** An offer is taken by a hand that grips nothing: a target that still settles is let go. */
+  accept() {
+    this.until.grip = this.left.grip = 0;
+    this.press("primary");
+  }
+
   /** Where both targets begin: at the robot's own mount and tip, so that they are seen. */
   begin(mount, tip) {
     const other = 1 - this.rigid;
@@ -126,7 +132,7 @@ export class DesktopHands {
     if (event.repeat) return;
     if (code === "Digit1" || code === "Digit2") this.chosen = code === "Digit1" ? this.rigid : 1 - this.rigid;
     else if (code === "Enter" && !(event.target instanceof HTMLButtonElement)) this.press("trigger");
-    else if (code === "KeyR") this.press("primary");
+    else if (code === "KeyR") this.accept();
     else if (code === "KeyF") this.press("stick_pressed");
     else if (code === "KeyH") this.acts.reach();
   }

@@ -2,23 +2,22 @@
 
 import { Quaternion, Vector3 } from "three";
 import { HANDS } from "./wire_table.js";
-import { Aligning, inverse } from "./aligning.js";
+import { Aligning, toWire } from "./aligning.js";
 import { fasten, placeOf, restore } from "./anchor.js";
-import { clock, noHand } from "./wire.js";
+import { noHand } from "./wire.js";
 
 const BUTTONS = { trigger: 0, grip: 1, stick_pressed: 3, primary: 4, secondary: 5 }; // of WebXR's xr-standard mapping
 const STICK = [2, 3]; // its axes
 const LEAST_RATE = 72, MOST_RATE = 120; // Hz
-const PATIENCE = 10; // s that a restored anchor may stay lost
 const TICK = [0.6, 30]; // strength and ms
-const CREEP = 0.002, CREEP_TURN = 0.002; // m and rad by which an anchor may creep: a new alignment voids a plan
+const CREEP = 0.0005, CREEP_TURN = 0.0005; // m and rad of an anchor that are not worth a message
 
 export const canImmerse = async () => Boolean(await navigator.xr?.isSessionSupported("immersive-ar").catch(() => false));
 
 export class Immersive {
-  /** `told(pose)` hears of every new place of the room in the base frame, null where it is lost. `ended()`: the session. */
-  constructor(renderer, told, ended) {
-    Object.assign(this, { renderer, told, ended });
+  /** `say(type, fields)`: to the server. `ended()`: the session. */
+  constructor(renderer, say, ended) {
+    Object.assign(this, { renderer, say, ended });
     this.session = null;
     this.aligning = new Aligning();
     this.held = { left: new Set(), right: new Set() };
@@ -32,10 +31,7 @@ export class Immersive {
     });
     this.session = session;
     this.aligning.begin();
-    this.anchor = null;
-    this.restoring = false;
-    this.sent = null;
-    this.lost = "";
+    this.leaveAnchor();
     session.addEventListener("end", () => {
       this.session = null;
       this.ended();
@@ -46,8 +42,6 @@ export class Immersive {
     if (rates.length) await session.updateTargetFrameRate(Math.max(...rates)).catch(() => {});
     this.space = this.renderer.xr.getReferenceSpace();
     this.space.addEventListener("reset", () => this.recentred());
-    this.anchor = await restore(session);
-    [this.restoring, this.until] = [Boolean(this.anchor), clock() + PATIENCE];
   }
 
   leave() {
@@ -60,66 +54,74 @@ export class Immersive {
 
   /** The room's frame has leapt: what stood in it is elsewhere. An anchor stays with the room. */
   recentred() {
-    if (this.anchor) return;
-    this.tell(null);
-    this.aligning.begin();
+    if (this.anchor) return this.tell(null);
+    this.say("alignment", { pose: null });
+  }
+
+  /** What the server says of the alignment. */
+  heard(told) {
+    if (!this.session) return;
+    this.fastening ||= told.fasten && !this.aligning.told?.fasten;
+    this.aligning.heard(told);
+    if (told.step === "lost") this.sent = undefined; // it waits to hear where the anchor is
+    if (told.fasten || told.anchor === this.wanted) return;
+    this.deleteAnchor();
+    this.wanted = told.anchor;
+    if (this.wanted) this.restore(this.wanted);
+  }
+
+  async restore(id) {
+    const { session } = this, found = await restore(session, id);
+    if (session === this.session && this.wanted === id) this.anchor = found;
+  }
+
+  /** `wanted`: id of the anchor that the server knows. `sent`: where it was told to be. */
+  leaveAnchor() {
+    [this.anchor, this.wanted, this.sent, this.fastening] = [null, "", undefined, false];
+  }
+
+  /** One that is worth nothing any more; a headset keeps only some. */
+  deleteAnchor() {
+    const { anchor, id } = this.anchor ?? {};
+    anchor?.delete?.();
+    if (anchor) this.session.deletePersistentAnchor?.(id)?.catch?.(() => {});
+    this.leaveAnchor();
   }
 
   /** What happens at a frame of the headset; returns both hands in the room's frame. */
-  frame(time, frame, flange) {
+  frame(frame) {
     const seen = this.controllers(frame);
     const viewer = frame.getViewerPose(this.space);
-    const { aligning } = this;
-    if (this.anchor) this.follow(frame, time);
-    if (viewer && !aligning.done && !this.restoring) {
-      const { position, orientation } = viewer.transform;
-      const eye = { position: vector(position), quaternion: quaternion(orientation) };
-      aligning.hear(time, seen, eye, flange);
-      if (aligning.done) this.aligned(frame);
+    this.eye = viewer && { position: vector(viewer.transform.position), quaternion: quaternion(viewer.transform.orientation) };
+    if (this.fastening) this.fasten(frame);
+    if (this.anchor) this.follow(frame);
+    if (this.eye && !this.aligning.done) {
+      const wish = this.aligning.hear(seen, this.eye);
+      if (wish === "touch") this.say("touch", {});
+      if (wish === "here") this.say("alignment", { pose: toWire(this.aligning.place) });
     }
     return this.hands(seen);
   }
 
-  aligned(frame) {
-    this.tell(inverse(this.aligning.place));
-    if (this.anchor && this.aligning.kept) return;
-    this.anchor?.delete?.();
-    this.anchor = null;
-    const session = this.session;
-    fasten(frame, this.space, this.aligning.place).then((anchor) => {
-      if (session === this.session) this.anchor = anchor;
+  /** An anchor where the server says that the base is. */
+  fasten(frame) {
+    this.deleteAnchor();
+    const { session } = this;
+    fasten(frame, this.space, this.aligning.place).then((found) => {
+      if (session === this.session && found) [this.anchor, this.wanted] = [found, found.id];
     }).catch(() => {}); // without one, a recentring asks to align again
   }
 
-  /** The base's place by its anchor. */
-  follow(frame, time) {
-    const place = placeOf(frame, this.space, this.anchor);
-    if (!place && this.restoring && time > this.until) {
-      [this.anchor, this.restoring, this.lost] = [null, false, ""]; // it is not found again: align anew
-      return;
-    }
-    if (!place) {
-      if (this.aligning.done && !this.lost) this.tell(null);
-      this.lost = "The headset has lost the robot’s place. Look around; the robot holds until it is found.";
-      return;
-    }
-    this.lost = "";
-    if (this.restoring) {
-      this.restoring = false;
-      this.aligning.restored(place);
-    }
-    if (!this.aligning.done) return;
-    const now = inverse(place);
-    const crept = this.sent
-      && now.position.distanceTo(this.sent.position) < CREEP && now.quaternion.angleTo(this.sent.quaternion) < CREEP_TURN;
-    if (crept) return;
-    this.aligning.place = place;
-    this.tell(now);
+  /** Tells where the anchor is. */
+  follow(frame) {
+    const place = placeOf(frame, this.space, this.anchor.anchor), { sent } = this;
+    const crept = place && sent && place.position.distanceTo(sent.position) < CREEP && place.quaternion.angleTo(sent.quaternion) < CREEP_TURN;
+    if (!crept && (place || sent !== null)) this.tell(place);
   }
 
-  tell(pose) {
-    this.sent = pose;
-    this.told(pose);
+  tell(place) {
+    this.sent = place;
+    this.say("anchor", { id: this.anchor.id, pose: place && toWire(place) });
   }
 
   /** The controllers that are tracked, with buttons that are held and those `pressed` since the frame before. */
@@ -149,7 +151,7 @@ export class Immersive {
     return found;
   }
 
-  /** As the wire has them. While the base is aligned, buttons mean that, and the robot hears of none but stop. */
+  /** As the wire has them. */
   hands(seen) {
     const hands = { left: noHand(), right: noHand() };
     for (const side of HANDS) {
@@ -158,9 +160,8 @@ export class Immersive {
       hands[side].secondary = this.held[side].has("secondary");
       if (!one) continue;
       const { position: p, quaternion: q } = one;
-      const given = this.aligning.done ? one.held : new Set(["secondary"].filter((name) => one.held.has(name)));
-      for (const name of Object.keys(BUTTONS)) hands[side][name] = given.has(name);
-      const [right, back] = this.aligning.done ? one.stick : [0, 0];
+      for (const name of Object.keys(BUTTONS)) hands[side][name] = one.held.has(name);
+      const [right, back] = one.stick;
       // WebXR's stick is negative forward, the wire's positive.
       Object.assign(hands[side], { tracked: true, position: p.toArray(), quaternion: [q.w, q.x, q.y, q.z], stick: [right, -back] });
     }

@@ -6,7 +6,6 @@ import styles from "./page.css";
 import { BACK } from "./colours.js";
 import { DesktopHands } from "./desktop.js";
 import { Immersive, canImmerse } from "./immersive.js";
-import { inverse, markOf } from "./aligning.js";
 import { Marks } from "./rays.js";
 import { PagePanel, RoomPanel, foreseenWords, words } from "./panel.js";
 import { Playback } from "./playback.js";
@@ -47,9 +46,8 @@ class Page {
       reach: () => this.drawn.showReach(!this.drawn.reachShown),
       held: (on) => find("grip").setAttribute("aria-pressed", String(on)),
     });
-    this.immersive = new Immersive(this.renderer, (pose) => this.tellAlignment(pose), () => this.leftHeadset());
+    this.immersive = new Immersive(this.renderer, (type, fields) => this.wire?.say(type, fields), () => this.leftHeadset());
     Object.assign(this, { state: null, lease: null, reason: null, frame: null, playback: null, told: null, recording: null });
-    this.alignment = null; // of the room in the base frame, as it is told to the server
     this.reaches = { rigid: null, tip: null };
     this.connect();
     this.buttons();
@@ -89,11 +87,10 @@ class Page {
         this.pair(reason);
       },
       lease: (message) => {
-        const before = this.wire.controls;
         this.lease = message;
         this.wire.controls = message.holder === this.wire.id;
-        if (this.wire.controls && !before && this.immersive.session) this.tellAlignment(this.alignment);
       },
+      aligning: (message) => this.immersive.heard(message),
       state: (message) => this.changed(message),
       world: ({ world }) => this.drawn.world(world),
       robot: (message) => this.robot(message),
@@ -208,28 +205,18 @@ class Page {
     } catch (error) {
       return this.warn(`The headset did not start: ${error.message}`);
     }
-    this.alignment = null;
     this.drawn.floor.visible = false;
     document.body.dataset.immersed = "";
     this.wire?.again({ space: "room" });
   }
 
   leftHeadset() {
-    this.alignment = null;
     this.drawn.floor.visible = true;
     delete document.body.dataset.immersed;
     this.board.hide();
     this.stand(DESKTOP);
     this.resize();
     this.wire?.again({ space: "base" });
-  }
-
-  /** The pose of the room in the base frame, to the server. */
-  tellAlignment(pose) {
-    this.alignment = pose;
-    if (!this.wire?.controls) return;
-    const { position, quaternion: q } = pose ?? {};
-    this.wire.say("alignment", { pose: pose && { position: position.toArray(), quaternion: [q.w, q.x, q.y, q.z] } });
   }
 
   /** Puts the base at `place`, its pose in the room. */
@@ -262,10 +249,9 @@ class Page {
   }
 
   inHeadset(now, frame) {
-    const flange = markOf(this.drawn.bodies, this.frame?.rows, STRIDE);
-    const hands = this.immersive.frame(now, frame, flange);
-    const { place } = this.immersive.aligning;
-    if (place) this.stand(place);
+    const hands = this.immersive.frame(frame), { eye, aligning } = this.immersive;
+    if (aligning.place) this.stand(aligning.place);
+    if (this.wire?.controls && this.wire.offset !== null) this.wire.view(eye, now);
     return hands;
   }
 
@@ -345,9 +331,9 @@ class Page {
     const spoken = words({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, stale });
     if (this.warning && this.warning.until > clock()) spoken.notice ||= this.warning.text;
     if (immersed) {
-      const { aligning, lost } = this.immersive;
+      const { aligning } = this.immersive;
       if (!aligning.done && wire?.up) [spoken.title, spoken.next] = ["Where is the robot?", aligning.next];
-      if (lost) [spoken.mode, spoken.title, spoken.next] = ["lost", "Robot’s place lost", lost];
+      if (aligning.step === "lost") [spoken.mode, spoken.title] = ["lost", "Robot’s place lost"];
       const eye = this.renderer.xr.getCamera();
       this.board.show(spoken, foreseenWords(this.told) || aligning.said, eye, dt);
       return;

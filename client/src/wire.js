@@ -1,6 +1,6 @@
 // The connection: what is fast in binary, what is rare in JSON, by the one table that the server has too.
 
-import { ANSWERS, FROM_CLIENT, FROM_SERVER, HAND, HANDS, HEAD, HEAD_BYTES, INPUT_BYTES, POSE, VERSION } from "./wire_table.js";
+import { ANSWERS, FROM_CLIENT, FROM_SERVER, HAND, HANDS, HEAD, HEAD_BYTES, POSE, VERSION } from "./wire_table.js";
 
 const KINDS = new Map(Object.entries(FROM_SERVER).map(([name, kind]) => [kind.type, { name, ...kind }]));
 const FIRST_WAIT = 0.25, LONGEST_WAIT = 4; // s until a connection is tried anew; it doubles
@@ -25,11 +25,16 @@ export function decode(buffer) {
   };
 }
 
-/** A binary message of a client; `hands` as `desktop` and `immersive` give them, of an input only. */
-export function encode(name, { received, stamp, hands = null, visible = false }) {
-  const kind = FROM_CLIENT[name];
-  const message = new DataView(new ArrayBuffer(hands ? INPUT_BYTES : HEAD_BYTES));
+/** A binary message of a client; `hands` as `desktop` and `immersive` give them, of an input only; `pose` of a view, null where it is lost. */
+export function encode(name, { received, stamp, hands = null, visible = false, pose = null }) {
+  const kind = FROM_CLIENT[name], rows = hands ? HANDS.length : kind.row.length ? 1 : 0;
+  const message = new DataView(new ArrayBuffer(HEAD_BYTES + 4 * rows * kind.row.length));
   let flags = 0;
+  if (pose) {
+    const { position: p, quaternion: q } = pose;
+    [p.x, p.y, p.z, q.w, q.x, q.y, q.z].forEach((number, place) => message.setFloat32(HEAD_BYTES + 4 * place, number, true));
+    flags |= kind.flags.tracked;
+  }
   if (hands) {
     HANDS.forEach((side, index) => {
       if (hands[side].tracked) flags |= kind.flags[`${side}_tracked`];
@@ -40,7 +45,7 @@ export function encode(name, { received, stamp, hands = null, visible = false })
   }
   message.setUint8(HEAD.type.offset, kind.type);
   message.setUint8(HEAD.flags.offset, flags);
-  message.setUint16(HEAD.count.offset, hands ? HANDS.length : 0, true);
+  message.setUint16(HEAD.count.offset, rows, true);
   message.setUint32(HEAD.sequence.offset, received, true);
   message.setFloat64(HEAD.time.offset, stamp, true);
   return message.buffer;
@@ -145,6 +150,11 @@ export class Wire {
   /** Poses and buttons of a frame of the page at `stamp`, s; it acknowledges what has come. */
   input(hands, visible, stamp) {
     this.send("input", { hands, visible, stamp });
+  }
+
+  /** The viewer's eyes in the room. */
+  view(pose, stamp) {
+    this.send("view", { pose, stamp });
   }
 
   stop() {

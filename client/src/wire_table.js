@@ -97,6 +97,21 @@ export const FROM_CLIENT = {
       "visible": 4
     }
   },
+  "view": {
+    "type": 19,
+    "row": [
+      "x",
+      "y",
+      "z",
+      "qw",
+      "qx",
+      "qy",
+      "qz"
+    ],
+    "flags": {
+      "tracked": 1
+    }
+  },
   "ack": {
     "type": 17,
     "row": [],
@@ -132,6 +147,14 @@ export const SAID = {
     "pose": "required",
     "type": "alignment"
   },
+  "touch": {
+    "type": "touch"
+  },
+  "anchor": {
+    "id": "required",
+    "pose": "required",
+    "type": "anchor"
+  },
   "shown": {
     "digest": "required",
     "type": "shown"
@@ -165,6 +188,17 @@ export const ANSWERS = {
     "asking": [],
     "clients": [],
     "type": "lease"
+  },
+  "aligning": {
+    "step": "required",
+    "next": "required",
+    "said": "required",
+    "place": "required",
+    "expected": "required",
+    "residual": "required",
+    "anchor": "required",
+    "fasten": "required",
+    "type": "aligning"
   },
   "state": {
     "mode": "required",

@@ -41,6 +41,11 @@ test("an input has each number in its place, and the flags of what is tracked", 
   assert.deepEqual(hand(0), { x: 1, y: 2, z: 3, qw: 0.5, qx: 0.5, qy: -0.5, qz: 0.5, trigger: 0, grip: 1, stick_x: -0.25, stick_y: 0.75, stick_pressed: 0, primary: 0, secondary: 0 });
   assert.equal(hand(1).secondary, 1);
   assert.equal(encode("ack", { received: 1, stamp: 0 }).byteLength, HEAD_BYTES);
+  const view = new DataView(encode("view", { received: 9, stamp: 2.5, pose: { position: { x: 1, y: 2, z: 3 }, quaternion: { w: 4, x: 5, y: 6, z: 7 } } }));
+  assert.equal(view.getUint8(1), FROM_CLIENT.view.flags.tracked);
+  assert.equal(view.getUint16(2, true), 1);
+  assert.deepEqual(Array.from({ length: 7 }, (_, place) => view.getFloat32(HEAD_BYTES + 4 * place, true)), [1, 2, 3, 4, 5, 6, 7]);
+  assert.equal(new DataView(encode("view", { received: 9, stamp: 2.5 })).byteLength, HEAD_BYTES + 28);
 });
 
 test("a preview plays while it comes in, ends once, and cannot be leapt through", () => {

@@ -3,6 +3,7 @@
 For some seconds it must touch nothing but the arm.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,9 @@ from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending, Operator
 from rehearsal.robot.scene import Object, Scene, Surface
 from rehearsal.robot.stand_in import StandInRobot
-from rehearsal.session import Session, make_world
+from rehearsal.session import Session
+from trunkline.errors import InputError
+from trunkline.foresight.believing import make_world
 from trunkline.foresight.foresight import Foresight
 from trunkline.frames import wxyz_from_rotation
 from trunkline.hybrid.grasps import object_in_base
@@ -44,10 +47,19 @@ class Offered:
         return "basket" if self.thing.shape == "basket" else "hanging"
 
 
-def offered(bench: Bench, s: settings.Grasped, rng: np.random.Generator) -> Offered:
+def offered(
+    bench: Bench, s: settings.Grasped, rng: np.random.Generator, shapes: Sequence[settings.Shape] = ()
+) -> Offered:
     """A random object at a random place, no heavier than what may be grasped at its width. What is gripped of it is at
-    that place: a basket's bar."""
-    shape = list(s.shapes)[rng.integers(len(s.shapes))]
+    that place: a basket's bar. `shapes`: of which it is one, all of the settings by default.
+
+    Raises:
+        InputError: the settings have none of these shapes.
+    """
+    kinds: list[settings.Shape] = [shape for shape in s.shapes if not shapes or shape in shapes]
+    if not kinds:
+        raise InputError(f"shapes: found {', '.join(s.shapes)}, expected {' or '.join(shapes)} as well")
+    shape = kinds[rng.integers(len(kinds))]
     of, stands = s.shapes[shape], shape == "basket"
     diameter = float(rng.uniform(of.thin, of.wide))
     heaviest = min(of.heavy, bench.config.handling.heaviest("basket" if stands else "hanging", diameter))

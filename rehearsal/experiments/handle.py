@@ -1,4 +1,4 @@
-"""Grasp what hangs or stands, bring it to a table and let it go: success is that it rests there."""
+"""Grasp what stands on one surface, bring it to another, a table, and let it go: success is that it rests there."""
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from rehearsal.robot.scene import Scene, Surface
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.teleop.things import below_grip
 
+STANDING: tuple[settings.Shape, ...] = ("basket",)
 STILL, BORNE = 0.03, 0.5  # m/s; of its weight, by the table
 
 
@@ -24,7 +25,7 @@ def table_for(s: settings.Grasped, place: list[float], rng: np.random.Generator)
 def handle(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
     """One run, and its frames from where the robot began to move."""
     rng, s = np.random.default_rng([seed, 3]), settings.grasped()
-    object = offered(bench, s, rng)
+    object = offered(bench, s, rng, STANDING)
     table = table_for(s, object.thing.position, rng)
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed, table)

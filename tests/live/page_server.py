@@ -13,6 +13,8 @@ import json
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import mujoco
 import numpy as np
@@ -25,17 +27,19 @@ from tests.support.operator import PACKAGE, READY_JOINTS, config
 from tests.teleop.test_plan import LIMITS, NETWORK, OFFSET, RADIUS, STRAIGHT, arc
 from trunkline.arm.spiral import spiral_chain
 from trunkline.errors import InputError
+from trunkline.foresight.believing import make_world
 from trunkline.hybrid.compose import compose, panda_joints
 from trunkline.hybrid.robots import PandaRobot
 from trunkline.live import foreseer, lease, talk
 from trunkline.live import scene as pictured
 from trunkline.live.access import Origins, make_token
-from trunkline.live.believing import make_world
+from trunkline.live.anchors import Anchors
 from trunkline.live.bodies import drawn
 from trunkline.live.desk import Desk
 from trunkline.live.robot import Standing
 from trunkline.live.server import House, Server
-from trunkline.pipeline.config import PROJECT
+from trunkline.live.settings import Config
+from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
@@ -194,7 +198,7 @@ async def obey(server: Server, robot: Robot, log: list[str]) -> None:
         print(json.dumps(log), flush=True)
 
 
-async def serve(port: int) -> None:
+async def serve(port: int, folder: Path) -> None:
     lease.SILENCE = PATIENCE
     figure, token, log = Figure(), make_token(), []
     robot, planning = Robot(figure), Planning(figure)
@@ -204,7 +208,11 @@ async def serve(port: int) -> None:
     core = Teleoperation(settings, Balls(), PACKAGE, OFFSET)
     desk = Desk(core, robot, planning, make_world((TABLE,), (CUP,)), 0.1)
     page, origins = PROJECT / "trunkline/live/page", Origins.of(["127.0.0.1"], port, tls=False)
-    server = Server(House(desk, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append))
+    alignment = load_folder(Config, PROJECT / "conf/live").alignment
+    anchors = Anchors(folder / "anchors.json")
+    server = Server(House(
+        desk, token, origins, PACKAGE, drawing(figure), Bowl(), RATE, page, log.append, alignment, anchors
+    ))  # fmt: skip
     planning.heard, tick = server.foreseen, server.tick
 
     def watched(now: float, dt: float) -> None:
@@ -225,4 +233,5 @@ async def serve(port: int) -> None:
 if __name__ == "__main__":
     if sys.argv[1:] == ["--light"]:
         pictured.MOST_TRIANGLES = 2000
-    asyncio.run(serve(unused_port()))
+    with TemporaryDirectory() as folder:
+        asyncio.run(serve(unused_port(), Path(folder)))

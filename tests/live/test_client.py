@@ -19,7 +19,7 @@ from trunkline.pipeline.config import PROJECT
 
 CLIENT, PAGE = PROJECT / "client", PROJECT / "trunkline/live/page"
 BROWSER = os.environ.get("TRUNKLINE_BROWSER", "/usr/bin/chromium")
-WITHOUT = ("align", "parts")  # tests that need none
+WITHOUT = ("parts",)  # tests that need none
 LARGEST = 250_000  # bytes of the page, compressed
 LONGEST = 900  # s of a file of tests, on cores that do other work as well
 

@@ -1,5 +1,8 @@
 """Plans and previews: what comes of an order, in which order, and how soon a newer one ends it."""
 
+import os
+import queue
+import time
 from dataclasses import replace
 from functools import cache
 from types import SimpleNamespace
@@ -11,6 +14,7 @@ from tests.live.test_robot import simulation
 from tests.support.operator import config
 from tests.support.small_arm import small_spec
 from tests.teleop.test_plan import LIMITS, MOUNT, NETWORK, OFFSET, TIP, request
+from trunkline.foresight.believing import make_world
 from trunkline.foresight.foresight import Foresight
 from trunkline.foresight.twin import Believed
 from trunkline.hybrid.doubts import Contact, Doubts
@@ -18,14 +22,14 @@ from trunkline.hybrid.placements import SideGrip
 from trunkline.hybrid.settings import HybridSettings
 from trunkline.hybrid.touch import read_geometry
 from trunkline.live import foreseer
-from trunkline.live.believing import make_world
 from trunkline.live.foreseer import Foreseer, Order, Overtaken
 from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.grasping import Grasping
-from trunkline.teleop.messages import Thing
+from trunkline.teleop.messages import Box, Target, Thing
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
+from trunkline.teleop.things import below_grip
 
 FUTURES = 3
 
@@ -76,6 +80,68 @@ def test_of_a_grasp_the_batch_tells_how_surely_it_holds():
     assert told.foreseen.low <= told.foreseen.probability <= told.foreseen.high
     curl = planned.plan.step * dict(planned.plan.phases)["curl"]
     assert curl < told.foreseen.times[0] < curl + 0.1
+
+
+def test_what_is_held_is_seen_in_the_arm_and_brought_to_rest_or_not():
+    """As the grasp before it left it; without one, nobody knows how the arm holds it."""
+    made_once, grasped = made(), order(8, "the cylinder")
+    list(made_once.answers(grasped))
+    held = replace(grasped.world.things[0], support="held")
+    lower, tip = ((x, y, z - 0.2) for x, y, z in (MOUNT, TIP))
+    targets = replace(grasped.request.targets, rigid=Target(lower), tip=Target(tip))
+    floor = Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, tip[2] - below_grip(held) - 0.02))
+    planner = made_once.planner
+    plan = planner.plan(grasped.request, grasped.world, grasped.joints, grasped.commands)
+    brought = Order(
+        replace(grasped.request, targets=targets), make_world((floor,), (held,)), plan.joints[-1], plan.commands[-1]
+    )
+    planned, _, *pieces, told = made_once.answers(brought)
+    assert planned.report.refused == ""
+    assert [name for name, _ in planned.plan.phases] == ["transfer", "release"]
+    assert told.foreseen.probability is not None
+    assert told.foreseen.low <= told.foreseen.probability <= told.foreseen.high
+    *_, blind = Foreseer(planner, made_once.foresight, made_once.bodies).answers(brought)
+    assert blind.foreseen.probability is None
+
+
+def test_the_assistants_offer_comes_after_what_the_batch_tells():
+    known, bodies = made().foresight, made().bodies
+    helpful = replace(known, settings=replace(known.settings, futures=2, assistant=1, sure=1.0, lifted=0.9))
+    answers = list(Foreseer(made().planner, helpful, bodies).answers(order(8, "the cylinder")))
+    tolds = [one for one in answers if isinstance(one, foreseer.Told)]
+    assert [one.foreseen.probability for one in tolds] == [0.0, 0.0]  # nothing is lifted by so much, wherever
+    assert tolds[0].foreseen.offer is None
+    assert answers[-2:] == tolds
+
+
+def answering(answers, orders, newest):
+    """A process that plans: it ends at an order of 0, and answers any other by its number."""
+    answers.send(foreseer.Ready())
+    while number := orders.get()[1]:
+        answers.send(number)
+    os._exit(1)
+
+
+def test_another_process_plans_where_one_has_ended():
+    heard = queue.Queue()
+    process = foreseer.ForeseerProcess(answering, (), heard.put)
+    try:
+        first = process.pid
+        for given, told in [(5, 5), (0, None), (6, 6)]:
+            process.order(given)
+            assert heard.get(timeout=60) == told
+        assert process.pid != first
+    finally:
+        process.close()
+
+
+def test_a_process_that_cannot_begin_is_not_begun_again():
+    heard = queue.Queue()
+    process = foreseer.ForeseerProcess(os._exit, (), heard.put)
+    assert heard.get(timeout=60) is None
+    time.sleep(0.2)
+    assert not process.alive
+    process.close()
 
 
 def test_a_refusal_is_one_answer():

@@ -4,20 +4,22 @@ import time
 from dataclasses import replace
 from functools import cache
 
+import mujoco
 import numpy as np
 import pytest
 
 from tests.support.operator import PACKAGE, config
 from tests.support.small_arm import small_spec
+from trunkline.foresight.believing import make_world
 from trunkline.foresight.twin import Believed, compose_twin
 from trunkline.hybrid.doubts import Doubts
 from trunkline.hybrid.futures import Way
 from trunkline.hybrid.preview import joined, nominal
 from trunkline.hybrid.settings import HybridSettings
 from trunkline.live import simulated
-from trunkline.live.believing import make_world
 from trunkline.live.bodies import Poses, drawn
-from trunkline.live.house import SEARCH
+from trunkline.live.house import SEARCH, subject_of
+from trunkline.live.logbook import tip_path
 from trunkline.live.robot import DEAD_MAN, RobotProcess
 from trunkline.live.settings import Config
 from trunkline.live.simulated import Plant, Simulation
@@ -103,6 +105,19 @@ def test_it_runs_a_plan_to_its_end_while_it_is_permitted(robot):
     np.testing.assert_allclose(robot.standing().joints, found.joints[-1], atol=1e-9)
     link = simulation().bodies.index("link_7")
     assert np.isfinite(robot.standing().bodies[link]).all()
+    np.testing.assert_allclose(robot.standing().lengths, found.commands[-1], atol=0.01)  # servos are springs
+
+
+def test_a_log_is_about_the_simulated_robot():
+    found, s = subject_of(simulation()), simulation()
+    assert (found.bodies, found.joints[0], found.tendons) == (s.bodies, "joint_1", ("tendon_1", "tendon_2", "tendon_3"))
+    assert found.tip[0] == "unit_08"
+    assert "base" in found.bodies
+    model, data = s.twin.model, mujoco.MjData(s.twin.model)
+    data.qpos[:] = s.twin.start
+    mujoco.mj_kinematics(model, data)
+    body = data.body(found.tip[0])
+    np.testing.assert_allclose(tip_path(np.append(body.xpos, body.xquat)[None], found.tip[1])[0], data.site("tip").xpos)
 
 
 def test_it_holds_when_it_is_stopped_and_goes_on_by_no_permit(robot):

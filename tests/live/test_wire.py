@@ -30,6 +30,14 @@ def test_an_input_is_128_bytes_and_read_back():
     np.testing.assert_array_equal(found.hands, np.arange(28.0).reshape(2, 14))
 
 
+def test_a_view_is_one_pose():
+    row = np.arange(7, dtype="<f4")
+    found = wire.read(struct.pack("<BBHId", 19, 1, 1, 3, 0.5) + row.tobytes())
+    assert (found.kind, found.flags, found.received, found.stamp) == ("view", {"tracked"}, 3, 0.5)
+    np.testing.assert_array_equal(found.view, row)
+    assert found.hands.shape == (0, 14)
+
+
 def test_a_frame_has_16_bytes_and_28_a_body():
     rows = np.arange(34 * 7.0).reshape(34, 7)
     message = wire.frame("robot", {"stopped"}, 34, 9, 2.5, rows)

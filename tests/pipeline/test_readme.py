@@ -147,9 +147,9 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "relaxation": None,  # the lab's arm has three branches, the model one
         "relaxation_time": None,
         "kp": True,
-        "kv": True,
+        "kv": False,
         "time_constant": True,
-        "dead_time": False,
+        "dead_time": True,
         "force_range": False,
         "capstan_friction": True,
     }

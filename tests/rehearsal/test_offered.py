@@ -8,7 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
 from rehearsal.experiments.grasp import Offered, offered
+from rehearsal.experiments.handle import STANDING
 from tests.support.operator import config
+from trunkline.errors import InputError
 
 BENCH = SimpleNamespace(config=config())
 
@@ -22,6 +24,15 @@ def test_some_hang_and_some_stand(objects):
     names = [one.name for one in objects]
     assert set(names) == {"hanging cylinder", "standing basket"}
     assert 15 < names.count("standing basket") < 45
+
+
+def test_what_is_handed_over_stood_on_a_surface():
+    s = settings.grasped()
+    rng = np.random.default_rng(0)
+    assert all(offered(BENCH, s, rng, STANDING).stands is not None for _ in range(20))  # type: ignore[arg-type]
+    del s.shapes["basket"]
+    with pytest.raises(InputError, match="shapes: found cylinder, expected basket as well"):
+        offered(BENCH, s, rng, STANDING)  # type: ignore[arg-type]
 
 
 def test_what_stands_does_so_on_its_stand_and_what_hangs_has_none(objects):

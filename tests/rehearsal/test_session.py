@@ -44,7 +44,8 @@ class Sent:
         self.instruments = SimpleNamespace(turn=Rotation.identity(), shift=np.zeros(3))
 
     def seen(self):
-        return SimpleNamespace(joints=self.joints[0], tip=np.zeros(3))
+        none = np.full(4, np.nan)
+        return SimpleNamespace(joints=self.joints[0], tip=np.zeros(3), thing=none[:3], thing_quaternion=none)
 
     def links(self):
         return np.zeros((1, 3)), np.zeros((1, 3))

@@ -53,7 +53,7 @@ def test_a_package_names_the_stage_that_is_missing(arm, capsys):
     with pytest.raises(SystemExit):
         run_stage("package_unity", stage.Config, stage.main)
     said = capsys.readouterr().err
-    assert said.startswith("error: artifacts/identify_stiffness/parameters.json: no such file, expected what an")
+    assert said.startswith("error: artifacts/reachability/meshes: found no mesh, expected .obj files")
     assert said.count("\n") == 1
 
 

@@ -80,7 +80,9 @@ def test_before_trials_are_weighed_the_search_is_where_one_without_weights_ends(
         fit = PlainFit(segments_of(PLANT), bounds, (), "positions", weights, METHOD)
         ends[outlying] = identify("test", PLANT, experiments, fit).values, values_of(bounds, fit.plain.vector)
     assert ends[4.0][0] != ends[1e9][0]
-    assert ends[4.0][1] == ends[1e9][1] == ends[1e9][0]
+    assert ends[1e9][1] == ends[1e9][0]
+    # which goes on to where a second-order model has its minimum, for less than a step of the polish
+    assert ends[4.0][1] == pytest.approx(ends[1e9][1], rel=2e-3)
 
 
 def test_a_hand_that_swings_is_told_in_the_words_of_the_stage():

@@ -5,6 +5,7 @@ import asyncio
 import struct
 import time
 from contextlib import asynccontextmanager, suppress
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -14,12 +15,14 @@ from aiohttp.test_utils import TestServer, unused_port
 from tests.support.operator import PACKAGE, Everywhere, config
 from tests.teleop.test_plan import LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from trunkline.errors import InputError
+from trunkline.foresight.believing import make_world
 from trunkline.live import foreseer, talk, wire
 from trunkline.live.access import Origins
-from trunkline.live.believing import make_world
 from trunkline.live.desk import Desk
 from trunkline.live.robot import Standing
 from trunkline.live.server import House, Server
+from trunkline.live.settings import Config
+from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
 from trunkline.teleop.messages import PlanReport
@@ -28,6 +31,12 @@ from trunkline.teleop.rigid_ik import RigidIK
 
 TOKEN, RATE, BODIES = "t" * 22, 72.0, 3
 PREVIEW = 0.3  # s that a preview lasts, whatever the plan
+
+
+@cache
+def live():
+    """The settings of a live session."""
+    return load_folder(Config, PROJECT / "conf/live")
 
 
 class PlainRobot:
@@ -87,13 +96,16 @@ class PlainPlanning:
 class Laid:
     """A server, its parts, and its log."""
 
-    def __init__(self, port, page=Path("nowhere")):
+    def __init__(self, port, page=Path("nowhere"), journal=None, anchors=None, settings=None):
         self.robot, self.planning, self.log = PlainRobot(), PlainPlanning(), []
-        core = Teleoperation(config().core, Everywhere(), PACKAGE, OFFSET)
-        self.desk = Desk(core, self.robot, self.planning, make_world(()), 0.1)
+        core = Teleoperation(settings or config().core, Everywhere(), PACKAGE, OFFSET)
+        self.desk = Desk(core, self.robot, self.planning, make_world(()), 0.1, journal)
+        self.desk.begin(RATE)
         scene = {"bodies": ["a", "b", "c"]}
         origins = Origins.of(["127.0.0.1"], port, tls=False)
-        self.server = Server(House(self.desk, TOKEN, origins, PACKAGE, scene, None, RATE, page, self.log.append))
+        self.server = Server(House(
+            self.desk, TOKEN, origins, PACKAGE, scene, None, RATE, page, self.log.append, live().alignment, anchors
+        ))  # fmt: skip
         self.planning.heard = self.server.foreseen
         self.url, self.origin = f"http://127.0.0.1:{port}", f"http://127.0.0.1:{port}"
 
@@ -182,10 +194,10 @@ def hand(place, **buttons):
 
 
 @asynccontextmanager
-async def laid(page=Path("nowhere")):
+async def laid(page=Path("nowhere"), journal=None, anchors=None, settings=None):
     """A server that runs, and how to come to it."""
     port = unused_port()
-    here = Laid(port, page)
+    here = Laid(port, page, journal, anchors, settings)
     served = TestServer(here.server.app(), host="127.0.0.1", port=port)
     async with served, ClientSession() as session:
 

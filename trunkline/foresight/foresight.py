@@ -13,10 +13,10 @@ from trunkline.foresight.settings import Previewing
 from trunkline.foresight.twin import Believed, compose_twin
 from trunkline.frames import rotation_from_wxyz
 from trunkline.hybrid.assistant import best, try_places
-from trunkline.hybrid.doubts import Contact, Doubts, draw
-from trunkline.hybrid.futures import Piece, Twin, Way, futures
+from trunkline.hybrid.doubts import Contact
+from trunkline.hybrid.futures import Twin, Way
 from trunkline.hybrid.placements import Grip
-from trunkline.hybrid.preview import Holding, Outcome, Preview, joined, nominal
+from trunkline.hybrid.preview import Holding, Preview, preview
 from trunkline.hybrid.resting import Resting
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.messages import Offer, Targets, Thing, World
@@ -24,34 +24,6 @@ from trunkline.teleop.plan import Plan
 from trunkline.teleop.things import beneath, grip_of, way_of_grasping
 
 NOWHERE = (0.0, 0.0, 0.0)
-
-Go = Callable[[], None]
-
-
-def _always() -> None:
-    pass
-
-
-def foresee(
-    twin: Twin, way: Way, doubts: Doubts, outcome: Outcome | None, count: int, seed: int, go_on: Go = _always
-) -> Preview:
-    """As `hybrid.preview.preview`, which it may leave within.
-
-    Args:
-        go_on: called before each quarter of a second that is simulated; what it raises ends it.
-    """
-    begun, draws = _asked(nominal(twin, way), go_on), draw(doubts, twin.arm, count, seed)
-    motion = joined(_asked(futures(twin, way, draws), go_on))
-    return Preview(joined(begun), motion, draws, outcome.holds(motion) if outcome is not None else None)
-
-
-def _asked(pieces: Iterator[Piece], go_on: Go) -> list[Piece]:
-    found = []
-    go_on()
-    for piece in pieces:
-        found.append(piece)
-        go_on()
-    return found
 
 
 @dataclass(frozen=True)
@@ -86,23 +58,24 @@ class Foresight:
         world: World,
         hangs: np.ndarray | None,
         seed: int,
-        go_on: Go = _always,
-    ) -> Foreseen:
-        """Futures of a plan to grasp; where they are not sure to hold, the assistant looks for a better place.
+        go_on: Callable[[], None] = lambda: None,
+    ) -> Iterator[Foreseen]:
+        """Futures of a plan to grasp; where they are not sure to hold, once more with what the assistant offers.
 
         Args:
             hangs: where the straight arm's tip is seen in its base frame, (3,), m: the twin leans likewise. None where
                 nobody has seen it.
-            go_on: as `foresee`.
+            go_on: as `preview`.
         """
         s, way, begins = self.settings, *self.way(plan, "curl")
         lean = self.known.lean(hangs)
         twin = compose_twin(self.known, world, thing, way.joints[0], way.commands[0], s, lean)
         holding = Holding(way.duration - s.hold, s.sag, s.slip, s.lifted)
-        found = Foreseen(foresee(twin, way, self.known.doubts, holding, s.futures, seed, go_on), begins)
-        if found.probability >= s.sure or s.assistant == 0:
-            return found
-        return replace(found, offer=self._offer(twin, way, holding, targets, thing, found.probability, seed))
+        found = Foreseen(preview(twin, way, self.known.doubts, holding, s.futures, seed, go_on=go_on), begins)
+        yield found
+        if found.probability < s.sure and s.assistant:
+            offer = self._offer(twin, way, holding, targets, thing, found.probability, seed, go_on)
+            yield replace(found, offer=offer)
 
     def bring(
         self,
@@ -113,20 +86,26 @@ class Foresight:
         hangs: np.ndarray | None,
         before: Foreseen,
         seed: int,
+        go_on: Callable[[], None] = lambda: None,
     ) -> Foreseen:
         """Futures of a plan to bring what is held elsewhere: whether it rests there.
 
         Args:
             before: of the grasp. What is not known of the thing's place is none of a thing in the arm.
+            go_on: as `preview`.
         """
         s, way, begins = self.settings, *self.way(plan, "transfer")
-        lean, pose = self.known.lean(hangs), before.preview.nominal.qpos[0, -1]
-        twin = compose_twin(self.known, world, thing, way.joints[0], way.commands[0], s, lean, pose)
+        twin = self.carrying(thing, world, way, hangs, before)
         doubts = replace(self.known.doubts, contact=Contact(self.known.doubts.contact.friction, NOWHERE, 0.0))
         board = beneath(targets.tip.position, world)
         assert board is not None  # else the planner refuses
         resting = Resting(plan.step * dict(plan.phases)["release"], np.array(board.low), np.array(board.high))
-        return Foreseen(foresee(twin, way, doubts, resting, s.futures, seed), begins)
+        return Foreseen(preview(twin, way, doubts, resting, s.futures, seed, go_on=go_on), begins)
+
+    def carrying(self, thing: Thing, world: World, way: Way, hangs: np.ndarray | None, before: Foreseen) -> Twin:
+        """The twin with the thing in its arm, as the nominal preview of its grasp left both."""
+        lean, pose = self.known.lean(hangs), before.preview.nominal.qpos[0, -1]
+        return compose_twin(self.known, world, thing, way.joints[0], way.commands[0], self.settings, lean, pose)
 
     def way(self, plan: Plan, first: str) -> tuple[Way, float]:
         """The plan from the phase `first` on, held for a while at its end, and when that phase begins, s."""
@@ -137,12 +116,20 @@ class Foresight:
         return Way(plan.step, joints, commands), plan.step * row
 
     def _offer(
-        self, twin: Twin, way: Way, holding: Holding, targets: Targets, thing: Thing, own: float, seed: int
+        self,
+        twin: Twin,
+        way: Way,
+        holding: Holding,
+        targets: Targets,
+        thing: Thing,
+        own: float,
+        seed: int,
+        go_on: Callable[[], None],
     ) -> Offer | None:
         s, centre = self.settings, np.array(grip_of(thing))
         mount = np.array(targets.rigid.position) - centre
         places = self.grips[way_of_grasping(thing)].near(_rotation(targets), mount, thing.diameter)
-        shares = try_places(twin, way, self.known.doubts, holding, places - mount, s.assistant, seed + 1)
+        shares = try_places(twin, way, self.known.doubts, holding, places - mount, s.assistant, seed + 1, go_on)
         chosen = best(places - mount, shares)
         if shares[chosen] <= own:
             return None

@@ -51,7 +51,7 @@ class Package:
         grasping = Grasping(rigid, config.mount_offset, self.straight, self.grips(config), config.handling)
         return Planner(
             rigid, self.network, self.straight, limits, config.mount_offset, shaper=shaper, chain=self.chain,
-            grasping=grasping,
+            grasping=grasping, length=self.geometry.length,
         )  # fmt: skip
 
     def grips(self, config: Config) -> dict[str, Grip]:

@@ -4,26 +4,36 @@ A mount that is elsewhere, turned alike, is an object that is elsewhere the othe
 plan serve all places, each with the same futures: places differ by what they are, not by their luck.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from trunkline.hybrid.doubts import Doubts, Draws, draw
 from trunkline.hybrid.futures import Twin, Way, futures
-from trunkline.hybrid.preview import Holding, joined
+from trunkline.hybrid.preview import Holding, asked, joined
 
 
 def try_places(
-    twin: Twin, way: Way, doubts: Doubts, holding: Holding, offsets: np.ndarray, count: int, seed: int = 0
+    twin: Twin,
+    way: Way,
+    doubts: Doubts,
+    holding: Holding,
+    offsets: np.ndarray,
+    count: int,
+    seed: int = 0,
+    go_on: Callable[[], None] = lambda: None,
 ) -> np.ndarray:
     """Share of `count` futures that hold the object, for each place. Shape (P,).
 
     Args:
         offsets: where the mount of each place is, less that of the plan, world axes, m. Shape (P, 3).
+        go_on: as `preview`.
     """
     one, places = draw(doubts, twin.arm, count, seed), len(offsets)
     moved = np.tile(one.offsets, (places, 1)) - np.repeat(offsets, count, axis=0)
     values = {name: np.tile(column, places) for name, column in one.values.items()}
     many = Draws(values, np.tile(one.friction, places), moved, np.tile(one.turns, places))
-    motion = joined(list(futures(twin, way, many)))
+    motion = joined(list(asked(futures(twin, way, many), go_on)))
     return holding.holds(motion).reshape(places, count).mean(axis=1)
 
 

@@ -33,7 +33,6 @@ from trunkline.simulation.winch import Winches
 
 FRAME = 1 / 60  # s, about, between frames of a motion
 FRAMES = 15  # of a piece: 0.25 s
-KNOTS = 0.1  # s between rows at which the Panda's torques are computed
 EASED_IMPRATIO = 10.0  # friction over normal impedance: what is held creeps more, but far less than counts as a slip
 UNIT_CENTER = re.compile(r"unit_\d+_center")
 RECORD = ("qpos", "site_xpos", "xpos", "xquat")
@@ -161,7 +160,7 @@ def eased(model: mujoco.MjModel, hanging: bool) -> mujoco.MjModel:
 
 @dataclass(frozen=True)
 class _Servos:
-    """`commands` (N, 7), rad, of the servos `motors` every KNOTS s; none on a fixed mount."""
+    """`commands` (N, 7), rad, of the servos `motors` at `times` (N,), s; none on a fixed mount."""
 
     motors: list[int]
     times: np.ndarray
@@ -178,13 +177,13 @@ def _servos(model: mujoco.MjModel, way: Way, start: np.ndarray | None) -> _Servo
     A servo's torque is k_p (u - q) - k_v q̇, so u = q + (k_v q̇ + τ) / k_p.
     """
     joints = panda_joints(model)
-    times = KNOTS * np.arange(int(np.ceil(way.duration / KNOTS)) + 1)
+    times = FRAME * np.arange(int(np.ceil(way.duration / FRAME)) + 1)
     if not len(joints):
         return _Servos([], times, np.zeros((len(times), 0)))
     motors = [model.actuator(f"{name}_position").id for name in JOINTS]
     angles = way.at(times)[:, : len(joints)]
-    speeds = np.gradient(angles, KNOTS, axis=0) if len(times) > 1 else np.zeros_like(angles)
-    gains = np.gradient(speeds, KNOTS, axis=0) if len(times) > 1 else np.zeros_like(angles)
+    speeds = np.gradient(angles, FRAME, axis=0) if len(times) > 1 else np.zeros_like(angles)
+    gains = np.gradient(speeds, FRAME, axis=0) if len(times) > 1 else np.zeros_like(angles)
     qpos = np.tile(model.qpos0 if start is None else start, (len(times), 1))
     qvel, qacc = np.zeros((2, len(times), model.nv))
     qpos[:, model.jnt_qposadr[joints]] = angles

@@ -114,20 +114,29 @@ def preview(
     count: int = 32,
     seed: int = 0,
     show: Callable[[Piece], None] = lambda piece: None,
+    go_on: Callable[[], None] = lambda: None,
 ) -> Preview:
     """Try a plan in `count` futures.
 
     Args:
         holding: what is asked of the plan; None where nothing is grasped.
         show: called with each piece of the nominal motion, before any future is simulated.
+        go_on: called before each piece, and after the last; what it raises ends the preview.
     """
-    begun = []
-    for piece in nominal(twin, way):
+    begun, draws = [], draw(doubts, twin.arm, count, seed)
+    for piece in asked(nominal(twin, way), go_on):
         show(piece)
         begun.append(piece)
-    draws = draw(doubts, twin.arm, count, seed)
-    motion = joined(list(futures(twin, way, draws)))
+    motion = joined(list(asked(futures(twin, way, draws), go_on)))
     return Preview(joined(begun), motion, draws, holding.holds(motion) if holding is not None else None)
+
+
+def asked(pieces: Iterator[Piece], go_on: Callable[[], None]) -> Iterator[Piece]:
+    """The pieces, `go_on` called before each and after the last."""
+    go_on()
+    for piece in pieces:
+        yield piece
+        go_on()
 
 
 def joined(pieces: list[Piece]) -> Piece:

@@ -17,11 +17,11 @@ from trunkline.identification.problem import Problem
 from trunkline.identification.resting import RestShape, spring_references
 from trunkline.identification.robust import reweighted
 from trunkline.identification.search import Convergence, Found, descend, search
-from trunkline.identification.surrogate import Surrogate, reaches, surrogate
+from trunkline.identification.surrogate import Surrogate, surrogate
 from trunkline.progress import progress
 from trunkline.trials.splits import IDENTIFY
 
-NEAR = 0.5  # of a surrogate's reach: from so near it is seen as well as from its centre
+SEEN = 0.05  # share of the losses by which a surrogate may mistake those at a new estimate, and still serve there
 REWEIGHINGS, SAME_WEIGHT = 4, 0.05  # at most; weights that change by less leave the minimum where it is
 BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
 
@@ -75,10 +75,9 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     if method.rough.step_factor > 1 and any(e.frames > 1 for e in seen):  # at rest, the step changes nothing
         near, last = fit.problem(model, seen, method.rough.step_factor), "whole"
         problems.append(near)
-    searches[last] = found = _polish(near, found, method.polish, f"{label} {last}")
+    found = _polish(near, found, method.polish, f"{label} near")
     # what outlies, and by how much an estimate answers a trial, is as plain at a coarser step, which costs less
-    around = surrogate(near, found.vector, found.linear.residuals if found.linear else None)
-    searches[last], around = _reweigh(near, found, around, fit, f"{label} reweighed")
+    searches[last], around = _reweigh(near, found, fit, f"{label} {last}")
     found = searches[last]
     if near is not exact:
         exact.trial_weights = near.trial_weights
@@ -154,19 +153,20 @@ def _polish(problem: Problem, rough: Found, polish: Polish, label: str) -> Found
         )  # fmt: skip
 
 
-def _reweigh(problem: Problem, found: Found, around: Surrogate, fit: Fit, label: str) -> tuple[Found, Surrogate]:
-    """The minimum in which outlying trials count less, and the surrogate around it; what it was if there are none.
+def _reweigh(problem: Problem, found: Found, fit: Fit, label: str) -> tuple[Found, Surrogate]:
+    """The minimum in which outlying trials count less, from near it, and the surrogate around it.
 
-    The surrogate says which, and about where the minimum then is; least squares goes there, until the weights stay.
-    Within reach of what a surrogate was made of, it is not made anew.
+    The surrogate says which, and about where the minimum then is; least squares goes there, until the weights stay. A
+    surrogate is made anew where it has not foreseen the losses found.
     """
     kinds, polish = [e.kind for e in problem.experiments], fit.method.polish
     straight = segment_positions(problem.model, problem.segments, problem.model.qpos0)
     bends = np.array([np.square(e.positions - straight).sum(axis=2)[e.measured].mean() for e in problem.experiments])
-    made_at, made = found.vector, around
-    for _ in range(REWEIGHINGS):
+    around = made = surrogate(problem, found.vector, found.linear.residuals if found.linear else None)
+    made_at = found.vector
+    for turn in range(REWEIGHINGS):
         weights, place = reweighted(around, kinds, bends, fit.weights.outlying)
-        if np.abs(weights - problem.trial_weights).max() < SAME_WEIGHT:
+        if turn and np.abs(weights - problem.trial_weights).max() < SAME_WEIGHT:
             break
         problem.trial_weights = weights
         tried = np.stack([found.vector, np.clip(found.vector + place, *problem.bounds())])
@@ -176,13 +176,19 @@ def _reweigh(problem: Problem, found: Found, around: Surrogate, fit: Fit, label:
                 problem, start, polish.iterations, polish.tolerance,
                 lambda best, bar=bar: bar.update(1, best_loss=best, **problem.effort()),
             )  # fmt: skip
-        moved = found.vector - made_at
-        if np.all(np.abs(moved) <= NEAR * reaches(problem)):
+        assert found.linear is not None, "least squares ends on its own linearisation"
+        moved, losses = found.vector - made_at, _trial_losses(problem, found.linear.residuals)
+        if np.abs(made.losses(moved[None])[0] - losses).sum() <= SEEN * losses.sum():
             around = made.moved(moved, weights)
         else:
-            around = made = surrogate(problem, found.vector, found.linear.residuals if found.linear else None)
+            around = made = surrogate(problem, found.vector, found.linear.residuals)
             made_at = found.vector
     return found, around
+
+
+def _trial_losses(problem: Problem, residuals: list[np.ndarray]) -> np.ndarray:
+    """Of every trial by itself, whatever its weight in the sum. Shape (T,)."""
+    return np.array([0.5 * block @ block for block in residuals]) / problem.trial_weights
 
 
 def with_parameters(

@@ -24,7 +24,7 @@ PATIENCE = 15.0  # s to rest for a pose that is to be a target
 NEAR_LIMIT = 0.95  # share of its largest force at which a motor is near it: there other commands hold the same pose
 TAUT_SHARE = 0.2  # of the deepest pulls, where all motors pull: more bends hardly more and presses the units together
 SHARE = 0.01  # of the arm's length; a larger error is worth a warning
-DOUBT = 0.8 * SHARE  # from which on a foreseen miss is a reason to doubt: what is foreseen has an error of its own
+DOUBT = 0.75 * SHARE  # from which on a foreseen miss is a reason to doubt: what is foreseen has an error of its own
 SWING = 4.0  # s that an arm without friction swings by itself before it is damped: then it has its shape
 PULL_SHARE = 0.8  # of the deepest pulls of the samples: together, two of them are near the motors' limits
 

@@ -2,8 +2,11 @@
 
 import numpy as np
 
-from trunkline.live.wire import HAND, Received
+from trunkline.live.aligner import Held
+from trunkline.live.wire import HAND, HANDS, Received
 from trunkline.teleop.messages import Controller
+from trunkline.teleop.soundness import fault_of
+from trunkline.teleop.vectors import unit
 
 PRESSED = 0.5
 NOWHERE = Controller((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), tracked=False)
@@ -23,6 +26,15 @@ def controllers(received: Received) -> tuple[Controller, Controller]:
 def stops(received: Received) -> bool:
     """Whether either secondary button is held, tracked or not."""
     return bool((received.hands[:, _AT["secondary"]] >= PRESSED).any())
+
+
+def held(received: Received, side: str) -> Held | None:
+    """The pose of a hand's controller, None where it is not tracked or is no pose."""
+    if not {f"{side}_tracked", "visible"} <= received.flags:
+        return None
+    x, y, z, a, b, c, d = (float(value) for value in received.hands[HANDS.index(side)][:7])
+    found = Controller((x, y, z), (a, b, c, d))
+    return None if fault_of(found) else Held(found.position, unit(found.quaternion))
 
 
 def _controller(hand: np.ndarray, tracked: bool) -> Controller:

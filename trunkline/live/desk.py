@@ -4,15 +4,17 @@ It has no sockets and no clock: the server calls it, with the time. Every decisi
 the core. It holds wherever it does not know.
 """
 
+import re
 from collections import deque
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
 
+from trunkline.foresight.believing import believe
 from trunkline.live import foreseer, talk
-from trunkline.live.believing import believe
 from trunkline.live.controllers import NOWHERE, controllers
+from trunkline.live.journal import Journal
 from trunkline.live.robot import Standing
 from trunkline.live.wire import MARKERS, Received
 from trunkline.live.words import next_action
@@ -32,8 +34,10 @@ from trunkline.teleop.messages import (
     World,
 )
 from trunkline.teleop.plan import Plan
+from trunkline.version import __version__
 
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the base frame already
+NUMBER = re.compile(r"[\d.]+")
 DIGITS = 4  # after the decimal point, of targets that are told
 MOST_INPUTS = 8  # of a tick; older ones than these are left out, presses and all
 
@@ -63,12 +67,22 @@ class Heard:
 
 
 class Desk:
-    """One robot, one core. `lift`: m by which a thing is lifted by a grasp."""
+    """One robot, one core. `lift`: m by which a thing is lifted by a grasp. `journal`: what is told all of it."""
 
-    def __init__(self, core: Teleoperation, robot: Robot, planning: Planning, world: World, lift: float) -> None:
+    def __init__(
+        self,
+        core: Teleoperation,
+        robot: Robot,
+        planning: Planning,
+        world: World,
+        lift: float,
+        journal: Journal | None = None,
+    ) -> None:
         self.core, self.robot, self.planning, self.world, self.lift = core, robot, planning, world, lift
+        self.journal = journal or Journal()
         self.state = core.start()
         self.alignment: Pose | None = None
+        self.unfit = ""
         self.plan: Plan | None = None
         self.preview: talk.Preview | None = None
         self.foreseen: talk.Foreseen | None = None
@@ -79,6 +93,15 @@ class Desk:
         self._last, self._fresh = self._nobody, True
         self._stop, self._fault, self._shown, self._since, self._believed = False, "", "", 0.0, ""
         self._asked, self._ordered, self._started, self._ran = 0, False, "", False
+        self._logged: tuple = ()
+
+    def begin(self, rate: float) -> None:
+        """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz."""
+        core, subject = self.core, self.journal.subject
+        self.journal.event(
+            "begin", version=__version__, package=core.package, rate=rate, settings=core.settings,
+            mount_offset=core.mount_offset, tip={"body": subject.tip[0], "place": subject.tip[1]},
+        )  # fmt: skip
 
     # --- what is heard
 
@@ -95,12 +118,20 @@ class Desk:
         """Of anybody: the robot is told at once, the core at its next step."""
         self._stop = True
         self.robot.stop()
+        if self.intent is None or self.intent.mode != "stopped":
+            self.journal.event("stop")
 
-    def control(self, alignment: Pose | None) -> None:
+    def control(self, alignment: Pose | None, unfit: str = "") -> None:
         """Somebody else controls now, or nobody, who is aligned so."""
         self._heard.clear()
-        self._last, self._fresh, self.alignment = self._nobody, True, alignment
+        self._last, self._fresh = self._nobody, True
+        self.align(alignment, unfit)
         self.robot.stop()
+
+    def align(self, alignment: Pose | None, unfit: str) -> None:
+        """Of whom controls, its reference frame in the base; `unfit`: why nothing may be executed so, "" where it
+        may."""
+        self.alignment, self.unfit = alignment, unfit
 
     def shown(self, digest: str, now: float) -> str:
         """A preview has been shown to its end; why that does not count, "" where it does."""
@@ -115,6 +146,7 @@ class Desk:
         if now - self._since < preview.duration:
             return f"shown: its preview lasts {preview.duration:.2f} s, found {now - self._since:.2f} s"
         self._shown = digest
+        self.journal.event("shown", digest=digest)
         return ""
 
     def answered(self, answer: foreseer.Answer | None, now: float) -> bool:
@@ -127,12 +159,16 @@ class Desk:
             return False
         if isinstance(answer, foreseer.Planned):
             self.report, self.plan = answer.report, answer.plan
+            self.journal.event("planned", report=answer.report)
         elif isinstance(answer, foreseer.Begun):
             self.preview, self._since = answer.preview, now
+            self.journal.event("preview", preview=answer.preview)
         elif isinstance(answer, foreseer.Shown):
             self.pieces.append(answer)
+            self.journal.piece(answer.first, answer.time, answer.poses)
         else:
             self.foreseen = answer.foreseen
+            self.journal.event("foreseen", foreseen=answer.foreseen)
         return True
 
     # --- what is done
@@ -158,9 +194,36 @@ class Desk:
             self.state, intent = self.core.step(self.state, given, dt / len(steps))
             self._ask(intent, standing)
             self._drive(intent)
+            self.journal.step(dt / len(steps), given, intent)
         self._last = steps[-1]
         self.intent = intent
+        self._tell_journal(intent, standing)
         return intent
+
+    @property
+    def blocked(self) -> str:
+        """Why nothing may be executed, whatever the core wants; "" where it may."""
+        return self.journal.fault or self.unfit
+
+    def _tell_journal(self, intent: Intent, standing: Standing) -> None:
+        """What is at the end of a tick; of what seldom changes, the changes."""
+        journal = self.journal
+        journal.standing(standing.time, standing.joints, standing.commands, standing.lengths, standing.bodies)
+        robot = self.robot.state()
+        said = NUMBER.sub("", intent.notice)  # what counts on is told once
+        now = (intent.mode, said), (robot.mode, robot.fault, robot.digest), self.alignment, self.world
+        mode, acts, alignment, world = self._logged or (None,) * 4
+        self._logged = now
+        if now[0] != mode:
+            journal.event("mode", mode=intent.mode, notice=intent.notice, digest=intent.preview or intent.execute)
+        if now[1] != acts:
+            journal.event("robot", robot=robot)
+        if self.alignment != alignment:
+            journal.event("alignment", pose=self.alignment)
+            if self.alignment is not None:
+                journal.alignment(self.alignment)
+        if self.world is not world:
+            journal.event("world", world=self.world)
 
     @property
     def _rigid(self) -> int:
@@ -179,6 +242,7 @@ class Desk:
             self._asked, self.report, self.plan, self.preview = request.serial, None, None, None
             self.foreseen, self.pieces, self._shown = None, [], ""
             self._ordered = True
+            self.journal.event("request", request=request)
             self.planning.order(foreseer.Order(request, self.world, standing.joints, standing.commands))
         elif self._ordered and intent.mode in ("hold", "stopped", "aim", "execute"):
             self._ordered = False
@@ -197,6 +261,9 @@ class Desk:
         self._ran = self._ran or running.mode == "running"
         if self._ran and running.mode == "idle":
             self._fault = "it has come to rest by itself"
+        if self.blocked and not self._fault:
+            self._fault = self.blocked
+            self.robot.stop()
         if not self._fault:
             self.robot.permit()
 
@@ -206,7 +273,8 @@ class Desk:
         if self.plan is None or self.plan.digest() != intent.execute:
             self._fault = "the plan that was confirmed is not there"
             return
-        self._fault = self.robot.start(self.plan, intent.execute)
+        self._fault = self.blocked or self.robot.start(self.plan, intent.execute)
+        self.journal.event("execute", digest=intent.execute, refused=self._fault)
 
     def _believe(self, standing: Standing, executor: ExecutorReport) -> None:
         done = executor.mode == "done" and executor.digest != self._believed and self.plan is not None
@@ -244,9 +312,14 @@ class Desk:
         touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
         return talk.State(
-            intent.mode, intent.motion, intent.notice, words, round(intent.countdown, 2), intent.preview,
-            intent.execute, _rounded(intent.targets), robot.mode, robot.fault,
+            intent.mode, intent.motion, _joined(intent.notice, self.blocked), words, round(intent.countdown, 2),
+            intent.preview, intent.execute, _rounded(intent.targets), robot.mode, robot.fault,
         )  # fmt: skip
+
+
+def _joined(notice: str, blocked: str) -> str:
+    """One line of both."""
+    return notice if blocked in notice else f"{notice}; {blocked}".removeprefix("; ")
 
 
 def _rounded(targets: Targets | None) -> Targets | None:

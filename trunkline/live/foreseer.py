@@ -2,7 +2,7 @@
 
 One order at a time; a newer one ends the one before within a quarter of a simulated second. An order is answered by
 `Planned`, then, if there is a plan, `Begun`, pieces of the nominal twin's motion, each as soon as it is simulated, and
-`Told`, what the batch of futures says.
+`Told`, what the batch of futures says; once more where the assistant has an offer.
 """
 
 import itertools
@@ -18,15 +18,16 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from trunkline.errors import InputError
-from trunkline.foresight.foresight import Foreseen, Foresight, foresee
+from trunkline.foresight.foresight import Foreseen, Foresight
 from trunkline.foresight.package import Package, read_package
 from trunkline.foresight.settings import Previewing
 from trunkline.foresight.twin import at_rest, believed, compose_twin
 from trunkline.hybrid.futures import FRAME, Twin, Way
-from trunkline.hybrid.preview import WITHIN, Preview, nominal
+from trunkline.hybrid.preview import WITHIN, Preview, nominal, preview
 from trunkline.live import talk
 from trunkline.live.bodies import Poses
 from trunkline.panda.kinematics import mount_pose
+from trunkline.processes import end_with_parent
 from trunkline.teleop.config import Config
 from trunkline.teleop.messages import PlanReport, Request, Target, Targets, Thing, World
 from trunkline.teleop.plan import Plan
@@ -103,6 +104,7 @@ class Foreseer:
         self.planner, self.foresight, self.bodies = planner, foresight, bodies
         self.known, self.previewing = foresight.known, foresight.settings
         self._kept: tuple[tuple, Twin | None] = ((), None)
+        self._grasped: Foreseen | None = None  # the last grasp: of a thing that is held, the one that was run
 
     @classmethod
     def of(cls, package: Package, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> "Foreseer":
@@ -125,14 +127,18 @@ class Foreseer:
         digest = plan.digest()
         yield Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan)
         way, _ = self.foresight.way(plan, plan.phases[0][0]) if plan.phases else (_still(plan), 0.0)
-        thing = _beside(order)
-        twin = self._twin(order.world, thing, way.joints[0], way.commands[0])
+        held = _held(order)
+        if held is not None and self._grasped is not None:
+            twin = self.foresight.carrying(held, order.world, way, None, self._grasped)
+        else:
+            twin = self._twin(order.world, _beside(order), way.joints[0], way.commands[0])
         phases = tuple((name, plan.step * row) for name, row in plan.phases)
         step = twin.model.opt.timestep * max(round(FRAME / twin.model.opt.timestep), 1)
         yield Begun(serial, talk.Preview(digest, step, way.duration, step, phases))
         go_on()
         yield from self._shown(serial, twin, way, go_on)
-        yield Told(serial, self._told(order, plan, twin, way, digest, go_on))
+        for found in self._foreseen(order, plan, twin, way, go_on):
+            yield Told(serial, told(digest, found))
 
     def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> Twin:
         """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
@@ -159,17 +165,20 @@ class Foreseer:
         if held is not None:
             yield Shown(serial, held.first, held.time, held.poses, True)
 
-    def _told(
-        self, order: Order, plan: Plan, twin: Twin, way: Way, digest: str, go_on: Callable[[], None]
-    ) -> talk.Foreseen:
+    def _foreseen(
+        self, order: Order, plan: Plan, twin: Twin, way: Way, go_on: Callable[[], None]
+    ) -> Iterator[Foreseen]:
         targets, serial = order.request.targets, order.request.serial
-        thing = order.world.thing(targets.thing) if targets.thing else None
-        if thing is not None and thing.support != "held":
-            found = self.foresight.grasp(plan, targets, thing, order.world, None, serial, go_on)
+        thing, held = order.world.thing(targets.thing) if targets.thing else None, _held(order)
+        if thing is not None and held is None:
+            for found in self.foresight.grasp(plan, targets, thing, order.world, None, serial, go_on):
+                self._grasped = found
+                yield found
+        elif held is not None and self._grasped is not None:
+            yield self.foresight.bring(plan, targets, held, order.world, None, self._grasped, serial, go_on)
         else:
-            tried = foresee(twin, way, self.known.doubts, None, self.previewing.futures, serial, go_on)
-            found = Foreseen(tried, 0.0)
-        return told(digest, found)
+            tried = preview(twin, way, self.known.doubts, None, self.previewing.futures, serial, go_on=go_on)
+            yield Foreseen(tried, 0.0)
 
 
 def told(digest: str, found: Foreseen) -> talk.Foreseen:
@@ -191,25 +200,37 @@ def _beside(order: Order) -> Thing | None:
     return (meant or things or [None])[0]
 
 
+def _held(order: Order) -> Thing | None:
+    """The thing that is brought elsewhere, None where none is."""
+    name = order.request.targets.thing
+    thing = order.world.thing(name) if name else None
+    return thing if thing is not None and thing.support == "held" else None
+
+
 def _still(plan: Plan) -> Way:
     return Way(plan.step, plan.joints, plan.commands)
 
 
 class ForeseerProcess:
-    """The process, seen from the server. `heard` is called by a thread of its own with every answer, and with None if
-    the process has ended."""
+    """The process, seen from the server; another one where it has ended. `heard` is called by a thread of its own with
+    every answer, and with None once the process has ended."""
 
     def __init__(self, run: Callable, setup: tuple, heard: Callable[[Answer | None], None]) -> None:
-        context = multiprocessing.get_context("spawn")
-        self._answers, theirs = context.Pipe(duplex=False)
-        self._orders, self._newest = context.Queue(), context.RawValue("Q", 0)
-        self._process = context.Process(
-            target=run, args=(theirs, self._orders, self._newest, *setup), daemon=True, name="foreseer"
-        )
+        self._run, self._setup, self._heard = run, setup, heard
+        self._context = multiprocessing.get_context("spawn")
+        self._newest, self._closed, self._lock = self._context.RawValue("Q", 0), False, threading.Lock()
+        self.ready = threading.Event()
+        self._begin()
+        threading.Thread(target=self._listen, daemon=True).start()
+
+    def _begin(self) -> None:
+        """With a pipe and a queue of its own: those of one that was killed may be locked for ever."""
+        self._answers, theirs = self._context.Pipe(duplex=False)
+        self._orders = self._context.Queue()
+        given = theirs, self._orders, self._newest, *self._setup
+        self._process = self._context.Process(target=self._run, args=given, daemon=True, name="foreseer")
         self._process.start()
         theirs.close()
-        self.ready = threading.Event()
-        threading.Thread(target=self._listen, args=(heard,), daemon=True).start()
 
     @property
     def pid(self) -> int | None:
@@ -222,14 +243,18 @@ class ForeseerProcess:
 
     def order(self, order: Order) -> None:
         """It does not wait; the order before is left."""
-        self._newest.value += 1
-        self._orders.put((self._newest.value, order))
+        with self._lock:
+            self._newest.value += 1
+            self._orders.put((self._newest.value, order))
 
     def leave(self) -> None:
         """What was ordered is not wanted any more."""
-        self._newest.value += 1
+        with self._lock:
+            self._newest.value += 1
 
     def close(self) -> None:
+        with self._lock:
+            self._closed = True
         self._orders.cancel_join_thread()
         self._process.terminate()
         self._process.join(5.0)
@@ -237,17 +262,23 @@ class ForeseerProcess:
             self._process.kill()
             self._process.join()
 
-    def _listen(self, heard: Callable[[Answer | None], None]) -> None:
+    def _listen(self) -> None:
         while True:
             try:
                 answer = self._answers.recv()
                 if isinstance(answer, Ready):
                     self.ready.set()
                 else:
-                    heard(answer)
+                    self._heard(answer)
             except (EOFError, OSError):
-                heard(None)
-                return
+                self._heard(None)
+                with self._lock:
+                    if self._closed or not self.ready.is_set():  # one that never began would not begin again
+                        return
+                    self.ready.clear()
+                    self._orders.cancel_join_thread()
+                    self._process.join()
+                    self._begin()
 
 
 def run(answers, orders, newest, path: Path, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> None:
@@ -256,7 +287,7 @@ def run(answers, orders, newest, path: Path, config: Config, previewing: Preview
     with suppress(OSError):
         os.nice(NICE)
     threadpool_limits(1)  # matrices are small; threads that wait for each other cost more than they bring
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    end_with_parent()
     package = read_package(path)
     foreseer = Foreseer.of(package, config, previewing, bodies)
     warm(foreseer, package)
@@ -293,10 +324,3 @@ def serve(answers, orders, newest, foreseer: Foreseer) -> None:
             except (InputError, ArithmeticError, ValueError) as error:  # a plan without a preview is never confirmed
                 refused = f"preview: {type(error).__name__}: {error}".splitlines()[0]
                 answers.send(Planned(PlanReport(order.request.serial, refused=refused)))
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(1)

@@ -6,17 +6,22 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.elements import actuators
+from trunkline.foresight.believing import make_world
 from trunkline.foresight.package import Package, read_package
 from trunkline.foresight.twin import believed, compose_twin
 from trunkline.live import foreseer, simulated
-from trunkline.live.believing import make_world
 from trunkline.live.bodies import drawn
+from trunkline.live.book import Subject
 from trunkline.live.desk import Desk
 from trunkline.live.foreseer import ForeseerProcess
+from trunkline.live.hardware import Hardware
+from trunkline.live.journal import JournalProcess, new_path
 from trunkline.live.robot import RobotProcess
 from trunkline.live.scene import Shells, scene
 from trunkline.live.settings import Config
 from trunkline.live.simulated import Simulation
+from trunkline.panda.shipped import JOINTS
 from trunkline.teleop.config import Config as Teleop
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.messages import Box
@@ -39,14 +44,22 @@ class Made:
     shells: Shells | None
     robot: RobotProcess
     planning: ForeseerProcess
+    journal: JournalProcess
 
     def close(self) -> None:
         self.planning.close()
         self.robot.close()
+        self.journal.close()
 
 
-def make(path: Path, teleop: Teleop, config: Config, heard: Callable[[foreseer.Answer | None], None]) -> Made:
-    """Of the package at `path`, the robot simulated.
+def make(
+    path: Path,
+    teleop: Teleop,
+    config: Config,
+    heard: Callable[[foreseer.Answer | None], None],
+    hardware: Hardware | None = None,
+) -> Made:
+    """Of the package at `path`, the robot simulated, or as `hardware` has it.
 
     Args:
         heard: called with every answer of the process that plans, by a thread of its own.
@@ -59,14 +72,34 @@ def make(path: Path, teleop: Teleop, config: Config, heard: Callable[[foreseer.A
     simulation, maps = simulation_of(package, teleop, config, joints), unpacked.maps_of(package.files)
     drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
     world = make_world((_floor(config.floor),), () if config.thing is None else (config.thing,))
-    robot = RobotProcess(
-        simulated.run, (simulation,), len(package.straight), len(simulation.bodies), simulation.limits, package.digest
-    )
+    journal = JournalProcess(new_path(Path(config.journal.folder)), subject_of(simulation), config.journal.period)
+    robot = robot_of(simulation, hardware)
     setup = path.resolve(), teleop, config.preview, simulation.bodies
     planning = ForeseerProcess(foreseer.run, setup, heard)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    desk = Desk(core, robot, planning, world, teleop.handling.lift)
-    return Made(desk, package.digest, drawing, Shells.of(maps), robot, planning)
+    desk = Desk(core, robot, planning, world, teleop.handling.lift, journal)
+    desk.begin(config.rate)
+    return Made(desk, package.digest, drawing, Shells.of(maps), robot, planning, journal)
+
+
+def subject_of(simulation: Simulation) -> Subject:
+    """Whom a log is about: the simulated robot."""
+    model = simulation.twin.model
+    tendons = tuple(model.tendon(number).name for number in model.actuator_trnid[actuators(model), 0])
+    site = model.site("tip")
+    x, y, z = (float(value) for value in site.pos)
+    tip = model.body(site.bodyid[0]).name, (x, y, z)
+    return Subject(simulation.bodies, tuple(JOINTS), tendons, simulation.commands, tip)
+
+
+def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
+    """The simulated robot's process, or the real one's."""
+    if hardware is not None:
+        from trunkline.live.real import RealRobot  # with what hardware needs installed
+
+        return RealRobot(hardware, simulation)
+    tendons, bodies = len(simulation.commands), len(simulation.bodies)
+    return RobotProcess(simulated.run, (simulation,), tendons, bodies, simulation.limits, simulation.package)
 
 
 def simulation_of(package: Package, teleop: Teleop, config: Config, joints: np.ndarray) -> Simulation:

@@ -23,7 +23,7 @@ DEAD_MAN = 0.08  # s without a permit
 STALE = 0.15  # s without a sign of the robot's process
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
-TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before joints, commands, thing and bodies
+TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before axes, lengths, thing and bodies
 PERMIT, PERMITTED, STOPS, STOPPED = range(4)  # of what it is told
 POSE = 7
 
@@ -33,7 +33,7 @@ class Channel:
 
     def __init__(self, context: SpawnContext, tendons: int, bodies: int) -> None:
         self.tendons, self.bodies = tendons, bodies
-        self.size = 5 + JOINTS + tendons + POSE * (1 + bodies)
+        self.size = 5 + JOINTS + 2 * tendons + POSE * (1 + bodies)
         self._told, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
         self._asked, self._fault = context.RawArray(ctypes.c_double, 4), context.RawArray(ctypes.c_char, TEXT)
         self.plans, self.wake = context.Queue(), context.Semaphore(0)
@@ -64,7 +64,8 @@ class Standing:
     """What the robot does at `time`, s.
 
     `joints` (7,), rad, `commands` (K,), m, and poses of the `thing` (7,), NaN where there is none, and of the `bodies`
-    (N, 7). held: s at which it was last commanded to hold.
+    (N, 7). held: s at which it was last commanded to hold. lengths: of the cables (K,), m, as measured; None where
+    nothing measures them.
     """
 
     time: float
@@ -73,6 +74,7 @@ class Standing:
     commands: np.ndarray
     thing: np.ndarray
     bodies: np.ndarray
+    lengths: np.ndarray | None = None
 
 
 class RobotProcess:
@@ -102,8 +104,8 @@ class RobotProcess:
     def standing(self) -> Standing:
         """The newest."""
         numbers, k, n = self.channel.hear()[0], self.channel.tendons, self.channel.bodies
-        joints, commands, thing, bodies = np.split(numbers[5:], np.cumsum([JOINTS, k, POSE]))
-        return Standing(numbers[TIME], numbers[HELD], joints, commands, thing, bodies.reshape(n, POSE))
+        joints, commands, lengths, thing, bodies = np.split(numbers[5:], np.cumsum([JOINTS, k, k, POSE]))
+        return Standing(numbers[TIME], numbers[HELD], joints, commands, thing, bodies.reshape(n, POSE), lengths)
 
     def check(self, plan: Plan) -> str:
         now = self.standing()

@@ -19,12 +19,17 @@ from aiohttp import WSCloseCode, WSMsgType, web
 from trunkline.errors import InputError
 from trunkline.live import controllers, foreseer, talk, wire
 from trunkline.live.access import HEADERS, Origins, PairingCode, same
+from trunkline.live.aligner import Aligner
+from trunkline.live.aligning import mark_at
+from trunkline.live.anchors import Anchor, Anchors
 from trunkline.live.clock import EVERY, PINGS, ClientClock
+from trunkline.live.controllers import held
 from trunkline.live.desk import HERE, Desk
 from trunkline.live.lease import Control
 from trunkline.live.outbox import Outbox
 from trunkline.live.robot import STALE
 from trunkline.live.scene import Shells
+from trunkline.live.settings import Alignment
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.messages import Pose
 from trunkline.teleop.vectors import DOWN, conjugate, rotate
@@ -36,6 +41,7 @@ MOST_CLIENTS = 64
 HEARTBEAT = 20.0  # s
 STATES = 0.1  # s between states that tell no new mode
 PING_GAP = 0.03  # s
+TOUCHING = "right"  # the hand whose controller touches
 TURNED = np.cos(np.radians(1.0))  # of gravity in the soft base, from which on there is a new shell
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 ABSENT = b"<!doctype html><title>Trunkline</title><p>error: the page is not built: `client/` makes it</p>\n"
@@ -49,13 +55,23 @@ class Client:
     name: str
     space: str
     socket: web.WebSocketResponse
-    alignment: Pose | None
+    aligner: Aligner | None  # None for who is in the base frame
     outbox: Outbox = field(default_factory=Outbox)
     clock: ClientClock = field(default_factory=ClientClock)
     left: float = BURST
     counted: float = 0.0
     refused: dict[str, float] = field(default_factory=dict)
     stopping: bool = False
+
+    @property
+    def alignment(self) -> Pose | None:
+        """Of its reference frame in the base, None where that is not known."""
+        return HERE if self.aligner is None else self.aligner.alignment
+
+    @property
+    def unfit(self) -> str:
+        """Why its alignment is not good enough to execute anything."""
+        return "" if self.aligner is None else self.aligner.unfit
 
     def count(self, now: float) -> None:
         """One more message: `left` of its rate, below 0 beyond it."""
@@ -65,7 +81,8 @@ class Client:
 
 @dataclass(frozen=True)
 class House:
-    """What a server is made of. scene: as `scene.scene` has it. bodies: how many the robot tells of."""
+    """What a server is made of. scene: as `scene.scene` has it. alignment: how clients in a room are aligned, None
+    where there are none; anchors: what is known of their rooms."""
 
     desk: Desk
     token: str
@@ -76,6 +93,8 @@ class House:
     rate: float
     page: Path
     log: Callable[[str], None] = print
+    alignment: Alignment | None = None
+    anchors: Anchors | None = None
 
 
 class Server:
@@ -85,13 +104,14 @@ class Server:
         self.house, self.desk, self.now = house, house.desk, now
         self.control, self.code = Control(), PairingCode()
         self.clients: dict[str, Client] = {}
+        self._aligners: dict[str, Aligner] = {}  # of clients that may come again
         self.frames = 0
         self._scene = json.dumps(house.scene, separators=(",", ":")).encode()
         self._zipped = gzip.compress(self._scene)
         self._page = read_page(house.page)
         self._said: tuple[float, talk.State | None] = (0.0, None)
         self._world, self._down, self._shell, self._ticking = None, None, b"", None
-        self._shelled = 0
+        self._shelled, self._unwritten = 0, ""
 
     # --- routes
 
@@ -188,17 +208,39 @@ class Server:
         if older is not None:
             self._leave(older)
             asyncio.create_task(_end(older.socket, "connection: the same client came again"))
-        id = hello.id if older is not None else secrets.token_hex(4)
-        client = Client(id, hello.name, hello.space, socket, HERE if hello.space == "base" else None)
+        if hello.space == "room" and self.house.alignment is None:
+            raise InputError("space: found room, expected base: nothing is aligned here")
+        aligner = self._aligner(hello)
+        id = hello.id if older is not None or hello.id in self._aligners else secrets.token_hex(4)
+        client = Client(id, hello.name, hello.space, socket, aligner)
+        if aligner is not None:
+            self._aligners[id] = aligner
         client.counted = self.now()
         self.clients[id] = client
         self.house.log(f"{id} {hello.name!r} came, {len(self.clients)} here")
+        self.desk.journal.event("came", client=id, name=hello.name, space=hello.space)
         self._greet(client)
         return client
+
+    def _aligner(self, hello: talk.Hello) -> Aligner | None:
+        """Its own where it comes again to the same room: whose anchor has to be seen anew."""
+        kept = self._aligners.pop(hello.id, None)
+        if hello.space == "base" or self.house.alignment is None:
+            return None
+        if kept is not None:
+            kept.lose()
+            self._aligners[hello.id] = kept
+            return kept
+        anchors = self.house.anchors
+        while len(self._aligners) >= MOST_CLIENTS:
+            self._aligners.pop(next(iter(self._aligners)))
+        return Aligner(self.house.alignment, anchors.find(anchors.newest) if anchors is not None else None)
 
     def _greet(self, client: Client) -> None:
         desk, say = self.desk, client.outbox.say
         say(talk.tell(talk.Welcome(client.id, self.house.token, self.house.package, self.house.rate)))
+        if client.aligner is not None:
+            say(talk.tell(client.aligner.told()))
         say(talk.tell(talk.Around(desk.world)))
         if desk.intent is not None:
             say(talk.tell(desk.told(self.control.holder)))
@@ -230,6 +272,8 @@ class Server:
                 client.outbox.acknowledge(received.received)
                 if received.kind == "input" and client.left >= 0:
                     self._input(client, received, now)
+                elif received.kind == "view" and client.left >= 0:
+                    self._keep_view(client, received)
             elif client.left >= 0:
                 self._said_by(client, talk.hear(message.data), now)
             if client.left < 0:
@@ -239,11 +283,14 @@ class Server:
 
     def _heed(self, client: Client, received: wire.Received) -> None:
         """The stop, of everybody and always: a message of its own, or a secondary button."""
+        if received.kind not in ("stop", "input"):
+            return
         stops = received.kind == "stop" or controllers.stops(received)
         if stops:
             self.desk.stop()
             if received.kind == "stop" or not client.stopping:
                 self.house.log(f"{client.id} stopped the robot")
+                self.desk.journal.event("stopped", client=client.id)
         client.stopping = stops and received.kind == "input"
 
     def _input(self, client: Client, received: wire.Received, now: float) -> None:
@@ -255,15 +302,41 @@ class Server:
             self._refuse(client, reason)
         else:
             self.control.hear(client.id, now)
+            self._keep_hands(client, received)
+            self._touch(client, received)
+
+    def _keep_hands(self, client: Client, received: wire.Received) -> None:
+        assert client.clock.offset is not None
+        for name, hand in zip(wire.HANDS, received.hands, strict=True):
+            if {f"{name}_tracked", "visible"} <= received.flags:
+                at, pose = received.stamp + client.clock.offset, hand[: len(wire.POSE)]
+                self.desk.journal.headset(name, at, pose, client.space == "base")
+
+    def _keep_view(self, client: Client, received: wire.Received) -> None:
+        offset = client.clock.offset if client.id == self.control.holder else None
+        if offset is not None and "tracked" in received.flags and received.view is not None:
+            self.desk.journal.headset("view", received.stamp + offset, received.view, client.space == "base")
+
+    def _touch(self, client: Client, received: wire.Received) -> None:
+        """What the touching hand of whom controls tells of the base's place."""
+        aligner, settings = client.aligner, self.house.alignment
+        if aligner is None or settings is None or aligner.step in ("done", "lost", "place"):
+            return
+        rests = self.desk.robot.state().mode in ("idle", "done")
+        mark = mark_at(self.desk.robot.standing().joints, settings.mark) if rests else None
+        before = aligner.told()
+        aligner.hear(received.stamp, held(received, TOUCHING), mark)
+        self._aligned(client, before)
 
     def _said_by(self, client: Client, said: talk.Said, now: float) -> None:
         if isinstance(said, talk.Pong):
             if client.clock.pong(said.number, said.stamp, now):
                 assert client.clock.offset is not None
                 client.outbox.say(talk.tell(talk.Clock(client.clock.offset, client.clock.round_trip)))
+                self.desk.journal.event("clock", client=client.id, offset=client.clock.offset)
         elif isinstance(said, talk.LeaseWish):
             self._lease(client, said, now)
-        elif isinstance(said, talk.Alignment):
+        elif isinstance(said, talk.Alignment | talk.Touching | talk.Anchored):
             self._align(client, said)
         elif isinstance(said, talk.Shown):
             reason = "shown: you do not control" if client.id != self.control.holder else ""
@@ -272,13 +345,49 @@ class Server:
         else:
             self._refuse(client, "hello: was said before")
 
-    def _align(self, client: Client, said: talk.Alignment) -> None:
-        if client.space != "room":
+    def _align(self, client: Client, said: talk.Alignment | talk.Touching | talk.Anchored) -> None:
+        aligner, anchors, reason = client.aligner, self.house.anchors, ""
+        if aligner is None:
             self._refuse(client, "alignment: your poses are in the base frame")
             return
-        client.alignment = said.pose
+        before, anchor = aligner.told(), aligner.anchor
+        if isinstance(said, talk.Touching):
+            aligner.touch()
+        elif isinstance(said, talk.Anchored):
+            reason = aligner.anchored(said.id, said.pose, anchors.find(said.id) if anchors is not None else None)
+        elif said.pose is None:
+            aligner.reset()
+        else:
+            reason = aligner.by_eye(said.pose)
+        if reason:
+            self._refuse(client, reason)
+        if anchors is not None and aligner.anchor is not None and aligner.anchor != anchor:
+            self._keep_anchor(anchors, aligner.anchor)
+        self._aligned(client, before)
+
+    def _aligned(self, client: Client, before: talk.Aligning) -> None:
+        """The core, the client and the log hear what has changed."""
+        assert client.aligner is not None
+        now = client.aligner.told()
         if client.id == self.control.holder:
-            self.desk.alignment = said.pose
+            self.desk.align(client.alignment, client.unfit)
+        if now == before:
+            return
+        client.outbox.state("aligning", talk.tell(now))
+        if (now.step, now.said) != (before.step, before.said):
+            self.desk.journal.event("aligning", client=client.id, aligning=now)
+
+    def _keep_anchor(self, anchors: Anchors, anchor: Anchor) -> None:
+        """Known from now on, and in its file as soon as the disk has it."""
+        if anchors.find(anchor.id) == anchor:
+            return
+        anchors.keep(anchor)
+
+        def saved(done: asyncio.Future) -> None:
+            if error := done.exception():
+                self.house.log(f"{anchors.path}: {error}; the anchor is not kept")
+
+        asyncio.get_running_loop().run_in_executor(None, anchors.save).add_done_callback(saved)
 
     def _lease(self, client: Client, wish: talk.LeaseWish, now: float) -> None:
         before = self.control.holder
@@ -301,6 +410,7 @@ class Server:
         self.control.release(client.id, self.now())
         self._passed(before)
         self.house.log(f"{client.id} left, {len(self.clients)} here")
+        self.desk.journal.event("left", client=client.id)
         self._tell_lease()
 
     def _passed(self, before: str) -> None:
@@ -309,7 +419,9 @@ class Server:
         if holder == before:
             return
         self.house.log(f"{holder or 'nobody'} controls")
-        self.desk.control(self.clients[holder].alignment if holder in self.clients else None)
+        self.desk.journal.event("control", client=holder)
+        client = self.clients.get(holder)
+        self.desk.control(client.alignment if client else None, client.unfit if client else "")
 
     def _refuse(self, client: Client, reason: str) -> None:
         """One line to whom it concerns, the same no oftener than once a second."""
@@ -318,6 +430,7 @@ class Server:
             client.refused[kind] = now
             client.outbox.say(talk.tell(talk.Refusal(reason)))
             self.house.log(f"refused {client.id}: {reason}")
+            self.desk.journal.event("refused", client=client.id, reason=reason)
 
     async def _send(self, client: Client) -> None:
         socket, outbox = client.socket, client.outbox
@@ -368,6 +481,9 @@ class Server:
             self._passed(before)
             self._tell_lease()
         self.desk.tick(dt)
+        if self.desk.journal.fault != self._unwritten:
+            self._unwritten = self.desk.journal.fault
+            self.house.log(self._unwritten)
         self._show_robot(now)
         self._tell_state(now)
         if self.desk.world is not self._world:

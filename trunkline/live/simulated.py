@@ -10,6 +10,7 @@ import time
 from contextlib import suppress
 from dataclasses import dataclass
 from queue import Empty
+from typing import Protocol
 
 import mujoco
 import numpy as np
@@ -89,9 +90,9 @@ class Plant:
         self.batch.rollout(self.steps, control=controls)
 
     @property
-    def sound(self) -> bool:
-        """Whether MuJoCo has not warned."""
-        return not self.batch.warning.any()
+    def fault(self) -> str:
+        """That MuJoCo has warned, "" while it has not."""
+        return "the simulation is not sound" if self.batch.warning.any() else ""
 
     def poses(self) -> np.ndarray:
         """Of the bodies, (N, 7)."""
@@ -100,6 +101,10 @@ class Plant:
     def thing(self) -> np.ndarray:
         """Of what may be grasped, (7,); NaN where there is none."""
         return self._thing.of(self.batch.bind("qpos")[0])[0]
+
+    def lengths(self) -> np.ndarray:
+        """Of the cables as the last tick began, m (K,)."""
+        return self._data.ten_length[self.model.actuator_trnid[self._motors, 0]]
 
     def _sent(self, joints: np.ndarray) -> np.ndarray:
         """What the servos are sent so that they are at `joints`, bearing the arm as it hangs now. Shape (7,)."""
@@ -115,14 +120,23 @@ class Plant:
         return servo_commands(self.model, joints, data.qfrc_inverse[dofs]) + self._ratio * speed
 
 
-class Loop:
-    """Plans in, motion out; what the process does at each turn."""
+class Moved(Protocol):
+    """What a process moves, a tick at a time."""
 
-    def __init__(self, channel: Channel, simulation: Simulation, plant: Plant) -> None:
-        self.channel, self.plant = channel, plant
-        self.robot = SimulatedRobot(
-            simulation.joints, simulation.commands, simulation.limits, simulation.package, self._move
-        )
+    @property
+    def tick(self) -> float: ...
+    @property
+    def fault(self) -> str: ...
+    def poses(self) -> np.ndarray: ...
+    def thing(self) -> np.ndarray: ...
+    def lengths(self) -> np.ndarray: ...
+
+
+class Loop:
+    """Plans in, motion out; what the process does at each turn. `robot` moves the `plant`."""
+
+    def __init__(self, channel: Channel, robot: SimulatedRobot, plant: Moved) -> None:
+        self.channel, self.robot, self.plant = channel, robot, plant
         self.serial, self.fault, self.held = 0, "", 0.0
         self._stops = channel.asked[STOPS]
 
@@ -139,10 +153,11 @@ class Loop:
         self._begin()
 
     def advance(self) -> None:
-        """One tick of the simulation."""
+        """One tick."""
         self.robot.advance(self.plant.tick)
-        if not self.plant.sound and not self.fault:
-            self.fault = "the simulation is not sound"
+        if self.plant.fault and not self.fault:
+            self.fault, self.held = self.plant.fault, time.monotonic()
+            self.robot.stop()
 
     def tell(self, now: float) -> None:
         """All that the server shall know."""
@@ -150,7 +165,8 @@ class Loop:
         mode = "fault" if self.fault else state.mode
         head = [now, MODES.index(mode), self.serial, self.held, 1.0]
         poses = [self.plant.thing(), self.plant.poses().ravel()]
-        self.channel.tell(np.concatenate([head, self.robot.joints, self.robot.commands, *poses]), self.fault)
+        axes = [self.robot.joints, self.robot.commands, self.plant.lengths()]
+        self.channel.tell(np.concatenate([head, *axes, *poses]), self.fault)
 
     def _begin(self) -> None:
         try:
@@ -160,11 +176,22 @@ class Loop:
         assert isinstance(plan, Plan)
         self.serial = serial
         overtaken = "a stop came before it began" if stops != self.channel.asked[STOPS] else ""
-        sick = "" if self.plant.sound else "the simulation is not sound"
-        self.fault = overtaken or sick or self.robot.start(plan, digest)
+        self.fault = overtaken or self.plant.fault or self.robot.start(plan, digest)
 
-    def _move(self, joints: np.ndarray, commands: np.ndarray, dt: float) -> None:
-        self.plant.move(joints, commands)
+
+def drive(loop: Loop, parent: int) -> None:
+    """Turn by turn, in real time, until the process `parent` is gone."""
+    due = time.monotonic()
+    while os.getppid() == parent:
+        loop.channel.wake.acquire(timeout=max(due - time.monotonic(), 0.0))
+        now = time.monotonic()
+        loop.turn(now)
+        if now >= due:
+            loop.advance()
+            due += loop.plant.tick
+            if now - due > BEHIND:
+                due = now
+        loop.tell(time.monotonic())
 
 
 def run(channel: Channel, simulation: Simulation) -> None:
@@ -174,15 +201,9 @@ def run(channel: Channel, simulation: Simulation) -> None:
         os.nice(NICE)
     threadpool_limits(1)
     parent = os.getppid()
-    loop = Loop(channel, simulation, Plant(simulation))
-    due = time.monotonic()
-    while os.getppid() == parent:
-        channel.wake.acquire(timeout=max(due - time.monotonic(), 0.0))
-        now = time.monotonic()
-        loop.turn(now)
-        if now >= due:
-            loop.advance()
-            due += loop.plant.tick
-            if now - due > BEHIND:
-                due = now
-        loop.tell(time.monotonic())
+    plant = Plant(simulation)
+    robot = SimulatedRobot(
+        simulation.joints, simulation.commands, simulation.limits, simulation.package,
+        lambda joints, commands, _: plant.move(joints, commands),
+    )  # fmt: skip
+    drive(Loop(channel, robot, plant), parent)

@@ -33,8 +33,8 @@ class Hello:
     """First of all, within 3 s: the `version` of this protocol, and `token` or `code`, one of them.
 
     id: of a connection before, to be the same client again; "" for a new one. space: "base" for poses in the rigid base
-    frame, "room" for poses in a frame that stands still, y up, as WebXR's `local-floor`, whose place an `alignment`
-    tells.
+    frame, "room" for poses in a frame that stands still, y up, as WebXR's `local-floor`, which has to be aligned
+    (`aligning`).
     """
 
     __pydantic_config__ = STRICT
@@ -69,12 +69,31 @@ class LeaseWish:
 
 @dataclass(frozen=True)
 class Alignment:
-    """Of a client in the "room": pose of its reference frame in the base frame, p_base = t + R p_reference. `pose`
-    null: lost, and the robot holds. Only of whom controls."""
+    """Of a client in the "room": the base stands at `pose` of its reference frame as the user sees it, which is for a
+    simulated robot alone. `pose` null: its reference frame has leapt, and where the base is is not known any more."""
 
     __pydantic_config__ = STRICT
     pose: Pose | None
     type: Literal["alignment"] = "alignment"
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Of a client in the "room": align by touches, from the beginning. What is touched is seen in its `input`."""
+
+    __pydantic_config__ = STRICT
+    type: Literal["touch"] = "touch"
+
+
+@dataclass(frozen=True)
+class Anchored:
+    """Of a client in the "room": its anchor `id` is at `pose` of its reference frame; null: it is lost, or that frame
+    has leapt, and the robot holds until it is back."""
+
+    __pydantic_config__ = STRICT
+    id: Annotated[str, Field(max_length=LONGEST)]
+    pose: Pose | None
+    type: Literal["anchor"] = "anchor"
 
 
 @dataclass(frozen=True)
@@ -87,7 +106,7 @@ class Shown:
     type: Literal["shown"] = "shown"
 
 
-Said = Hello | Pong | LeaseWish | Alignment | Shown
+Said = Hello | Pong | LeaseWish | Alignment | Touching | Anchored | Shown
 
 
 # --- from the server
@@ -148,6 +167,30 @@ class Lease:
     asking: tuple[str, ...] = ()
     clients: tuple[Person, ...] = ()
     type: Literal["lease"] = "lease"
+
+
+AligningStep = Literal["place", "tip", "touch", "check", "lost", "done"]
+
+
+@dataclass(frozen=True)
+class Aligning:
+    """To a client in the "room", how far its alignment is: the `step`, what is to be done `next` and what was `said` of
+    the last, in words.
+
+    place: pose of the base in the client's reference frame, null where it is not known yet. expected: error of it where
+    the arm works, or of the one touch, m; residual: of the touches, rms, m; null where nothing tells. anchor: id of the
+    one to be restored, or that is followed; "" for none. fasten: an anchor shall be fastened at `place`, and told.
+    """
+
+    step: AligningStep
+    next: str
+    said: str
+    place: Pose | None
+    expected: float | None
+    residual: float | None
+    anchor: str
+    fasten: bool
+    type: Literal["aligning"] = "aligning"
 
 
 @dataclass(frozen=True)
@@ -216,10 +259,10 @@ class Around:
     type: Literal["world"] = "world"
 
 
-Answer = Welcome | Refusal | Ping | Clock | Lease | State | Preview | Foreseen | Around
+Answer = Welcome | Refusal | Ping | Clock | Lease | Aligning | State | Preview | Foreseen | Around
 
-SAID: tuple[type, ...] = (Hello, Pong, LeaseWish, Alignment, Shown)
-ANSWERS: tuple[type, ...] = (Welcome, Refusal, Ping, Clock, Lease, State, Preview, Foreseen, Around)
+SAID: tuple[type, ...] = (Hello, Pong, LeaseWish, Alignment, Touching, Anchored, Shown)
+ANSWERS: tuple[type, ...] = (Welcome, Refusal, Ping, Clock, Lease, Aligning, State, Preview, Foreseen, Around)
 
 _SAID: TypeAdapter[Said] = TypeAdapter(Annotated[Said, Field(discriminator="type")])
 _ANSWERS = {kind: TypeAdapter(kind) for kind in ANSWERS}

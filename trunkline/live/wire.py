@@ -57,6 +57,10 @@ FROM_CLIENT = {
         16, HAND, ("left_tracked", "right_tracked", "visible"), "2: the left, then the right hand",
         "binary messages received so far, on this connection", "s of the client's clock at which the poses were so",
     ),
+    "view": Kind(
+        19, POSE, ("tracked",), "1: the viewer's eyes, in the client's reference frame",
+        "binary messages received so far, on this connection", "s of the client's clock at which they were there",
+    ),
     "ack": Kind(17, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"),
     "stop": Kind(18, (), (), "0", "binary messages received so far, on this connection", "s of the client's clock"),
 }  # fmt: skip
@@ -65,19 +69,21 @@ _CODES = {"u8": "B", "u16": "H", "u32": "I", "f64": "d"}
 _HEAD = struct.Struct("<" + "".join(_CODES[kind] for _, kind in HEAD))
 HEAD_BYTES = _HEAD.size
 INPUT_BYTES = HEAD_BYTES + 4 * len(HAND) * len(HANDS)
+ROWS = {"input": len(HANDS), "view": 1}
 BY_NUMBER = {kind.number: name for name, kind in FROM_CLIENT.items()}
 
 
 @dataclass(frozen=True)
 class Received:
     """A client's binary message: `kind` of FROM_CLIENT, its `flags` that are set, `received` by the client so far,
-    `stamp` s of its clock, and `hands` (2, 14), float64, of an input, else (0, 14)."""
+    `stamp` s of its clock, and `hands` (2, 14), float64, of an input, else (0, 14), or the `view` (7,) of one."""
 
     kind: str
     flags: frozenset[str]
     received: int
     stamp: float
     hands: np.ndarray
+    view: np.ndarray | None = None
 
 
 def frame(kind: str, flags: set[str], count: int, sequence: int, time: float, rows: np.ndarray) -> bytes:
@@ -103,12 +109,14 @@ def read(message: bytes) -> Received:
     if number not in BY_NUMBER:
         raise InputError(f"message: found type {number}, expected one of {', '.join(map(str, BY_NUMBER))}")
     name = BY_NUMBER[number]
-    kind, rows = FROM_CLIENT[name], len(HANDS) if name == "input" else 0
+    kind, rows = FROM_CLIENT[name], ROWS.get(name, 0)
     size = HEAD_BYTES + 4 * rows * len(kind.row)
     if count != rows or len(message) != size:
         raise InputError(f"{name}: found {count} rows in {len(message)} bytes, expected {rows} in {size}")
     if bits >> len(kind.flags):
         raise InputError(f"{name}: found flags {bits:#x}, expected {len(kind.flags)} bits")
     flags = frozenset(flag for bit, flag in enumerate(kind.flags) if bits >> bit & 1)
-    hands = np.frombuffer(message, "<f4", offset=HEAD_BYTES).astype(float).reshape(-1, len(HAND))
-    return Received(name, flags, received, stamp, hands)
+    numbers = np.frombuffer(message, "<f4", offset=HEAD_BYTES).astype(float)
+    if name == "view":
+        return Received(name, flags, received, stamp, np.empty((0, len(HAND))), numbers)
+    return Received(name, flags, received, stamp, numbers.reshape(-1, len(HAND)))

@@ -1,6 +1,7 @@
 """What a log holds, before anybody says what it is: topics, rates, bodies, gaps."""
 
-from dataclasses import dataclass, field
+import re
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from trunkline.logs.messages import JOINTS, POSES
 from trunkline.logs.pose_stream import PoseStream, pose_stream
 from trunkline.sessions.source import COMMAND_WORDS, POSITION_WORDS, choose, pose_topics, static_topics
 
+LIVE = "/core/input"  # a topic of a live session alone
+OTHERS = re.compile(r"/headset/|/joint_states$")  # topics of a live session that tell of people and the rigid robot
 GAP = 1.5  # median intervals between frames that make a gap
 
 
@@ -37,15 +40,16 @@ def survey(path: Path) -> Survey:
         InputError: it cannot be read at all.
     """
     found = Survey(read_log(path, POSES.keys() | JOINTS.keys()))
+    arms = _of_the_arm(found.log)
     try:
-        found.pose_topics = pose_topics(found.log, None)
+        found.pose_topics = pose_topics(arms, None)
         if found.pose_topics:
             found.poses = pose_stream(found.pose_topics, statics=static_topics(found.log))
     except (InputError, ValueError) as error:
         found.notes.append(f"poses: {error}")
     for role, words in (("command", COMMAND_WORDS), ("position", POSITION_WORDS)):
         try:
-            topic = choose(found.log, None, JOINTS, role, words)
+            topic = choose(arms, None, JOINTS, role, words)
             if topic is not None:
                 stream = joint_stream(topic)
                 setattr(found, f"{role}_topic", topic.name)
@@ -53,6 +57,13 @@ def survey(path: Path) -> Survey:
         except (InputError, ValueError) as error:
             found.notes.append(f"{role}: {error}")
     return found
+
+
+def _of_the_arm(log: Log) -> Log:
+    """A live session's log (docs/live_log.md) without the topics that are not the arm's; any other as it is."""
+    if LIVE not in log.topics:
+        return log
+    return replace(log, topics={name: topic for name, topic in log.topics.items() if not OTHERS.match(name)})
 
 
 def describe(found: Survey) -> list[str]:

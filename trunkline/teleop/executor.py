@@ -94,7 +94,7 @@ class SimulatedRobot:
         if self._plan is not None and self._report.mode == "running":
             before = self._pace
             if self._braking:
-                self._pace = max(before - dt / BRAKE, 0.0)
+                self._pace = max(before - self._slowed(dt), 0.0)
             self._time += dt * (before + self._pace) / 2
             self.joints, self.commands = self._plan.at(self._time)
             if self._braking and self._pace == 0.0:
@@ -103,3 +103,7 @@ class SimulatedRobot:
                 self._report = ExecutorReport("done", self._report.digest)
         if self._move is not None:
             self._move(self.joints, self.commands, dt)
+
+    def _slowed(self, dt: float) -> float:
+        """By how much a stop slows the pace in `dt` s."""
+        return dt / BRAKE

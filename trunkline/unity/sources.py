@@ -19,14 +19,13 @@ def read_sources(root: Path) -> Sources:
         InputError: a file is missing.
     """
     artifacts = root / "artifacts"
-    identified = {stage: existing(artifacts / stage / "parameters.json").read_text() for stage in IDENTIFIED}
     meshes = sorted((artifacts / "reachability/meshes").glob("*.obj"))
     if not meshes:
         found = f"{artifacts}/reachability/meshes: found no mesh"
         raise InputError(f"{found}, expected .obj files (run the reachability stage)")
     return Sources(
         mjcf=existing(artifacts / "identify_control/arm.xml").read_text(),
-        parameters={stage: json.loads(text) for stage, text in identified.items()},
+        parameters={s: json.loads(existing(artifacts / s / "parameters.json").read_text()) for s in IDENTIFIED},
         network=existing(artifacts / "train_ik/ik.onnx"),
         meshes=meshes,
         grids=existing(artifacts / "reachability/grids.npz"),

@@ -1,0 +1,112 @@
+"""Foresight against what happened, from a log whose truth is known."""
+
+import numpy as np
+import pytest
+
+from tests.live.test_journal import NAMES, SUBJECT, ZERO
+from tests.support.operator import Operator
+from tests.teleop.test_plan import START, STRAIGHT
+from trunkline.foresight.believing import make_world
+from trunkline.live import talk
+from trunkline.live.book import Book
+from trunkline.live.hindsight import executions, lines, main
+from trunkline.live.journal import Journal
+from trunkline.live.logbook import read_logbook
+from trunkline.teleop.messages import ExecutorReport, Intent, Thing
+
+DIGEST, BEGIN, DELAY, OFF, LASTS, STEP = "d" * 64, 100.0, 0.04, 0.002, 2.0, 0.02
+CUP = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.2))
+
+
+def place(time):
+    """Of the arm's last body, (T, 7): turned by half a turn about x, so that its tip is above it."""
+    along = np.clip(np.asarray(time, float), 0.0, LASTS)
+    zero = np.zeros_like(along)
+    path = [0.5 + 0.2 * np.sin(along), 0.1 * along, 0.3 + zero, zero, zero + 1.0, zero, zero]
+    return np.stack(path, axis=-1)
+
+
+class Clocked(Journal):
+    def __init__(self, file):
+        self.time = 99.0
+        super().__init__(SUBJECT, lambda: self.time)
+        self.book = Book(file, SUBJECT, ZERO)
+
+    def keep(self, record):
+        self.book.write(record)
+
+
+def recorded(path, probability=0.8, held=True, end=None, spread=0.01):
+    """A log of one execution; `end`: s after which it was stopped."""
+    with open(path, "wb") as file:
+        journal, operator = Clocked(file), Operator()
+        journal.event("begin", package="p", tip={"body": SUBJECT.tip[0], "place": SUBJECT.tip[1]})
+        journal.event("world", world=make_world((), (CUP,)))
+        preview = talk.Preview(DIGEST, STEP, LASTS, STEP, (("approach", 0.0),))
+        journal.event("preview", preview=preview)
+        times = np.arange(1, round(LASTS / STEP) + 1) * STEP
+        for first in range(0, len(times), 20):
+            piece = place(times[first : first + 20])
+            journal.piece(first, float(times[first]), np.stack([piece] * len(NAMES), axis=1))
+        tip = place(times[-1])[:3] + [0.0, 0.0, 0.1]
+        journal.event("foreseen", foreseen=talk.Foreseen(
+            DIGEST, probability, 0.6, 0.9, (LASTS,), (tuple(tip),), (spread,), 0.9, 12))  # fmt: skip
+        journal.time = BEGIN
+        journal.event("execute", digest=DIGEST, refused="")
+        journal.event("robot", robot=ExecutorReport("running", DIGEST))
+        for time in np.arange(0.0, LASTS + 0.5, 1 / 72):
+            journal.time = BEGIN + time
+            if end is not None and time >= end:
+                journal.event("robot", robot=ExecutorReport("idle", DIGEST))
+                break
+            poses = np.stack([place(time - DELAY)] * len(NAMES)) + [0.0, 0.0, OFF, 0.0, 0.0, 0.0, 0.0]
+            journal.standing(journal.time, START, STRAIGHT, None, poses)
+            intent: Intent = operator.step()
+            journal.step(1 / 60, operator.given, intent)
+        if end is None:
+            journal.event("robot", robot=ExecutorReport("done", DIGEST))
+            if held:
+                thing = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.4), support="held")
+                journal.event("world", world=make_world((), (thing,)))
+        journal.book.finish()
+    return path
+
+
+def test_the_tip_is_compared_with_the_preview_whenever_the_robot_began(tmp_path):
+    (found,) = executions(read_logbook(recorded(tmp_path / "run.mcap")))
+    assert found.delay == pytest.approx(DELAY, abs=2e-3)
+    assert found.median == pytest.approx(OFF, abs=2e-4)
+    assert found.worst == pytest.approx(OFF, abs=5e-4)
+    assert found.seconds == pytest.approx(LASTS - STEP, abs=0.05)
+    assert (found.end, found.within, found.probability, found.held) == ("done", True, 0.8, True)
+    assert found.time == pytest.approx(1.0)
+
+
+def test_what_did_not_come_about_counts_against_what_was_foreseen(tmp_path):
+    found = [next(executions(read_logbook(recorded(tmp_path / f"{n}.mcap", 0.8, n > 0, spread=1e-3)))) for n in (0, 1)]
+    assert [one.held for one in found] == [False, True]
+    assert [one.within for one in found] == [False, False]  # the tip is 2 mm off, foreseen within 1
+    assert lines(found)[-1] == (
+        "2 executed; 0 of 2 tips ended within the spread; outcome as foreseen in 1 of 2, Brier score 0.340"
+    )
+
+
+def test_of_a_plan_that_was_stopped_its_part_is_compared_and_no_outcome(tmp_path, capsys):
+    path = recorded(tmp_path / "run.mcap", end=1.0)
+    (found,) = executions(read_logbook(path))
+    assert (found.end, found.within, found.held) == ("held", None, None)
+    assert found.seconds == pytest.approx(1.0 - DELAY - STEP, abs=0.05)
+    assert found.median == pytest.approx(OFF, abs=2e-4)
+    assert main([str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "tip 2.0 mm, at most 2.0 mm from the preview over 0.9 s, 40 ms later" in said
+    assert "grasp foreseen at 0.80, not tried to its end" in said
+
+
+def test_where_nothing_was_executed_nothing_is_said(tmp_path):
+    path = recorded(tmp_path / "run.mcap")
+    book = read_logbook(path)
+    refused = [event | {"refused": "busy"} if event["event"] == "execute" else event for event in book.events]
+    book.events[:] = refused
+    assert list(executions(book)) == []
+    assert lines([]) == ["0 executed"]

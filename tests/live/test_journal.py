@@ -1,0 +1,395 @@
+"""The log of a live session: the core goes through it again to the same bytes, `ingest` sees the arm in it, and neither
+a killed process nor a full disk moves a robot or loses more than a second."""
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from itertools import count, groupby
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from tests.live.test_session import asked, executing, grips
+from tests.support.disks import filling, full, stuck
+from tests.support.live import BODIES, RATE, controlling, hand, laid
+from tests.support.operator import PACKAGE, Everywhere, Operator, config
+from tests.support.sessions import motion_truth
+from tests.support.workbench import ROOT
+from tests.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
+from trunkline.errors import InputError
+from trunkline.live import replay
+from trunkline.live.book import EVENTS, POSES, Book, Subject
+from trunkline.live.journal import Journal, JournalProcess, new_path
+from trunkline.live.logbook import read_logbook
+from trunkline.live.wire import HANDS
+from trunkline.logs.log import read_log
+from trunkline.preparation.inspect import main as inspect
+from trunkline.sessions.session import read_session
+from trunkline.takes.checks import Limits
+from trunkline.takes.intake import take_in
+from trunkline.teleop.core import Teleoperation
+from trunkline.teleop.messages import Input, Pose, from_json, to_json
+
+NAMES = ("link_7", "base", "unit_01")
+JOINTS = tuple(f"joint_{n}" for n in range(1, 8))
+SUBJECT = Subject(NAMES, JOINTS, ("tendon_1", "tendon_2", "tendon_3"), STRAIGHT, ("unit_01", (0.0, 0.0, -0.1)))
+ZERO = 1_700_000_000 * 10**9
+PERIOD = 0.2
+
+
+class Written(Journal):
+    """One that writes here and now; `time` is its clock where it is set."""
+
+    def __init__(self, path, subject=SUBJECT):
+        super().__init__(subject, lambda: time.monotonic() if self.time is None else self.time)
+        self.time = None
+        self.file = open(path, "wb")  # noqa: SIM115
+        self.book = Book(self.file, subject, ZERO)
+
+    def keep(self, record):
+        self.book.write(record)
+
+    def close(self):
+        self.book.finish()
+        self.file.close()
+
+
+def patient():
+    """Settings for a machine that does other work as well."""
+    core = config().core
+    return replace(core, safety=replace(core.safety, silence=5.0, plan_wait=30.0, start_wait=30.0))
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """Of a session in which a plan was executed to its end, another stopped, and its client went."""
+    path = tmp_path_factory.mktemp("logs") / "run.mcap"
+    journal = Written(path)
+
+    async def session():
+        async with laid(journal=journal, settings=patient()) as here:
+            guest = await controlling(here)
+            await executing(here, guest)
+            await guest.hears("state", 60.0, mode="aim", robot="done")
+            guest.left, guest.right = grips(MOUNT, stick_y=float("nan")), hand(MOUNT)
+            await guest.hears("state", mode="hold")
+            guest.left, guest.right = hand(MOUNT), hand(TIP)
+            await guest.say(type="shown", digest="x")
+            await guest.stop()
+            await guest.hears("state", mode="stopped")
+            guest.sending.cancel()
+            await guest.socket.close()
+            await asyncio.sleep(0.1)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("trunkline.live.lease.SILENCE", 60.0)
+        asyncio.run(session())
+    journal.close()
+    return path
+
+
+def core(**changes):
+    return Teleoperation(replace(patient(), **changes), Everywhere(), PACKAGE, OFFSET)
+
+
+def test_the_core_goes_through_a_log_again_to_the_same_bytes(log):
+    logbook = read_logbook(log)
+    assert logbook.damage == []
+    assert len(logbook.steps) > RATE
+    found = replay.core_of(logbook, PACKAGE, Everywhere())
+    assert found.settings == patient()
+    assert replay.replay(logbook.steps, found) is None
+
+
+def test_the_first_difference_is_named_by_time_and_field(log):
+    steps = read_logbook(log).steps
+    aiming = next(n for n, step in enumerate(steps) if b'"mode":"aim"' in step.intent and b'"targets":{' in step.intent)
+    given = from_json(Input, steps[aiming].given)
+    (x, y, z), turn = given.left.position, given.left
+    moved = replace(given, left=replace(turn, position=(x + 1e-9, y, z)))
+    other = [*steps[:aiming], steps[aiming]._replace(given=to_json(moved)), *steps[aiming + 1 :]]
+    found = replay.replay(other, core())
+    assert (found.number, found.time) == (aiming + 1, steps[aiming].time)
+    assert found.field.startswith("targets.rigid.position")
+    assert f"step {aiming + 1} at {found.time:.3f} s" in str(found)
+    found = replay.replay(steps, core(delay=0.25))
+    assert (found.field, found.found, found.expected) == ("countdown", 0.25, 0.5)
+
+
+def test_a_log_of_another_package_or_of_no_session_is_refused_by_name(log, tmp_path):
+    with pytest.raises(InputError, match="package: found digest bbbbbbbbbbbb, expected aaaaaaaaaaaa"):
+        replay.core_of(read_logbook(log), "b" * 64, Everywhere())
+    path = tmp_path / "empty.mcap"
+    Written(path).close()
+    with pytest.raises(InputError, match="found no step of the core"):
+        read_logbook(path)
+
+
+def test_ingest_sees_the_arm_whole_and_takes_no_hand_for_it(log, capsys):
+    assert inspect([str(log)]) == 0
+    said, proposed = capsys.readouterr().out.split("Proposed session.yaml:\n")
+    for name in NAMES:
+        assert f"    {name:7}  seen in 100.0 %" in said
+    assert f"frames of {BODIES} bodies, with orientations; " in said
+    assert " 0 messages unreadable" in said
+    assert f"/headset/{HANDS[0]}" in said
+    assert "topics: {poses: /tf, commands: /tendons/command}" in proposed  # this robot measures no lengths
+    assert "base: base" in proposed
+
+
+def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, capsys):
+    truth = motion_truth()
+    bodies = ("link_7", "base", *truth.segments)
+    journal = Written(tmp_path / "run.mcap", Subject(bodies, JOINTS, truth.tendons, STRAIGHT, ("unit_08", (0, 0, 0))))
+    base = np.append(truth.base_position, truth.base_quaternion)
+    intent = (operator := Operator()).step()
+    for row in range(0, len(truth.time), 4):
+        at = journal.time = float(truth.time[row])
+        arm = np.concatenate([truth.positions[row], truth.quaternions[row]], axis=1)
+        pull, wound = truth.commands[row // 5], truth.tendon_positions[row]
+        journal.standing(at, START + 0.1 * np.sin(at), STRAIGHT - pull, STRAIGHT - wound, np.stack([base, base, *arm]))
+        for part in ("left", "right", "view"):
+            journal.headset(part, at, base, False)
+        journal.step(1 / 120, operator.given, intent)
+    journal.close()
+    assert inspect([str(tmp_path)]) == 0
+    (tmp_path / "session.yaml").write_text(capsys.readouterr().out.split("Proposed session.yaml:\n")[1])
+    session = read_session(tmp_path)
+    session.segments = {name: name for name in truth.segments}  # the Panda's links are left out
+    ((_, take, _),) = take_in(tmp_path, session, Limits(0.2, 0.3, 0.1, 1.0))
+    assert (take.segments, take.tendons) == (truth.segments, truth.tendons), take
+    moves = take.time > 0.5  # poses that repeat themselves to the last bit are taken for frozen ones
+    np.testing.assert_allclose(take.positions[moves], truth.positions[::4][moves], atol=1e-9)
+    there = np.isfinite(take.base_positions).all(axis=1)
+    np.testing.assert_allclose(take.base_positions[there], [truth.base_position] * there.sum(), atol=1e-9)
+    np.testing.assert_allclose(take.tendon_positions, truth.tendon_positions[::4], atol=1e-12)
+    assert take.commands.max() == pytest.approx(truth.commands.max(), rel=1e-3)
+
+
+def test_events_tell_who_controlled_what_was_planned_and_how_it_ended(log):
+    events = read_logbook(log).events
+    kinds = [event["event"] for event in events]
+    for kind in ("begin", "came", "clock", "control", "request", "planned", "preview", "piece", "foreseen", "shown",
+                 "execute", "refused", "stop", "stopped", "left", "alignment", "world"):  # fmt: skip
+        assert kind in kinds, kind
+    modes = [mode for mode, _ in groupby(event["mode"] for event in events if event["event"] == "mode")]
+    assert modes[:8] == ["hold", "aim", "plan", "preview", "ready", "delay", "execute", "aim"]
+    assert modes[-1] == "stopped"
+    digests = {e["digest"] for e in events if e["event"] in ("shown", "execute")}
+    assert digests == {e["preview"]["digest"] for e in events if e["event"] == "preview"}
+    assert [e["robot"]["mode"] for e in events if e["event"] == "robot"] == ["idle", "running", "done"]
+
+
+def test_others_read_it_as_ros_2(log):
+    with open(log, "rb") as file:
+        found = {}
+        for _, channel, message, ros in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            found.setdefault(channel.topic, []).append((message, ros))
+    _, first = found[POSES][0]
+    assert [one.child_frame_id for one in first.transforms] == list(NAMES)
+    assert first.transforms[0].header.frame_id == "rigid_base"
+    assert first.transforms[0].transform.translation.z == 3.0
+    _, fixed = found["/tf_static"][0]
+    assert (fixed.transforms[0].header.frame_id, fixed.transforms[0].child_frame_id) == ("rigid_base", "reference")
+    message, joints = found["/joint_states"][0]
+    np.testing.assert_allclose(joints.position, START)
+    assert message.log_time // 10**9 >= ZERO // 10**9
+    pulls = np.array([ros.position for _, ros in found["/tendons/command"]])
+    np.testing.assert_allclose(pulls[0], 0.0, atol=1e-12)
+    assert pulls.max() > 0.01  # a cable that is wound in is a pull of more than 0
+    _, held = found["/headset/left"][0]
+    assert held.header.frame_id == "rigid_base"  # hands of a browser
+    assert found[EVENTS][0][1].data.startswith('{"event":"begin"')
+
+
+def test_poses_that_are_no_newer_are_not_told_twice_and_what_is_not_there_is_left_out(tmp_path):
+    journal = Written(tmp_path / "run.mcap")
+    poses = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
+    poses[0] = np.nan
+    for at in (1.0, 1.0, 0.9, 1.1):
+        journal.standing(at, START, STRAIGHT, None, poses)
+    operator = Operator()
+    journal.step(0.1, operator.given, operator.step())
+    journal.close()
+    found = read_logbook(tmp_path / "run.mcap").poses
+    assert found.names == NAMES[1:]
+    np.testing.assert_allclose(1e-9 * (found.stamps - ZERO), [1.0, 1.1], atol=1e-6)
+
+
+# --- the process
+
+
+def fed(journal, seconds, pace=0.01):
+    """Times at which something was told, of the journal's clock."""
+    told, end = [], time.monotonic() + seconds
+    while time.monotonic() < end:
+        told.append(time.monotonic())
+        journal.event("tick", number=len(told))
+        time.sleep(pace)
+    return told
+
+
+def ticks(path):
+    """What is in the file, whatever has become of it: numbers, and what is damaged."""
+    found = read_log(path)
+    texts = found.topics[EVENTS].messages if EVENTS in found.topics else []
+    return [int(text.partition(b'"number":')[2].rstrip(b"}\0")) for text in texts], found.damage
+
+
+def until(happens, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not happens():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.01)
+
+
+def test_a_process_that_is_killed_loses_less_than_a_second_and_says_so(tmp_path):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, PERIOD)
+    journal.event("tick", number=0)
+    until(lambda: path.exists() and path.stat().st_size > 500)
+    told = fed(journal, 1.5)
+    killed = time.monotonic()
+    os.kill(journal.pid, signal.SIGKILL)
+    journal.event("tick", number=-1)
+    until(lambda: (journal.event("tick", number=-1), journal.fault)[1])
+    assert journal.fault == "log: run.mcap: its process has ended; nothing is executed"
+    numbers, damage = ticks(path)
+    assert numbers == list(range(len(numbers)))  # none is missing in between
+    assert damage != []
+    assert killed - told[numbers[-1]] < 1.0
+    journal.close()
+
+
+SESSION = """
+import sys, time
+from pathlib import Path
+if __name__ == "__main__":
+    from trunkline.live.journal import NOTHING, JournalProcess
+    journal = JournalProcess(Path(sys.argv[1]), NOTHING, 60.0)
+    for number in range(1, 301):
+        journal.event("tick", number=number)
+    while journal._waiting.qsize():
+        time.sleep(0.01)
+    time.sleep(0.1)
+    print("told", flush=True)
+    time.sleep(600)
+"""
+
+
+def test_where_the_session_itself_is_killed_its_log_is_ended_as_it_should(tmp_path):
+    path, script = tmp_path / "run.mcap", tmp_path / "session.py"
+    script.write_text(SESSION)
+    session = subprocess.Popen([sys.executable, str(script), str(path)], cwd=ROOT, stdout=subprocess.PIPE,
+                               env=os.environ | {"PYTHONPATH": str(ROOT)})  # fmt: skip
+    assert session.stdout.readline() == b"told\n"
+    session.kill()
+    session.wait()
+    until(lambda: path.is_file() and path.stat().st_size > 0 and ticks(path) == (list(range(1, 301)), []))
+
+
+def test_a_session_that_ends_leaves_a_whole_file(tmp_path):
+    journal = JournalProcess(tmp_path / "ended.mcap", SUBJECT, PERIOD)
+    told = len(fed(journal, 0.2))
+    journal.close()
+    numbers, damage = ticks(tmp_path / "ended.mcap")
+    assert (numbers, damage) == (list(range(1, told + 1)), [])
+    assert not journal.fault
+
+
+@pytest.mark.parametrize("opened", [full, filling])
+def test_a_full_disk_is_said_in_one_line_and_what_was_written_stays(tmp_path, opened):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, PERIOD, opened)
+    numbers = count(1)
+
+    def fails():
+        journal.event("tick", number=next(numbers))
+        return journal.fault
+
+    until(fails)
+    assert journal.fault == "log: run.mcap: no space left on device; nothing is executed"
+    journal.close()
+    if opened is filling:
+        found, damage = ticks(path)
+        assert found == list(range(1, len(found) + 1))
+        assert len(found) > 10
+        assert damage != []
+
+
+def test_a_disk_that_does_not_answer_delays_nobody(tmp_path, monkeypatch):
+    monkeypatch.setattr("trunkline.live.journal.MOST", 200)
+    monkeypatch.setattr("trunkline.live.journal.PATIENCE", 0.1)
+    journal = JournalProcess(tmp_path / "run.mcap", SUBJECT, PERIOD, stuck)
+    longest = 0.0
+    for number in range(20_000):
+        before = time.thread_time()
+        journal.event("tick", number=number, filler="x" * 1000)
+        longest = max(longest, time.thread_time() - before)
+        if journal.fault:
+            break
+    assert journal.fault == "log: run.mcap: the disk does not keep up; nothing is executed"
+    assert longest < 0.1
+    journal.close()
+
+
+class Failing(Journal):
+    fault = ""
+
+
+def test_where_the_log_ends_nothing_new_is_executed_and_all_are_told():
+    async def session():
+        journal = Failing()
+        async with laid(journal=journal) as here:
+            guest, watcher = await controlling(here), await here.come()
+            state = await asked(here, guest)
+            journal.fault = "log: run.mcap: no space left on device; nothing is executed"
+            await asyncio.sleep(0.4)
+            await guest.say(type="shown", digest=state["preview"])
+            await guest.hears("state", mode="ready")
+            assert (await watcher.hears("state", mode="ready"))["notice"].endswith(journal.fault)
+            kept = here.robot.robot.joints.copy()
+            guest.right = grips(TIP, trigger=1.0)
+            await guest.hears("state", mode="stopped")
+            assert journal.fault in (await watcher.hears("state", mode="stopped"))["notice"]
+            assert here.log.count(journal.fault) == 1
+            np.testing.assert_array_equal(here.robot.robot.joints, kept)
+
+    asyncio.run(session())
+
+
+def test_where_the_log_ends_a_robot_under_way_holds():
+    async def session():
+        journal = Failing()
+        async with laid(journal=journal) as here:
+            guest = await controlling(here)
+            await executing(here, guest)
+            await asyncio.sleep(0.2)
+            journal.fault = "log: run.mcap: no space left on device; nothing is executed"
+            await guest.hears("state", mode="stopped", robot="idle")
+            assert here.robot.stops
+
+    asyncio.run(session())
+
+
+def test_a_folder_that_cannot_be_is_one_line(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="journal.folder: .*file/logs: not a directory"):
+        new_path(tmp_path / "file/logs")
+    assert new_path(tmp_path / "logs").parent.is_dir()
+
+
+def test_a_lost_alignment_is_told_and_none_is_written_for_it(tmp_path):
+    journal = Written(tmp_path / "run.mcap")
+    journal.alignment(Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0)))
+    journal.event("alignment", pose=None)
+    journal.close()
+    with open(tmp_path / "run.mcap", "rb") as file:
+        topics = [c.topic for _, c, _ in make_reader(file).iter_messages()]
+    assert sorted(topics) == [EVENTS, "/tf_static"]

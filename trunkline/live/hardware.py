@@ -1,0 +1,53 @@
+"""What of a session's robot is real: nothing, unless it is named."""
+
+from dataclasses import dataclass
+
+from trunkline.errors import InputError
+from trunkline.execution.arm import ArmSettings
+from trunkline.execution.motors import MotorSettings
+from trunkline.execution.ros_settings import RosSettings
+from trunkline.execution.settings import Config
+
+SIMULATED = "virtual"  # the bus behind which the motors are simulated
+ROBOTS = ("simulated", "panda", "fr3", "ros2")
+MOTORS = ("simulated", "gm6020")
+
+
+@dataclass(frozen=True)
+class Hardware:
+    """What is real. robot: "panda", "fr3", "ros2" or "fake", "" for none. bus: its channel, "" for no motors;
+    `SIMULATED` for simulated ones. interface: of python-can."""
+
+    robot: str
+    arm: ArmSettings
+    ros: RosSettings
+    bus: str
+    interface: str
+    motors: MotorSettings
+
+    @property
+    def real(self) -> bool:
+        """Whether anything but simulations would move."""
+        return self.robot not in ("", "fake") or self.bus not in ("", SIMULATED)
+
+    def words(self) -> str:
+        """What will move."""
+        where = self.ros.trajectory if self.robot == "ros2" else self.arm.address
+        robot = f"the robot {self.robot} at {where}" if self.robot else "no real robot"
+        numbers = ", ".join(map(str, self.motors.numbers))
+        motors = f"motors {numbers} on the bus {self.bus}" if self.bus not in ("", SIMULATED) else "no real motors"
+        return f"{robot}, {motors}"
+
+
+def hardware_of(robot: str, motors: str, bus: str, interface: str, config: Config) -> Hardware | None:
+    """What the options name; None where all is simulated. interface: of python-can, "" for the usual one.
+
+    Raises:
+        InputError: motors without a bus, or a bus without motors.
+    """
+    if (motors == "gm6020") != bool(bus):
+        raise InputError("--motors, --bus: found one of them, expected both: --motors gm6020 --bus can0")
+    if robot == "simulated" and not bus:
+        return None
+    interface = interface or ("virtual" if bus == SIMULATED else "socketcan")
+    return Hardware("" if robot == "simulated" else robot, config.arm, config.ros, bus, interface, config.motors)

@@ -1,0 +1,171 @@
+"""The log of a live session: all that is heard, wanted and done goes to one MCAP file, by a process of its own.
+
+So a slow disk delays no frame and no stop. What is lost by `kill -9` is younger than `period`. Where the log cannot be
+written any more, `fault` says why, and whoever moves the robot has to hold it.
+"""
+
+import ctypes
+import multiprocessing
+import queue
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from pydantic import ConfigDict, TypeAdapter
+
+from trunkline.errors import InputError
+from trunkline.live.book import (
+    BASE,
+    COMMAND,
+    EVENTS,
+    HEADSET,
+    INPUT,
+    INTENT,
+    JOINTS,
+    MEASURED,
+    NOTHING,
+    POSES,
+    REFERENCE,
+    STATIC,
+    TEXT,
+    Record,
+    Subject,
+    new_file,
+    run,
+)
+from trunkline.teleop import messages
+from trunkline.teleop.messages import Input, Intent, Pose
+
+MOST = 5000  # records that may wait: some 15 s of a session
+_EVENT = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="null"))
+PATIENCE = 5.0  # s that the process has to end in
+
+
+class Journal:
+    """Takes what a session of `subject` has to tell, as records for `keep`. By itself it keeps none. Times are s of
+    `now`."""
+
+    fault = ""  # why it is not written any more, in one line
+
+    def __init__(self, subject: Subject = NOTHING, now: Callable[[], float] = time.monotonic) -> None:
+        self.subject, self.now = subject, now
+
+    def keep(self, record: Record) -> None:
+        """Take a record, without waiting."""
+
+    def step(self, dt: float, given: Input, intent: Intent) -> None:
+        """What the core was given and wanted, exactly."""
+        text = b'{"dt":%b,"given":%b}' % (repr(float(dt)).encode(), messages.to_json(given))
+        now = self.now()
+        self.keep(Record(INPUT, now, now, text))
+        self.keep(Record(INTENT, now, now, messages.to_json(intent)))
+
+    def standing(
+        self, at: float, joints: np.ndarray, commands: np.ndarray, lengths: np.ndarray | None, bodies: np.ndarray
+    ) -> None:
+        """The robot as it was `at`: joints (7,), rad; lengths of the cables (K,), m, commanded and measured; poses of
+        the bodies (N, 7)."""
+        now = self.now()
+        self.keep(Record(JOINTS, at, now, joints))
+        self.keep(Record(COMMAND, at, now, commands))
+        if lengths is not None:
+            self.keep(Record(MEASURED, at, now, lengths))
+        self.keep(Record(POSES, at, now, bodies, BASE))
+
+    def headset(self, part: str, at: float, pose: np.ndarray, in_base: bool) -> None:
+        """Pose (7,) of the `left` or `right` hand, or of the `view`."""
+        self.keep(Record(HEADSET + part, at, self.now(), pose, BASE if in_base else REFERENCE))
+
+    def alignment(self, pose: Pose) -> None:
+        """Of the reference frame in the base."""
+        now = self.now()
+        self.keep(Record(STATIC, now, now, np.array([*pose.position, *pose.quaternion]), BASE))
+
+    def piece(self, first: int, begins: float, poses: np.ndarray) -> None:
+        """Of a preview: the arm's last body in frames from the one numbered `first`, at `begins` s of the plan.
+
+        Args:
+            poses: of all bodies, (F, N, 7).
+        """
+        if self.subject.bodies:
+            rows = poses[:, self.subject.bodies.index(self.subject.tip[0])]
+            self.event("piece", first=first, begins=begins, poses=rows.tolist())
+
+    def event(self, kind: str, **fields: object) -> None:
+        """Anything else, by the name of its `kind`; fields are what JSON can hold, or dataclasses."""
+        now = self.now()
+        self.keep(Record(EVENTS, now, now, _EVENT.dump_json({"event": kind, "time": now} | fields)))
+
+
+class JournalProcess(Journal):
+    """One that writes to `path`, by another process."""
+
+    def __init__(
+        self, path: Path, subject: Subject, period: float, opened: Callable[[Path], BinaryIO] | None = None
+    ) -> None:
+        super().__init__(subject)
+        context = multiprocessing.get_context("spawn")
+        theirs, self._pipe = context.Pipe(duplex=False)
+        self._told, self._lost = context.RawArray(ctypes.c_char, TEXT), ""
+        zero = time.time_ns() - round(1e9 * self.now())  # once: a wall clock that jumps moves nothing in the log
+        self.path = path
+        self._process = context.Process(
+            target=run, args=(theirs, self._told, path, subject, zero, period, opened or new_file), daemon=True,
+            name="journal",
+        )  # fmt: skip
+        self._process.start()
+        theirs.close()
+        self._waiting: queue.Queue[Record | None] = queue.Queue(MOST)
+        threading.Thread(target=self._send, daemon=True).start()
+
+    @property
+    def pid(self) -> int | None:
+        return self._process.pid
+
+    @property
+    def fault(self) -> str:
+        return self._told.value.decode(errors="replace") or self._lost
+
+    def keep(self, record: Record) -> None:
+        if self.fault:
+            return
+        try:
+            self._waiting.put_nowait(record)
+        except queue.Full:  # from here on nothing is written: what is there stays without gaps
+            self._lost = f"log: {self.path.name}: the disk does not keep up; nothing is executed"
+
+    def close(self) -> None:
+        """Write what waits, and end the file."""
+        with suppress(queue.Full):
+            self._waiting.put(None, timeout=PATIENCE)
+        self._process.join(PATIENCE)
+        if self._process.is_alive():
+            self._process.kill()
+            self._process.join()
+
+    def _send(self) -> None:
+        try:
+            while (record := self._waiting.get()) is not None and not self._lost:
+                self._pipe.send(record)
+        except OSError:
+            self._lost = f"log: {self.path.name}: its process has ended; nothing is executed"
+        finally:
+            self._pipe.close()
+
+
+def new_path(folder: Path) -> Path:
+    """For a log that begins now, in a `folder` that is made where there is none.
+
+    Raises:
+        InputError: it cannot be.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        found = (error.strerror or str(error)).lower()
+        raise InputError(f"journal.folder: {folder}: {found}, expected a folder to write logs into") from error
+    return folder / time.strftime("%Y-%m-%dT%H-%M-%S.mcap", time.gmtime())

@@ -1,0 +1,162 @@
+"""A real machine's process, and what is drawn of it: the calls are those of the simulated robot.
+
+The machine's process turns 1000 times a second and knows no physics. What is drawn is the twin, moved in a process of
+its own by what the axes are sent: nothing measures the soft arm's shape here, nor where a thing is.
+"""
+
+import gc
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from trunkline.errors import InputError
+from trunkline.execution.arm import Arm
+from trunkline.execution.bank import Plant as PlantOfMotor
+from trunkline.execution.machine import Arm as ArmOfMachine
+from trunkline.execution.machine import Machine
+from trunkline.execution.motors import MotorSettings
+from trunkline.execution.on_bus import BankOnBus, BusMotors, open_bus
+from trunkline.execution.pace import PacedRobot
+from trunkline.execution.stream import LIMITS
+from trunkline.live.hardware import SIMULATED, Hardware
+from trunkline.live.robot import POSE, READY, Channel, RobotProcess, Standing
+from trunkline.live.simulated import Loop, Plant, Simulation, drive
+from trunkline.panda.shipped import JOINTS
+from trunkline.processes import end_with_parent
+from trunkline.teleop.trajectory import Limits
+
+URGENT = 40  # of SCHED_FIFO; asked for, and done without where there is no right to it
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """Where the twin begins: `joints` (7,), rad, and `commands` (K,), m, of the straight arm."""
+
+    joints: np.ndarray
+    commands: np.ndarray
+    limits: Limits
+    package: str
+
+
+class Moved(Machine):
+    """A machine as `Loop` turns it; it knows no poses."""
+
+    def poses(self) -> np.ndarray:
+        return np.empty((0, POSE))
+
+    def thing(self) -> np.ndarray:
+        return np.full(POSE, np.nan)
+
+
+class RealRobot(RobotProcess):
+    """An `Executor` whose robot is a machine."""
+
+    def __init__(self, hardware: Hardware, simulation: Simulation) -> None:
+        begins = Beginning(simulation.joints, simulation.commands, simulation.limits, simulation.package)
+        tendons = len(simulation.commands)
+        if hardware.bus and len(hardware.motors.numbers) != tendons:
+            raise InputError(f"motors.numbers: found {len(hardware.motors.numbers)}, expected {tendons}, one a tendon")
+        super().__init__(run, (hardware, begins), tendons, 0, simulation.limits, simulation.package)
+        context = multiprocessing.get_context("spawn")
+        self._drawn = Channel(context, tendons, len(simulation.bodies))
+        self._twin = context.Process(
+            target=draw, args=(self._drawn, self.channel, simulation), daemon=True, name="twin"
+        )
+        self._twin.start()
+
+    @property
+    def alive(self) -> bool:
+        return super().alive and self._twin.is_alive()
+
+    @property
+    def ready(self) -> bool:
+        return super().ready and self._drawn.hear()[0][READY] > 0
+
+    def standing(self) -> Standing:
+        poses = self._drawn.hear()[0][-POSE * (1 + self._drawn.bodies) :].reshape(-1, POSE)
+        return replace(super().standing(), thing=poses[0], bodies=poses[1:])
+
+    def close(self) -> None:
+        super().close()
+        self._twin.kill()
+        self._twin.join()
+
+
+def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
+    """The machine's process: until its parent is gone, or it is ended."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    parent = os.getppid()
+    threadpool_limits(1)
+    bank, machine = None, None
+    try:
+        arm = arm_of(hardware)
+        bus = open_bus(hardware.interface, hardware.bus) if hardware.bus else None
+        if hardware.bus == SIMULATED:
+            bank = BankOnBus(bank_of(hardware.motors), open_bus(hardware.interface, hardware.bus))
+        machine = Moved(arm, BusMotors(hardware.motors, bus) if bus is not None else None, begins.commands)
+        joints = machine.begin(begins.joints)
+        moved, limits = machine, LIMITS["fr3" if hardware.robot == "fr3" else "panda"]
+        robot = PacedRobot(
+            joints, begins.commands, begins.limits, begins.package, lambda q, c, _: moved.move(q, c), limits
+        )  # fmt: skip
+        gc.freeze()
+        if hardware.real:
+            with suppress(OSError, AttributeError):
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(URGENT))
+        drive(Loop(channel, robot, machine), parent)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr, flush=True)
+        sys.exit(1)
+    finally:
+        if machine is not None:
+            machine.close()
+        if bank is not None:
+            bank.close()
+
+
+def arm_of(hardware: Hardware) -> ArmOfMachine | None:
+    """The robot, None where none is named."""
+    if hardware.robot == "ros2":
+        from trunkline.execution.ros_arm import RosArm  # with what it needs installed
+
+        return RosArm(hardware.ros)
+    return Arm(hardware.arm, hardware.robot) if hardware.robot else None
+
+
+def bank_of(settings: MotorSettings) -> list[PlantOfMotor]:
+    """Simulated motors that are as the settings have them."""
+    reel = settings.reel
+    return [
+        PlantOfMotor(inertia=reel.inertia, radius=reel.radius, stiffness=reel.stiffness, side=side)
+        for side in settings.sides
+    ]
+
+
+def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
+    """The twin's process: it goes where the machine's axes are sent, no faster than a plan would."""
+    os.environ["TRUNKLINE_THREADS"] = "1"
+    threadpool_limits(1)
+    end_with_parent()
+    plant, limits = Plant(simulation), simulation.limits
+    here, furthest = np.append(simulation.joints, simulation.commands), limits.velocity * plant.tick
+    due = time.monotonic()
+    while True:
+        numbers = machine.hear()[0]
+        if numbers[READY] > 0:
+            there = numbers[5 : 5 + len(here)]
+            here = here + np.clip(there - here, -furthest, furthest)
+        plant.move(here[: len(JOINTS)], here[len(JOINTS) :])
+        told = np.zeros(channel.size)
+        told[READY] = 1.0
+        told[-POSE * (1 + channel.bodies) :] = np.append(plant.thing(), plant.poses())
+        channel.tell(told, "")
+        due = max(due + plant.tick, time.monotonic() - plant.tick)
+        time.sleep(max(due - time.monotonic(), 0.0))

@@ -1,0 +1,17 @@
+"""Processes that are made by others."""
+
+import multiprocessing
+import os
+import threading
+
+
+def end_with_parent() -> None:
+    """From now on this process ends with the one that made it: one whose parent was killed would wait for ever."""
+    threading.Thread(target=_wait, daemon=True).start()
+
+
+def _wait() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(1)
