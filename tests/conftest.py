@@ -8,6 +8,10 @@ from pathlib import PurePosixPath
 
 import pytest
 
+from trunkline.processor import hold_arithmetic
+
+hold_arithmetic()  # before anything imports NumPy
+
 # Files and folders whose tests run the kernels of trunkline.statics. To compile them takes most of a minute the first
 # time, in every worker that needs them before the first has written them to the cache. So these share a worker.
 KERNELS = ("ik", "reachability", "statics", "test_capstan.py", "test_library.py")

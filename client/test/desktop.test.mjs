@@ -148,6 +148,7 @@ test("a lost connection is said, the robot turns grey, and it comes back", async
   await server.tell("drop");
   await until(page, () => document.querySelector("#mode").dataset.mode === "lost", null, "words on the lost connection");
   assert.ok(await page.evaluate(() => globalThis.trunkline.drawn.faded));
+  await server.tell("listen");
   await until(page, () => globalThis.trunkline.wire.up && globalThis.trunkline.state && true);
   await until(page, () => !globalThis.trunkline.drawn.faded);
 });
@@ -164,7 +165,8 @@ test("a robot that is not heard of is old, and grey", async (t) => {
 test("without its token the page asks for the six digits, and a wrong token is said", async (t) => {
   const { page } = await open(t, browser, server, { url: `${server.origin}/` });
   await until(page, () => !document.querySelector("#pairing").hidden);
-  await page.fill("#code", server.code);
+  const renewed = (await server.tell("code")).findLast((line) => line.startsWith("code "));
+  await page.fill("#code", renewed.slice("code ".length));
   await page.click("#pairing button");
   await loaded(page);
   assert.ok(await page.evaluate(() => document.querySelector("#pairing").hidden));

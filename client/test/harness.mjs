@@ -25,12 +25,11 @@ export async function serve() {
   const child = spawn(PYTHON, ["-m", "tests.live.page_server", ...(PICTURES ? [] : ["--light"])], { cwd: root, stdio: ["pipe", "pipe", "inherit"] });
   const lines = createInterface({ input: child.stdout })[Symbol.asyncIterator]();
   const first = (await lines.next()).value ?? "";
-  const [word, port, token, code] = first.split(" ");
+  const [word, port, token] = first.split(" ");
   assert.equal(word, "ready", "the server did not start");
   return {
     origin: `http://127.0.0.1:${port}`,
     url: `http://127.0.0.1:${port}/#token=${token}`,
-    code,
     async tell(text = "log") {
       child.stdin.write(`${text}\n`);
       return JSON.parse((await lines.next()).value);

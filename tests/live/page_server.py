@@ -2,10 +2,11 @@
 
     python -m tests.live.page_server [--light]
 
-prints `ready PORT TOKEN CODE` and serves until its input ends. A line on its input is a fault to be shown: `silent` and
-`speak` (the robot tells nothing new), `drop` (all connections end), `fault` (the robot reports one); the modes that
-there were, and what else the server logged, come back as a line of JSON. With `--light` meshes have few triangles. It
-is patient with clients that draw by software beside other work: PATIENCE.
+prints `ready PORT TOKEN` and serves until its input ends. A line on its input is a fault to be shown: `silent` and
+`speak` (the robot tells nothing new), `drop` and `listen` (all connections end, and none is taken until then), `fault`
+(the robot reports one); `code` renews the pairing code. The modes that there were, and what else the server logged,
+come back as a line of JSON. With `--light` meshes have few triangles. It is patient with clients that draw by software
+beside other work: PATIENCE.
 """
 
 import asyncio
@@ -185,16 +186,29 @@ def drawing(figure: Figure) -> dict:
     return found | {"reach": reach, "shell": {"around": AROUND, "along": ALONG}}
 
 
-async def obey(server: Server, robot: Robot, log: list[str]) -> None:
+async def listen(runner: web.AppRunner, port: int) -> web.TCPSite:
+    site = web.TCPSite(runner, "127.0.0.1", port)
+    await site.start()
+    return site
+
+
+async def obey(server: Server, robot: Robot, runner: web.AppRunner, port: int, log: list[str]) -> None:
     """Lines of the input, until it ends; the log goes out for each."""
     loop = asyncio.get_running_loop()
+    site = await listen(runner, port)
+    print(f"ready {port} {server.house.token}", flush=True)
     while line := await loop.run_in_executor(None, sys.stdin.readline):
         word = line.strip()
         robot.is_silent = word == "silent" or (robot.is_silent and word != "speak")
         robot.fault = {"fault": "joint 4: torque", "well": ""}.get(word, robot.fault)
         if word == "drop":
+            await site.stop()
             for client in list(server.clients.values()):
                 await client.socket.close()
+        if word == "listen":
+            site = await listen(runner, port)
+        if word == "code":
+            log.append(f"code {server.code.renew(time.monotonic())}")
         print(json.dumps(log), flush=True)
 
 
@@ -224,9 +238,7 @@ async def serve(port: int, folder: Path) -> None:
     server.tick = watched
     runner = web.AppRunner(server.app())
     await runner.setup()
-    await web.TCPSite(runner, "127.0.0.1", port).start()
-    print(f"ready {port} {token} {server.code.renew(time.monotonic())}", flush=True)
-    await obey(server, robot, log)
+    await obey(server, robot, runner, port, log)
     await runner.cleanup()
 
 
