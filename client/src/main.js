@@ -21,6 +21,7 @@ const WIDE = 1200; // pixels of a page on which the keys do not cover the robot
 const STILL = 0.3; // s without a grip, after which the core's targets are taken over
 const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no plan is shown; it may come before its mode does
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
+const PLANNED = new Set(["plan", ...SHOWN_IN, "execute"]);
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
 
 const find = (id) => document.getElementById(id);
@@ -49,6 +50,7 @@ class Page {
     this.immersive = new Immersive(this.renderer, (type, fields) => this.wire?.say(type, fields), () => this.leftHeadset());
     Object.assign(this, { state: null, lease: null, reason: null, frame: null, playback: null, told: null, recording: null });
     this.reaches = { rigid: null, tip: null };
+    this.ready = Promise.resolve(); // when the scene is there, whose sizes a preview needs
     this.connect();
     this.buttons();
     this.stand(DESKTOP);
@@ -95,7 +97,7 @@ class Page {
       world: ({ world }) => this.drawn.world(world),
       robot: (message) => this.robot(message),
       shell: ({ rows }) => this.drawn.shell(rows),
-      preview: (message) => (message.kind ? this.piece(message) : this.show(message)),
+      preview: (message) => this.ready.then(() => this.loaded && (message.kind ? this.piece(message) : this.show(message))),
       foreseen: (message) => {
         this.told = message;
         this.drawn.foreseen(message);
@@ -104,15 +106,19 @@ class Page {
     };
   }
 
-  async welcome({ token, package: digest }) {
+  welcome({ token, package: digest }) {
     sessionStorage.setItem(KEPT, token);
     find("pairing").hidden = true;
     this.reason = null;
     if (this.immersive.session) this.ask();
-    if (this.loaded === digest) return;
+    if (this.loaded !== digest) this.ready = this.load(digest, token);
+  }
+
+  async load(digest, token) {
     const answer = await fetch("scene.json", { headers: { Authorization: `Bearer ${token}` } });
     if (!answer.ok) return this.warn(`The scene was refused: ${answer.status}.`);
     this.drawn.load(await answer.json());
+    this.drawn.everythingOnce(() => this.renderer.render(this.drawn.scene, this.camera));
     this.loaded = digest;
   }
 
@@ -122,6 +128,8 @@ class Page {
   }
 
   changed(state) {
+    const wasPlanned = PLANNED.has(this.state?.mode) && !PLANNED.has(state.mode);
+    if (wasPlanned && state.notice) this.warn(state.notice); // the core's own is gone once it aims again
     this.state = state;
     if (OVER.has(state.mode)) this.show(null);
     for (const kind of ["rigid", "tip"]) {

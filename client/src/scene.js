@@ -64,6 +64,15 @@ export class RobotScene {
     if (this.known) this.world(this.known);
   }
 
+  /** Draws by `draw` what is not there yet as well, of no size: to compile it later would take longer than an input may. */
+  everythingOnce(draw) {
+    this.pretend(new Float32Array(this.count * STRIDE).fill(NaN));
+    this.foreseen({ tip: [[0, 0, 0], [0, 0, 1e-6]], spread: [0, 0] });
+    draw();
+    this.pretend(null);
+    this.foreseen(null);
+  }
+
   /** The robot as it is: rows of poses, of which the first are the bodies'. */
   pose(rows) {
     if (!this.live) return;

@@ -95,7 +95,7 @@ def test_the_score_has_the_rig_beside_the_model(model, chain):
         asked.append(len(pulls))
         return drive(model, chain.straight_lengths - pulls, gravity, 10.0).end + [1e-3, 0, 0]
 
-    settings = AsControls(targets=12, timed=8, on_rig=4, seconds=10.0)
+    settings = AsControls(targets=12, timed=8, sent=4, seconds=10.0)
     rng = np.random.default_rng(0)
     on_model, on_plant = score(model, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, rng, rig)
     assert asked == [4]
@@ -118,7 +118,7 @@ def test_a_model_without_friction_is_driven_once_and_damped_at_last(model, chain
         return drive(model, commands, *rest, **more)
 
     monkeypatch.setattr(as_controls, "drive", counted)
-    settings = AsControls(targets=12, timed=2, on_rig=4, seconds=10.0)
+    settings = AsControls(targets=12, timed=2, sent=4, seconds=10.0)
     found, _ = score(smooth, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, np.random.default_rng(0))
     assert driven_arms == [2, found["targets"] - 2]
     friction = found["friction"]

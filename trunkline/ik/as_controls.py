@@ -37,13 +37,13 @@ class AsControls:
     """See conf/train_ik/config.yaml.
 
     targets: that are drawn; some of them are left out, see `Drawn`. timed: how many of them are driven
-    without friction for as long as it takes, to see how long that is. on_rig: how many a rig is sent. seconds: longest
-    time to rest.
+    without friction for as long as it takes, to see how long that is. sent: how many are sent at once to a model with
+    friction, and to a rig. seconds: longest time to rest.
     """
 
     targets: Annotated[int, Field(ge=8, le=100_000)]
     timed: Annotated[int, Field(ge=1, le=100_000)]
-    on_rig: Annotated[int, Field(ge=1, le=100_000)]
+    sent: Annotated[int, Field(ge=1, le=100_000)]
     seconds: Annotated[PositiveFloat, Field(le=120)]
 
 
@@ -176,7 +176,7 @@ def score(
     targets = drawn.targets
     timed = driven(model, ask, targets[: settings.timed], settings.seconds, friction=False, calm=True)
     if has_friction(model):
-        sent = driven(model, ask, targets, settings.seconds)
+        sent = driven(model, ask, targets[: settings.sent], settings.seconds)
         seconds = sent.time_to_rest()
     else:  # all drives are without: those that were timed are the first of them
         parts = [timed]
@@ -190,12 +190,17 @@ def score(
     on_model = {
         **drawn.counts(),
         "frictionless": settled(model, ask, targets).metrics(chain.length) | {"seconds_to_rest": timed.time_to_rest()},
-        "friction": sent.metrics(chain.length) | {"seconds_to_rest": seconds, "dry_friction": dry},
+        "friction": {
+            "targets": len(sent.position),
+            **sent.metrics(chain.length),
+            "seconds_to_rest": seconds,
+            "dry_friction": dry,
+        },
         "all_taut": taut.counts() | settled(model, ask, taut.targets).metrics(chain.length),
     }
     if rig is None:
         return on_model, None
-    few = targets[: settings.on_rig]
+    few = targets[: settings.sent]
     answer = ask(few)
     pulls = chain.straight_lengths - answer["commands"]  # motors count from the straight arm, as in a session's logs
     origin, turn = base_frame(model)  # a rig knows the tracked base, in which the arm's mount is turned

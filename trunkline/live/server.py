@@ -42,6 +42,7 @@ HEARTBEAT = 20.0  # s
 STATES = 0.1  # s between states that tell no new mode
 PING_GAP = 0.03  # s
 TOUCHING = "right"  # the hand whose controller touches
+PREVIEWED = ("plan", "preview", "ready", "delay")  # modes in which who comes is shown the preview from its beginning
 TURNED = np.cos(np.radians(1.0))  # of gravity in the soft base, from which on there is a new shell
 TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
 ABSENT = b"<!doctype html><title>Trunkline</title><p>error: the page is not built: `client/` makes it</p>\n"
@@ -244,10 +245,10 @@ class Server:
         say(talk.tell(talk.Around(desk.world)))
         if desk.intent is not None:
             say(talk.tell(desk.told(self.control.holder)))
-        if desk.preview is not None:
-            say(talk.tell(desk.preview))
-            for piece in desk.pieces:
-                client.outbox.piece(_piece(piece))
+            if desk.preview is not None and desk.intent.mode in PREVIEWED:
+                say(talk.tell(desk.preview))
+                for piece in desk.pieces:
+                    client.outbox.piece(_piece(piece))
         if desk.foreseen is not None:
             say(talk.tell(desk.foreseen))
         if self._shell:
