@@ -21,10 +21,11 @@ from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.config import Config
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.following import Follower
+from trunkline.teleop.following import Follower, sought
 from trunkline.teleop.messages import ExecutorReport, Input, Intent, Joints, Offer, PlanReport, Pose, World
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.targets import why_not
+from trunkline.teleop.trajectory import JOINTS
 
 RATE = 60.0  # Hz, of a headset's frames
 TICKS = 2  # in which the robot is commanded a frame
@@ -72,6 +73,7 @@ class Session:
             robot.joints[0], package.straight, self.planner.limits, package.digest, self._move
         )
         self.follower: Follower | None = None
+        self.refused = ""  # why the newest targets are not followed, "" where they are
         self.plan: Plan | None = None
         self.report: PlanReport | None = None
         self.fault, self.shown, self.showing, self.since = "", "", "", 0.0
@@ -190,18 +192,25 @@ class Session:
                 except InputError as error:
                     self.fault, self.follower = str(error), None
             self.executor.advance(1 / RATE / TICKS)
-        if self.follower is not None and self.follower.refused:
-            self.refusals.append((self.now, self.follower.refused))
+        if self.follower is not None and self.refused:
+            self.refusals.append((self.now, self.refused))
 
     def _hear(self, intent: Intent) -> None:
         """While it follows, the robot hears the newest targets, those that can be followed, and does them later."""
         if intent.mode != "follow":
-            self.follower = None
+            self.follower, self.refused = None, ""
             return
         if self.follower is None:
-            joints, commands, delay = self.executor.joints, self.executor.commands, self.config.core.follow_delay
-            self.follower = Follower(self.planner, joints, commands, 1 / RATE / TICKS, delay, self.package.period)
-        self.follower.hear(self.now, None if why_not(intent.targets) else intent.targets)
+            here = self.executor.joints, self.executor.commands
+            delay, period = self.config.core.follow_delay, self.package.period
+            limits, mount_offset = self.planner.limits, self.config.mount_offset
+            self.follower = Follower(limits, mount_offset, *here, 1 / RATE / TICKS, delay, period)
+        if not self.follower.due(self.now):
+            return
+        goal = None
+        if not why_not(intent.targets):
+            goal, self.refused = sought(self.planner, intent.targets, self.follower.goal[:JOINTS])
+        self.follower.hear(self.now, goal)
 
     def _move(self, joints: np.ndarray, commands: np.ndarray, dt: float) -> None:
         try:

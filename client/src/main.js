@@ -21,7 +21,7 @@ const WIDE = 1200; // pixels of a page on which the keys do not cover the robot
 const STILL = 0.3; // s without a grip, after which the core's targets are taken over
 const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no plan is shown; it may come before its mode does
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
-const PLANNED = new Set(["plan", ...SHOWN_IN, "execute"]);
+const BUSY = new Set(["plan", ...SHOWN_IN, "execute", "follow"]); // modes after which it is to be read why they ended
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
 
 const find = (id) => document.getElementById(id);
@@ -128,8 +128,8 @@ class Page {
   }
 
   changed(state) {
-    const wasPlanned = PLANNED.has(this.state?.mode) && !PLANNED.has(state.mode);
-    if (wasPlanned && state.notice) this.warn(state.notice); // the core's own is gone once it aims again
+    const wasBusy = BUSY.has(this.state?.mode) && !BUSY.has(state.mode);
+    if (wasBusy && state.notice) this.warn(state.notice); // the core's own is gone once it aims again
     this.state = state;
     if (OVER.has(state.mode)) this.show(null);
     for (const kind of ["rigid", "tip"]) {

@@ -113,6 +113,28 @@ test("keys move the chosen target by a step, and the grip let go holds the robot
   await inMode(page, "hold");
 });
 
+test("the robot follows while the grip is held, and the page says why it holds then", async (t) => {
+  const { page } = await open(t, browser, server);
+  await loaded(page);
+  await takeControl(page);
+  await drag(page, "rigid", 16, -12);
+  await drag(page, "tip", -30, -45);
+  await until(page, () => globalThis.trunkline.state.targets && true);
+  await page.keyboard.down("KeyG");
+  await page.waitForTimeout(300);
+  await page.keyboard.press("KeyF");
+  await inMode(page, "follow");
+  await until(page, () => globalThis.trunkline.state.robot === "running");
+  const before = await target(page, "rigid");
+  await page.keyboard.press("Digit1");
+  for (let n = 0; n < 3; n++) await page.keyboard.press("ArrowUp");
+  await until(page, (z) => globalThis.trunkline.state.targets.rigid.position[2] > z + 0.02, before[2]);
+  await page.keyboard.up("KeyG");
+  await inMode(page, "hold");
+  await until(page, () => globalThis.trunkline.state.robot === "idle");
+  await until(page, () => /grips let go/.test(document.querySelector("#notice").textContent));
+});
+
 test("out of reach is told in words, by a ring and by an offer that R takes", async (t) => {
   const { page } = await open(t, browser, server);
   await loaded(page);

@@ -37,13 +37,14 @@ from trunkline.live.access import Origins, make_token
 from trunkline.live.anchors import Anchors
 from trunkline.live.bodies import drawn
 from trunkline.live.desk import Desk
-from trunkline.live.robot import Standing
+from trunkline.live.robot import Following, Standing
 from trunkline.live.server import House, Server
 from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.following import Follower, sought
 from trunkline.teleop.messages import Box, ExecutorReport, PlanReport, Targets, Thing
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.reading import Reading
@@ -51,6 +52,7 @@ from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.vectors import add, conjugate, distance, rotate, scale, subtract
 
 RATE, LENGTH, UNITS = 72.0, 0.5, 24  # Hz, m
+TICK = 0.005  # s
 PATIENCE = 5.0  # s for which a client may be silent
 CENTRE, REACH = (0.0, 0.0, 0.333), 0.85  # m, of the ball in which the mount can be
 AROUND, ALONG = 32, 10
@@ -111,12 +113,19 @@ class Robot:
 
     def __init__(self, figure: Figure) -> None:
         self.figure, self.robot = figure, SimulatedRobot(np.array(READY_JOINTS), STRAIGHT, LIMITS, PACKAGE)
-        self.start, self.stop, self.last, self.fault = self.robot.start, self.robot.stop, time.monotonic(), ""
+        self.start, self.stop, self.hear = self.robot.start, self.robot.stop, self.robot.hear
+        self.last, self.fault = time.monotonic(), ""
         self.kept: Standing | None = None
         self.is_silent = False
 
     def permit(self) -> None:
         pass
+
+    def follow(self, following: Following) -> str:
+        here = self.robot.joints, self.robot.commands
+        return self.robot.follow(
+            Follower(LIMITS, following.mount_offset, *here, TICK, following.delay, following.period)
+        )
 
     def state(self) -> ExecutorReport:
         return ExecutorReport("fault", "", self.fault) if self.fault else self.robot.state()
@@ -125,8 +134,9 @@ class Robot:
         if self.is_silent and self.kept is not None:
             return self.kept
         now = time.monotonic()
-        self.robot.advance(now - self.last)
-        self.last = now
+        while self.last + TICK <= now:
+            self.robot.advance(TICK)
+            self.last += TICK
         poses = self.figure.poses(self.robot.joints, self.robot.commands)
         self.kept = Standing(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), poses)
         return self.kept
@@ -149,7 +159,11 @@ class Planning:
         self.figure, self.heard = figure, None
         self.planner = Planner(RigidIK(OFFSET), NETWORK, STRAIGHT, LIMITS, OFFSET, step=0.005)
 
-    def order(self, order: foreseer.Order) -> None:
+    def order(self, order: foreseer.Order | foreseer.Seek) -> None:
+        if isinstance(order, foreseer.Seek):
+            targets = order.targets and within(order.targets)
+            self.heard(foreseer.Found(order.serial, *sought(self.planner, targets, order.joints)))
+            return
         serial = order.request.serial
         try:
             request = replace(order.request, targets=within(order.request.targets))

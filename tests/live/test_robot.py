@@ -20,7 +20,7 @@ from trunkline.live import simulated
 from trunkline.live.bodies import Poses, drawn
 from trunkline.live.house import SEARCH, subject_of
 from trunkline.live.logbook import tip_path
-from trunkline.live.robot import DEAD_MAN, RobotProcess
+from trunkline.live.robot import DEAD_MAN, Following, RobotProcess
 from trunkline.live.settings import Config
 from trunkline.live.simulated import Plant, Simulation
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -140,6 +140,42 @@ def test_it_holds_when_nobody_says_that_it_may_go_on(robot):
     until(lambda: robot.state().mode == "idle")
     assert robot.standing().held - silent + 0.02 >= DEAD_MAN
     assert robot.standing().held - silent < DEAD_MAN + BRAKE + LATE
+
+
+def hearing(robot, axes, seconds):
+    """What it follows, for so long."""
+    begun = heard = time.monotonic()
+    while (now := time.monotonic()) < begun + seconds:
+        robot.permit()
+        if now >= heard:
+            robot.hear(0.0, axes)
+            heard = now + 0.1
+        time.sleep(0.01)
+
+
+def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(robot):
+    now = robot.standing()
+    here = np.append(now.joints, now.commands)
+    there = here + np.eye(10)[0] * 0.3
+    assert robot.follow(Following(0.3, 0.0, 0.05)) == ""
+    until(lambda: robot.state().mode == "running", 3.0, robot.permit)
+    assert robot.follow(Following(0.3, 0.0, 0.05)).startswith("busy")
+    hearing(robot, here, 0.25)
+    hearing(robot, there, 0.2)
+    np.testing.assert_allclose(robot.standing().joints, now.joints, atol=1e-3)  # its delay is longer
+    hearing(robot, there, 2.0)
+    np.testing.assert_allclose(robot.standing().joints, there[:7], atol=1e-3)
+    assert robot.state().mode == "running"
+    hearing(robot, here, 0.45)
+    pressed = time.monotonic()
+    robot.stop()
+    until(lambda: robot.state().mode == "idle", 3.0, robot.permit)
+    assert robot.standing().held - pressed < LATE
+    kept = robot.standing().joints
+    assert here[0] < kept[0] < there[0]
+    robot.hear(0.0, here)
+    time.sleep(0.3)
+    np.testing.assert_array_equal(robot.standing().joints, kept)
 
 
 def test_a_stop_before_a_plan_has_come_counts(robot):

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from tests.support.live import Hands, binary, controlling, hand, laid
-from tests.teleop.test_plan import MOUNT, TIP
+from tests.teleop.test_plan import MOUNT, OFFSET, TIP
 from trunkline.live import wire
+from trunkline.panda.kinematics import mount_pose
 
 UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
 
@@ -52,6 +53,30 @@ def test_from_hands_to_a_robot_that_has_arrived():
             await guest.hears("state", 20.0, mode="aim", robot="done")
             np.testing.assert_allclose(here.robot.robot.joints, here.planning.plans[0].joints[-1], atol=1e-9)
             assert np.abs(here.robot.robot.joints - before).max() > 0.05
+
+    asyncio.run(session())
+
+
+def test_a_robot_follows_moving_targets_until_both_grips_are_let_go():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            await guest.hears("state", mode="aim")
+            guest.left, guest.right = grips(MOUNT), grips(TIP)
+            await asyncio.sleep(0.8)
+            guest.right = grips(TIP, stick_pressed=1.0)
+            await guest.hears("state", mode="follow")
+            aside = np.array([0.0, 0.05, 0.0])
+            guest.left, guest.right = grips(MOUNT + aside), grips(TIP + aside)
+            await guest.hears("state", motion="follow", robot="running")
+            for mount in (MOUNT + aside, np.array(MOUNT)):  # there, and back again
+                guest.left, guest.right = grips(mount), grips(TIP + mount - MOUNT)
+                await asyncio.sleep(here.desk.core.settings.follow_delay + 2.5)
+                found = mount_pose(here.robot.robot.joints[None], OFFSET)[0][0]
+                np.testing.assert_allclose(found[:2], mount[:2], atol=5e-3)
+            guest.left, guest.right = hand(MOUNT + UP), hand(TIP + UP)
+            await guest.hears("state", mode="hold", robot="idle")
+            assert not here.planning.plans
 
     asyncio.run(session())
 

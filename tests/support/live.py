@@ -25,11 +25,13 @@ from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.following import Follower, sought
 from trunkline.teleop.messages import PlanReport
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
 
 TOKEN, RATE, BODIES = "t" * 22, 72.0, 3
+TICK = 0.005  # s
 PREVIEW = 0.3  # s that a preview lasts, whatever the plan
 
 
@@ -45,7 +47,13 @@ class PlainRobot:
     def __init__(self):
         self.robot, self.last, self.stops, self.permits = SimulatedRobot(START, STRAIGHT, LIMITS, PACKAGE), 0.0, [], 0
         self.silent = 0.0
-        self.start, self.state = self.robot.start, self.robot.state
+        self.start, self.state, self.hear = self.robot.start, self.robot.state, self.robot.hear
+
+    def follow(self, following):
+        here = self.robot.joints, self.robot.commands
+        return self.robot.follow(
+            Follower(LIMITS, following.mount_offset, *here, TICK, following.delay, following.period)
+        )
 
     def permit(self):
         self.permits += 1
@@ -56,9 +64,10 @@ class PlainRobot:
 
     def standing(self):
         now = time.monotonic()
-        if self.last:
-            self.robot.advance(now - self.last)
-        self.last = now
+        self.last = self.last or now
+        while self.last + TICK <= now:
+            self.robot.advance(TICK)
+            self.last += TICK
         bodies = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (BODIES, 1))
         return Standing(now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), bodies)
 
@@ -71,6 +80,9 @@ class PlainPlanning:
         self.heard, self.left, self.plans = None, 0, []
 
     def order(self, order):
+        if isinstance(order, foreseer.Seek):
+            self.heard(foreseer.Found(order.serial, *sought(self.planner, order.targets, order.joints)))
+            return
         serial = order.request.serial
         try:
             plan = self.planner.plan(order.request, order.world, order.joints, order.commands)

@@ -6,7 +6,7 @@ import pytest
 
 from tests.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT, targets
 from trunkline.panda.kinematics import mount_pose
-from trunkline.teleop.following import KNOT, Follower
+from trunkline.teleop.following import KNOT, Follower, sought
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
 
@@ -21,12 +21,20 @@ def at(y: float):
 
 def follow(y, seconds: float, delay: float = DELAY, period: float = PERIOD) -> tuple[np.ndarray, Follower]:
     """Rows of all axes while the targets are at `y`, a function of time, s."""
-    follower, rows = Follower(PLANNER, START, STRAIGHT, DT, delay, period), []
+    follower, rows = Follower(LIMITS, OFFSET, START, STRAIGHT, DT, delay, period), []
     for index in range(round(seconds / DT)):
-        follower.hear(index * DT, at(y(index * DT)))
+        assert hear(follower, index * DT, at(y(index * DT))) == ""
         rows.append(np.concatenate(follower.tick(index * DT)))
-        assert follower.refused == ""
     return np.array(rows), follower
+
+
+def hear(follower: Follower, now: float, wanted) -> str:
+    """Why the targets at `now` are not followed."""
+    if not follower.due(now):
+        return ""
+    goal, refused = sought(PLANNER, wanted, follower.goal[:7])
+    follower.hear(now, goal)
+    return refused
 
 
 def mount(rows: np.ndarray) -> np.ndarray:
@@ -82,11 +90,24 @@ def test_refused_targets_leave_it_at_the_last_and_are_said():
     _, follower = follow(lambda now: 0.0, 2.0)
     for index in range(120):
         now = 2.0 + index * DT
-        follower.hear(now, at(3.0))
+        refused = hear(follower, now, at(3.0))
         rows = np.concatenate(follower.tick(now))
         if index == 0:
             kept = rows
-    assert follower.refused.startswith(("out of reach", "limit"))
+            assert refused.startswith(("out of reach", "limit"))
     np.testing.assert_allclose(rows, kept, atol=1e-4)
-    follower.hear(5.0, at(0.05))
-    assert follower.refused == ""
+    assert hear(follower, 5.0, at(0.05)) == ""
+
+
+def test_it_brakes_within_its_limits_wherever_the_targets_are(followed):
+    rows, follower = follow(lambda now: 0.2 * min(now, 2.0), 1.5)
+    before = rows[-3:]
+    follower.brake()
+    for index in range(60):
+        rows = np.vstack([rows, np.concatenate(follower.tick(1.5 + index * DT))])
+        if follower.rests:
+            break
+    assert follower.rests
+    moving = np.vstack([before, rows[-index - 1 :]])
+    assert (np.abs(np.diff(moving, 2, axis=0)).max(axis=0) / DT**2 <= 1.001 * LIMITS.acceleration).all()
+    assert 2 < index < 30

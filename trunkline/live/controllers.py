@@ -9,6 +9,7 @@ from trunkline.teleop.soundness import fault_of
 from trunkline.teleop.vectors import unit
 
 PRESSED = 0.5
+BUTTONS = ("trigger", "grip", "stick_pressed", "primary", "secondary")
 NOWHERE = Controller((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), tracked=False)
 STICK = HAND.index("stick_x")
 _AT = {name: place for place, name in enumerate(HAND)}
@@ -40,6 +41,5 @@ def held(received: Received, side: str) -> Held | None:
 def _controller(hand: np.ndarray, tracked: bool) -> Controller:
     x, y, z, a, b, c, d = (float(value) for value in hand[:7])
     stick_x, stick_y = (float(value) for value in hand[STICK : STICK + 2])
-    held = {name: bool(hand[_AT[name]] >= PRESSED) for name in ("trigger", "grip", "primary", "secondary")}
-    # the stick's press, which begins to follow, is not passed on: nothing here follows yet
+    held = {name: bool(hand[_AT[name]] >= PRESSED) for name in BUTTONS}
     return Controller((x, y, z), (a, b, c, d), tracked, stick=(stick_x, stick_y), **held)

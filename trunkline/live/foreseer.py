@@ -29,6 +29,7 @@ from trunkline.live.bodies import Poses
 from trunkline.panda.kinematics import mount_pose
 from trunkline.processes import end_with_parent
 from trunkline.teleop.config import Config
+from trunkline.teleop.following import sought
 from trunkline.teleop.messages import PlanReport, Request, Target, Targets, Thing, World
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.planner import Planner
@@ -48,6 +49,25 @@ class Order:
     world: World
     joints: np.ndarray
     commands: np.ndarray
+
+
+@dataclass(frozen=True)
+class Seek:
+    """What `targets` ask of a robot that follows is asked for, the nearest to `joints` (7,), rad; targets None: nothing
+    that it may follow."""
+
+    serial: int
+    targets: Targets | None
+    joints: np.ndarray
+
+
+@dataclass(frozen=True)
+class Found:
+    """Axes (7 + K,), rad and m; None for the last ones still, `refused` says why, "" where there are no targets."""
+
+    serial: int
+    axes: np.ndarray | None
+    refused: str
 
 
 @dataclass(frozen=True)
@@ -90,7 +110,7 @@ class Ready:
     """The process has compiled what it needs, and hears orders."""
 
 
-Answer = Planned | Begun | Shown | Told
+Answer = Planned | Begun | Shown | Told | Found
 
 
 class Overtaken(Exception):
@@ -116,8 +136,11 @@ class Foreseer:
         foresight = Foresight(believed(previewing, package.files), package.grips(config), previewing)
         return cls(package.planner(config), foresight, bodies)
 
-    def answers(self, order: Order, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
+    def answers(self, order: Order | Seek, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
         """All that comes of an order, each as soon as it is known. `go_on` raises where it need not be."""
+        if isinstance(order, Seek):
+            yield Found(order.serial, *sought(self.planner, order.targets, order.joints))
+            return
         request, serial = order.request, order.request.serial
         try:
             plan = self.planner.plan(request, order.world, order.joints, order.commands)
@@ -241,7 +264,7 @@ class ForeseerProcess:
         """Whether its process is there."""
         return self._process.is_alive()
 
-    def order(self, order: Order) -> None:
+    def order(self, order: Order | Seek) -> None:
         """It does not wait; the order before is left."""
         with self._lock:
             self._newest.value += 1
@@ -323,4 +346,7 @@ def serve(answers, orders, newest, foreseer: Foreseer) -> None:
                     answers.send(answer)
             except (InputError, ArithmeticError, ValueError) as error:  # a plan without a preview is never confirmed
                 refused = f"preview: {type(error).__name__}: {error}".splitlines()[0]
-                answers.send(Planned(PlanReport(order.request.serial, refused=refused)))
+                if isinstance(order, Seek):
+                    answers.send(Found(order.serial, None, refused))
+                else:
+                    answers.send(Planned(PlanReport(order.request.serial, refused=refused)))

@@ -77,7 +77,7 @@ def make(
     setup = path.resolve(), teleop, config.preview, simulation.bodies
     planning = ForeseerProcess(foreseer.run, setup, heard)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
-    desk = Desk(core, robot, planning, world, teleop.handling.lift, journal)
+    desk = Desk(core, robot, planning, world, teleop.handling.lift, journal, package.period)
     desk.begin(config.rate)
     return Made(desk, package.digest, drawing, Shells.of(maps), robot, planning, journal)
 

@@ -26,7 +26,7 @@ from trunkline.execution.on_bus import BankOnBus, BusMotors, open_bus
 from trunkline.execution.pace import PacedRobot
 from trunkline.execution.stream import LIMITS
 from trunkline.live.hardware import SIMULATED, Hardware
-from trunkline.live.robot import POSE, READY, Channel, RobotProcess, Standing
+from trunkline.live.robot import POSE, READY, Channel, Following, RobotProcess, Standing
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.panda.shipped import JOINTS
 from trunkline.processes import end_with_parent
@@ -70,6 +70,9 @@ class RealRobot(RobotProcess):
             target=draw, args=(self._drawn, self.channel, simulation), daemon=True, name="twin"
         )
         self._twin.start()
+
+    def follow(self, following: Following) -> str:
+        return "follow: found a real machine, expected the simulated robot: what it follows was not previewed"
 
     @property
     def alive(self) -> bool:

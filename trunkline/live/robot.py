@@ -14,7 +14,7 @@ from multiprocessing.context import SpawnContext
 
 import numpy as np
 
-from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.executor import FOLLOWS, SimulatedRobot
 from trunkline.teleop.messages import ExecutorReport
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import JOINTS, Limits
@@ -57,6 +57,23 @@ class Channel:
             if before % 2 == 0 and self._number.value == before:
                 return numbers, fault.decode(errors="replace")
         return numbers, fault.decode(errors="replace")  # its writer was killed within: the time in it is old
+
+
+@dataclass(frozen=True)
+class Following:
+    """As `Follower` has it. delay, period: s. mount_offset: m."""
+
+    delay: float
+    period: float
+    mount_offset: float
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What targets asked for at `time`, s: axes (7 + K,), None for the last ones still."""
+
+    time: float
+    axes: np.ndarray | None
 
 
 @dataclass(frozen=True)
@@ -119,11 +136,26 @@ class RobotProcess:
             return f"digest: found {plan.digest()[:12]}, expected {digest[:12]}"
         if reason := self.check(plan):
             return reason
+        self._begin(plan, digest)
+        return ""
+
+    def follow(self, following: Following) -> str:
+        """Go after what `hear` is told, as long as it is permitted; why not, "" where it does."""
+        if self.state().mode == "running":
+            return "busy: another plan runs"
+        self._begin(following, FOLLOWS)
+        return ""
+
+    def hear(self, age: float, axes: np.ndarray | None) -> None:
+        """What targets asked for `age` s ago, (7 + K,); None for the last ones still."""
+        self.channel.plans.put((self._serial, FOLLOWS, Goal(time.monotonic() - age, axes), self.channel.asked[STOPS]))
+        self.channel.wake.release()
+
+    def _begin(self, asked: Plan | Following, digest: str) -> None:
         self._serial, self._digest, self._begun = self._serial + 1, digest, time.monotonic()
         self.permit()
-        self.channel.plans.put((self._serial, digest, plan, self.channel.asked[STOPS]))
+        self.channel.plans.put((self._serial, digest, asked, self.channel.asked[STOPS]))
         self.channel.wake.release()
-        return ""
 
     def permit(self) -> None:
         """The robot may go on with what was started last, for another DEAD_MAN s."""

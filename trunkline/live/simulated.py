@@ -21,12 +21,13 @@ from trunkline.hybrid.compose import panda_joints
 from trunkline.hybrid.futures import Twin
 from trunkline.hybrid.torques import servo_commands
 from trunkline.live.bodies import Poses
-from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, Channel
+from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, Channel, Following, Goal
 from trunkline.panda.shipped import JOINTS
 from trunkline.simulation.motion import batch_of, hold
 from trunkline.simulation.rubbing import REFRESH, rubbing
 from trunkline.simulation.winch import Winches
 from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.following import Follower
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import Limits
 
@@ -150,7 +151,7 @@ class Loop:
             self._stops = asked[STOPS]
             self.robot.stop()
             self.held = now
-        self._begin()
+        self._hear(now)
 
     def advance(self) -> None:
         """One tick."""
@@ -162,21 +163,37 @@ class Loop:
     def tell(self, now: float) -> None:
         """All that the server shall know."""
         state = self.robot.state()
+        self.fault = self.fault or state.fault
         mode = "fault" if self.fault else state.mode
         head = [now, MODES.index(mode), self.serial, self.held, 1.0]
         poses = [self.plant.thing(), self.plant.poses().ravel()]
         axes = [self.robot.joints, self.robot.commands, self.plant.lengths()]
         self.channel.tell(np.concatenate([head, *axes, *poses]), self.fault)
 
-    def _begin(self) -> None:
+    def _hear(self, now: float) -> None:
         try:
-            serial, digest, plan, stops = self.channel.plans.get_nowait()
+            serial, digest, asked, stops = self.channel.plans.get_nowait()
         except Empty:
             return
-        assert isinstance(plan, Plan)
+        if isinstance(asked, Goal):
+            if serial == self.serial:
+                self.robot.hear(now - asked.time, asked.axes)
+            return
         self.serial = serial
         overtaken = "a stop came before it began" if stops != self.channel.asked[STOPS] else ""
-        self.fault = overtaken or self.plant.fault or self.robot.start(plan, digest)
+        self.fault = overtaken or self.plant.fault or self._begin(asked, digest)
+
+    def _begin(self, asked: Plan | Following, digest: str) -> str:
+        """Why it does not begin, "" where it does."""
+        robot = self.robot
+        if isinstance(asked, Plan):
+            return robot.start(asked, digest)
+        return robot.follow(
+            Follower(
+                robot.limits, asked.mount_offset, robot.joints, robot.commands, self.plant.tick, asked.delay,
+                asked.period,
+            )  # fmt: skip
+        )
 
 
 def drive(loop: Loop, parent: int) -> None:

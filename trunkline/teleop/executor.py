@@ -5,7 +5,9 @@ from typing import Protocol
 
 import numpy as np
 
+from trunkline.errors import InputError
 from trunkline.panda.kinematics import within_limits
+from trunkline.teleop.following import Follower
 from trunkline.teleop.messages import ExecutorReport
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import JOINTS, Limits
@@ -13,6 +15,7 @@ from trunkline.teleop.trajectory import JOINTS, Limits
 AT_START = 1e-3  # rad and m, by which the robot may be off a plan's first row
 ROUNDING = 1.02  # share of a limit that differences of rows may show of a way that keeps it
 BRAKE = 0.1  # s in which a stop brings the robot to rest, on its way
+FOLLOWS = "follow"  # in place of a digest, of a robot that follows
 
 
 class Executor(Protocol):
@@ -39,7 +42,8 @@ class SimulatedRobot:
     """A robot that is where its plan says, or a model that the caller moves: `move(joints, commands, dt)` is called
     with what the axes shall be, at every `advance`.
 
-    A stop slows time down along the plan, to 0 within BRAKE s, so that it ends on the way that was checked.
+    A stop slows time down along the plan, to 0 within BRAKE s, so that it ends on the way that was checked. A robot
+    that follows has no such way: it brakes as hard as its limits allow.
     """
 
     def __init__(
@@ -51,8 +55,10 @@ class SimulatedRobot:
         move: Callable[[np.ndarray, np.ndarray, float], None] | None = None,
     ) -> None:
         self.joints, self.commands = np.array(joints, dtype=float), np.array(commands, dtype=float)
-        self._limits, self._package, self._move = limits, package, move
+        self.limits, self._package, self._move = limits, package, move
         self._plan: Plan | None = None
+        self._follower: Follower | None = None
+        self._fault = ""
         self._time, self._pace, self._braking = 0.0, 1.0, False
         self._report = ExecutorReport()
 
@@ -65,10 +71,10 @@ class SimulatedRobot:
         if not within_limits(plan.joints).all():
             return "plan: a joint leaves its range"
         speed = np.abs(np.diff(rows, axis=0)).max(axis=0, initial=0.0) / plan.step
-        if (speed > ROUNDING * self._limits.velocity).any():
-            axis = int(np.argmax(speed / self._limits.velocity))
+        if (speed > ROUNDING * self.limits.velocity).any():
+            axis = int(np.argmax(speed / self.limits.velocity))
             name = f"joint {axis + 1}" if axis < JOINTS else f"tendon {axis + 1 - JOINTS}"
-            return f"plan: {name} moves at {speed[axis]:.3g}, expected at most {self._limits.velocity[axis]:.3g}"
+            return f"plan: {name} moves at {speed[axis]:.3g}, expected at most {self.limits.velocity[axis]:.3g}"
         off = np.abs(rows[0] - np.append(self.joints, self.commands)).max()
         return f"plan: starts {off:.3g} away from where the robot is" if off > AT_START else ""
 
@@ -83,15 +89,33 @@ class SimulatedRobot:
         self._report = ExecutorReport("running", digest)
         return ""
 
+    def follow(self, follower: Follower) -> str:
+        """Go where `follower` goes, which begins here and is in step with `advance`; why not, "" where it does."""
+        if self._report.mode == "running":
+            return "busy: another plan runs"
+        self._follower, self._time, self._braking, self._fault = follower, 0.0, False, ""
+        self._report = ExecutorReport("running", FOLLOWS)
+        return ""
+
+    def hear(self, age: float, axes: np.ndarray | None) -> None:
+        """What targets asked for `age` s ago, as `Follower.hear`."""
+        if self._follower is not None:
+            self._follower.hear(self._time - age, axes)
+
     def state(self) -> ExecutorReport:
         return self._report
 
     def stop(self) -> None:
-        self._braking = self._braking or self._report.mode == "running"
+        if self._report.mode == "running" and not self._braking:
+            self._braking = True
+            if self._follower is not None:
+                self._follower.brake()
 
     def advance(self, dt: float) -> None:
         """Let `dt` s pass."""
-        if self._plan is not None and self._report.mode == "running":
+        if self._follower is not None:
+            self._go_after(self._follower, dt)
+        elif self._plan is not None and self._report.mode == "running":
             before = self._pace
             if self._braking:
                 self._pace = max(before - self._slowed(dt), 0.0)
@@ -103,6 +127,19 @@ class SimulatedRobot:
                 self._report = ExecutorReport("done", self._report.digest)
         if self._move is not None:
             self._move(self.joints, self.commands, dt)
+
+    def _go_after(self, follower: Follower, dt: float) -> None:
+        self._time += dt
+        try:
+            self.joints, self.commands = follower.tick(self._time)
+        except InputError as error:
+            self._fault, given_up = str(error), self._braking
+            self.stop()
+            if given_up:  # it finds no way to brake either
+                follower.rests = True
+        if follower.rests:
+            self._follower = None
+            self._report = ExecutorReport("fault" if self._fault else "idle", FOLLOWS, self._fault)
 
     def _slowed(self, dt: float) -> float:
         """By how much a stop slows the pace in `dt` s."""

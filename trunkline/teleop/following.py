@@ -20,22 +20,41 @@ from trunkline.errors import InputError
 from trunkline.panda.collision import clearance
 from trunkline.teleop.messages import Targets
 from trunkline.teleop.planner import Planner
-from trunkline.teleop.trajectory import JOINTS
+from trunkline.teleop.trajectory import JOINTS, Limits
 
 KNOT = 0.1  # s between targets that are looked at, linear between: a hand that aims moves evenly for so long
 SAMPLES = 24  # of a mean
 
 
+def sought(planner: Planner, targets: Targets | None, joints: np.ndarray) -> tuple[np.ndarray | None, str]:
+    """Axes (7 + K,), rad and m, that `targets` ask for, the nearest to `joints` (7,); None where there are none that
+    the robot may follow, and why they are refused, "" where they are not."""
+    if targets is None:
+        return None, ""
+    try:
+        return np.concatenate(planner.goal(targets, joints)), ""
+    except InputError as error:
+        return None, str(error)
+
+
 class Follower:
     """From rest at `joints` (7,), rad, and `commands` (K,), m, in ticks of `dt` s, `delay` s behind the targets.
-    `period`: s, of the arm's slowest swing, 0 for an arm that does not swing. `refused` says why the newest targets are
-    not followed, "" where they are."""
+    `period`: s, of the arm's slowest swing, 0 for an arm that does not swing. `rests`: whether it has come to rest,
+    once it brakes."""
 
     def __init__(
-        self, planner: Planner, joints: np.ndarray, commands: np.ndarray, dt: float, delay: float, period: float = 0.0
+        self,
+        limits: Limits,
+        mount_offset: float,
+        joints: np.ndarray,
+        commands: np.ndarray,
+        dt: float,
+        delay: float,
+        period: float = 0.0,
     ) -> None:
-        here, limits = np.append(joints, commands), planner.limits
-        self._planner, self._dt, self._delay, self.refused = planner, dt, delay, ""
+        here = np.append(joints, commands)
+        self._mount_offset, self._dt, self._delay = mount_offset, dt, delay
+        self._braking, self.rests = False, False
         self._width = min(period, max(2 * (delay - KNOT), 0.0))
         self._times: list[float] = []
         self._goals = [here]  # of `_times`, and before these where it began
@@ -47,21 +66,28 @@ class Follower:
         self._now.max_jerk = limits.jerk.tolist()
         self._now.minimum_duration = dt  # sooner there, it would run ahead
 
-    def hear(self, now: float, targets: Targets | None) -> None:
-        """The targets at `now`, s; None where there are none that the robot may follow."""
-        if self._times and now < self._times[-1] + KNOT - 1e-6:
-            return
-        goal = self._goals[-1]
-        if targets is not None:
-            try:
-                goal, self.refused = np.concatenate(self._planner.goal(targets, goal[:JOINTS])), ""
-            except InputError as error:
-                self.refused = str(error)
+    @property
+    def goal(self) -> np.ndarray:
+        """The newest, (7 + K,), rad and m."""
+        return self._goals[-1]
+
+    def due(self, now: float) -> bool:
+        """Whether targets are to be looked at, at `now`, s."""
+        return not self._times or now >= self._times[-1] + KNOT - 1e-6
+
+    def hear(self, now: float, goal: np.ndarray | None) -> None:
+        """Axes that the targets at `now`, s, ask for, (7 + K,); None: the last ones still."""
+        self._goals.append(self.goal if goal is None else goal)
         self._times.append(now)
-        self._goals.append(goal)
         since = bisect_left(self._times, now - self._delay - self._width) - 1
         if since > 0:
             del self._times[:since], self._goals[:since]
+
+    def brake(self) -> None:
+        """To rest, as soon as the limits allow; ticks bring it there, wherever the targets are."""
+        self._braking = True
+        self._now.control_interface, self._now.minimum_duration = ruckig.ControlInterface.Velocity, None
+        self._now.target_velocity = self._now.target_acceleration = [0.0] * len(self.goal)
 
     def tick(self, now: float) -> tuple[np.ndarray, np.ndarray]:
         """Joints (7,), rad, and commands (K,), m, that the robot is sent at `now`, s: one tick after the last ones.
@@ -69,16 +95,18 @@ class Follower:
         Raises:
             InputError: Ruckig finds no way, or the next pose would touch itself; the robot is to be stopped.
         """
-        here, next_one = self._way(now), self._way(now + self._dt)
-        velocity = np.clip((next_one - here) / self._dt, -self._velocity, self._velocity)
-        self._now.target_position, self._now.target_velocity = next_one.tolist(), velocity.tolist()
+        if not self._braking:
+            here, next_one = self._way(now), self._way(now + self._dt)
+            velocity = np.clip((next_one - here) / self._dt, -self._velocity, self._velocity)
+            self._now.target_position, self._now.target_velocity = next_one.tolist(), velocity.tolist()
         result = self._ruckig.update(self._now, self._next)
         if result < 0:
             raise InputError(f"following: Ruckig found {result}, expected a way to the targets")
         found = np.array(self._next.new_position)
-        if clearance(found[None, :JOINTS], self._planner.mount_offset)[0] <= 0:
+        if not self._braking and clearance(found[None, :JOINTS], self._mount_offset)[0] <= 0:
             raise InputError("self-collision: the robot would touch itself as it follows")
         self._next.pass_to_input(self._now)
+        self.rests = self._braking and result == ruckig.Result.Finished
         return found[:JOINTS], found[JOINTS:]
 
     def _way(self, now: float) -> np.ndarray:

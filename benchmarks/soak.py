@@ -1,0 +1,286 @@
+"""A live session for hours: whether its server's memory grows, a lease is lost, or a stop is missed.
+
+    python -m benchmarks.soak [PACKAGE] [--hours 8]
+
+Server, core, sockets and messages are the real ones; the robot is where its plan says, and a plan is a move of one
+joint that is there at once. The session's clock is the server's alone and goes on as soon as an input has been heard,
+so that hours pass in minutes and no pause of this machine counts. One client controls and goes through aim, preview,
+confirmation and execution, over and over; now and then it gives the lease to the next who has come. Others come, watch
+and leave; each stops the robot once.
+"""
+
+import argparse
+import asyncio
+import gc
+import json
+import resource
+import struct
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from aiohttp import ClientSession, WSMsgType, web
+
+from trunkline.errors import InputError, in_one_line
+from trunkline.foresight.believing import make_world
+from trunkline.foresight.package import Package, read_package
+from trunkline.live import foreseer, talk, wire
+from trunkline.live.access import Origins, make_token
+from trunkline.live.desk import Desk
+from trunkline.live.house import SEARCH
+from trunkline.live.robot import Following, Standing
+from trunkline.live.server import House, Server
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.pipeline.results import recorded
+from trunkline.teleop.config import Config as Teleop
+from trunkline.teleop.core import Teleoperation
+from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.messages import ExecutorReport, PlanReport
+from trunkline.teleop.plan import Plan
+from trunkline.teleop.trajectory import JOINTS, gentle, limits_of
+
+PORT, RATE, BODIES = 18445, 72.0, 26
+RIGID, TIP, LENGTH = (0.5, 0.0, 0.55), (0.62, 0.0, 0.2), 0.6  # m, of the targets and of rays at first
+VISIT, STAY, HAND_OVER = 20.0, 8.0, 300.0  # s between visitors, of a visit, between hand-overs of the lease
+EARLY = 0.05  # share of the time after which memory is first looked at
+
+
+class Robot:
+    """Where its plan says, by the session's clock."""
+
+    def __init__(self, package: Package, teleop: Teleop) -> None:
+        limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
+        self.robot = SimulatedRobot(SEARCH, package.straight, limits, package.digest)
+        self.start, self.hear, self.now, self.stops = self.robot.start, self.robot.hear, 0.0, 0
+
+    def follow(self, following: Following) -> str:
+        return "follow: not here"
+
+    def permit(self) -> None:
+        pass
+
+    def stop(self) -> None:
+        self.stops += 1
+        self.robot.stop()
+
+    def state(self) -> ExecutorReport:
+        return self.robot.state()
+
+    def standing(self) -> Standing:
+        bodies = np.tile([0.1, 0.2, 0.3, 1.0, 0.0, 0.0, 0.0], (BODIES, 1))
+        return Standing(self.now, 0.0, self.robot.joints, self.robot.commands, np.full(7, np.nan), bodies)
+
+
+class Planning:
+    """The first joint to one side and back again; previewed by two pieces."""
+
+    def __init__(self, robot: Robot) -> None:
+        self.robot, self.made = robot.robot, 0
+        self.server: Server | None = None
+
+    def order(self, order: foreseer.Order | foreseer.Seek) -> None:
+        assert isinstance(order, foreseer.Order)
+        assert self.server is not None
+        request, robot = order.request, self.robot
+        self.made += 1
+        here = np.append(robot.joints, robot.commands)
+        there = np.append(SEARCH, robot.commands) + np.eye(len(here))[0] * (0.2 if self.made % 2 else 0.0)
+        rows = gentle(here, there, robot.limits, 0.01)
+        plan = Plan(0.01, rows[:, :JOINTS], rows[:, JOINTS:], (("approach", 0),), request.package, request.world)
+        digest, poses = plan.digest(), np.zeros((15, BODIES, 7), dtype=np.float32)
+        told = talk.Foreseen(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
+        for answer in (
+            foreseer.Planned(PlanReport(request.serial, digest, "", plan.package, plan.world), plan),
+            foreseer.Begun(request.serial, talk.Preview(digest, 0.02, 0.3, 0.02, (("approach", 0.0),))),
+            foreseer.Shown(request.serial, 0, 0.02, poses, False),
+            foreseer.Shown(request.serial, 15, 0.32, poses, True),
+            foreseer.Told(request.serial, told),
+        ):
+            self.server.foreseen(answer)
+
+    def leave(self) -> None:
+        pass
+
+
+class Stepped(Server):
+    """A server whose clock is another's; it counts inputs and stops that were heard."""
+
+    inputs, stopped = 0, 0
+
+    def _input(self, client, received, now: float) -> None:
+        super()._input(client, received, now)
+        self.inputs += 1
+
+    def _heed(self, client, received) -> None:
+        super()._heed(client, received)
+        self.stopped += received.kind == "stop"
+
+    async def _run(self) -> None:
+        await asyncio.Event().wait()
+
+
+class Guest:
+    """A client that acknowledges everything and keeps what it was told last."""
+
+    def __init__(self, socket, now) -> None:
+        self.socket, self.now, self.told, self.received = socket, now, {}, 0
+        self.knows = asyncio.Event()  # its clock
+        self.task = asyncio.create_task(self._listen())
+
+    async def _listen(self) -> None:
+        async for message in self.socket:
+            if message.type is WSMsgType.BINARY:
+                self.received += 1
+                await self.send("ack")
+            elif message.type is WSMsgType.TEXT:
+                told = json.loads(message.data)
+                self.told[told["type"]] = told
+                if told["type"] == "ping":
+                    await self.say(type="pong", number=told["number"], stamp=self.now())
+                if told["type"] == "clock":
+                    self.knows.set()
+
+    async def say(self, **message) -> None:
+        await self.socket.send_json(message)
+
+    async def send(self, kind: str, rows: bytes = b"", flags: int = 0, count: int = 0) -> None:
+        head = struct.pack("<BBHId", wire.FROM_CLIENT[kind].number, flags, count, self.received, self.now())
+        await self.socket.send_bytes(head + rows)
+
+    async def leave(self) -> None:
+        await self.socket.close()
+        await self.task
+
+
+class Hands:
+    """What the hands of whom controls do: a cycle by the core's own mode."""
+
+    def __init__(self) -> None:
+        self.mode, self.since, self.cycles = "", 0.0, 0
+
+    def held(self, guest: Guest, now: float) -> dict[str, float]:
+        mode = (guest.told.get("state") or {}).get("mode", "")
+        if mode != self.mode:
+            self.cycles += self.mode == "execute" and mode == "aim"
+            self.mode, self.since = mode, now
+        spent = now - self.since
+        if mode == "aim":
+            return {"grip": 1.0, "trigger": float(spent % 1.2 > 0.8)}
+        if mode == "ready":
+            return {"grip": 1.0, "trigger": float(spent > 0.2)}
+        if mode in ("delay", "execute"):
+            return {"grip": 1.0}
+        return {"primary": float(spent % 0.5 < 0.2)} if mode == "stopped" else {}
+
+
+def above(target: tuple[float, float, float], held: dict[str, float]) -> list[float]:
+    """A hand above its target, its ray straight down, in the base frame."""
+    x, y, z = target
+    row = dict.fromkeys(wire.HAND, 0.0) | {"x": x, "y": y, "z": z + LENGTH, "qw": 1.0} | held
+    return [row[name] for name in wire.HAND]
+
+
+async def session(package: Package, hours: float) -> None:
+    teleop = load_folder(Teleop, PROJECT / "conf/teleop")
+    robot, clock, said = Robot(package, teleop), [0.0], Counter()
+    planning = Planning(robot)
+    core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
+    desk, token = Desk(core, robot, planning, make_world(()), teleop.handling.lift), make_token()
+
+    def log(line: str) -> None:
+        said["silent"] += line.endswith("was silent")
+        said["error"] += line.startswith("error:")
+
+    origins, scene = Origins.of(["127.0.0.1"], PORT, False), {"bodies": [f"b{n}" for n in range(BODIES)]}
+    house = House(desk, token, origins, package.digest, scene, None, RATE, Path("nowhere"), log)
+    server = planning.server = Stepped(house, lambda: clock[0])
+    runner = web.AppRunner(server.app(), access_log=None)
+    await runner.setup()
+    await web.TCPSite(runner, "127.0.0.1", PORT).start()
+    url, began = f"http://127.0.0.1:{PORT}", time.monotonic()
+    async with ClientSession() as sockets:
+
+        async def come() -> Guest:
+            socket = await sockets.ws_connect(f"{url}/ws", headers={"Origin": url}, max_msg_size=0)
+            guest = Guest(socket, lambda: clock[0])
+            await guest.say(type="hello", version=wire.VERSION, token=token)
+            await guest.knows.wait()
+            return guest
+
+        async def until(happens) -> None:
+            end = time.monotonic() + 10.0
+            while not happens():
+                if time.monotonic() > end:
+                    raise InputError(f"after {clock[0]:.1f} s of the session nothing was heard for 10 s")
+                await asyncio.sleep(0)
+
+        async def control(guest: Guest) -> None:
+            await guest.say(type="lease", action="ask")
+            await until(lambda: server.control.holder == guest.told["welcome"]["id"])
+
+        guest, hands, visitors = await come(), Hands(), []
+        await control(guest)
+        found = Counter(visits=1)
+        ticks, memory = round(3600 * hours * RATE), 0
+        for tick in range(ticks):
+            now = clock[0] = robot.now = (tick + 1) / RATE
+            robot.robot.advance(1 / RATE)
+            held, before = hands.held(guest, now), server.inputs
+            rows = np.array([above(RIGID, held), above(TIP, held)], dtype="<f4").tobytes()
+            await guest.send("input", rows, 7, 2)
+            await until(lambda before=before: server.inputs > before)
+            server.tick(now, 1 / RATE)
+            if tick % round(VISIT * RATE) == 0:
+                visitors.append((now, await come()))
+                found["visits"] += 1
+            if visitors and now > visitors[0][0] + STAY:
+                heard, stops = server.stopped, robot.stops
+                await visitors[0][1].send("stop")
+                await until(lambda heard=heard: server.stopped > heard)
+                found["stops"] += 1
+                found["missed"] += robot.stops == stops
+                if now // HAND_OVER > found["given"]:
+                    await guest.say(type="lease", action="give", to=visitors[0][1].told["welcome"]["id"])
+                    await until(lambda: server.control.holder == visitors[0][1].told["welcome"]["id"])
+                    await guest.leave()
+                    guest, found["given"] = visitors.pop(0)[1], int(now // HAND_OVER)
+                    found["hand-overs"] += 1
+                else:
+                    await visitors.pop(0)[1].leave()
+            if tick == round(EARLY * ticks):
+                memory = resident()
+    grown = resident() / memory - 1
+    passed = time.monotonic() - began
+    print(
+        f"{hours:g} h of input at {RATE:g} Hz in {passed / 60:.1f} min ({3600 * hours / passed:.0f} times as fast):"
+        f" {hands.cycles} cycles from aim to a robot that has arrived, {planning.made} plans,"
+        f" {found['visits']} clients, {found['hand-overs']} hand-overs"
+    )
+    print(
+        f"memory {100 * grown:+.1f} % since {100 * EARLY:.0f} % of the time, {said['silent']} leases lost,"
+        f" {found['missed']} of {found['stops']} stops missed, {said['error']} errors"
+    )
+    await runner.cleanup()
+
+
+def resident() -> int:
+    """Bytes of memory that this process has."""
+    gc.collect()
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+
+
+@in_one_line
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("package", nargs="?", type=Path)
+    parser.add_argument("--hours", type=float, default=8.0)
+    given = parser.parse_args()
+    path = given.package or next(iter(sorted(Path("artifacts/package_unity").glob("*.tgz"))))
+    with recorded("soak", given.hours >= 8):
+        asyncio.run(session(read_package(path), given.hours))
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
