@@ -1,7 +1,7 @@
 """The stand-in lab."""
 
 from trunkline.loading import say_loading
-from trunkline.processor import hold_arithmetic
+from trunkline.arithmetic import hold_arithmetic
 
 hold_arithmetic()
 say_loading("demo")

@@ -1,7 +1,7 @@
 """The stages of dvc.yaml, a file each: read, one call, write."""
 
 from trunkline.loading import say_loading
-from trunkline.processor import hold_arithmetic
+from trunkline.arithmetic import hold_arithmetic
 
 hold_arithmetic()
 say_loading("stages")

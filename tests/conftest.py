@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 
 import pytest
 
-from trunkline.processor import hold_arithmetic
+from trunkline.arithmetic import hold_arithmetic
 
 hold_arithmetic()  # before anything imports NumPy
 

@@ -32,8 +32,8 @@ EXAMPLES = sorted(
 )
 
 # What surrounds every stage (load, show, refuse, write) and never changes a number: no reason to run again.
-INERT = ("trunkline/errors.py", "trunkline/processor.py", "trunkline/progress.py", "trunkline/settings.py")
-INERT += ("trunkline/loading.py", "trunkline/threads.py", "demo/__init__.py", "rehearsal/__init__.py")
+INERT = ("trunkline/arithmetic.py", "trunkline/errors.py", "trunkline/loading.py", "trunkline/progress.py")
+INERT += ("trunkline/settings.py", "trunkline/threads.py", "demo/__init__.py", "rehearsal/__init__.py")
 INERT += ("trunkline/figures/", "trunkline/pipeline/", "rehearsal/report.py")
 ACTIVE = ("trunkline/pipeline/identify.py",)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from trunkline.processor import HELD, NEEDED, hold_arithmetic
+from trunkline.arithmetic import HELD, NEEDED, hold_arithmetic
 
 ROOT = Path(__file__).parents[1]
 DIGITS = """
