@@ -190,6 +190,15 @@ def test_who_comes_later_sees_the_plan_that_is_previewed():
             await later.hears("foreseen")
             await asyncio.sleep(0.2)
             assert sum(frame[0] == 2 for frame in later.frames) == 2
+            for left in (hand(MOUNT + UP), grips(MOUNT), grips(MOUNT + UP / 4)):  # a ray that moves makes it void
+                guest.left = left
+                await asyncio.sleep(0.2)
+            await guest.hears("state", mode="aim")
+            last = await here.come()
+            await last.hears("state")
+            await asyncio.sleep(0.2)
+            assert not [told for told in last.said if told["type"] == "preview"]
+            assert not any(frame[0] == 2 for frame in last.frames)
 
     asyncio.run(session())
 
