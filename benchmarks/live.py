@@ -32,7 +32,7 @@ from trunkline.teleop.config import Config as Teleop
 PORT, HZ = 18444, 72.0
 RIGID, TIP = (0.5, 0.0, 0.55), (0.62, 0.0, 0.2)  # m, of the targets that plans are asked for
 LENGTH = 0.6  # m, of rays at first: hands are above what they point at
-BETWEEN = 0.15  # s between stops
+BETWEEN = (1.5, 3.0)  # s between stops: in aim, planning, preview or its batch
 QUIET = 5.0  # s in which frames and processor are counted
 
 
@@ -93,19 +93,18 @@ async def watched(server: Server, made: Made, ours) -> tuple[int, float, float, 
     await asyncio.sleep(QUIET)
     frames, cpu, lasted = server.frames - frames, time.process_time() - cpu, time.monotonic() - began
     bytes_a_frame = wire.HEAD_BYTES + 28 * (len(made.scene["bodies"]) + len(wire.MARKERS))
-    held, seen, plans, sent = [], made.robot.standing().held, set(), []
+    held, seen, asked = [], made.robot.standing().held, made.desk.state.serial
     ours.send("stop")
     while not ours.poll():
         await asyncio.sleep(0.002)
         now = made.robot.standing().held
         if now != seen:
             held, seen = [*held, now], now
-        if made.desk.plan is not None:
-            plans.add(id(made.desk.plan))
     sent = np.array(ours.recv())
     after = np.searchsorted(held, sent)
     kept = after < len(held)
-    return bytes_a_frame, cpu / frames, frames / lasted, np.array(held)[after[kept]] - sent[kept], len(plans)
+    plans = made.desk.state.serial - asked
+    return bytes_a_frame, cpu / frames, frames / lasted, np.array(held)[after[kept]] - sent[kept], plans
 
 
 def attend(pipe, token: str, watchers: int, stops: int) -> None:
@@ -128,9 +127,9 @@ async def clients(pipe, token: str, watchers: int, stops: int) -> None:
         pipe.send("here")
         while not pipe.poll():
             await asyncio.sleep(0.01)
-        sent = []
+        sent, rng = [], np.random.default_rng(0)
         for _ in range(stops):
-            await asyncio.sleep(BETWEEN * (4 + np.random.default_rng(len(sent)).random()))
+            await asyncio.sleep(rng.uniform(*BETWEEN))
             sent.append(time.monotonic())
             await sockets[1].send_bytes(struct.pack("<BBHId", wire.FROM_CLIENT["stop"].number, 0, 0, 0, 0.0))
         await asyncio.sleep(0.5)

@@ -11,6 +11,7 @@ and leave; each stops the robot once.
 
 import argparse
 import asyncio
+import contextlib
 import gc
 import json
 import resource
@@ -43,6 +44,7 @@ from trunkline.teleop.trajectory import JOINTS, gentle, limits_of
 PORT, RATE, BODIES = 18445, 72.0, 26
 RIGID, TIP, LENGTH = (0.5, 0.0, 0.55), (0.62, 0.0, 0.2), 0.6  # m, of the targets and of rays at first
 VISIT, STAY, HAND_OVER = 20.0, 8.0, 300.0  # s between visitors, of a visit, between hand-overs of the lease
+SHOWN = 0.5  # s in which a preview is shown
 EARLY = 0.05  # share of the time after which memory is first looked at
 
 
@@ -126,7 +128,11 @@ class Guest:
     def __init__(self, socket, now) -> None:
         self.socket, self.now, self.told, self.received = socket, now, {}, 0
         self.knows = asyncio.Event()  # its clock
-        self.task = asyncio.create_task(self._listen())
+        self.task = asyncio.create_task(self._read())
+
+    async def _read(self) -> None:
+        with contextlib.suppress(ConnectionError):  # it may leave as something comes
+            await self._listen()
 
     async def _listen(self) -> None:
         async for message in self.socket:
@@ -227,6 +233,9 @@ async def session(package: Package, hours: float) -> None:
             now = clock[0] = robot.now = (tick + 1) / RATE
             robot.robot.advance(1 / RATE)
             held, before = hands.held(guest, now), server.inputs
+            if hands.mode == "preview" and now - hands.since > SHOWN:
+                hands.since = now
+                await guest.say(type="shown", digest=guest.told["preview"]["digest"])
             rows = np.array([above(RIGID, held), above(TIP, held)], dtype="<f4").tobytes()
             await guest.send("input", rows, 7, 2)
             await until(lambda before=before: server.inputs > before)

@@ -36,7 +36,7 @@ from trunkline.teleop.planner import Planner
 from trunkline.teleop.vectors import DOWN
 from trunkline.threads import thread_count
 
-NICE = 5
+NICE = 10
 PULL = 0.03  # m of the first cable, for a plan that is thrown away
 EVERY = 0.1  # s between the times at which a spread is told
 
