@@ -36,9 +36,9 @@ def test_one_without_the_time_is_named():
     assert steps > 0
 
 
-def pressed():
+def pressed(**motors):
     """Arms whose tendons press on them; so they creep."""
-    model = small_spec(6).compile()
+    model = small_spec(6, **motors).compile()
     batch = batch_of(model, 2)
     batch.expand("opt.gravity")[:] = gravity_in_base(0.0)
     batch.bind("act")[:] = batch.bind("ctrl")[:] = model.tendon_length0 - [[0.005, 0.004, 0.005], [0.004, 0.004, 0.003]]
@@ -63,6 +63,12 @@ def test_what_is_led_to_rest_stays_there():
     place = batch.bind("qpos").copy()
     batch.step(nstep=round(10 * FIRST_SPAN / timestep))
     np.testing.assert_allclose(batch.bind("qpos"), place, atol=1e-9)
+
+
+def test_stiff_motors_do_not_throw_the_arm_to_and_fro():
+    batch, timestep = pressed(kp=30e3, kv=27)
+    moving, _ = come_to_rest(batch, timestep, 30.0)
+    assert not len(moving)
 
 
 def test_no_arm_is_left_standing_where_it_would_fall_from():

@@ -10,12 +10,11 @@ LIMIT = ([0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0])  # solref, solimp
 
 
 def small_spec(units: int = 8, **motors: float) -> mujoco.MjSpec:
-    """`motors`: what they have beside gains and a lag, as `Actuation` names it."""
+    """`motors`: what they have beside these gains and this lag, or instead, as `Actuation` names it."""
     chain = spiral_chain(0.507, 0.080, 0.012, units)
     properties = unit_properties(chain, TPU_95A_MODULUS, TPU_95A_DENSITY, 0.24, 0.1)
-    tendons = Tendons(
-        count=3, radius_ratio=0.85, friction=0.5, kp=2000, kv=85, max_force=80, time_constant=0.05, **motors
-    )
+    gains = {"kp": 2000, "kv": 85, "max_force": 80, "time_constant": 0.05}
+    tendons = Tendons(count=3, radius_ratio=0.85, friction=0.5, **gains | motors)
     return build_spec(chain, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT))
 
 
