@@ -89,9 +89,9 @@ async def watched(server: Server, made: Made, ours) -> tuple[int, float, float, 
     while not ours.poll():
         await asyncio.sleep(0.05)
     assert ours.recv() == "here"
-    frames, cpu, began = server.frames, time.process_time(), time.monotonic()
+    frames, cpu, began = server.showing.frames, time.process_time(), time.monotonic()
     await asyncio.sleep(QUIET)
-    frames, cpu, lasted = server.frames - frames, time.process_time() - cpu, time.monotonic() - began
+    frames, cpu, lasted = server.showing.frames - frames, time.process_time() - cpu, time.monotonic() - began
     bytes_a_frame = wire.HEAD_BYTES + 28 * (len(made.scene["bodies"]) + len(wire.MARKERS))
     held, seen, asked = [], made.robot.standing().held, made.desk.state.serial
     ours.send("stop")

@@ -1,19 +1,16 @@
-"""Routes, connections and the clockwork of a live session: one port, one origin, one event loop.
+"""Connections and the clockwork of a live session: one port, one origin, one event loop.
 
 Nothing here takes longer than a frame: plans, previews and the robot are processes of their own. The stop is heard
 before anything else of a message is looked at.
 """
 
 import asyncio
-import gzip
-import json
 import secrets
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from aiohttp import WSCloseCode, WSMsgType, web
 
 from trunkline.errors import InputError
@@ -22,62 +19,22 @@ from trunkline.live.access import HEADERS, Origins, PairingCode, same
 from trunkline.live.aligner import Aligner
 from trunkline.live.aligning import mark_at
 from trunkline.live.anchors import Anchor, Anchors
-from trunkline.live.clock import EVERY, PINGS, ClientClock
+from trunkline.live.client import PER_SECOND, Client, end
 from trunkline.live.controllers import held
-from trunkline.live.desk import HERE, Desk
+from trunkline.live.desk import Desk
 from trunkline.live.lease import Control
-from trunkline.live.outbox import Outbox
-from trunkline.live.robot import STALE
 from trunkline.live.scene import Shells
 from trunkline.live.settings import Alignment
-from trunkline.teleop.alignment import base_quaternion
-from trunkline.teleop.messages import Pose
-from trunkline.teleop.vectors import DOWN, conjugate, rotate
+from trunkline.live.showing import Showing, piece
+from trunkline.live.site import Site
 
 HELLO = 3.0  # s for the first message
 LARGEST = 64 * 1024  # bytes of a message
-PER_SECOND, BURST, FLOOD = 400.0, 400.0, 4000.0  # messages of a client; of too many, those that end it
+FLOOD = 4000.0  # messages of a client beyond its rate that end it
 MOST_CLIENTS = 64
 HEARTBEAT = 20.0  # s
-STATES = 0.1  # s between states that tell no new mode
-PING_GAP = 0.03  # s
 TOUCHING = "right"  # the hand whose controller touches
 PREVIEWED = ("plan", "preview", "ready", "delay")  # modes in which who comes is shown the preview from its beginning
-TURNED = np.cos(np.radians(1.0))  # of gravity in the soft base, from which on there is a new shell
-TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml"}
-ABSENT = b"<!doctype html><title>Trunkline</title><p>error: the page is not built: `client/` makes it</p>\n"
-
-
-@dataclass
-class Client:
-    """Who is connected."""
-
-    id: str
-    name: str
-    space: str
-    socket: web.WebSocketResponse
-    aligner: Aligner | None  # None for who is in the base frame
-    outbox: Outbox = field(default_factory=Outbox)
-    clock: ClientClock = field(default_factory=ClientClock)
-    left: float = BURST
-    counted: float = 0.0
-    refused: dict[str, float] = field(default_factory=dict)
-    stopping: bool = False
-
-    @property
-    def alignment(self) -> Pose | None:
-        """Of its reference frame in the base, None where that is not known."""
-        return HERE if self.aligner is None else self.aligner.alignment
-
-    @property
-    def unfit(self) -> str:
-        """Why its alignment is not good enough to execute anything."""
-        return "" if self.aligner is None else self.aligner.unfit
-
-    def count(self, now: float) -> None:
-        """One more message: `left` of its rate, below 0 beyond it."""
-        self.left = min(self.left + PER_SECOND * (now - self.counted), BURST) - 1
-        self.counted = now
 
 
 @dataclass(frozen=True)
@@ -106,54 +63,18 @@ class Server:
         self.control, self.code = Control(), PairingCode()
         self.clients: dict[str, Client] = {}
         self._aligners: dict[str, Aligner] = {}  # of clients that may come again
-        self.frames = 0
-        self._scene = json.dumps(house.scene, separators=(",", ":")).encode()
-        self._zipped = gzip.compress(self._scene)
-        self._page = read_page(house.page)
-        self._said: tuple[float, talk.State | None] = (0.0, None)
-        self._world, self._down, self._shell, self._ticking = None, None, b"", None
-        self._shelled, self._unwritten = 0, ""
+        self.showing = Showing(house.desk, house.shells)
+        self._site = Site(house.origins, house.token, house.scene, house.page, house.log)
+        self._world, self._unwritten = None, ""
 
     # --- routes
 
     def app(self) -> web.Application:
-        app = web.Application(middlewares=[self._guarded], client_max_size=LARGEST)
+        app = web.Application(middlewares=[self._site.guarded], client_max_size=LARGEST)
         app.router.add_get("/ws", self._socket)
-        app.router.add_get("/scene.json", self._get_scene)
-        app.router.add_get("/{name:.*}", self._get_page)
+        self._site.add_routes(app)
         app.cleanup_ctx.append(self._clockwork)
         return app
-
-    @web.middleware
-    async def _guarded(self, request: web.Request, handler) -> web.StreamResponse:
-        reason = self.house.origins.fault(request.headers.get("Host"), request.headers.get("Origin"), False)
-        if reason:
-            self.house.log(f"refused {request.remote}: {reason}")
-            return web.Response(status=403, text=f"error: {reason}\n", headers=HEADERS)
-        try:
-            response = await handler(request)
-        except web.HTTPException as error:
-            return web.Response(status=error.status, text=f"error: {error.reason}\n", headers=HEADERS)
-        if not response.prepared:
-            response.headers.update(HEADERS)
-        return response
-
-    async def _get_page(self, request: web.Request) -> web.Response:
-        name = request.match_info["name"] or "index.html"
-        if not self._page:
-            return web.Response(status=503, body=ABSENT, content_type="text/html")
-        if name not in self._page:
-            raise web.HTTPNotFound
-        return web.Response(body=self._page[name], content_type=TYPES[Path(name).suffix], charset="utf-8")
-
-    async def _get_scene(self, request: web.Request) -> web.Response:
-        scheme, _, token = request.headers.get("Authorization", "").partition(" ")
-        if scheme != "Bearer" or not same(token, self.house.token):
-            raise web.HTTPUnauthorized
-        zipped = "gzip" in request.headers.get("Accept-Encoding", "")
-        encoding = {"Content-Encoding": "gzip"} if zipped else {}
-        body = self._zipped if zipped else self._scene
-        return web.Response(body=body, content_type="application/json", headers=encoding)
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
         reason = self.house.origins.fault(request.headers.get("Host"), request.headers.get("Origin"), True)
@@ -168,14 +89,14 @@ class Server:
             client = await self._welcome(socket)
         except InputError as error:
             self.house.log(f"refused {request.remote}: {error}")
-            await _end(socket, str(error))
+            await end(socket, str(error))
             return socket
-        tasks = [asyncio.create_task(work) for work in (self._send(client), self._ping(client))]
+        tasks = [asyncio.create_task(work) for work in (client.send(), client.ping(self.now))]
         try:
             await self._hear(client)
         except InputError as error:
             self.house.log(f"refused {client.id}: {error}")
-            await _end(socket, str(error))
+            await end(socket, str(error))
         finally:
             for task in tasks:
                 task.cancel()
@@ -208,7 +129,7 @@ class Server:
         older = self.clients.get(hello.id)
         if older is not None:
             self._leave(older)
-            asyncio.create_task(_end(older.socket, "connection: the same client came again"))
+            asyncio.create_task(end(older.socket, "connection: the same client came again"))
         if hello.space == "room" and self.house.alignment is None:
             raise InputError("space: found room, expected base: nothing is aligned here")
         aligner = self._aligner(hello)
@@ -247,12 +168,12 @@ class Server:
             say(talk.tell(desk.told(self.control.holder)))
             if desk.preview is not None and desk.intent.mode in PREVIEWED:
                 say(talk.tell(desk.preview))
-                for piece in desk.pieces:
-                    client.outbox.piece(_piece(piece))
+                for shown in desk.pieces:
+                    client.outbox.piece(piece(shown))
         if desk.foreseen is not None:
             say(talk.tell(desk.foreseen))
-        if self._shell:
-            client.outbox.show("shell", self._shell)
+        if self.showing.shell:
+            client.outbox.show("shell", self.showing.shell)
         self._tell_lease()
 
     async def _hear(self, client: Client) -> None:
@@ -426,30 +347,9 @@ class Server:
 
     def _refuse(self, client: Client, reason: str) -> None:
         """One line to whom it concerns, the same no oftener than once a second."""
-        now, kind = self.now(), reason.partition(":")[0]
-        if now - client.refused.get(kind, -np.inf) >= 1.0:
-            client.refused[kind] = now
-            client.outbox.say(talk.tell(talk.Refusal(reason)))
+        if client.refuses(reason, self.now()):
             self.house.log(f"refused {client.id}: {reason}")
             self.desk.journal.event("refused", client=client.id, reason=reason)
-
-    async def _send(self, client: Client) -> None:
-        socket, outbox = client.socket, client.outbox
-        while not socket.closed:
-            item = outbox.take()
-            if item is None:
-                await outbox.ready.wait()
-            elif isinstance(item, str):
-                await socket.send_str(item)
-            else:
-                await socket.send_bytes(item)
-
-    async def _ping(self, client: Client) -> None:
-        while not client.socket.closed:
-            for _ in range(PINGS):
-                client.outbox.say(talk.tell(talk.Ping(client.clock.ping(self.now()))))
-                await asyncio.sleep(PING_GAP)
-            await asyncio.sleep(EVERY)
 
     # --- the clockwork
 
@@ -485,8 +385,7 @@ class Server:
         if self.desk.journal.fault != self._unwritten:
             self._unwritten = self.desk.journal.fault
             self.house.log(self._unwritten)
-        self._show_robot(now)
-        self._tell_state(now)
+        self._show(now)
         if self.desk.world is not self._world:
             self._world = self.desk.world
             self._tell(talk.Around(self.desk.world))
@@ -500,60 +399,23 @@ class Server:
                 client.outbox.forget_pieces()
             self._tell(answer.preview)
         elif isinstance(answer, foreseer.Shown):
-            message = _piece(answer)
+            message = piece(answer)
             for client in self.clients.values():
                 client.outbox.piece(message)
         elif isinstance(answer, foreseer.Told):
             self._tell(answer.foreseen)
 
-    def _show_robot(self, now: float) -> None:
-        desk, standing = self.desk, self.desk.robot.standing()
-        assert desk.intent is not None
-        self.frames += 1
-        rows = np.concatenate([standing.bodies, desk.markers()])
-        flags = {
-            name
-            for name, is_set in (
-                ("moving", desk.robot.state().mode == "running"),
-                ("stopped", desk.intent.mode == "stopped"),
-                ("stale", now - standing.time > STALE),
-            )
-            if is_set
-        }
-        frame = wire.frame("robot", flags, len(rows), self.frames & 0xFFFFFFFF, standing.time, rows)
-        shell = self._new_shell(now)
+    def _show(self, now: float) -> None:
+        """The robot, its reach and the state to all."""
+        frame, shell = self.showing.robot(now), self.showing.new_shell(now)
+        state = self.showing.new_state(now, self.control.holder)
+        text = talk.tell(state) if state is not None else ""
         for client in self.clients.values():
             client.outbox.show("robot", frame)
             if shell:
                 client.outbox.show("shell", shell)
-
-    def _new_shell(self, now: float) -> bytes:
-        """Of the tip's reach, where gravity has turned; else nothing."""
-        intent, shells = self.desk.intent, self.house.shells
-        if shells is None or intent is None:
-            return b""
-        down = np.array(DOWN)
-        if intent.targets is not None:
-            turn = base_quaternion(intent.targets.pointing, intent.targets.heading)
-            down = np.array(rotate(conjugate(turn), DOWN))
-        if self._down is not None and down @ self._down > TURNED:
-            return b""
-        self._down, points = down, shells.at(down)
-        self._shelled += 1
-        self._shell = wire.frame("shell", set(), len(points), self._shelled, now, points)
-        return self._shell
-
-    def _tell_state(self, now: float) -> None:
-        state, (since, before) = self.desk.told(self.control.holder), self._said
-        if state == before:
-            return
-        urgent = before is None or (state.mode, state.robot, state.fault) != (before.mode, before.robot, before.fault)
-        if not urgent and now - since < STATES:
-            return
-        self._said = now, state
-        text = talk.tell(state)
-        for client in self.clients.values():
-            client.outbox.state("state", text)
+            if text:
+                client.outbox.state("state", text)
 
     def _tell_lease(self) -> None:
         people = tuple(talk.Person(client.id, client.name) for client in self.clients.values())
@@ -566,25 +428,3 @@ class Server:
                 self.house.log(f"refused {client.id}: it does not read")
                 self._leave(client)
                 asyncio.create_task(client.socket.close())
-
-
-def read_page(folder: Path) -> dict[str, bytes]:
-    """Contents by name of the files that a page may have; none where there is no index.html."""
-    files = [file for file in folder.glob("*") if file.suffix in TYPES and file.is_file() and not file.is_symlink()]
-    found = {file.name: file.read_bytes() for file in files}
-    return found if "index.html" in found else {}
-
-
-def _piece(piece: foreseer.Shown) -> bytes:
-    flags = {"last"} if piece.last else set()
-    return wire.frame("preview", flags, piece.poses.shape[1], piece.first, piece.time, piece.poses)
-
-
-async def _end(socket: web.WebSocketResponse, reason: str) -> None:
-    """Say why, and close."""
-    if not socket.closed:
-        try:
-            await socket.send_str(talk.tell(talk.Refusal(reason, closing=True)))
-        except ConnectionError:
-            return
-        await socket.close(code=WSCloseCode.POLICY_VIOLATION, message=reason.encode()[:120])
