@@ -66,7 +66,7 @@ def test_what_is_led_to_rest_stays_there():
 
 
 def test_stiff_motors_do_not_throw_the_arm_to_and_fro():
-    batch, timestep = pressed(kp=30e3, kv=27)
+    batch, timestep = pressed(kp=100e3, kv=27)
     moving, _ = come_to_rest(batch, timestep, 30.0)
     assert not len(moving)
 

@@ -1,6 +1,6 @@
 """Settling: heavily damped and without friction, MuJoCo is stepped until every joint is near rest, and led there.
 
-Friction and the joints' branches and sliders are off, damping, of joints and motors, is what settles soonest: nothing
+Friction and the joints' branches and sliders are off, damping, of joints and tendons, is what settles soonest: nothing
 of it moves the shape at rest, or it is the middle of a band of them; though which of several shapes an arm comes to
 may depend on its way.
 """
@@ -100,8 +100,9 @@ def relax(batch: Batch, model: mujoco.MjModel) -> float:
     for name in ("dof_frictionloss", "tendon_frictionloss", "dof_dampingpoly"):
         batch.expand(name)[:] = 0
     batch.expand("dof_damping")[:] = RELAXATION * batch.expand("jnt_stiffness")[:, model.dof_jntid]
-    gain, bias = batch.expand("actuator_gainprm")[:, :, 0], batch.expand("actuator_biasprm")
-    bias[:, :, 2] = np.minimum(bias[:, :, 2], -timestep * gain)  # a step never takes a stiff motor past its target
+    # a step never throws the arm past where its motors pull; their own damping ends where a tendon is slack
+    pull = batch.expand("actuator_gainprm")[:, :, 0]
+    batch.expand("tendon_damping")[:, model.actuator_trnid[:, 0]] = timestep * pull
     for one in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
         batch.expand("tendon_stiffness")[:, one.tendon] = 0
     return timestep
