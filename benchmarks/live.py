@@ -17,21 +17,15 @@ import time
 from pathlib import Path
 
 import numpy as np
-from aiohttp import ClientSession, WSMsgType, web
+from aiohttp import ClientSession, WSMsgType
 
+from benchmarks.guests import RIGID, SEEN, TIP, hands_at, opened
 from trunkline.live import wire
-from trunkline.live.access import Origins, make_token
-from trunkline.live.foreseer import Answer
-from trunkline.live.house import Made, make
-from trunkline.live.server import House, Server
-from trunkline.live.settings import Config
-from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.live.house import Made
+from trunkline.live.server import Server
 from trunkline.pipeline.results import recorded
-from trunkline.teleop.config import Config as Teleop
 
 PORT, HZ = 18444, 72.0
-RIGID, TIP = (0.5, 0.0, 0.55), (0.62, 0.0, 0.2)  # m, of the targets that plans are asked for
-LENGTH = 0.6  # m, of rays at first: hands are above what they point at
 BETWEEN = (1.5, 3.0)  # s between stops: in aim, planning, preview or its batch
 QUIET = 5.0  # s in which frames and processor are counted
 
@@ -53,35 +47,16 @@ def main(package: Path, watchers: int, stops: int) -> None:
 
 async def serve(package: Path, watchers: int, stops: int) -> tuple[int, float, float, np.ndarray, int]:
     """Bytes and s of processor a frame, frames a second, s from each stop to its hold, and how many plans were made."""
-    loop, servers = asyncio.get_running_loop(), []
-
-    def heard(answer: Answer | None) -> None:
-        loop.call_soon_threadsafe(lambda: [server.foreseen(answer) for server in servers])
-
-    teleop, config = load_folder(Teleop, PROJECT / "conf/teleop"), load_folder(Config, PROJECT / "conf/live")
-    made = await asyncio.to_thread(make, package, teleop, config, heard)
-    while not (made.robot.ready and made.planning.ready.is_set()):
-        await asyncio.sleep(0.1)
-    token = make_token()
-    house = House(
-        made.desk, token, Origins.of(["127.0.0.1"], PORT, False), made.package, made.scene, made.shells, config.rate,
-        Path("nowhere"), lambda line: None,
-    )  # fmt: skip
-    server = Server(house)
-    servers.append(server)
-    runner = web.AppRunner(server.app(), access_log=None)
-    await runner.setup()
-    await web.TCPSite(runner, "127.0.0.1", PORT).start()
-    context = multiprocessing.get_context("spawn")
-    ours, theirs = context.Pipe()
-    clients = context.Process(target=attend, args=(theirs, token, watchers, stops), daemon=True)
-    clients.start()
-    try:
-        return await watched(server, made, ours)
-    finally:
-        clients.terminate()
-        await runner.cleanup()
-        made.close()
+    async with opened(package, PORT) as (server, made):
+        context = multiprocessing.get_context("spawn")
+        ours, theirs = context.Pipe()
+        attending = theirs, server.house.token, watchers, stops
+        clients = context.Process(target=attend, args=attending, daemon=True)
+        clients.start()
+        try:
+            return await watched(server, made, ours)
+        finally:
+            clients.terminate()
 
 
 async def watched(server: Server, made: Made, ours) -> tuple[int, float, float, np.ndarray, int]:
@@ -164,17 +139,9 @@ async def point(socket) -> None:
                                   (0.5, {"grip": 1.0, "trigger": 1.0})):  # fmt: skip
                 end = time.monotonic() + seconds
                 while time.monotonic() < end:
-                    rows = np.array([hand(RIGID, held), hand(TIP, held)], dtype="<f4").tobytes()
-                    head = struct.pack("<BBHId", wire.FROM_CLIENT["input"].number, 7, 2, 0, time.monotonic())
-                    await socket.send_bytes(head + rows)
+                    head = struct.pack("<BBHId", wire.FROM_CLIENT["input"].number, SEEN, 2, 0, time.monotonic())
+                    await socket.send_bytes(head + hands_at(RIGID, TIP, held))
                     await asyncio.sleep(1 / HZ)
-
-
-def hand(target: tuple[float, float, float], held: dict[str, float]) -> list[float]:
-    """Above its target, its ray straight down, in the base frame."""
-    x, y, z = target
-    row = dict.fromkeys(wire.HAND, 0.0) | {"x": x, "y": y, "z": z + LENGTH, "qw": 1.0} | held
-    return [row[name] for name in wire.HAND]
 
 
 if __name__ == "__main__":

@@ -11,22 +11,20 @@ and leave; each stops the robot once.
 
 import argparse
 import asyncio
-import contextlib
 import gc
-import json
 import resource
-import struct
 import time
 from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from aiohttp import ClientSession, WSMsgType, web
+from aiohttp import ClientSession, web
 
+from benchmarks.guests import RIGID, SEEN, TIP, Guest, Hands, hands_at
 from trunkline.errors import InputError, in_one_line
 from trunkline.foresight.believing import make_world
 from trunkline.foresight.package import Package, read_package
-from trunkline.live import foreseer, talk, wire
+from trunkline.live import foreseer, talk
 from trunkline.live.access import Origins, make_token
 from trunkline.live.desk import Desk
 from trunkline.live.house import SEARCH
@@ -42,7 +40,6 @@ from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import JOINTS, gentle, limits_of
 
 PORT, RATE, BODIES = 18445, 72.0, 26
-RIGID, TIP, LENGTH = (0.5, 0.0, 0.55), (0.62, 0.0, 0.2), 0.6  # m, of the targets and of rays at first
 VISIT, STAY, HAND_OVER = 20.0, 8.0, 300.0  # s between visitors, of a visit, between hand-overs of the lease
 SHOWN = 0.5  # s in which a preview is shown
 EARLY = 0.05  # share of the time after which memory is first looked at
@@ -122,71 +119,6 @@ class Stepped(Server):
         await asyncio.Event().wait()
 
 
-class Guest:
-    """A client that acknowledges everything and keeps what it was told last."""
-
-    def __init__(self, socket, now) -> None:
-        self.socket, self.now, self.told, self.received = socket, now, {}, 0
-        self.knows = asyncio.Event()  # its clock
-        self.task = asyncio.create_task(self._read())
-
-    async def _read(self) -> None:
-        with contextlib.suppress(ConnectionError):  # it may leave as something comes
-            await self._listen()
-
-    async def _listen(self) -> None:
-        async for message in self.socket:
-            if message.type is WSMsgType.BINARY:
-                self.received += 1
-                await self.send("ack")
-            elif message.type is WSMsgType.TEXT:
-                told = json.loads(message.data)
-                self.told[told["type"]] = told
-                if told["type"] == "ping":
-                    await self.say(type="pong", number=told["number"], stamp=self.now())
-                if told["type"] == "clock":
-                    self.knows.set()
-
-    async def say(self, **message) -> None:
-        await self.socket.send_json(message)
-
-    async def send(self, kind: str, rows: bytes = b"", flags: int = 0, count: int = 0) -> None:
-        head = struct.pack("<BBHId", wire.FROM_CLIENT[kind].number, flags, count, self.received, self.now())
-        await self.socket.send_bytes(head + rows)
-
-    async def leave(self) -> None:
-        await self.socket.close()
-        await self.task
-
-
-class Hands:
-    """What the hands of whom controls do: a cycle by the core's own mode."""
-
-    def __init__(self) -> None:
-        self.mode, self.since, self.cycles = "", 0.0, 0
-
-    def held(self, guest: Guest, now: float) -> dict[str, float]:
-        mode = (guest.told.get("state") or {}).get("mode", "")
-        if mode != self.mode:
-            self.cycles += self.mode == "execute" and mode == "aim"
-            self.mode, self.since = mode, now
-        spent = now - self.since
-        if mode == "aim":
-            return {"grip": 1.0, "trigger": float(spent % 1.2 > 0.8)}
-        if mode == "ready":
-            return {"grip": 1.0, "trigger": float(spent > 0.2)}
-        if mode in ("delay", "execute"):
-            return {"grip": 1.0}
-        return {"primary": float(spent % 0.5 < 0.2)} if mode == "stopped" else {}
-
-
-def above(target: tuple[float, float, float], held: dict[str, float]) -> list[float]:
-    """A hand above its target, its ray straight down, in the base frame."""
-    x, y, z = target
-    row = dict.fromkeys(wire.HAND, 0.0) | {"x": x, "y": y, "z": z + LENGTH, "qw": 1.0} | held
-    return [row[name] for name in wire.HAND]
-
-
 async def session(package: Package, hours: float) -> None:
     teleop = load_folder(Teleop, PROJECT / "conf/teleop")
     robot, clock, said = Robot(package, teleop), [0.0], Counter()
@@ -210,8 +142,7 @@ async def session(package: Package, hours: float) -> None:
         async def come() -> Guest:
             socket = await sockets.ws_connect(f"{url}/ws", headers={"Origin": url}, max_msg_size=0)
             guest = Guest(socket, lambda: clock[0])
-            await guest.say(type="hello", version=wire.VERSION, token=token)
-            await guest.knows.wait()
+            await guest.greet(token)
             return guest
 
         async def until(happens) -> None:
@@ -236,8 +167,7 @@ async def session(package: Package, hours: float) -> None:
             if hands.mode == "preview" and now - hands.since > SHOWN:
                 hands.since = now
                 await guest.say(type="shown", digest=guest.told["preview"]["digest"])
-            rows = np.array([above(RIGID, held), above(TIP, held)], dtype="<f4").tobytes()
-            await guest.send("input", rows, 7, 2)
+            await guest.send("input", hands_at(RIGID, TIP, held), SEEN, 2)
             await until(lambda before=before: server.inputs > before)
             server.tick(now, 1 / RATE)
             if tick % round(VISIT * RATE) == 0:

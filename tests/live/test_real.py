@@ -16,10 +16,11 @@ from trunkline.execution.machine import LEAD, SMOOTH, TICK
 from trunkline.execution.pace import PacedRobot
 from trunkline.execution.settings import Config
 from trunkline.execution.stream import LIMITS, Stream
-from trunkline.live.__main__ import alignment_for, parsed
+from trunkline.live.__main__ import parsed
 from trunkline.live.hardware import SIMULATED, hardware_of
 from trunkline.live.real import Moved, RealRobot
 from trunkline.live.robot import DEAD_MAN, HELD, MODE, MODES, PERMIT, PERMITTED, STOPS, Channel
+from trunkline.live.session import alignment_for
 from trunkline.live.settings import Config as Live
 from trunkline.live.simulated import Loop
 from trunkline.panda.limits import ACCELERATION
