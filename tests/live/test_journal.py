@@ -17,8 +17,8 @@ from mcap_ros2.decoder import DecoderFactory
 
 from tests.live.test_session import asked, executing, grips
 from tests.support.disks import filling, full, stuck
-from tests.support.live import BODIES, RATE, controlling, hand, laid
-from tests.support.operator import PACKAGE, Everywhere, Operator, config
+from tests.support.live import BODIES, RATE, controlling, hand, laid, patient
+from tests.support.operator import PACKAGE, Everywhere, Operator
 from tests.support.sessions import motion_truth
 from tests.support.workbench import ROOT
 from tests.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
@@ -60,10 +60,7 @@ class Written(Journal):
         self.file.close()
 
 
-def patient():
-    """Settings for a machine that does other work as well."""
-    core = config().core
-    return replace(core, safety=replace(core.safety, silence=5.0, plan_wait=30.0, start_wait=30.0))
+UNHURRIED = patient(silence=5.0, plan_wait=30.0, start_wait=30.0)
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +70,7 @@ def log(tmp_path_factory):
     journal = Written(path)
 
     async def session():
-        async with laid(journal=journal, settings=patient()) as here:
+        async with laid(journal=journal, settings=UNHURRIED) as here:
             guest = await controlling(here)
             await executing(here, guest)
             await guest.hears("state", 60.0, mode="aim", robot="done")
@@ -95,7 +92,7 @@ def log(tmp_path_factory):
 
 
 def core(**changes):
-    return Teleoperation(replace(patient(), **changes), Everywhere(), PACKAGE, OFFSET)
+    return Teleoperation(replace(UNHURRIED, **changes), Everywhere(), PACKAGE, OFFSET)
 
 
 def test_the_core_goes_through_a_log_again_to_the_same_bytes(log):
@@ -103,7 +100,7 @@ def test_the_core_goes_through_a_log_again_to_the_same_bytes(log):
     assert logbook.damage == []
     assert len(logbook.steps) > RATE
     found = replay.core_of(logbook, PACKAGE, Everywhere())
-    assert found.settings == patient()
+    assert found.settings == UNHURRIED
     assert replay.replay(logbook.steps, found) is None
 
 

@@ -5,6 +5,7 @@ import asyncio
 import struct
 import time
 from contextlib import asynccontextmanager, suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -105,12 +106,18 @@ class PlainPlanning:
         self.left += 1
 
 
+def patient(**seconds):
+    """Settings for a machine that does other work as well: of `Safety`, with other limits."""
+    core = config().core
+    return replace(core, safety=replace(core.safety, **{"silence": 0.5} | seconds))
+
+
 class Laid:
     """A server, its parts, and its log."""
 
     def __init__(self, port, page=Path("nowhere"), journal=None, anchors=None, settings=None):
         self.robot, self.planning, self.log = PlainRobot(), PlainPlanning(), []
-        core = Teleoperation(settings or config().core, Everywhere(), PACKAGE, OFFSET)
+        core = Teleoperation(settings or patient(), Everywhere(), PACKAGE, OFFSET)
         self.desk = Desk(core, self.robot, self.planning, make_world(()), 0.1, journal)
         self.desk.begin(RATE)
         scene = {"bodies": ["a", "b", "c"]}
