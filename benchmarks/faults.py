@@ -5,7 +5,7 @@
 The session is the real one on the simulated robot: server, log, planning and robot are processes of their own, and so
 is the client that controls. It goes through aim, preview, confirmation and execution; as the robot moves, something is
 done to one of them. Times are those of the robot's own process, on one clock. The reason is read from the session's log
-at its end. The motors are simulated ones on a virtual bus: `python -m benchmarks.motors` has all of theirs.
+at its end. `python -m benchmarks.motors` has what motors do that are silent, or told nothing.
 """
 
 import argparse
@@ -26,13 +26,10 @@ from aiohttp import ClientSession
 
 from benchmarks.guests import RIGID, SEEN, TIP, Guest, Hands, Place, hands_at, opened
 from trunkline.errors import InputError, in_one_line
-from trunkline.execution.check import measures
-from trunkline.execution.settings import Config as Execution
 from trunkline.live.house import Made
 from trunkline.live.logbook import read_logbook
 from trunkline.live.robot import DEAD_MAN
 from trunkline.live.server import Server
-from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.pipeline.results import recorded
 
 PORT, HZ = 18446, 72.0
@@ -238,9 +235,6 @@ def main(package: Path, times: int) -> None:
     most = max(max(row.held) for row in found.values())
     print(f"\nGoal: {1e3 * GOAL:.0f} ms; found at most {1e3 * most:.0f} ms. The robot itself brakes after"
           f" {1e3 * DEAD_MAN:.0f} ms without a permit.")  # fmt: skip
-    for asked, wanted, is_so, _ in measures(load_folder(Execution, PROJECT / "conf/execution").motors):
-        if "silent" in asked or "no command" in asked:
-            print(f"Motors: {asked}: {is_so} (goal {wanted}).")
 
 
 @in_one_line

@@ -139,7 +139,7 @@ def test_it_holds_when_nobody_says_that_it_may_go_on(robot):
     silent = time.monotonic()
     until(lambda: robot.state().mode == "idle")
     assert robot.standing().held - silent + 0.02 >= DEAD_MAN
-    assert robot.standing().held - silent < DEAD_MAN + BRAKE + LATE
+    assert robot.standing().held - silent < DEAD_MAN + LATE
 
 
 def hearing(robot, axes, seconds):

@@ -139,18 +139,20 @@ class Loop:
     def __init__(self, channel: Channel, robot: SimulatedRobot, plant: Moved) -> None:
         self.channel, self.robot, self.plant = channel, robot, plant
         self.serial, self.fault, self.held = 0, "", 0.0
-        self._stops = channel.asked[STOPS]
+        self._stops, self._holds = channel.asked[STOPS], False
 
     def turn(self, now: float) -> None:
         """Obey what was asked since."""
         asked = self.channel.asked
         stopped = asked[STOPS] != self._stops
         permitted = asked[PERMITTED] == self.serial and now - asked[PERMIT] <= DEAD_MAN
-        running = self.robot.state().mode == "running"
-        if stopped or (running and not permitted):
+        holds = stopped or (self.robot.state().mode == "running" and not permitted)
+        if holds:
             self._stops = asked[STOPS]
             self.robot.stop()
+        if stopped or (holds and not self._holds):
             self.held = now
+        self._holds = holds
         self._hear(now)
 
     def advance(self) -> None:
