@@ -24,7 +24,6 @@ from trunkline.live.robot import DEAD_MAN, Following, RobotProcess
 from trunkline.live.settings import Config
 from trunkline.live.simulated import Plant, Simulation
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.teleop.executor import BRAKE
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import gentle, limits_of, point_to_point
 
