@@ -27,6 +27,7 @@ from trunkline.trials.trial import Trial, read_trials, write_trials
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("trunkline", "stages", "studies", "benchmarks", "examples", "demo")
+READERS = {"filter", "identify_stiffness", "identify_damping", "identify_control", "score"}  # of trials
 # who may name the split test, or all splits, and for what
 MAY_NAME = {
     "demo/laboratory.py": {"TEST"},  # records it
@@ -86,8 +87,8 @@ def test_no_other_stage_depends_on_trials():
     for file in (ROOT / "dvc.yaml", ROOT / "examples/asl_trunk/dvc.yaml"):
         stages = yaml.safe_load(file.read_text())["stages"]
         folders = {"data/processed/ingest", "data/processed/filter"}
-        readers = {name for name, stage in stages.items() if folders & set(stage["deps"])}
-        assert readers <= {"filter", "identify_stiffness", "identify_damping", "identify_control", "score"}
+        others = {name for name, stage in stages.items() if folders & set(stage["deps"])} - READERS
+        assert not others, f"{file.name}: {others} read trials; READERS names who does, and asks for no `test`"
 
 
 def test_trials_come_only_for_the_splits_that_are_asked_for(tmp_path):
