@@ -29,6 +29,7 @@ PORT, HZ = 18447, 72.0
 URL = f"http://127.0.0.1:{PORT}"
 PATIENCE = 60.0  # s for a plan and its preview
 SOON = 3.0  # s for an answer
+PAUSE = 1.5  # s after a preview, and after a refusal: the same is said once a second
 PROMISED = "a" * 64  # a digest of no plan
 
 
@@ -143,7 +144,8 @@ async def previewed(guest: Guest) -> list[bytes]:
         if time.monotonic() > end:
             raise InputError(f"found no preview within {PATIENCE:g} s")
         held, preview = hands.held(guest, time.monotonic()), guest.told.get("preview")
-        if hands.mode == "preview" and preview:
+        is_over = preview and time.monotonic() > hands.since + preview["duration"] + PAUSE
+        if hands.mode == "preview" and is_over:
             await guest.say(type="shown", digest=preview["digest"])
         held = {"grip": 1.0} if hands.mode == "ready" else held
         await guest.send("input", hands_at(RIGID, TIP, held), SEEN, 2)
