@@ -144,8 +144,8 @@ async def previewed(guest: Guest) -> list[bytes]:
         if time.monotonic() > end:
             raise InputError(f"found no preview within {PATIENCE:g} s")
         held, preview = hands.held(guest, time.monotonic()), guest.told.get("preview")
-        is_over = preview and time.monotonic() > hands.since + preview["duration"] + PAUSE
-        if hands.mode == "preview" and is_over:
+        over = hands.since + preview["duration"] + PAUSE if preview else np.inf
+        if preview and hands.mode == "preview" and time.monotonic() > over:
             await guest.say(type="shown", digest=preview["digest"])
         held = {"grip": 1.0} if hands.mode == "ready" else held
         await guest.send("input", hands_at(RIGID, TIP, held), SEEN, 2)
