@@ -15,7 +15,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
@@ -24,15 +24,16 @@ from pathlib import Path
 import numpy as np
 from aiohttp import ClientSession
 
-from benchmarks.guests import RIGID, SEEN, TIP, Guest, Hands, Place, hands_at, opened
+from benchmarks.guests import HZ, RIGID, SEEN, TIP, Hands, Place, hands_at, knock, package_of
 from trunkline.errors import InputError, in_one_line
 from trunkline.live.house import Made
 from trunkline.live.logbook import read_logbook
 from trunkline.live.robot import DEAD_MAN
 from trunkline.live.server import Server
+from trunkline.live.session import Address, opened
 from trunkline.pipeline.results import recorded
 
-PORT, HZ = 18446, 72.0
+ADDRESS = Address(18446)
 ASIDE = 0.15  # m to both sides, of the targets in turns
 MOVING = 0.4  # s for which the robot has moved before anything is done
 PATIENCE = 90.0  # s for a client to come and for a cycle
@@ -70,21 +71,14 @@ def operate(pipe: Connection, token: str) -> None:
 
 
 async def _operate(pipe: Connection, token: str) -> None:
-    url, wrong, hands, shown = f"http://127.0.0.1:{PORT}", "", Hands(), 0.0
+    wrong, hands = "", Hands()
     async with ClientSession() as session:
-        socket = await session.ws_connect(f"{url}/ws", headers={"Origin": url}, max_msg_size=0)
-        guest = Guest(socket, lambda: time.monotonic() + JUMP * (wrong == "jump"))
+        guest = await knock(session, ADDRESS.url, lambda: time.monotonic() + JUMP * (wrong == "jump"))
         await guest.greet(token)
         await guest.say(type="lease", action="ask")
-        while not socket.closed:
+        while not guest.socket.closed:
             wrong = pipe.recv() if pipe.poll() else wrong
-            before, now = hands.mode, time.monotonic()
-            held = hands.held(guest, now)
-            side = ASIDE * (-1) ** hands.cycles if before != "stopped" else 0.0
-            preview = guest.told.get("preview")
-            if hands.mode == "preview" and preview and now - max(hands.since, shown) > preview["duration"] + 0.3:
-                shown = now
-                await guest.say(type="shown", digest=preview["digest"])
+            held, side = await hands.move(guest, time.monotonic()), ASIDE * (-1) ** hands.cycles
             rows = hands_at(_beside(RIGID, side), _beside(TIP, side), held)
             rows = np.full(len(rows) // 4, np.nan, dtype="<f4").tobytes() if wrong == "nan" else rows
             await guest.send("input", rows, LOST if wrong == "lose" else SEEN, 2)
@@ -107,7 +101,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Fault:
-    """`do` it, and `mend` it, where that can be. last: nothing can be executed afterwards."""
+    """`do` it, and `mend` it. last: it cannot be mended, and ends its session."""
 
     title: str
     do: Callable[[Scene], None]
@@ -179,7 +173,7 @@ async def suffered(fault: Fault, scene: Scene) -> tuple[float, float, float]:
 @asynccontextmanager
 async def staged(package: Path, lines: list[tuple[float, str]]) -> AsyncIterator[Scene]:
     """A session, and who controls it; what the server says goes to `lines`, with the time."""
-    async with opened(package, PORT, lambda line: lines.append((time.monotonic(), line))) as (server, made):
+    async with opened(package, ADDRESS, lambda line: lines.append((time.monotonic(), line))) as (server, made):
         scene = Scene(server, made, Operator(server.house.token))
         try:
             yield scene
@@ -187,7 +181,7 @@ async def staged(package: Path, lines: list[tuple[float, str]]) -> AsyncIterator
             scene.operator.close()
 
 
-async def session(package: Path, faults: list[Fault]) -> Iterator[tuple[Fault, float, float, str]]:
+async def session(package: Path, faults: list[Fault]) -> list[tuple[Fault, float, float, str]]:
     """Of each fault in turn: s until the robot was told to hold, until it rested, and what was said."""
     lines, times, spans = [], [], []
     async with staged(package, lines) as scene:
@@ -199,7 +193,7 @@ async def session(package: Path, faults: list[Fault]) -> Iterator[tuple[Fault, f
             print(f"{fault.title}: {1e3 * held:.0f} ms", file=sys.stderr, flush=True)
     events = [event for event in read_logbook(path).events if event["event"] in WHY]
     said = [_why(done, events) or _line(done, lines) for done in times]
-    return iter([(fault, *span, why) for fault, span, why in zip(faults, spans, said, strict=True)])
+    return [(fault, *span, why) for fault, span, why in zip(faults, spans, said, strict=True)]
 
 
 def _why(done: float, events: list[dict]) -> str:
@@ -219,8 +213,9 @@ def _line(done: float, lines: list[tuple[float, str]]) -> str:
 
 def main(package: Path, times: int) -> None:
     found: dict[str, Found] = {}
-    mended = [fault for fault in FAULTS if not fault.last] * times
-    for faults in ([*mended, FAULTS[-2]], [FAULTS[-1]]):
+    ends = [fault for fault in FAULTS if fault.last]
+    before = [fault for fault in FAULTS if not fault.last] * times
+    for faults in ([*before, ends[0]], *([end] for end in ends[1:])):
         for fault, held, rested, said in asyncio.run(session(package, faults)):
             row = found.setdefault(fault.title, Found())
             row.held.append(held)
@@ -243,9 +238,9 @@ def run(arguments: list[str]) -> int:
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--times", type=int, default=5)
     given = parser.parse_args(arguments)
-    path = given.package or next(iter(sorted(Path("artifacts/package_unity").glob("*.tgz"))))
+    package = package_of(given.package)
     with recorded("faults", given.times >= 5):
-        main(path, given.times)
+        main(package, given.times)
     return 0
 
 

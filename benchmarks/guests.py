@@ -1,34 +1,43 @@
-"""Clients of a live session, and the session itself on a port of this machine, for what is measured of it."""
+"""Clients of a live session, for what is measured of it."""
 
 import asyncio
 import contextlib
 import json
 import struct
-from collections.abc import AsyncIterator, Callable
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from aiohttp import WSMsgType, web
+from aiohttp import ClientSession, WSMsgType
 
+from trunkline.errors import InputError
 from trunkline.live import wire
-from trunkline.live.access import Origins, make_token
-from trunkline.live.foreseer import Answer
-from trunkline.live.house import Made, make
-from trunkline.live.server import House, Server
-from trunkline.live.settings import Config
-from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.teleop.config import Config as Teleop
 
+PACKAGES = Path("artifacts/package_unity")
+HZ = 72.0  # of inputs
 Place = tuple[float, float, float]  # m, in the base frame
 
 RIGID, TIP, LENGTH = (0.5, 0.0, 0.55), (0.62, 0.0, 0.2), 0.6  # m, of the targets and of rays at first
 SEEN = 7  # an input's flags: both hands tracked, the page visible
+WATCHED = 0.2  # s after a preview's end, at which it is said to have been shown
+
+
+def package_of(given: Path | None) -> Path:
+    """
+    Raises:
+        InputError: none is given, and the pipeline has made none.
+    """
+    found = given or next(iter(sorted(PACKAGES.glob("*.tgz"))), None)
+    if found is None:
+        raise InputError(f"{PACKAGES}: no package, expected one: run `make demo`, or name another")
+    return found
 
 
 class Guest:
     """A client that acknowledges everything and keeps what it was told last. `now`: its clock, s."""
 
-    def __init__(self, socket, now) -> None:
+    def __init__(self, socket, now: Callable[[], float] = time.monotonic) -> None:
         self.socket, self.now, self.told, self.received = socket, now, {}, 0
         self.knows = asyncio.Event()  # its clock
         self.task = asyncio.create_task(self._read())
@@ -67,11 +76,29 @@ class Guest:
         await self.task
 
 
-class Hands:
-    """What the hands of whom controls do: a cycle by the core's own mode."""
+async def knock(
+    session: ClientSession, url: str, now: Callable[[], float] = time.monotonic, headers: dict[str, str] | None = None
+) -> Guest:
+    """A client that has said nothing yet, and comes from the page of `url` unless its `headers` say another."""
+    socket = await session.ws_connect(f"{url}/ws", headers={"Origin": url} | (headers or {}), max_msg_size=0)
+    return Guest(socket, now)
 
-    def __init__(self) -> None:
-        self.mode, self.since, self.cycles = "", 0.0, 0
+
+class Hands:
+    """What the hands of whom controls do: a cycle by the core's own mode. watched: s after its end, at which a preview
+    is said to have been shown."""
+
+    def __init__(self, watched: float = WATCHED) -> None:
+        self.mode, self.since, self.cycles, self._watched, self._said = "", 0.0, 0, watched, 0.0
+
+    async def move(self, guest: Guest, now: float) -> dict[str, float]:
+        """Say that a preview was shown, once it was; what the hands hold."""
+        held, preview = self.held(guest, now), guest.told.get("preview")
+        watched = self._watched + preview["duration"] if preview else np.inf
+        if preview and self.mode == "preview" and now - max(self.since, self._said) > watched:
+            self._said = now
+            await guest.say(type="shown", digest=preview["digest"])
+        return held
 
     def held(self, guest: Guest, now: float) -> dict[str, float]:
         mode = (guest.told.get("state") or {}).get("mode", "")
@@ -96,34 +123,3 @@ def hands_at(rigid: Place, tip: Place, held: dict[str, float]) -> bytes:
         for x, y, z in (rigid, tip)
     ]  # fmt: skip
     return np.array(rows, dtype="<f4").tobytes()
-
-
-@contextlib.asynccontextmanager
-async def opened(
-    package: Path, port: int, log: Callable[[str], None] = lambda line: None
-) -> AsyncIterator[tuple[Server, Made]]:
-    """A session as `make live` has it, its robot simulated, without a page: ready, and ended at last."""
-    loop, servers = asyncio.get_running_loop(), []
-
-    def heard(answer: Answer | None) -> None:
-        loop.call_soon_threadsafe(lambda: [server.foreseen(answer) for server in servers])
-
-    teleop, config = load_folder(Teleop, PROJECT / "conf/teleop"), load_folder(Config, PROJECT / "conf/live")
-    made = await asyncio.to_thread(make, package, teleop, config, heard)
-    try:
-        while not (made.robot.ready and made.planning.ready.is_set()):
-            await asyncio.sleep(0.1)
-        server = Server(House(
-            made.desk, make_token(), Origins.of(["127.0.0.1"], port, False), made.package, made.scene, made.shells,
-            config.rate, Path("nowhere"), log,
-        ))  # fmt: skip
-        servers.append(server)
-        runner = web.AppRunner(server.app(), access_log=None)
-        await runner.setup()
-        await web.TCPSite(runner, "127.0.0.1", port).start()
-        try:
-            yield server, made
-        finally:
-            await runner.cleanup()
-    finally:
-        await asyncio.to_thread(made.close)

@@ -19,14 +19,14 @@ from pathlib import Path
 import numpy as np
 from aiohttp import ClientSession, WSServerHandshakeError
 
-from benchmarks.guests import RIGID, SEEN, TIP, Guest, Hands, hands_at, opened
+from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock, package_of
 from trunkline.errors import InputError, in_one_line
 from trunkline.live.house import Made
 from trunkline.live.server import Server
+from trunkline.live.session import Address, opened
 from trunkline.pipeline.results import recorded
 
-PORT, HZ = 18447, 72.0
-URL = f"http://127.0.0.1:{PORT}"
+ADDRESS = Address(18447)
 PATIENCE = 60.0  # s for a plan and its preview
 SOON = 3.0  # s for an answer
 PAUSE = 1.5  # s after a preview, and after a refusal: the same is said once a second
@@ -42,16 +42,11 @@ class Scene:
     session: ClientSession
     token: str
 
-    async def come(self, **headers: str) -> Guest:
+    async def come(self) -> Guest:
         """A client that is in."""
-        guest = await self.knock(**headers)
+        guest = await knock(self.session, ADDRESS.url)
         await guest.greet(self.token)
         return guest
-
-    async def knock(self, **headers: str) -> Guest:
-        """One that has said nothing yet."""
-        socket = await self.session.ws_connect(f"{URL}/ws", headers={"Origin": URL} | headers, max_msg_size=0)
-        return Guest(socket, time.monotonic)
 
     async def control(self) -> Guest:
         """A client that controls."""
@@ -84,15 +79,15 @@ async def refused(guest: Guest) -> str:
 
 async def at_door(scene: Scene, **headers: str) -> str:
     try:
-        await scene.knock(**headers)
+        await knock(scene.session, ADDRESS.url, headers=headers)
     except WSServerHandshakeError as error:
-        answer = await scene.session.get(f"{URL}/ws", headers={"Origin": URL} | headers)
+        answer = await scene.session.get(f"{ADDRESS.url}/ws", headers={"Origin": ADDRESS.url} | headers)
         return f"{error.status} {(await answer.text()).strip()}"
     return "NOTHING"
 
 
 async def hello(scene: Scene, **message: object) -> str:
-    guest = await scene.knock()
+    guest = await knock(scene.session, ADDRESS.url)
     await guest.say(type="hello", **message)
     return await refused(guest)
 
@@ -132,7 +127,7 @@ async def flood(scene: Scene) -> str:
 
 async def previewed(guest: Guest) -> list[bytes]:
     """Go on until a confirmation would start the robot; the inputs that were sent, in whole messages."""
-    hands, kept, end = Hands(), [], time.monotonic() + PATIENCE
+    hands, kept, end = Hands(PAUSE), [], time.monotonic() + PATIENCE
     send = guest.socket.send_bytes
 
     async def keep(message: bytes) -> None:
@@ -143,10 +138,7 @@ async def previewed(guest: Guest) -> list[bytes]:
     while hands.mode != "ready":
         if time.monotonic() > end:
             raise InputError(f"found no preview within {PATIENCE:g} s")
-        held, preview = hands.held(guest, time.monotonic()), guest.told.get("preview")
-        over = hands.since + preview["duration"] + PAUSE if preview else np.inf
-        if preview and hands.mode == "preview" and time.monotonic() > over:
-            await guest.say(type="shown", digest=preview["digest"])
+        held = await hands.move(guest, time.monotonic())
         held = {"grip": 1.0} if hands.mode == "ready" else held
         await guest.send("input", hands_at(RIGID, TIP, held), SEEN, 2)
         await asyncio.sleep(1 / HZ)
@@ -199,7 +191,7 @@ ATTEMPTS: dict[str, Attempt] = {
 
 async def session(package: Path) -> None:
     """All of them, one after the other."""
-    async with opened(package, PORT) as (server, made), ClientSession() as session:
+    async with opened(package, ADDRESS, lambda line: None) as (server, made), ClientSession() as session:
         scene = Scene(server, made, session, server.house.token)
         began: list[str] = []
         start = made.robot.start
@@ -223,9 +215,9 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("package", nargs="?", type=Path)
     given = parser.parse_args(arguments)
-    path = given.package or next(iter(sorted(Path("artifacts/package_unity").glob("*.tgz"))))
+    package = package_of(given.package)
     with recorded("hostile"):
-        asyncio.run(session(path))
+        asyncio.run(session(package))
     return 0
 
 

@@ -10,27 +10,26 @@ process has obeyed it, on one clock. Clients are in a process of their own, so t
 import argparse
 import asyncio
 import contextlib
-import json
 import multiprocessing
-import struct
 import time
 from pathlib import Path
 
 import numpy as np
-from aiohttp import ClientSession, WSMsgType
+from aiohttp import ClientSession
 
-from benchmarks.guests import RIGID, SEEN, TIP, hands_at, opened
+from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, hands_at, knock, package_of
+from trunkline.errors import in_one_line
 from trunkline.live import wire
 from trunkline.live.house import Made
 from trunkline.live.server import Server
+from trunkline.live.session import Address, opened
 from trunkline.pipeline.results import recorded
 
-PORT, HZ = 18444, 72.0
+ADDRESS = Address(18444)
 BETWEEN = (1.5, 3.0)  # s between stops: in aim, planning, preview or its batch
 QUIET = 5.0  # s in which frames and processor are counted
 
 
-@recorded("live")
 def main(package: Path, watchers: int, stops: int) -> None:
     found = asyncio.run(serve(package, watchers, stops))
     bytes_a_frame, cpu, rate, held, plans = found
@@ -47,7 +46,7 @@ def main(package: Path, watchers: int, stops: int) -> None:
 
 async def serve(package: Path, watchers: int, stops: int) -> tuple[int, float, float, np.ndarray, int]:
     """Bytes and s of processor a frame, frames a second, s from each stop to its hold, and how many plans were made."""
-    async with opened(package, PORT) as (server, made):
+    async with opened(package, ADDRESS, lambda line: None) as (server, made):
         context = multiprocessing.get_context("spawn")
         ours, theirs = context.Pipe()
         attending = theirs, server.house.token, watchers, stops
@@ -88,17 +87,11 @@ def attend(pipe, token: str, watchers: int, stops: int) -> None:
 
 
 async def clients(pipe, token: str, watchers: int, stops: int) -> None:
-    url = f"http://127.0.0.1:{PORT}"
     async with ClientSession() as session:
-        sockets = [
-            await session.ws_connect(f"{url}/ws", headers={"Origin": url}, max_msg_size=0) for _ in range(watchers + 1)
-        ]
-        known = asyncio.Event()
-        tasks = [asyncio.create_task(watch(socket, token, known if n == 0 else None))
-                 for n, socket in enumerate(sockets)]  # fmt: skip
-        await known.wait()
-        await sockets[0].send_json({"type": "lease", "action": "ask"})
-        tasks.append(asyncio.create_task(point(sockets[0])))
+        guests = [await knock(session, ADDRESS.url) for _ in range(watchers + 1)]
+        await asyncio.gather(*(guest.greet(token) for guest in guests))
+        await guests[0].say(type="lease", action="ask")
+        pointing = asyncio.create_task(point(guests[0]))
         pipe.send("here")
         while not pipe.poll():
             await asyncio.sleep(0.01)
@@ -106,31 +99,14 @@ async def clients(pipe, token: str, watchers: int, stops: int) -> None:
         for _ in range(stops):
             await asyncio.sleep(rng.uniform(*BETWEEN))
             sent.append(time.monotonic())
-            await sockets[1].send_bytes(struct.pack("<BBHId", wire.FROM_CLIENT["stop"].number, 0, 0, 0, 0.0))
+            await guests[1].send("stop")
         await asyncio.sleep(0.5)
         pipe.send(sent)
         await asyncio.sleep(5.0)
-        for task in tasks:
-            task.cancel()
+        pointing.cancel()
 
 
-async def watch(socket, token: str, known: asyncio.Event | None) -> None:
-    """Acknowledge everything."""
-    await socket.send_json({"type": "hello", "version": wire.VERSION, "token": token})
-    received = 0
-    async for message in socket:
-        if message.type is WSMsgType.BINARY:
-            received += 1
-            await socket.send_bytes(struct.pack("<BBHId", wire.FROM_CLIENT["ack"].number, 0, 0, received, 0.0))
-        elif message.type is WSMsgType.TEXT:
-            told = json.loads(message.data)
-            if told["type"] == "ping":
-                await socket.send_json({"type": "pong", "number": told["number"], "stamp": time.monotonic()})
-            if told["type"] == "clock" and known is not None:
-                known.set()
-
-
-async def point(socket) -> None:
+async def point(guest: Guest) -> None:
     """Both grips held at two targets, the trigger pulled, all let go, primary pressed: over and over, as fast as a
     stop and a plan allow."""
     with contextlib.suppress(ConnectionError):
@@ -139,16 +115,22 @@ async def point(socket) -> None:
                                   (0.5, {"grip": 1.0, "trigger": 1.0})):  # fmt: skip
                 end = time.monotonic() + seconds
                 while time.monotonic() < end:
-                    head = struct.pack("<BBHId", wire.FROM_CLIENT["input"].number, SEEN, 2, 0, time.monotonic())
-                    await socket.send_bytes(head + hands_at(RIGID, TIP, held))
+                    await guest.send("input", hands_at(RIGID, TIP, held), SEEN, 2)
                     await asyncio.sleep(1 / HZ)
 
 
-if __name__ == "__main__":
+@in_one_line
+def run() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--watchers", type=int, default=20)
     parser.add_argument("--stops", type=int, default=200)
     options = parser.parse_args()
-    found = options.package or next(iter(sorted(Path("artifacts/package_unity").glob("*.tgz"))))
-    main(found, options.watchers, options.stops)
+    package = package_of(options.package)
+    with recorded("live", options.watchers >= 20 and options.stops >= 200):
+        main(package, options.watchers, options.stops)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(run())

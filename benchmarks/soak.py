@@ -18,30 +18,31 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
-from aiohttp import ClientSession, web
+from aiohttp import ClientSession
 
-from benchmarks.guests import RIGID, SEEN, TIP, Guest, Hands, hands_at
+from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock, package_of
 from trunkline.errors import InputError, in_one_line
 from trunkline.foresight.believing import make_world
 from trunkline.foresight.package import Package, read_package
 from trunkline.live import foreseer, talk
-from trunkline.live.access import Origins, make_token
+from trunkline.live.access import make_token
 from trunkline.live.desk import Desk
 from trunkline.live.house import SEARCH
-from trunkline.live.robot import Following, Standing
+from trunkline.live.robot import Standing
 from trunkline.live.server import House, Server
+from trunkline.live.session import Address, listening
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.pipeline.results import recorded
 from trunkline.teleop.config import Config as Teleop
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.following import Following
 from trunkline.teleop.messages import ExecutorReport, PlanReport
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import JOINTS, gentle, limits_of
 
-PORT, RATE, BODIES = 18445, 72.0, 26
+ADDRESS, BODIES = Address(18445), 26
 VISIT, STAY, HAND_OVER = 20.0, 8.0, 300.0  # s between visitors, of a visit, between hand-overs of the lease
-SHOWN = 0.5  # s in which a preview is shown
 EARLY = 0.05  # share of the time after which memory is first looked at
 
 
@@ -49,8 +50,8 @@ class Robot:
     """Where its plan says, by the session's clock."""
 
     def __init__(self, package: Package, teleop: Teleop) -> None:
-        limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
-        self.robot = SimulatedRobot(SEARCH, package.straight, limits, package.digest)
+        self.limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
+        self.robot = SimulatedRobot(SEARCH, package.straight, self.limits, package.digest)
         self.start, self.hear, self.now, self.stops = self.robot.start, self.robot.hear, 0.0, 0
 
     def follow(self, following: Following) -> str:
@@ -75,7 +76,7 @@ class Planning:
     """The first joint to one side and back again; previewed by two pieces."""
 
     def __init__(self, robot: Robot) -> None:
-        self.robot, self.made = robot.robot, 0
+        self.robot, self.limits, self.made = robot.robot, robot.limits, 0
         self.server: Server | None = None
 
     def order(self, order: foreseer.Order | foreseer.Seek) -> None:
@@ -85,7 +86,7 @@ class Planning:
         self.made += 1
         here = np.append(robot.joints, robot.commands)
         there = np.append(SEARCH, robot.commands) + np.eye(len(here))[0] * (0.2 if self.made % 2 else 0.0)
-        rows = gentle(here, there, robot.limits, 0.01)
+        rows = gentle(here, there, self.limits, 0.01)
         plan = Plan(0.01, rows[:, :JOINTS], rows[:, JOINTS:], (("approach", 0),), request.package, request.world)
         digest, poses = plan.digest(), np.zeros((15, BODIES, 7), dtype=np.float32)
         told = talk.Foreseen(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
@@ -130,18 +131,14 @@ async def session(package: Package, hours: float) -> None:
         said["silent"] += line.endswith("was silent")
         said["error"] += line.startswith("error:")
 
-    origins, scene = Origins.of(["127.0.0.1"], PORT, False), {"bodies": [f"b{n}" for n in range(BODIES)]}
-    house = House(desk, token, origins, package.digest, scene, None, RATE, Path("nowhere"), log)
+    scene = {"bodies": [f"b{n}" for n in range(BODIES)]}
+    house = House(desk, token, ADDRESS.origins, package.digest, scene, None, HZ, Path("nowhere"), log)
     server = planning.server = Stepped(house, lambda: clock[0])
-    runner = web.AppRunner(server.app(), access_log=None)
-    await runner.setup()
-    await web.TCPSite(runner, "127.0.0.1", PORT).start()
-    url, began = f"http://127.0.0.1:{PORT}", time.monotonic()
-    async with ClientSession() as sockets:
+    began = time.monotonic()
+    async with listening(server, ADDRESS), ClientSession() as sockets:
 
         async def come() -> Guest:
-            socket = await sockets.ws_connect(f"{url}/ws", headers={"Origin": url}, max_msg_size=0)
-            guest = Guest(socket, lambda: clock[0])
+            guest = await knock(sockets, ADDRESS.url, lambda: clock[0])
             await guest.greet(token)
             return guest
 
@@ -159,18 +156,15 @@ async def session(package: Package, hours: float) -> None:
         guest, hands, visitors = await come(), Hands(), []
         await control(guest)
         found = Counter(visits=1)
-        ticks, memory = round(3600 * hours * RATE), 0
+        ticks, memory = round(3600 * hours * HZ), 0
         for tick in range(ticks):
-            now = clock[0] = robot.now = (tick + 1) / RATE
-            robot.robot.advance(1 / RATE)
-            held, before = hands.held(guest, now), server.inputs
-            if hands.mode == "preview" and now - hands.since > SHOWN:
-                hands.since = now
-                await guest.say(type="shown", digest=guest.told["preview"]["digest"])
+            now = clock[0] = robot.now = (tick + 1) / HZ
+            robot.robot.advance(1 / HZ)
+            held, before = await hands.move(guest, now), server.inputs
             await guest.send("input", hands_at(RIGID, TIP, held), SEEN, 2)
             await until(lambda before=before: server.inputs > before)
-            server.tick(now, 1 / RATE)
-            if tick % round(VISIT * RATE) == 0:
+            server.tick(now, 1 / HZ)
+            if tick % round(VISIT * HZ) == 0:
                 visitors.append((now, await come()))
                 found["visits"] += 1
             if visitors and now > visitors[0][0] + STAY:
@@ -192,7 +186,7 @@ async def session(package: Package, hours: float) -> None:
     grown = resident() / memory - 1
     passed = time.monotonic() - began
     print(
-        f"{hours:g} h of input at {RATE:g} Hz in {passed / 60:.1f} min ({3600 * hours / passed:.0f} times as fast):"
+        f"{hours:g} h of input at {HZ:g} Hz in {passed / 60:.1f} min ({3600 * hours / passed:.0f} times as fast):"
         f" {hands.cycles} cycles from aim to a robot that has arrived, {planning.made} plans,"
         f" {found['visits']} clients, {found['hand-overs']} hand-overs"
     )
@@ -200,7 +194,6 @@ async def session(package: Package, hours: float) -> None:
         f"memory {100 * grown:+.1f} % since {100 * EARLY:.0f} % of the time, {said['silent']} leases lost,"
         f" {found['missed']} of {found['stops']} stops missed, {said['error']} errors"
     )
-    await runner.cleanup()
 
 
 def resident() -> int:
@@ -215,9 +208,9 @@ def main() -> int:
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--hours", type=float, default=8.0)
     given = parser.parse_args()
-    path = given.package or next(iter(sorted(Path("artifacts/package_unity").glob("*.tgz"))))
+    package = read_package(package_of(given.package))
     with recorded("soak", given.hours >= 8):
-        asyncio.run(session(read_package(path), given.hours))
+        asyncio.run(session(package, given.hours))
     return 0
 
 

@@ -21,7 +21,7 @@ from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.config import Config
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.following import Follower, sought
+from trunkline.teleop.following import Follower, Following, sought
 from trunkline.teleop.messages import ExecutorReport, Input, Intent, Joints, Offer, PlanReport, Pose, World
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.targets import why_not
@@ -202,9 +202,8 @@ class Session:
             return
         if self.follower is None:
             here = self.executor.joints, self.executor.commands
-            delay, period = self.config.core.follow_delay, self.package.period
-            limits, mount_offset = self.planner.limits, self.config.mount_offset
-            self.follower = Follower(limits, mount_offset, *here, 1 / RATE / TICKS, delay, period)
+            following = Following(self.config.core.follow_delay, self.package.period, self.config.mount_offset)
+            self.follower = Follower(self.planner.limits, following, *here, 1 / RATE / TICKS)
         if not self.follower.due(self.now):
             return
         goal = None

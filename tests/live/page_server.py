@@ -37,14 +37,14 @@ from trunkline.live.access import Origins, make_token
 from trunkline.live.anchors import Anchors
 from trunkline.live.bodies import drawn
 from trunkline.live.desk import Desk
-from trunkline.live.robot import Following, Standing
+from trunkline.live.robot import Standing
 from trunkline.live.server import House, Server
 from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.following import Follower, sought
+from trunkline.teleop.following import Following, sought
 from trunkline.teleop.messages import Box, ExecutorReport, PlanReport, Targets, Thing
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.reading import Reading
@@ -122,10 +122,7 @@ class Robot:
         pass
 
     def follow(self, following: Following) -> str:
-        here = self.robot.joints, self.robot.commands
-        return self.robot.follow(
-            Follower(LIMITS, following.mount_offset, *here, TICK, following.delay, following.period)
-        )
+        return self.robot.follow(following, TICK)
 
     def state(self) -> ExecutorReport:
         return ExecutorReport("fault", "", self.fault) if self.fault else self.robot.state()

@@ -20,10 +20,11 @@ from trunkline.live import simulated
 from trunkline.live.bodies import Poses, drawn
 from trunkline.live.house import SEARCH, subject_of
 from trunkline.live.logbook import tip_path
-from trunkline.live.robot import DEAD_MAN, Following, RobotProcess
+from trunkline.live.robot import DEAD_MAN, RobotProcess
 from trunkline.live.settings import Config
 from trunkline.live.simulated import Plant, Simulation
 from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.teleop.following import Following
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import gentle, limits_of, point_to_point
 

@@ -26,7 +26,7 @@ from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.following import Follower, sought
+from trunkline.teleop.following import sought
 from trunkline.teleop.messages import PlanReport
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
@@ -51,10 +51,7 @@ class PlainRobot:
         self.start, self.state, self.hear = self.robot.start, self.robot.state, self.robot.hear
 
     def follow(self, following):
-        here = self.robot.joints, self.robot.commands
-        return self.robot.follow(
-            Follower(LIMITS, following.mount_offset, *here, TICK, following.delay, following.period)
-        )
+        return self.robot.follow(following, TICK)
 
     def permit(self):
         self.permits += 1

@@ -6,7 +6,7 @@ import pytest
 
 from tests.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT, targets
 from trunkline.panda.kinematics import mount_pose
-from trunkline.teleop.following import KNOT, Follower, sought
+from trunkline.teleop.following import KNOT, Follower, Following, sought
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
 
@@ -21,7 +21,7 @@ def at(y: float):
 
 def follow(y, seconds: float, delay: float = DELAY, period: float = PERIOD) -> tuple[np.ndarray, Follower]:
     """Rows of all axes while the targets are at `y`, a function of time, s."""
-    follower, rows = Follower(LIMITS, OFFSET, START, STRAIGHT, DT, delay, period), []
+    follower, rows = Follower(LIMITS, Following(delay, period, OFFSET), START, STRAIGHT, DT), []
     for index in range(round(seconds / DT)):
         assert hear(follower, index * DT, at(y(index * DT))) == ""
         rows.append(np.concatenate(follower.tick(index * DT)))

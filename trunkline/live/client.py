@@ -49,7 +49,7 @@ class Client:
         self.left = min(self.left + PER_SECOND * (now - self.counted), BURST) - 1
         self.counted = now
 
-    def refuses(self, reason: str, now: float) -> bool:
+    def refuse(self, reason: str, now: float) -> bool:
         """Say it in one line; whether it was said, which is the same no oftener than every SAID_AGAIN."""
         kind = reason.partition(":")[0]
         if kind in self.refused and now - self.refused[kind] < SAID_AGAIN:

@@ -15,13 +15,14 @@ from trunkline.foresight.believing import believe
 from trunkline.live import foreseer, talk
 from trunkline.live.controllers import NOWHERE, controllers
 from trunkline.live.journal import Journal
-from trunkline.live.robot import Following, Standing
+from trunkline.live.robot import Standing
+from trunkline.live.seeking import Seeking
 from trunkline.live.wire import MARKERS, Received
 from trunkline.live.words import next_action
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import FOLLOWS
-from trunkline.teleop.following import KNOT
+from trunkline.teleop.following import Following
 from trunkline.teleop.messages import (
     Controller,
     ExecutorReport,
@@ -36,8 +37,6 @@ from trunkline.teleop.messages import (
     World,
 )
 from trunkline.teleop.plan import Plan
-from trunkline.teleop.targets import why_not
-from trunkline.teleop.trajectory import JOINTS
 from trunkline.version import __version__
 
 HERE = Pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))  # of poses that are in the base frame already
@@ -103,11 +102,7 @@ class Desk:
         self._stop, self._fault, self._shown, self._since, self._believed = False, "", "", 0.0, ""
         self._asked, self._ordered, self._started, self._ran = 0, False, "", False
         self._logged: tuple = ()
-        self._now, self._seeks, self._sought = 0.0, 0, -np.inf  # s of ticks; of following, as are the next
-        self._seeking: dict[int, float] = {}
-        self._goals: list[tuple[float, np.ndarray | None]] = []  # found before the robot may follow
-        self._near: np.ndarray | None = None
-        self._refused = ""
+        self._seeking = Seeking(planning.order, robot.hear)
 
     def begin(self, rate: float) -> None:
         """The log's first line: all that a replay needs besides the package. rate: of ticks, Hz."""
@@ -169,7 +164,7 @@ class Desk:
             self.report = PlanReport(self._asked, refused="the process that plans has ended")
             return False
         if isinstance(answer, foreseer.Found):
-            self._found(answer)
+            self._seeking.found(answer)
             return False
         serial = answer.report.serial if isinstance(answer, foreseer.Planned) else answer.serial
         if serial != self._asked:
@@ -210,8 +205,11 @@ class Desk:
             )  # fmt: skip
             self.state, intent = self.core.step(self.state, given, dt / len(steps))
             self._ask(intent, standing)
-            self._now += dt / len(steps)
-            self._seek(intent, standing)
+            self._seeking.advance(dt / len(steps))
+            if intent.mode == "follow":
+                self._seeking.seek(intent.targets, standing.joints)
+            else:
+                self._seeking.end()
             self._drive(intent)
             self.journal.step(dt / len(steps), given, intent)
         self._last = steps[-1]
@@ -293,41 +291,14 @@ class Desk:
             following = Following(self.core.settings.follow_delay, self.period, self.core.mount_offset)
             self._fault = self.blocked or self.robot.follow(following)
             self.journal.event("follow", refused=self._fault)
-            while self._goals and not self._fault:
-                self._hear(*self._goals.pop(0))
+            if not self._fault:
+                self._seeking.begin()
             return
         if self.plan is None or self.plan.digest() != intent.execute:
             self._fault = "the plan that was confirmed is not there"
             return
         self._fault = self.blocked or self.robot.start(self.plan, intent.execute)
         self.journal.event("execute", digest=intent.execute, refused=self._fault)
-
-    def _seek(self, intent: Intent, standing: Standing) -> None:
-        """Every KNOT s, what the targets ask of a robot that follows."""
-        if intent.mode != "follow":
-            self._seeking, self._goals, self._sought, self._near, self._refused = {}, [], -np.inf, None, ""
-        elif self._now >= self._sought + KNOT:
-            self._seeks, self._sought = self._seeks + 1, self._now
-            self._seeking[self._seeks] = self._now
-            targets = None if why_not(intent.targets) else intent.targets
-            near = standing.joints if self._near is None else self._near
-            self.planning.order(foreseer.Seek(self._seeks, targets, near))
-
-    def _found(self, answer: foreseer.Found) -> None:
-        """What was sought; of an older following it is nothing."""
-        time = self._seeking.pop(answer.serial, None)
-        if time is None:
-            return
-        self._seeking = {serial: at for serial, at in self._seeking.items() if serial > answer.serial}
-        self._refused = answer.refused
-        self._near = self._near if answer.axes is None else answer.axes[:JOINTS]
-        if self._started == FOLLOWS:
-            self._hear(time, answer.axes)
-        else:
-            self._goals.append((time, answer.axes))
-
-    def _hear(self, time: float, axes: np.ndarray | None) -> None:
-        self.robot.hear(self._now - time, axes)
 
     def _believe(self, standing: Standing, executor: ExecutorReport) -> None:
         done = executor.mode == "done" and executor.digest != self._believed and self.plan is not None
@@ -365,7 +336,7 @@ class Desk:
         touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
         return talk.State(
-            intent.mode, intent.motion, _joined(intent.notice or self._refused, self.blocked), words,
+            intent.mode, intent.motion, _joined(intent.notice or self._seeking.refused, self.blocked), words,
             round(intent.countdown, 2), intent.preview, intent.execute, _rounded(intent.targets),
             robot.mode, robot.fault,
         )  # fmt: skip

@@ -26,10 +26,11 @@ from trunkline.execution.on_bus import BankOnBus, BusMotors, open_bus
 from trunkline.execution.pace import PacedRobot
 from trunkline.execution.stream import LIMITS
 from trunkline.live.hardware import SIMULATED, Hardware
-from trunkline.live.robot import POSE, READY, Channel, Following, RobotProcess, Standing
+from trunkline.live.robot import POSE, READY, Channel, RobotProcess, Standing
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.panda.shipped import JOINTS
 from trunkline.processes import end_with_parent
+from trunkline.teleop.following import Following
 from trunkline.teleop.trajectory import Limits
 
 URGENT = 40  # of SCHED_FIFO; asked for, and done without where there is no right to it

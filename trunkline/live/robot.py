@@ -15,6 +15,7 @@ from multiprocessing.context import SpawnContext
 import numpy as np
 
 from trunkline.teleop.executor import FOLLOWS, SimulatedRobot
+from trunkline.teleop.following import Following
 from trunkline.teleop.messages import ExecutorReport
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import JOINTS, Limits
@@ -57,15 +58,6 @@ class Channel:
             if before % 2 == 0 and self._number.value == before:
                 return numbers, fault.decode(errors="replace")
         return numbers, fault.decode(errors="replace")  # its writer was killed within: the time in it is old
-
-
-@dataclass(frozen=True)
-class Following:
-    """As `Follower` has it. delay, period: s. mount_offset: m."""
-
-    delay: float
-    period: float
-    mount_offset: float
 
 
 @dataclass(frozen=True)

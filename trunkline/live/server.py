@@ -347,7 +347,7 @@ class Server:
 
     def _refuse(self, client: Client, reason: str) -> None:
         """One line to whom it concerns, the same no oftener than once a second."""
-        if client.refuses(reason, self.now()):
+        if client.refuse(reason, self.now()):
             self.house.log(f"refused {client.id}: {reason}")
             self.desk.journal.event("refused", client=client.id, reason=reason)
 

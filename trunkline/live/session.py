@@ -2,10 +2,12 @@
 
 import argparse
 import asyncio
+import contextlib
 import functools
 import ssl
 import sys
-from dataclasses import replace
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from aiohttp import web
@@ -16,7 +18,7 @@ from trunkline.live.access import CODE_SECONDS, Origins, make_token
 from trunkline.live.anchors import Anchors
 from trunkline.live.foreseer import Answer
 from trunkline.live.hardware import Hardware, hardware_of
-from trunkline.live.house import make
+from trunkline.live.house import Made, make
 from trunkline.live.server import House, Server
 from trunkline.live.settings import Alignment, Config
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -30,28 +32,63 @@ def alignment_for(hardware: Hardware | None, settings: Alignment) -> Alignment:
     return replace(settings, by_eye=False) if hardware is not None and hardware.real else settings
 
 
-async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLContext | None) -> None:
-    """Until it is interrupted."""
+@dataclass(frozen=True)
+class Address:
+    """Where a session is found. names: of this machine, as others may call it. context: of its TLS, None without."""
+
+    port: int
+    host: str = "127.0.0.1"
+    names: tuple[str, ...] = ("127.0.0.1",)
+    context: ssl.SSLContext | None = None
+
+    @property
+    def origins(self) -> Origins:
+        return Origins.of(list(self.names), self.port, self.context is not None)
+
+    @property
+    def url(self) -> str:
+        return f"{self.origins.scheme}://{self.names[0]}:{self.port}"
+
+
+@contextlib.asynccontextmanager
+async def listening(server: Server, address: Address) -> AsyncIterator[None]:
+    """
+    Raises:
+        InputError: the address cannot be had.
+    """
+    runner = web.AppRunner(server.app(), access_log=None, handle_signals=False)
+    await runner.setup()
+    try:
+        try:
+            await web.TCPSite(runner, address.host, address.port, ssl_context=address.context).start()
+        except OSError as error:
+            raise InputError(f"--host {address.host} --port {address.port}: {error.strerror}") from error
+        yield
+    finally:
+        await runner.cleanup()
+
+
+@contextlib.asynccontextmanager
+async def opened(
+    package: Path, address: Address, log: Callable[[str], None], hardware: Hardware | None = None
+) -> AsyncIterator[tuple[Server, Made]]:
+    """A session that is ready, on the simulated robot where there is no hardware; its processes end with it.
+
+    Raises:
+        InputError: no package, a process that ends, a log that cannot be written, an address that cannot be had.
+    """
     loop, servers = asyncio.get_running_loop(), []
 
     def heard(answer: Answer | None) -> None:
         loop.call_soon_threadsafe(lambda: [server.foreseen(answer) for server in servers])
 
     teleop, config = load_folder(Teleop, PROJECT / "conf/teleop"), load_folder(Config, PROJECT / "conf/live")
-    hardware = hardware_of(
-        options.robot, options.motors, options.bus, options.interface,
-        load_folder(Execution, PROJECT / "conf/execution"),
-    )  # fmt: skip
-    if hardware is not None and hardware.real:
-        print(f"REAL: {hardware.words()}. Nobody has tried this on real ones yet (docs/execution.md).", flush=True)
     alignment = alignment_for(hardware, config.alignment)
     anchors = Anchors(Path(alignment.anchors))
-    made = await asyncio.to_thread(make, options.package, teleop, config, heard, hardware)
+    made = await asyncio.to_thread(make, package, teleop, config, heard, hardware)
     try:
-        token, log = make_token(), functools.partial(print, flush=True)
-        origins = Origins.of(names, options.port, context is not None)
         house = House(
-            made.desk, token, origins, made.package, made.scene, made.shells, config.rate, PAGE, log,
+            made.desk, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE, log,
             alignment, anchors,
         )  # fmt: skip
         while not (made.robot.ready and made.planning.ready.is_set()):
@@ -62,21 +99,27 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
             await asyncio.sleep(0.05)
         server = Server(house)
         servers.append(server)
-        runner = web.AppRunner(server.app(), access_log=None, handle_signals=False)
-        await runner.setup()
-        try:
-            await web.TCPSite(runner, options.host, options.port, ssl_context=context).start()
-        except OSError as error:
-            raise InputError(f"--host {options.host} --port {options.port}: {error.strerror}") from error
-        log(f"log: {made.journal.path}")
-        log(f"{origins.scheme}://{names[0]}:{options.port}/#token={token}")
-        _pair(server, log, loop)
-        try:
-            await asyncio.Event().wait()
-        finally:
-            await runner.cleanup()
+        async with listening(server, address):
+            yield server, made
     finally:
         await asyncio.to_thread(made.close)
+
+
+async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLContext | None) -> None:
+    """Until it is interrupted."""
+    log = functools.partial(print, flush=True)
+    hardware = hardware_of(
+        options.robot, options.motors, options.bus, options.interface,
+        load_folder(Execution, PROJECT / "conf/execution"),
+    )  # fmt: skip
+    if hardware is not None and hardware.real:
+        log(f"REAL: {hardware.words()}. Nobody has tried this on real ones yet (docs/execution.md).")
+    address = Address(options.port, options.host, tuple(names), context)
+    async with opened(options.package, address, log, hardware) as (server, made):
+        log(f"log: {made.journal.path}")
+        log(f"{address.url}/#token={server.house.token}")
+        _pair(server, log, asyncio.get_running_loop())
+        await asyncio.Event().wait()
 
 
 def _pair(server: Server, log, loop: asyncio.AbstractEventLoop) -> None:

@@ -21,13 +21,13 @@ from trunkline.hybrid.compose import panda_joints
 from trunkline.hybrid.futures import Twin
 from trunkline.hybrid.torques import servo_commands
 from trunkline.live.bodies import Poses
-from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, Channel, Following, Goal
+from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, Channel, Goal
 from trunkline.panda.shipped import JOINTS
 from trunkline.simulation.motion import batch_of, hold
 from trunkline.simulation.rubbing import REFRESH, rubbing
 from trunkline.simulation.winch import Winches
 from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.following import Follower
+from trunkline.teleop.following import Following
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import Limits
 
@@ -190,12 +190,7 @@ class Loop:
         robot = self.robot
         if isinstance(asked, Plan):
             return robot.start(asked, digest)
-        return robot.follow(
-            Follower(
-                robot.limits, asked.mount_offset, robot.joints, robot.commands, self.plant.tick, asked.delay,
-                asked.period,
-            )  # fmt: skip
-        )
+        return robot.follow(asked, self.plant.tick)
 
 
 def drive(loop: Loop, parent: int) -> None:

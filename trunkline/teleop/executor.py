@@ -7,7 +7,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.panda.kinematics import within_limits
-from trunkline.teleop.following import Follower
+from trunkline.teleop.following import Follower, Following
 from trunkline.teleop.messages import ExecutorReport
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import JOINTS, Limits
@@ -55,7 +55,7 @@ class SimulatedRobot:
         move: Callable[[np.ndarray, np.ndarray, float], None] | None = None,
     ) -> None:
         self.joints, self.commands = np.array(joints, dtype=float), np.array(commands, dtype=float)
-        self.limits, self._package, self._move = limits, package, move
+        self._limits, self._package, self._move = limits, package, move
         self._plan: Plan | None = None
         self._follower: Follower | None = None
         self._fault = ""
@@ -71,10 +71,10 @@ class SimulatedRobot:
         if not within_limits(plan.joints).all():
             return "plan: a joint leaves its range"
         speed = np.abs(np.diff(rows, axis=0)).max(axis=0, initial=0.0) / plan.step
-        if (speed > ROUNDING * self.limits.velocity).any():
-            axis = int(np.argmax(speed / self.limits.velocity))
+        if (speed > ROUNDING * self._limits.velocity).any():
+            axis = int(np.argmax(speed / self._limits.velocity))
             name = f"joint {axis + 1}" if axis < JOINTS else f"tendon {axis + 1 - JOINTS}"
-            return f"plan: {name} moves at {speed[axis]:.3g}, expected at most {self.limits.velocity[axis]:.3g}"
+            return f"plan: {name} moves at {speed[axis]:.3g}, expected at most {self._limits.velocity[axis]:.3g}"
         off = np.abs(rows[0] - np.append(self.joints, self.commands)).max()
         return f"plan: starts {off:.3g} away from where the robot is" if off > AT_START else ""
 
@@ -89,11 +89,12 @@ class SimulatedRobot:
         self._report = ExecutorReport("running", digest)
         return ""
 
-    def follow(self, follower: Follower) -> str:
-        """Go where `follower` goes, which begins here and is in step with `advance`; why not, "" where it does."""
+    def follow(self, following: Following, tick: float) -> str:
+        """Go after the targets that it hears of, at every `advance` of `tick` s; why not, "" where it does."""
         if self._report.mode == "running":
             return "busy: another plan runs"
-        self._follower, self._time, self._braking, self._fault = follower, 0.0, False, ""
+        self._follower = Follower(self._limits, following, self.joints, self.commands, tick)
+        self._time, self._braking, self._fault = 0.0, False, ""
         self._report = ExecutorReport("running", FOLLOWS)
         return ""
 

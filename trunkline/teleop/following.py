@@ -12,6 +12,7 @@ they are refused, the last that were not hold: the robot comes to rest there.
 """
 
 from bisect import bisect_left
+from dataclasses import dataclass
 
 import numpy as np
 import ruckig
@@ -37,25 +38,27 @@ def sought(planner: Planner, targets: Targets | None, joints: np.ndarray) -> tup
         return None, str(error)
 
 
+@dataclass(frozen=True)
+class Following:
+    """How targets are followed. delay: s behind them. period: s, of the arm's slowest swing, 0 for an arm that does not
+    swing. mount_offset: m."""
+
+    delay: float
+    period: float
+    mount_offset: float
+
+
 class Follower:
-    """From rest at `joints` (7,), rad, and `commands` (K,), m, in ticks of `dt` s, `delay` s behind the targets.
-    `period`: s, of the arm's slowest swing, 0 for an arm that does not swing. `rests`: whether it has come to rest,
-    once it brakes."""
+    """From rest at `joints` (7,), rad, and `commands` (K,), m, in ticks of `dt` s. `rests`: whether it has come to
+    rest, once it brakes."""
 
     def __init__(
-        self,
-        limits: Limits,
-        mount_offset: float,
-        joints: np.ndarray,
-        commands: np.ndarray,
-        dt: float,
-        delay: float,
-        period: float = 0.0,
+        self, limits: Limits, following: Following, joints: np.ndarray, commands: np.ndarray, dt: float
     ) -> None:
         here = np.append(joints, commands)
-        self._mount_offset, self._dt, self._delay = mount_offset, dt, delay
+        self._mount_offset, self._dt, self._delay = following.mount_offset, dt, following.delay
         self._braking, self.rests = False, False
-        self._width = min(period, max(2 * (delay - KNOT), 0.0))
+        self._width = min(following.period, max(2 * (self._delay - KNOT), 0.0))
         self._times: list[float] = []
         self._goals = [here]  # of `_times`, and before these where it began
         self._velocity = 0.999 * limits.velocity  # that Ruckig takes as one within the limits
