@@ -82,6 +82,17 @@ def test_a_robot_follows_moving_targets_until_both_grips_are_let_go():
     asyncio.run(session())
 
 
+def test_nobody_is_told_that_nobody_who_controls_is_silent():
+    async def session():
+        async with laid() as here:
+            guest = await here.come()
+            await asyncio.sleep(1.0)
+            assert here.desk.intent.notice.startswith("client silent")
+            assert {told["notice"] for told in guest.said if told["type"] == "state"} == {""}
+
+    asyncio.run(session())
+
+
 def test_frames_tell_bodies_and_both_targets():
     async def session():
         async with laid() as here:

@@ -329,14 +329,15 @@ class Desk:
         return found
 
     def told(self, holder: str) -> talk.State:
-        """The state for clients, `holder` controlling."""
+        """The state for clients, `holder` controlling; where nobody does, the core's notice, of silence, says nothing."""
         intent, robot = self.intent, self.robot.state()
         assert intent is not None
         hands = self.state.hands
         touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
+        notice = intent.notice or self._seeking.refused if holder else ""
         return talk.State(
-            intent.mode, intent.motion, _joined(intent.notice or self._seeking.refused, self.blocked), words,
+            intent.mode, intent.motion, _joined(notice, self.blocked), words,
             round(intent.countdown, 2), intent.preview, intent.execute, _rounded(intent.targets),
             robot.mode, robot.fault,
         )  # fmt: skip
