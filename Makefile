@@ -8,6 +8,7 @@ TOOLS := client/node_modules/package-lock.json
 REQUIREMENTS := requirements.lock requirements-torch.txt
 PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
+unexport PYTHONDONTWRITEBYTECODE  # where that is set, every process of a stage compiles all its libraries: 9 s each
 
 .PHONY: demo rehearse live client browser test types gate baseline lock readme pull push setup stale requirements clean
 

@@ -33,6 +33,11 @@ class Cost(NamedTuple):
     memory: float
 
 
+def environment() -> dict[str, str]:
+    """As most have it: what Python compiles is kept, as `make` keeps it too."""
+    return {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
+
+
 def run_stage(module: str, folder: Path) -> Cost:
     """Run a stage's module in `folder`, the root of a checkout, with this Python.
 
@@ -42,7 +47,7 @@ def run_stage(module: str, folder: Path) -> Cost:
     begun, first, lines = time.monotonic(), 0.0, []
     process = subprocess.Popen(
         [sys.executable, "-m", module],
-        cwd=folder, env=os.environ | {"PYTHONPATH": str(folder)},
+        cwd=folder, env=environment() | {"PYTHONPATH": str(folder)},
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
     )  # fmt: skip
     assert process.stdout is not None
