@@ -95,7 +95,7 @@ def test_a_controller_hears_where_the_joints_shall_be(joined):
     assert controller.heard[0].joint_names == list(SETTINGS.names)
     assert 0 <= point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec <= 0.03
     until(
-        lambda: np.abs(arm._measured - target).max() < 1e-12, lambda: (controller.turn(), arm._hear(time.monotonic()))
+        lambda: np.abs(arm.measured - target).max() < 1e-12, lambda: (controller.turn(), arm._hear(time.monotonic()))
     )
 
 
@@ -106,7 +106,7 @@ def test_silence_and_a_joint_astray_are_faults(joined):
     assert arm.fault.startswith("/joint_states: silent for ")
     arm.fault, controller.joints, controller.stuck = "", READY + 0.2 * np.eye(7)[3], True
     arm.send(time.monotonic() + 0.03, READY)
-    until(lambda: np.abs(arm._measured - READY).max() > 0.1, lambda: (controller.turn(), arm._hear(time.monotonic())))
+    until(lambda: np.abs(arm.measured - READY).max() > 0.1, lambda: (controller.turn(), arm._hear(time.monotonic())))
     arm.turn(arm._heard)
     assert arm.fault == "panda_joint4: found 0.2 rad from where it is sent, expected at most 0.1"
 

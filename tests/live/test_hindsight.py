@@ -12,6 +12,7 @@ from trunkline.live.book import Book
 from trunkline.live.hindsight import executions, lines, main
 from trunkline.live.journal import Journal
 from trunkline.live.logbook import read_logbook
+from trunkline.live.robot import Standing
 from trunkline.teleop.messages import ExecutorReport, Intent, Thing
 
 DIGEST, BEGIN, DELAY, OFF, LASTS, STEP = "d" * 64, 100.0, 0.04, 0.002, 2.0, 0.02
@@ -60,7 +61,7 @@ def recorded(path, probability=0.8, held=True, end=None, spread=0.01):
                 journal.event("robot", robot=ExecutorReport("idle", DIGEST))
                 break
             poses = np.stack([place(time - DELAY)] * len(NAMES)) + [0.0, 0.0, OFF, 0.0, 0.0, 0.0, 0.0]
-            journal.standing(journal.time, START, STRAIGHT, None, poses)
+            journal.standing(Standing(journal.time, 0.0, START, STRAIGHT, poses[0], poses))
             intent: Intent = operator.step()
             journal.step(1 / 60, operator.given, intent)
         if end is None:

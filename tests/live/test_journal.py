@@ -27,6 +27,7 @@ from trunkline.live import replay
 from trunkline.live.book import EVENTS, POSES, Book, Subject
 from trunkline.live.journal import Journal, JournalProcess, new_path
 from trunkline.live.logbook import read_logbook
+from trunkline.live.robot import Standing
 from trunkline.live.wire import HANDS
 from trunkline.logs.log import read_log
 from trunkline.preparation.inspect import main as inspect
@@ -150,7 +151,9 @@ def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, c
         at = journal.time = float(truth.time[row])
         arm = np.concatenate([truth.positions[row], truth.quaternions[row]], axis=1)
         pull, wound = truth.commands[row // 5], truth.tendon_positions[row]
-        journal.standing(at, START + 0.1 * np.sin(at), STRAIGHT - pull, STRAIGHT - wound, np.stack([base, base, *arm]))
+        joints, nothing = START + 0.1 * np.sin(at), np.full(7, np.nan)
+        poses = np.stack([base, base, *arm])
+        journal.standing(Standing(at, 0.0, joints, STRAIGHT - pull, nothing, poses, joints + 1e-4, STRAIGHT - wound))
         for part in ("left", "right", "view"):
             journal.headset(part, at, base, False)
         journal.step(1 / 120, operator.given, intent)
@@ -194,7 +197,7 @@ def test_others_read_it_as_ros_2(log):
     assert first.transforms[0].transform.translation.z == 3.0
     _, fixed = found["/tf_static"][0]
     assert (fixed.transforms[0].header.frame_id, fixed.transforms[0].child_frame_id) == ("rigid_base", "reference")
-    message, joints = found["/joint_states"][0]
+    message, joints = found["/joints/command"][0]
     np.testing.assert_allclose(joints.position, START)
     assert message.log_time // 10**9 >= ZERO // 10**9
     pulls = np.array([ros.position for _, ros in found["/tendons/command"]])
@@ -210,13 +213,27 @@ def test_poses_that_are_no_newer_are_not_told_twice_and_what_is_not_there_is_lef
     poses = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
     poses[0] = np.nan
     for at in (1.0, 1.0, 0.9, 1.1):
-        journal.standing(at, START, STRAIGHT, None, poses)
+        journal.standing(Standing(at, 0.0, START, STRAIGHT, poses[0], poses))
     operator = Operator()
     journal.step(0.1, operator.given, operator.step())
     journal.close()
     found = read_logbook(tmp_path / "run.mcap").poses
     assert found.names == NAMES[1:]
     np.testing.assert_allclose(1e-9 * (found.stamps - ZERO), [1.0, 1.1], atol=1e-6)
+
+
+def test_what_is_sent_and_what_is_measured_are_told_apart_and_what_is_not_measured_is_left_out(tmp_path):
+    journal = Written(tmp_path / "run.mcap")
+    poses, unknown = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1)), np.full(3, np.nan)
+    journal.standing(Standing(1.0, 0.0, START, STRAIGHT, poses[0], poses, START + 0.01, unknown))
+    journal.close()
+    with open(tmp_path / "run.mcap", "rb") as file:
+        found = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
+        told = {channel.topic: ros for _, channel, _, ros in found}
+    np.testing.assert_allclose(told["/joints/command"].position, START)
+    np.testing.assert_allclose(told["/joint_states"].position, START + 0.01)
+    assert "/tendons/command" in told
+    assert "/tendons/state" not in told
 
 
 # --- the process

@@ -40,7 +40,7 @@ class PlayedArm:
 
     def __init__(self, rig):
         self._rig, self.stream, self.fault = rig, Stream(READY, LIMITS["panda"]), ""
-        self.joints = READY
+        self.joints = self.measured = READY
 
     def begin(self):
         pass

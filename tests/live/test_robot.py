@@ -106,6 +106,8 @@ def test_it_runs_a_plan_to_its_end_while_it_is_permitted(robot):
     link = simulation().bodies.index("link_7")
     assert np.isfinite(robot.standing().bodies[link]).all()
     np.testing.assert_allclose(robot.standing().lengths, found.commands[-1], atol=0.01)  # servos are springs
+    np.testing.assert_allclose(robot.standing().measured, found.joints[-1], atol=5e-3)
+    assert not np.array_equal(robot.standing().measured, robot.standing().joints)
 
 
 def test_a_log_is_about_the_simulated_robot():

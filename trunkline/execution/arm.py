@@ -61,6 +61,12 @@ class Arm:
         assert self.told is not None
         return np.array(self.told.commanded)
 
+    @property
+    def measured(self) -> np.ndarray:
+        """As they are, (7,), rad."""
+        assert self.told is not None
+        return np.array(self.told.measured)
+
     def begin(self) -> None:
         """Wait until the robot is under control.
 

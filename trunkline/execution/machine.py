@@ -15,6 +15,7 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.execution.on_bus import BusMotors
 from trunkline.execution.pace import Smoother
+from trunkline.teleop.trajectory import JOINTS
 
 LEAD = 0.03  # s
 TICK = 0.001  # s
@@ -30,6 +31,11 @@ class Arm(Protocol):
     @property
     def joints(self) -> np.ndarray:
         """As they were sent last, (7,), rad."""
+        ...
+
+    @property
+    def measured(self) -> np.ndarray:
+        """As they are, (7,), rad."""
         ...
 
     def begin(self) -> None: ...
@@ -103,6 +109,10 @@ class Machine:
             if now - self._turned > TICK / 2:
                 self._turned = now
                 self._motors.turn(*self._pulled(now))
+
+    def measured(self) -> np.ndarray:
+        """The arm's joints, rad (7,); NaN without an arm."""
+        return np.full(JOINTS, np.nan) if self._arm is None else self._arm.measured
 
     def lengths(self) -> np.ndarray:
         """Of the cables, m (K,), as the motors' encoders have them; NaN without motors."""

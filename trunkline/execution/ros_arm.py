@@ -23,11 +23,11 @@ SILENT = 0.2  # s without the joints' state
 
 
 class RosArm:
-    """A robot that a controller moves, and whose joints' states are told."""
+    """A robot that a controller moves, and whose joints' states are told. measured: the newest, (7,), rad."""
 
     def __init__(self, settings: RosSettings) -> None:
         self._settings, self.fault = settings, ""
-        self._measured, self._sent = np.full(len(settings.names), np.nan), np.full(len(settings.names), np.nan)
+        self.measured, self._sent = np.full(len(settings.names), np.nan), np.full(len(settings.names), np.nan)
         self._heard, self._told = time.monotonic(), 0.0
         try:
             participant = DomainParticipant(settings.domain)
@@ -45,7 +45,7 @@ class RosArm:
     @property
     def joints(self) -> np.ndarray:
         """As they were sent last, or are where nothing was sent, (7,), rad."""
-        return np.where(np.isnan(self._sent), self._measured, self._sent)
+        return np.where(np.isnan(self._sent), self.measured, self._sent)
 
     def begin(self) -> None:
         """Wait until the joints' state is told and a controller listens.
@@ -54,9 +54,9 @@ class RosArm:
             InputError: either is not there.
         """
         end = time.monotonic() + CONNECTING
-        while np.isnan(self._measured).any() or not self._writer.get_matched_subscriptions():
+        while np.isnan(self.measured).any() or not self._writer.get_matched_subscriptions():
             if time.monotonic() > end:
-                known = not np.isnan(self._measured).any()
+                known = not np.isnan(self.measured).any()
                 missing = self._settings.trajectory if known else self._settings.states
                 side = (
                     "found nobody who listens" if known else f"found no state of {self._settings.names[0]} and others"
@@ -81,7 +81,7 @@ class RosArm:
         self._hear(now)
         if (silent := now - self._heard) > SILENT:
             self._fail(f"{self._settings.states}: silent for {1e3 * silent:.0f} ms")
-        off = np.abs(self._measured - self.joints)
+        off = np.abs(self.measured - self.joints)
         if off.max() > self._settings.astray:
             name, most = self._settings.names[int(off.argmax())], self._settings.astray
             self._fail(f"{name}: found {off.max():.3g} rad from where it is sent, expected at most {most:g}")
@@ -95,7 +95,7 @@ class RosArm:
                 zip(getattr(state, "name", ()), getattr(state, "position", ()), strict=False)
             )
             if all(name in where for name in self._settings.names):
-                self._measured, self._heard = np.array([where[name] for name in self._settings.names]), now
+                self.measured, self._heard = np.array([where[name] for name in self._settings.names]), now
 
     def _fail(self, fault: str) -> None:
         self.fault = self.fault or fault

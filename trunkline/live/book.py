@@ -15,8 +15,9 @@ import numpy as np
 from mcap.writer import Writer
 from rosbags.typesys import Stores, get_typestore
 
-POSES, STATIC, JOINTS = "/tf", "/tf_static", "/joint_states"
-COMMAND, MEASURED = "/tendons/command", "/tendons/state"
+POSES, STATIC = "/tf", "/tf_static"
+JOINTS_SENT, JOINTS = "/joints/command", "/joint_states"  # the latter: ROS's name for what is measured
+TENDONS_SENT, TENDONS = "/tendons/command", "/tendons/state"
 HEADSET, PARTS = "/headset/", ("left", "right", "view")
 EVENTS, INPUT, INTENT = "/events", "/core/input", "/core/intent"
 BASE, REFERENCE = "rigid_base", "reference"  # frames
@@ -26,9 +27,7 @@ GEOMETRY = ("Vector3", "Point", "Quaternion", "Pose", "Transform", "TransformSta
 TYPES = {
     POSES: "tf2_msgs/msg/TFMessage",
     STATIC: "tf2_msgs/msg/TFMessage",
-    JOINTS: "sensor_msgs/msg/JointState",
-    COMMAND: "sensor_msgs/msg/JointState",
-    MEASURED: "sensor_msgs/msg/JointState",
+    **dict.fromkeys((JOINTS_SENT, JOINTS, TENDONS_SENT, TENDONS), "sensor_msgs/msg/JointState"),
     **{HEADSET + part: "geometry_msgs/msg/PoseStamped" for part in PARTS},
     **dict.fromkeys(TEXTS, "std_msgs/msg/String"),
 }
@@ -111,9 +110,9 @@ class Book:
         assert isinstance(content, np.ndarray)
         seconds, rest = divmod(self._ns(record.stamp), 1_000_000_000)
         header = types["std_msgs/msg/Header"](types["builtin_interfaces/msg/Time"](seconds, rest), record.frame)
-        if record.topic == JOINTS:
+        if record.topic in (JOINTS_SENT, JOINTS):
             return self._joints(header, list(subject.joints), content)
-        if record.topic in (COMMAND, MEASURED):
+        if record.topic in (TENDONS_SENT, TENDONS):
             return self._joints(header, list(subject.tendons), subject.straight - content)
         vector, point, turn, pose, transform, stamped = (types[f"geometry_msgs/msg/{name}"] for name in GEOMETRY)
         if record.topic.startswith(HEADSET):

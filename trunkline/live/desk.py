@@ -225,7 +225,7 @@ class Desk:
     def _tell_journal(self, intent: Intent, standing: Standing) -> None:
         """What is at the end of a tick; of what seldom changes, the changes."""
         journal = self.journal
-        journal.standing(standing.time, standing.joints, standing.commands, standing.lengths, standing.bodies)
+        journal.standing(standing)
         robot = self.robot.state()
         said = NUMBER.sub("", intent.notice)  # what counts on is told once
         now = (intent.mode, said), (robot.mode, robot.fault, robot.digest), self.alignment, self.world
@@ -329,7 +329,7 @@ class Desk:
         return found
 
     def told(self, holder: str) -> talk.State:
-        """The state for clients, `holder` controlling; where nobody does, the core's notice, of silence, says nothing."""
+        """The state for clients, `holder` controlling; where nobody does, the core's notice is left out: of silence."""
         intent, robot = self.intent, self.robot.state()
         assert intent is not None
         hands = self.state.hands

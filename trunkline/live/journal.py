@@ -20,23 +20,25 @@ from pydantic import ConfigDict, TypeAdapter
 from trunkline.errors import InputError
 from trunkline.live.book import (
     BASE,
-    COMMAND,
     EVENTS,
     HEADSET,
     INPUT,
     INTENT,
     JOINTS,
-    MEASURED,
+    JOINTS_SENT,
     NOTHING,
     POSES,
     REFERENCE,
     STATIC,
+    TENDONS,
+    TENDONS_SENT,
     TEXT,
     Record,
     Subject,
     new_file,
     run,
 )
+from trunkline.live.robot import Standing
 from trunkline.teleop import messages
 from trunkline.teleop.messages import Input, Intent, Pose
 
@@ -64,17 +66,16 @@ class Journal:
         self.keep(Record(INPUT, now, now, text))
         self.keep(Record(INTENT, now, now, messages.to_json(intent)))
 
-    def standing(
-        self, at: float, joints: np.ndarray, commands: np.ndarray, lengths: np.ndarray | None, bodies: np.ndarray
-    ) -> None:
-        """The robot as it was `at`: joints (7,), rad; lengths of the cables (K,), m, commanded and measured; poses of
-        the bodies (N, 7)."""
+    def standing(self, robot: Standing) -> None:
+        """What the robot does; of what is measured, what is."""
         now = self.now()
-        self.keep(Record(JOINTS, at, now, joints))
-        self.keep(Record(COMMAND, at, now, commands))
-        if lengths is not None:
-            self.keep(Record(MEASURED, at, now, lengths))
-        self.keep(Record(POSES, at, now, bodies, BASE))
+        for topic, axes in (
+            (JOINTS_SENT, robot.joints), (JOINTS, robot.measured), (TENDONS_SENT, robot.commands),
+            (TENDONS, robot.lengths),
+        ):  # fmt: skip
+            if axes is not None and np.isfinite(axes).all():
+                self.keep(Record(topic, robot.time, now, axes))
+        self.keep(Record(POSES, robot.time, now, robot.bodies, BASE))
 
     def headset(self, part: str, at: float, pose: np.ndarray, in_base: bool) -> None:
         """Pose (7,) of the `left` or `right` hand, or of the `view`."""

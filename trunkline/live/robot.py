@@ -24,7 +24,7 @@ DEAD_MAN = 0.08  # s without a permit
 STALE = 0.15  # s without a sign of the robot's process
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
-TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before axes, lengths, thing and bodies
+TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before axes, sent and measured, thing and bodies
 PERMIT, PERMITTED, STOPS, STOPPED = range(4)  # of what it is told
 POSE = 7
 
@@ -34,7 +34,7 @@ class Channel:
 
     def __init__(self, context: SpawnContext, tendons: int, bodies: int) -> None:
         self.tendons, self.bodies = tendons, bodies
-        self.size = 5 + JOINTS + 2 * tendons + POSE * (1 + bodies)
+        self.size = 5 + 2 * (JOINTS + tendons) + POSE * (1 + bodies)
         self._told, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
         self._asked, self._fault = context.RawArray(ctypes.c_double, 4), context.RawArray(ctypes.c_char, TEXT)
         self.plans, self.wake = context.Queue(), context.Semaphore(0)
@@ -72,9 +72,9 @@ class Goal:
 class Standing:
     """What the robot does at `time`, s.
 
-    `joints` (7,), rad, `commands` (K,), m, and poses of the `thing` (7,), NaN where there is none, and of the `bodies`
-    (N, 7). held: s at which it was last commanded to hold. lengths: of the cables (K,), m, as measured; None where
-    nothing measures them.
+    `joints` (7,), rad, and `commands` (K,), m, as they are sent, and poses of the `thing` (7,), NaN where there is
+    none, and of the `bodies` (N, 7). held: s at which it was last commanded to hold. As measured: `measured` (7,), rad,
+    of the joints, and `lengths` (K,), m, of the cables; NaN or None where nothing measures them.
     """
 
     time: float
@@ -83,6 +83,7 @@ class Standing:
     commands: np.ndarray
     thing: np.ndarray
     bodies: np.ndarray
+    measured: np.ndarray | None = None
     lengths: np.ndarray | None = None
 
 
@@ -113,8 +114,11 @@ class RobotProcess:
     def standing(self) -> Standing:
         """The newest."""
         numbers, k, n = self.channel.hear()[0], self.channel.tendons, self.channel.bodies
-        joints, commands, lengths, thing, bodies = np.split(numbers[5:], np.cumsum([JOINTS, k, k, POSE]))
-        return Standing(numbers[TIME], numbers[HELD], joints, commands, thing, bodies.reshape(n, POSE), lengths)
+        joints, commands, measured, lengths, thing, bodies = np.split(
+            numbers[5:], np.cumsum([JOINTS, k, JOINTS, k, POSE])
+        )
+        bodies = bodies.reshape(n, POSE)
+        return Standing(numbers[TIME], numbers[HELD], joints, commands, thing, bodies, measured, lengths)
 
     def check(self, plan: Plan) -> str:
         now = self.standing()

@@ -103,6 +103,10 @@ class Plant:
         """Of what may be grasped, (7,); NaN where there is none."""
         return self._thing.of(self.batch.bind("qpos")[0])[0]
 
+    def measured(self) -> np.ndarray:
+        """The Panda's joints, rad (7,)."""
+        return self.batch.bind("qpos")[0, self.model.jnt_qposadr[self._joints]]
+
     def lengths(self) -> np.ndarray:
         """Of the cables as the last tick began, m (K,)."""
         return self._data.ten_length[self.model.actuator_trnid[self._motors, 0]]
@@ -130,6 +134,7 @@ class Moved(Protocol):
     def fault(self) -> str: ...
     def poses(self) -> np.ndarray: ...
     def thing(self) -> np.ndarray: ...
+    def measured(self) -> np.ndarray: ...
     def lengths(self) -> np.ndarray: ...
 
 
@@ -169,7 +174,7 @@ class Loop:
         mode = "fault" if self.fault else state.mode
         head = [now, MODES.index(mode), self.serial, self.held, 1.0]
         poses = [self.plant.thing(), self.plant.poses().ravel()]
-        axes = [self.robot.joints, self.robot.commands, self.plant.lengths()]
+        axes = [self.robot.joints, self.robot.commands, self.plant.measured(), self.plant.lengths()]
         self.channel.tell(np.concatenate([head, *axes, *poses]), self.fault)
 
     def _hear(self, now: float) -> None:

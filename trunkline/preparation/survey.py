@@ -15,7 +15,7 @@ from trunkline.logs.pose_stream import PoseStream, pose_stream
 from trunkline.sessions.source import COMMAND_WORDS, POSITION_WORDS, choose, pose_topics, static_topics
 
 LIVE = "/core/input"  # a topic of a live session alone
-OTHERS = re.compile(r"/headset/|/joint_states$")  # topics of a live session that tell of people and the rigid robot
+OTHERS = re.compile(r"/headset/|/joint_states$|/joints/command$")  # of people and of the rigid robot
 GAP = 1.5  # median intervals between frames that make a gap
 
 
