@@ -24,8 +24,9 @@ from pathlib import Path
 import numpy as np
 from aiohttp import ClientSession
 
-from benchmarks.guests import HZ, RIGID, SEEN, TIP, Hands, Place, hands_at, knock, package_of
+from benchmarks.guests import HZ, RIGID, SEEN, TIP, Hands, Place, hands_at, knock
 from trunkline.errors import InputError, in_one_line
+from trunkline.foresight.package import only_package
 from trunkline.live.house import Made
 from trunkline.live.logbook import read_logbook
 from trunkline.live.robot import DEAD_MAN
@@ -238,7 +239,7 @@ def run(arguments: list[str]) -> int:
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--times", type=int, default=5)
     given = parser.parse_args(arguments)
-    package = package_of(given.package)
+    package = given.package or only_package()
     with recorded("faults", given.times >= 5):
         main(package, given.times)
     return 0

@@ -6,32 +6,18 @@ import json
 import struct
 import time
 from collections.abc import Callable
-from pathlib import Path
 
 import numpy as np
 from aiohttp import ClientSession, WSMsgType
 
-from trunkline.errors import InputError
 from trunkline.live import wire
 
-PACKAGES = Path("artifacts/package_unity")
 HZ = 72.0  # of inputs
 Place = tuple[float, float, float]  # m, in the base frame
 
 RIGID, TIP, LENGTH = (0.5, 0.0, 0.55), (0.62, 0.0, 0.2), 0.6  # m, of the targets and of rays at first
 SEEN = 7  # an input's flags: both hands tracked, the page visible
 WATCHED = 0.2  # s after a preview's end, at which it is said to have been shown
-
-
-def package_of(given: Path | None) -> Path:
-    """
-    Raises:
-        InputError: none is given, and the pipeline has made none.
-    """
-    found = given or next(iter(sorted(PACKAGES.glob("*.tgz"))), None)
-    if found is None:
-        raise InputError(f"{PACKAGES}: no package, expected one: run `make demo`, or name another")
-    return found
 
 
 class Guest:

@@ -19,8 +19,9 @@ from pathlib import Path
 import numpy as np
 from aiohttp import ClientSession, WSServerHandshakeError
 
-from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock, package_of
+from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock
 from trunkline.errors import InputError, in_one_line
+from trunkline.foresight.package import only_package
 from trunkline.live.house import Made
 from trunkline.live.server import Server
 from trunkline.live.session import Address, opened
@@ -215,7 +216,7 @@ def main(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("package", nargs="?", type=Path)
     given = parser.parse_args(arguments)
-    package = package_of(given.package)
+    package = given.package or only_package()
     with recorded("hostile"):
         asyncio.run(session(package))
     return 0

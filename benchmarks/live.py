@@ -17,8 +17,9 @@ from pathlib import Path
 import numpy as np
 from aiohttp import ClientSession
 
-from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, hands_at, knock, package_of
+from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, hands_at, knock
 from trunkline.errors import in_one_line
+from trunkline.foresight.package import only_package
 from trunkline.live import wire
 from trunkline.live.house import Made
 from trunkline.live.server import Server
@@ -126,7 +127,7 @@ def run() -> int:
     parser.add_argument("--watchers", type=int, default=20)
     parser.add_argument("--stops", type=int, default=200)
     options = parser.parse_args()
-    package = package_of(options.package)
+    package = options.package or only_package()
     with recorded("live", options.watchers >= 20 and options.stops >= 200):
         main(package, options.watchers, options.stops)
     return 0

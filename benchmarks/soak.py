@@ -20,10 +20,10 @@ from pathlib import Path
 import numpy as np
 from aiohttp import ClientSession
 
-from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock, package_of
+from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock
 from trunkline.errors import InputError, in_one_line
 from trunkline.foresight.believing import make_world
-from trunkline.foresight.package import Package, read_package
+from trunkline.foresight.package import Package, only_package, read_package
 from trunkline.live import foreseer, talk
 from trunkline.live.access import make_token
 from trunkline.live.desk import Desk
@@ -208,7 +208,7 @@ def main() -> int:
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--hours", type=float, default=8.0)
     given = parser.parse_args()
-    package = read_package(package_of(given.package))
+    package = read_package(given.package or only_package())
     with recorded("soak", given.hours >= 8):
         asyncio.run(session(package, given.hours))
     return 0

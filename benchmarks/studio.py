@@ -25,9 +25,8 @@ import mujoco
 import numpy as np
 
 from benchmarks.browser import browsing
-from benchmarks.guests import package_of
 from trunkline.errors import InputError, in_one_line
-from trunkline.foresight.package import read_package
+from trunkline.foresight.package import only_package, read_package
 from trunkline.live.house import SEARCH, simulation_of
 from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -142,7 +141,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--seconds", type=float, default=20.0)
     parser.add_argument("--pictures", type=Path, help="a folder, for a picture of each page")
     given = parser.parse_args(arguments)
-    package = package_of(given.package)
+    package = given.package or only_package()
     with recorded("studio", given.seconds >= 20):
         found = asyncio.run(compared(package, given.seconds, given.pictures))
         print("| | first picture, s | bytes a frame | others a second | frames a second | server, CPU ms a frame |"

@@ -16,8 +16,9 @@ from rehearsal.experiments.bench import bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import summary
 from rehearsal.report import draw
-from rehearsal.runs import make, only_package, source_of, wanted
+from rehearsal.runs import make, source_of, wanted
 from trunkline.errors import in_one_line
+from trunkline.foresight.package import only_package
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.limits import read_limits
 from trunkline.pipeline.rehearsal_table import rehearsal_table

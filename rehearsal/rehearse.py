@@ -9,8 +9,9 @@ from pydantic import Field
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import rewrite_results, summary
 from rehearsal.report import draw
-from rehearsal.runs import make, only_package, source_of, wanted
+from rehearsal.runs import make, source_of, wanted
 from trunkline.errors import nearest
+from trunkline.foresight.package import only_package
 from trunkline.pipeline.limits import read_limits
 from trunkline.pipeline.rehearsal_table import rehearsal_table
 from trunkline.pipeline.stage import run_stage, write_json

@@ -16,12 +16,11 @@ from rehearsal.experiments.ablations import VARIANTS, varied
 from rehearsal.experiments.bench import Bench, bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, append_result, read_results
-from trunkline.errors import InputError
+from trunkline.foresight.package import PACKAGES
 from trunkline.processes import end_with_parent
 from trunkline.unity.unpacked import package_digest
 from trunkline.unity.unpacked import read_package as read_files
 
-PACKAGES = Path("artifacts/package_unity")
 SHOWN = 12  # digits of a digest
 
 
@@ -44,18 +43,6 @@ class Run:
     experiment: str
     seed: int
     variant: str = ""
-
-
-def only_package(folder: Path = PACKAGES) -> Path:
-    """The package that the pipeline made.
-
-    Raises:
-        InputError: there is none, or more than one.
-    """
-    found = sorted(folder.glob("*.tgz"))
-    if len(found) != 1:
-        raise InputError(f"{folder}: found {len(found)} packages (*.tgz), expected one: `make demo` makes it")
-    return found[0]
 
 
 def source_of(package: Path) -> Source:

@@ -24,6 +24,7 @@ import numpy as np
 from rehearsal.experiments.bench import Bench, bench_of
 from rehearsal.experiments.follow import Run, run
 from rehearsal.operator.hands import Person
+from trunkline.foresight.package import only_package
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.panda.kinematics import mount_pose
 from trunkline.pipeline.results import recorded
@@ -40,7 +41,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=4)
     parser.add_argument("--package", type=Path, default=None)
     given = parser.parse_args()
-    package = given.package or next(Path("artifacts/package_unity").glob("*.tgz"), Path("none"))
+    package = given.package or only_package()
     bench = bench_of(package)
     print("| operator | seed | " + " | ".join(SHARES) + " | operator's lag |")
     print("|---|---:|" + "---:|" * (len(SHARES) + 1))

@@ -22,6 +22,7 @@ from rehearsal.experiments.ablations import varied
 from rehearsal.experiments.bench import Bench, Seen, bench_of
 from rehearsal.experiments.grasp import run
 from rehearsal.session import Session
+from trunkline.foresight.package import only_package
 from trunkline.panda.kinematics import mount_pose
 from trunkline.pipeline.results import recorded
 
@@ -34,7 +35,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=6)
     parser.add_argument("--package", type=Path, default=None)
     given = parser.parse_args()
-    package = given.package or next(Path("artifacts/package_unity").glob("*.tgz"), Path("none"))
+    package = given.package or only_package()
     tell(varied(bench_of(package), "grasp", "single"), given.runs)
 
 

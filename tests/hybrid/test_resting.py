@@ -1,5 +1,6 @@
 """Things that rest on a board, and things that do not."""
 
+import mujoco
 import numpy as np
 import pytest
 
@@ -7,7 +8,13 @@ from trunkline.hybrid.futures import Piece
 from trunkline.hybrid.resting import Resting
 
 TIME = np.linspace(0.0, 4.0, 81)
-RESTING = Resting(1.0, np.array([-0.3, -0.3, -0.13]), np.array([0.3, 0.3, -0.1]))
+# a thing that slides up to a unit of the arm, 0.1 m above
+MODEL = mujoco.MjModel.from_xml_string("""
+<mujoco><worldbody>
+  <geom size="0.02" pos="0 0 0.1" contype="2" conaffinity="10"/>
+  <body name="object"><joint type="slide" axis="0 0 1"/><geom size="0.02" contype="4" conaffinity="14"/></body>
+</worldbody></mujoco>""")
+RESTING = Resting(1.0, np.array([-0.3, -0.3, -0.13]), np.array([0.3, 0.3, -0.1]), MODEL)
 SET_DOWN = np.where(TIME[:, None] < 1.0, [0.1, 0.0, 0.0], [0.1, 0.0, -0.05])
 
 
@@ -31,6 +38,13 @@ CASES = {
 def test_what_rests(name):
     path, rests = CASES[name]
     assert RESTING.holds(motion(path))[0] == rests
+
+
+@pytest.mark.parametrize(("height", "rests"), [(0.0, True), (0.059, True), (0.061, False), (np.nan, True)])
+def test_what_the_arm_still_touches_does_not_rest(height, rests):
+    found = motion(SET_DOWN)
+    found.qpos[:, -1] = height
+    assert RESTING.holds(found)[0] == rests
 
 
 def test_a_future_that_is_not_sound_does_not_count():

@@ -13,8 +13,9 @@ from matplotlib.image import imread
 from rehearsal import runs
 from rehearsal.experiments.result import Result, read_results, summary
 from rehearsal.report import draw
-from rehearsal.runs import Run, Source, make, make_one, only_package, source_of, wanted
+from rehearsal.runs import Run, Source, make, make_one, source_of, wanted
 from trunkline.errors import InputError
+from trunkline.foresight.package import only_package
 from trunkline.pipeline.limits import Limit
 from trunkline.pipeline.rehearsal_table import rehearsal_table
 

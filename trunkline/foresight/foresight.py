@@ -99,7 +99,8 @@ class Foresight:
         doubts = replace(self.known.doubts, contact=Contact(self.known.doubts.contact.friction, NOWHERE, 0.0))
         board = beneath(targets.tip.position, world)
         assert board is not None  # else the planner refuses
-        resting = Resting(plan.step * dict(plan.phases)["release"], np.array(board.low), np.array(board.high))
+        opens = plan.step * dict(plan.phases)["release"]
+        resting = Resting(opens, np.array(board.low), np.array(board.high), twin.model)
         return Foreseen(preview(twin, way, doubts, resting, s.futures, seed, go_on=go_on), begins)
 
     def carrying(self, thing: Thing, world: World, way: Way, hangs: np.ndarray | None, before: Foreseen) -> Twin:

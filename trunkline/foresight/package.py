@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from trunkline.arm.geometry import ChainGeometry
+from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.hybrid.placements import Grip, SideGrip
 from trunkline.hybrid.touch import read_geometry
@@ -27,6 +28,8 @@ from trunkline.teleop.trajectory import limits_of
 from trunkline.teleop.vectors import DOWN, Vector, conjugate, rotate
 from trunkline.unity import unpacked
 from trunkline.unity.twin import MANIFEST, MODEL
+
+PACKAGES = Path("artifacts/package_unity")
 
 
 @dataclass(frozen=True)
@@ -71,6 +74,18 @@ class Package:
         gravity = STANDARD_GRAVITY * np.array(rotate(conjugate(turn), DOWN))
         x, y, z = (float(value) for value in settle(self.model, commands[None], gravity).position[0])
         return np.array(mount) + np.array(rotate(turn, (x, y, z)))
+
+
+def only_package(folder: Path = PACKAGES) -> Path:
+    """The package that the pipeline made.
+
+    Raises:
+        InputError: there is none, or more than one.
+    """
+    found = sorted(folder.glob("*.tgz"))
+    if len(found) != 1:
+        raise InputError(f"{folder}: found {len(found)} packages (*.tgz), expected one: `make demo` makes it")
+    return found[0]
 
 
 def read_package(path: Path) -> Package:

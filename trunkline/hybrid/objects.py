@@ -132,6 +132,18 @@ def object_geoms(model: mujoco.MjModel) -> np.ndarray:
     return np.flatnonzero(model.geom_bodyid == body)
 
 
+def touched(model: mujoco.MjModel, qpos: np.ndarray) -> np.ndarray:
+    """Whether the arm touches the object, in each pose of a composed model. Shapes (B, nq) to (B,)."""
+    thing, arm = object_geoms(model), np.flatnonzero(model.geom_contype & ARM)
+    data, found = mujoco.MjData(model), np.zeros(len(qpos), dtype=bool)
+    for row in np.flatnonzero(np.isfinite(qpos).all(axis=1)):
+        data.qpos[:] = qpos[row]
+        mujoco.mj_fwdPosition(model, data)
+        pairs = data.contact.geom[data.contact.dist <= 0]
+        found[row] = (np.isin(pairs, thing).any(axis=1) & np.isin(pairs, arm).any(axis=1)).any()
+    return found
+
+
 def _size(shape: str, half: np.ndarray) -> list[float]:
     """MuJoCo's size of a cylinder, box or sphere from half its sizes (3,), m."""
     return {"cylinder": [half[0], half[2], 0], "box": list(half), "sphere": [half[0], 0, 0]}[shape]

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
+import mujoco
 import numpy as np
 
 from trunkline.hybrid.futures import Piece
+from trunkline.hybrid.objects import touched
 
 STILL = 0.01  # m by which it may move within LAST
 LAST = 0.5  # s
@@ -17,15 +19,17 @@ class Resting:
     Attributes:
         since: s, when the arm begins to open; from then on what rests is no higher.
         low, high: corners of the board, m. Shape (3,).
+        model: of whom the motion is.
     """
 
     since: float
     low: np.ndarray
     high: np.ndarray
+    model: mujoco.MjModel
 
     def holds(self, motion: Piece) -> np.ndarray:
-        """Of which futures it rests there: its centre is over the board, it stands still, and nothing carries it off.
-        Shape (B,)."""
+        """Of which futures it rests there: its centre is over the board, it stands still, nothing carries it off, and
+        the arm has let go of it. Shape (B,)."""
         first, late = (int(np.argmin(np.abs(motion.time - time))) for time in (self.since, motion.time[-1] - LAST))
         place = motion.object[:, :, :3]
         with np.errstate(invalid="ignore"):
@@ -33,4 +37,4 @@ class Resting:
             height = place[:, -1, 2]
             down = (height > self.high[2]) & (height < place[:, first, 2] + STILL)
             still = np.linalg.norm(place[:, -1] - place[:, late], axis=1) < STILL
-        return over & down & still & motion.sound
+        return over & down & still & ~touched(self.model, motion.qpos[:, -1]) & motion.sound
