@@ -41,14 +41,17 @@ def full_spec() -> mujoco.MjSpec:
     return spec
 
 
-def cantilever_spec(units: int, stiffness: float, length: float) -> mujoco.MjSpec:
+X, Y = ("x", (1, 0, 0)), ("y", (0, 1, 0))
+
+
+def cantilever_spec(units: int, stiffness: float, length: float, hinges=(X, Y)) -> mujoco.MjSpec:
     """A chain of equal units, two hinges each at its upper end."""
     spec = mujoco.MjSpec()
     body = spec.worldbody.add_body(name="base")
     for unit in range(units):
         body = body.add_body(name=f"unit_{unit:02d}", pos=[0, 0, -length if unit else 0.0])
         body.explicitinertial, body.mass, body.inertia = True, 1e-3, [1e-6] * 3
-        for axis, direction in (("x", (1, 0, 0)), ("y", (0, 1, 0))):
+        for axis, direction in hinges:
             hinge = mujoco.mjtJoint.mjJNT_HINGE
             body.add_joint(name=f"{body.name}_{axis}", type=hinge, axis=direction, stiffness=[stiffness, 0, 0])
     body.add_site(name="tip", pos=[0, 0, -length])
@@ -77,6 +80,20 @@ def test_what_is_written_is_read(name):
     start = start_model()
     for other in others:  # nothing else moves
         assert PARAMETERS[other].read(model) == pytest.approx(PARAMETERS[other].read(start)), other
+
+
+@pytest.mark.parametrize("hinges", [(X, Y), (Y, X), (("x", (-1, 0, 0)), Y)])
+@pytest.mark.parametrize("about", ["x", "y"])
+def test_an_arm_is_bent_about_an_axis_however_it_is_drawn(hinges, about):
+    bent = {}
+    for drawn in ((X, Y), hinges):
+        model = model_with({f"rest_bend_{about}": 0.1}, model=cantilever_spec(5, 1.0, 0.1, drawn).compile())
+        data = mujoco.MjData(model)
+        data.qpos[:] = model.qpos_spring
+        mujoco.mj_forward(model, data)
+        bent[drawn] = data.site("tip").xpos.copy()
+    np.testing.assert_allclose(bent[hinges], bent[(X, Y)], atol=1e-12)
+    assert abs(bent[hinges]["xy".index(about) - 1]) > 0.05
 
 
 def test_all_at_once_in_any_order():

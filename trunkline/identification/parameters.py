@@ -303,11 +303,15 @@ def _yield_bend(number: int) -> Parameter:
 
 def _rest_bend(axis: int, power: int) -> Parameter:
     """A coefficient of the shape in which the springs are slack: every joint bends by c_0 + c_1 s about an axis, s from
-    -1 at the first joint to 1 at the last."""
+    -1 at the first joint to 1 at the last. Of a joint's two hinges, one is about x, or nearer to it, whichever comes
+    first."""
 
     def basis(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray]:
-        hinges = np.arange(arm_hinges(model)).reshape(-1, 2)[:, axis]
-        return hinges, np.linspace(-1, 1, len(hinges)) ** power
+        pairs = np.arange(arm_hinges(model)).reshape(-1, 2)
+        about_x = np.abs(model.jnt_axis[pairs, 0]).argmax(axis=1)
+        hinges = pairs[np.arange(len(pairs)), about_x if axis == 0 else 1 - about_x]
+        sense = np.where(model.jnt_axis[hinges, axis] < 0, -1.0, 1.0)
+        return hinges, sense * np.linspace(-1, 1, len(hinges)) ** power
 
     def read(model: mujoco.MjModel) -> float:
         hinges, shape = basis(model)
