@@ -1,7 +1,7 @@
 """Segments taken for one another: labels that change places, told by the distances along the arm.
 
 The distance between nearby segments hardly depends on the arm's shape. Where two labels are exchanged, both are
-at the other's usual distances from their neighbours.
+at the other's usual distances from their neighbours. What is found here, `repairs` puts back.
 """
 
 from dataclasses import dataclass
