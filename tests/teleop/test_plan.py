@@ -137,15 +137,6 @@ def test_a_solid_in_the_way_is_named(planner):
         planner.plan(behind, wall, START, STRAIGHT)
 
 
-def test_a_solid_in_the_straight_arms_way_is_named(planner):
-    aim, top = request(MOUNT, TIP), MOUNT[2] - 0.2
-    board = World("world", (Box("the table", (MOUNT[0] - 0.1, -0.3, top - 0.05), (MOUNT[0] + 0.1, 0.3, top)),))
-    planner.plan(aim, board, START, STRAIGHT)
-    replace(planner, length=0.19).plan(aim, board, START, STRAIGHT)
-    with pytest.raises(InputError, match="world: the straight arm would come into the table after"):
-        replace(planner, length=0.21).plan(aim, board, START, STRAIGHT)
-
-
 def test_a_network_of_one_tilt_refuses_gravity_from_a_side_that_it_does_not_know():
     with pytest.raises(InputError, match="gravity: comes 30° beside a tendon's plane"):
         bend(NETWORK, tuple(BENT), (0.5 * np.cos(np.pi / 6), 0.5 * np.sin(np.pi / 6), -(0.75**0.5)), 0.02)

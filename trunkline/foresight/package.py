@@ -54,7 +54,7 @@ class Package:
         grasping = Grasping(rigid, config.mount_offset, self.straight, self.grips(config), config.handling)
         return Planner(
             rigid, self.network, self.straight, limits, config.mount_offset, shaper=shaper, chain=self.chain,
-            grasping=grasping, length=self.geometry.length,
+            grasping=grasping,
         )  # fmt: skip
 
     def grips(self, config: Config) -> dict[str, Grip]:

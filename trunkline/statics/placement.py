@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.statics.capstan import Rub, new_rub
+from trunkline.statics.chain import Chain
 from trunkline.statics.kernel import kernel
 from trunkline.statics.vectors import copy, cross, dot, plus, product, turn_about, turned, vector
 
@@ -99,6 +100,28 @@ def place_chords(first, last, chain, qpos, chords):
         place(chain, qpos[row], state)
         for i in range(units):
             copy(state.chord[i], chords[row, i])
+
+
+def joint_places(chain: Chain, qpos: np.ndarray) -> np.ndarray:
+    """Joints, then the tip, at joint angles `qpos` (B, nq), in the base frame, m. Shape (B, n + 1, 3)."""
+    places = np.empty((len(qpos), chain.units + 1, 3))
+    _place_joints(0, len(qpos), chain, np.ascontiguousarray(qpos), places)
+    return places
+
+
+@kernel
+def _place_joints(first, last, chain, qpos, places):
+    """Fill `places` (B, n + 1, 3), rows `first` to `last`."""
+    units, tendons = chain.crosses.shape
+    state = new_state(units, tendons)
+    for row in range(first, last):
+        place(chain, qpos[row], state)
+        for k in range(3):
+            places[row, units, k] = state.position[units - 1, k]
+            for i in range(units):
+                places[row, i, k] = state.position[i, k]
+            for m in range(3):
+                places[row, units, k] += state.rotation[units - 1, k, m] * chain.tip[m]
 
 
 @kernel

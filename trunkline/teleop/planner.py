@@ -6,21 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.panda.collision import clearance
-from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, joint_frames
 from trunkline.statics.chain import Chain
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.grasping import Grasping, Leg
 from trunkline.teleop.messages import Request, Targets, World
+from trunkline.teleop.obstacles import refuse
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.shaping import Shaper, shaped
 from trunkline.teleop.tendons import Network, bend
 from trunkline.teleop.trajectory import JOINTS, Limits, gentle, point_to_point
 from trunkline.teleop.vectors import DOWN, Vector, add, conjugate, rotate, subtract
-
-LINK_RADIUS = 0.08  # m, about the joints' centres and the mount, that no solid of the world may come into
-ALONG = 25  # points of the straight arm's axis that no solid may come over
 
 # The shaper for the arm's swings: of a gravity direction (3,) in its base frame, the commands at the end (K,), and by
 # how much they change (K,), m; `trunkline.teleop.swing` has it of a MuJoCo model.
@@ -31,8 +27,7 @@ ShaperOf = Callable[[np.ndarray, np.ndarray, np.ndarray], Shaper]
 class Planner:
     """What plans are made with. `straight`: commands that leave the arm straight, m, (K,). `tolerance`: m, how far
     from its target the tip may be foreseen. `step`: s, between a plan's rows. `chain`: the arm's statics, by which the
-    network's answers are corrected. `grasping`: how things are grasped. `length`: of the straight arm, m, which no
-    solid may be in the way of as it approaches; 0 asks for nothing."""
+    network's answers are corrected, and no solid may be in the arm's way. `grasping`: how things are grasped."""
 
     rigid: RigidIK
     network: Network
@@ -44,7 +39,6 @@ class Planner:
     shaper: ShaperOf | None = None
     chain: Chain | None = None
     grasping: Grasping | None = None
-    length: float = 0.0
 
     def plan(
         self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
@@ -72,7 +66,7 @@ class Planner:
             rows.append(np.concatenate([way[1:], np.tile(end, (round(leg.calm / self.step), 1))]))
         every = np.concatenate(rows)
         found = Plan(self.step, every[:, :JOINTS], every[:, JOINTS:], tuple(phases), request.package, request.world)
-        refuse(found, world, self.mount_offset, self.length)
+        refuse(found, world, self.mount_offset, self.chain)
         return found
 
     def _legs(
@@ -115,37 +109,3 @@ def _soft_target(targets: Targets) -> tuple[Vector, Vector]:
     """Tip target and gravity direction in the soft arm's base frame."""
     back = conjugate(base_quaternion(targets.pointing, targets.heading))
     return rotate(back, subtract(targets.tip.position, targets.rigid.position)), rotate(back, DOWN)
-
-
-def refuse(plan: Plan, world: World, mount_offset: float, length: float) -> None:
-    """Whether the rigid robot's way is free, and that of the straight arm of `length` m as it approaches.
-
-    Raises:
-        InputError: a joint beyond its limits, the robot touching itself, or one of its joints or the arm in a solid of
-            the world.
-    """
-    for joint in range(JOINTS):
-        angles = plan.joints[:, joint]
-        if angles.min() < Q_MIN[joint] or angles.max() > Q_MAX[joint]:
-            raise InputError(f"limit: joint {joint + 1} of the rigid robot would leave its range on the way")
-    gaps = clearance(plan.joints, mount_offset)
-    if gaps.min() <= 0:
-        when = plan.step * int(np.argmin(gaps))
-        raise InputError(
-            f"self-collision: the robot would touch itself after {when:.2f} s, by {-1e3 * gaps.min():.0f} mm"
-        )
-    frames = joint_frames(plan.joints)
-    mount = frames[-1].p + (FLANGE + mount_offset) * frames[-1].z
-    rigid = {f"joint {i + 1} of the rigid robot": frame.p for i, frame in enumerate(frames) if i >= 2}
-    rigid["mount of the rigid robot"] = mount
-    end = next((row for phase, row in plan.phases if phase != "approach"), len(plan.joints))
-    straight = [(mount + share * length * frames[-1].z)[:, :end] for share in np.linspace(0, 1, ALONG)[1:]]
-    moving = [(name, path, LINK_RADIUS) for name, path in rigid.items()]
-    moving += [("the straight arm", path, 0.0) for path in straight if length and path.size]
-    for box in world.boxes:
-        low, high = np.array(box.low)[:, None], np.array(box.high)[:, None]
-        for name, path, radius in moving:
-            away = np.linalg.norm(np.maximum(np.maximum(low - path, path - high), 0.0), axis=0)
-            if away.min() <= radius:
-                when = plan.step * int(np.argmin(away))
-                raise InputError(f"world: {name} would come into {box.name} after {when:.2f} s")
