@@ -208,7 +208,9 @@ class Session:
             return
         goal = None
         if not why_not(intent.targets):
-            goal, self.refused = sought(self.planner, intent.targets, self.follower.goal[:JOINTS])
+            goal, self.refused = sought(
+                self.planner, intent.targets, self.follower.goal[:JOINTS], self.world
+            )
         self.follower.hear(self.now, goal)
 
     def _move(self, joints: np.ndarray, commands: np.ndarray, dt: float) -> None:

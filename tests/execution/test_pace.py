@@ -8,12 +8,14 @@ from trunkline.execution.pace import PacedRobot, Smoother
 from trunkline.execution.stream import LIMITS
 from trunkline.panda.limits import ACCELERATION, JERK
 from trunkline.teleop.executor import BRAKE
+from trunkline.teleop.following import KNOT, Following
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import limits_of, point_to_point
 
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 START = np.append(READY, [0.5, 0.5, 0.5])
 PLANNED = limits_of(config().motors)
+OFFSET, DELAY = 0.05, 0.5
 TICK, PANDA, FR3 = 0.001, LIMITS["panda"], LIMITS["fr3"]
 
 
@@ -67,6 +69,48 @@ def test_without_a_stop_the_plan_is_run_to_its_end():
     plan = planned(np.append(np.full(7, 0.2), [-0.02, 0, 0]))
     rows = stopped(plan, 100.0)
     np.testing.assert_allclose(rows[-1], np.append(plan.joints[-1], plan.commands[-1]), atol=1e-12)
+
+
+def following(axes, seconds, ends=np.inf):
+    """Rows sent as it follows `axes`, a function of time, which is heard every KNOT s; stopped after `ends` s."""
+    smoother, rows = Smoother(START, 10), []
+    robot = PacedRobot(READY, START[7:], PLANNED, "package", lambda q, c, _: rows.append(np.append(q, c)), FR3)
+    assert robot.follow(Following(DELAY, 0.0, OFFSET), TICK) == ""
+    for tick in range(round(seconds / TICK)):
+        now = tick * TICK
+        if tick % round(KNOT / TICK) == 0:
+            robot.hear(0.0, axes(now))
+        if now >= ends:
+            robot.stop()
+        robot.advance(TICK)
+    return robot, np.array([smoother.next(row) for row in rows])
+
+
+def swaying(now):
+    return START + 0.15 * np.append(np.sin(now) * np.ones(7), np.zeros(3))
+
+
+@pytest.mark.parametrize("ends", [np.inf, 0.3, 1.5, 2.0])
+def test_as_it_follows_and_brakes_it_keeps_the_limits(ends):
+    robot, rows = following(swaying, 3.0, ends)
+    speed = np.diff(rows[:, :7], axis=0) / TICK
+    gain = np.diff(speed, axis=0) / TICK
+    assert (np.abs(speed) / FR3.velocity).max() < 1.0
+    assert (np.abs(gain) / FR3.acceleration).max() < 1.0
+    assert (np.abs(np.diff(gain, axis=0) / TICK) / FR3.jerk).max() < 1.0
+    if ends < 3.0:
+        assert robot.state().mode == "idle"
+        assert not speed[-1].any()
+    else:
+        assert robot.state().mode == "running"
+        np.testing.assert_allclose(rows[-1], swaying(3.0 - DELAY - 0.02), atol=5e-3)
+
+
+def test_it_stays_at_the_last_targets_that_its_range_has():
+    """An FR3's joint 6 reaches less far in than a Panda's."""
+    beyond = START + (0.4 - START[5]) * np.eye(10)[5]
+    _, rows = following(lambda now: swaying(0.5) if now < 0.5 else beyond, 3.0)
+    np.testing.assert_allclose(rows[-1], swaying(0.5), atol=1e-4)
 
 
 def test_a_smoothed_step_becomes_a_way_of_continuous_acceleration():

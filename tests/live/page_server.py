@@ -159,7 +159,7 @@ class Planning:
     def order(self, order: foreseer.Order | foreseer.Seek) -> None:
         if isinstance(order, foreseer.Seek):
             targets = order.targets and within(order.targets)
-            self.heard(foreseer.Found(order.serial, *sought(self.planner, targets, order.joints)))
+            self.heard(foreseer.Found(order.serial, *sought(self.planner, targets, order.joints, order.world)))
             return
         serial = order.request.serial
         try:

@@ -19,13 +19,14 @@ from trunkline.execution.stream import LIMITS, Stream
 from trunkline.live.__main__ import parsed
 from trunkline.live.hardware import SIMULATED, hardware_of
 from trunkline.live.real import Moved, RealRobot
-from trunkline.live.robot import DEAD_MAN, HELD, MODE, MODES, PERMIT, PERMITTED, STOPS, Channel
+from trunkline.live.robot import DEAD_MAN, HELD, MODE, MODES, PERMIT, PERMITTED, STOPS, Channel, Goal
 from trunkline.live.session import alignment_for
 from trunkline.live.settings import Config as Live
 from trunkline.live.simulated import Loop
 from trunkline.panda.limits import ACCELERATION
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.teleop.executor import BRAKE
+from trunkline.teleop.executor import BRAKE, FOLLOWS
+from trunkline.teleop.following import KNOT, Following
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import gentle, limits_of
 
@@ -33,6 +34,7 @@ READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 STRAIGHT = np.array([0.5, 0.5, 0.5])
 LATE = LEAD + (SMOOTH - 1) * TICK  # s by which limbs are behind the plan
 TURN, PULL, SECONDS = 0.5, 0.06, 1.5
+DELAY = 0.3  # s, of following
 
 
 class PlayedArm:
@@ -200,6 +202,28 @@ def test_a_fault_lasts(rig):
     until(lambda: rig.loop.serial == 2, each=rig.tick)
     assert rig.mode == "fault"
     assert rig.channel.hear()[1] == "robot: reflex"
+    assert still(rig)
+
+
+def test_both_limbs_follow_and_rest_as_they_are_let_go(rig):
+    """Seen from another place than where its plan would have led."""
+    rig.channel.asked[STOPS] += 1
+    rig.rest(BRAKE + LATE + 0.05)
+    stops, here = rig.channel.asked[STOPS], np.append(rig.sent[-1], STRAIGHT)
+    rig.channel.plans.put((2, FOLLOWS, Following(DELAY, 0.0, 0.05), stops))
+    rig.channel.asked[PERMITTED] = 2
+    until(lambda: rig.loop.serial == 2, each=lambda: rig.loop.turn(rig.now))
+    goal = here + 0.1 * np.eye(10)[0] - 0.02 * np.eye(10)[8]
+    for _ in range(20):
+        rig.channel.plans.put((2, FOLLOWS, Goal(rig.now, goal), stops))
+        rig.rest(KNOT)
+    assert rig.mode == "running"
+    assert rig.arm.stream.fault == ""
+    np.testing.assert_allclose(rig.sent[-1], goal[:7], atol=1e-6)
+    np.testing.assert_allclose(rig.pulls[-1], STRAIGHT - goal[7:], atol=1e-3)
+    rig.permitted = False
+    rig.rest(DEAD_MAN + 0.2)
+    assert rig.mode == "idle"
     assert still(rig)
 
 

@@ -79,7 +79,7 @@ class PlainPlanning:
 
     def order(self, order):
         if isinstance(order, foreseer.Seek):
-            self.heard(foreseer.Found(order.serial, *sought(self.planner, order.targets, order.joints)))
+            self.heard(foreseer.Found(order.serial, *sought(self.planner, order.targets, order.joints, order.world)))
             return
         serial = order.request.serial
         try:

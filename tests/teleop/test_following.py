@@ -1,12 +1,15 @@
 """Following: the robot comes to where the targets were a set delay before, keeps its limits on the way, and rests when
 they stop or are refused."""
 
+import re
+
 import numpy as np
 import pytest
 
-from tests.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT, targets
+from tests.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT, WORLD, targets
 from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.following import KNOT, Follower, Following, sought
+from trunkline.teleop.messages import Box, World
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
 
@@ -28,11 +31,11 @@ def follow(y, seconds: float, delay: float = DELAY, period: float = PERIOD) -> t
     return np.array(rows), follower
 
 
-def hear(follower: Follower, now: float, wanted) -> str:
+def hear(follower: Follower, now: float, wanted, world: World = WORLD) -> str:
     """Why the targets at `now` are not followed."""
     if not follower.due(now):
         return ""
-    goal, refused = sought(PLANNER, wanted, follower.goal[:7])
+    goal, refused = sought(PLANNER, wanted, follower.goal[:7], world)
     follower.hear(now, goal)
     return refused
 
@@ -97,6 +100,14 @@ def test_refused_targets_leave_it_at_the_last_and_are_said():
             assert refused.startswith(("out of reach", "limit"))
     np.testing.assert_allclose(rows, kept, atol=1e-4)
     assert hear(follower, 5.0, at(0.05)) == ""
+
+
+def test_targets_that_lead_into_a_solid_are_refused():
+    shelf = World("world", (Box("the shelf", (0.4, 0.2, 0.4), (0.6, 0.4, 0.6)),))
+    _, follower = follow(lambda now: 0.0, 0.5)
+    assert hear(follower, 1.0, at(0.05), shelf) == ""
+    refused = hear(follower, 2.0, at(0.3), shelf)
+    assert re.fullmatch("world: joint . of the rigid robot would come into the shelf", refused)
 
 
 def test_it_brakes_within_its_limits_wherever_the_targets_are(followed):

@@ -7,11 +7,13 @@ import numpy as np
 
 from trunkline.execution.stream import RobotLimits
 from trunkline.teleop.executor import BRAKE, SimulatedRobot
+from trunkline.teleop.following import Follower, Following
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import JOINTS, Limits
 
 SHARE = 0.95  # of the Panda's accelerations that a stop makes use of
 LEAST = 0.3  # of them, whatever the plan itself accelerates there
+STRIDE = 0.005  # s between the places that a robot seeks as it follows; it goes evenly from one to the next
 
 
 class PacedRobot(SimulatedRobot):
@@ -21,7 +23,8 @@ class PacedRobot(SimulatedRobot):
 
         -dp/dt = min(1 / BRAKE, min over joints of (SHARE a - |q''| p²) / |q'|)
 
-    and a plan that is fast where it is stopped takes longer than BRAKE s to come to rest.
+    and a plan that is fast where it is stopped takes longer than BRAKE s to come to rest. As it follows, targets beyond
+    its range count as none.
     """
 
     def __init__(
@@ -37,11 +40,35 @@ class PacedRobot(SimulatedRobot):
         self._robot, self._most = robot, robot.acceleration
 
     def check(self, plan: Plan) -> str:
-        outside = np.maximum(self._robot.low - plan.joints, plan.joints - self._robot.high)
+        outside = self._outside(plan.joints)
         if outside.max() > 0:
             row, joint = np.unravel_index(int(outside.argmax()), outside.shape)
             return f"plan: joint {joint + 1} leaves this robot's range at {plan.joints[row, joint]:.3f} rad"
         return super().check(plan)
+
+    def follow(self, following: Following, tick: float) -> str:
+        self._before = self._after = np.append(self.joints, self.commands)
+        self._strode = STRIDE  # the first stride begins at once
+        return super().follow(following, STRIDE)
+
+    def hear(self, age: float, axes: np.ndarray | None) -> None:
+        if axes is not None and self._outside(axes[None, :JOINTS]).max() > 0:
+            axes = None
+        super().hear(age, axes)
+
+    def _go_after(self, follower: Follower, dt: float) -> None:
+        self._strode += dt
+        if self._strode > STRIDE + dt / 2:
+            self._before, self._strode = self._after, dt
+            super()._go_after(follower, STRIDE)
+            self._after = np.append(self.joints, self.commands)
+        if self._follower is not None:
+            share = min(self._strode / STRIDE, 1.0)
+            self.joints, self.commands = np.split(self._before + share * (self._after - self._before), [JOINTS])
+
+    def _outside(self, joints: np.ndarray) -> np.ndarray:
+        """By how much each of `joints` (T, 7), rad, leaves its range, (T, 7); less than zero for one that does not."""
+        return np.maximum(self._robot.low - joints, joints - self._robot.high)
 
     def _slowed(self, dt: float) -> float:
         return dt * self._slowing()

@@ -207,7 +207,7 @@ class Desk:
             self._ask(intent, standing)
             self._seeking.advance(dt / len(steps))
             if intent.mode == "follow":
-                self._seeking.seek(intent.targets, standing.joints)
+                self._seeking.seek(intent.targets, standing.joints, self.world)
             else:
                 self._seeking.end()
             self._drive(intent)

@@ -59,6 +59,7 @@ class Seek:
     serial: int
     targets: Targets | None
     joints: np.ndarray
+    world: World
 
 
 @dataclass(frozen=True)
@@ -139,7 +140,7 @@ class Foreseer:
     def answers(self, order: Order | Seek, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
         """All that comes of an order, each as soon as it is known. `go_on` raises where it need not be."""
         if isinstance(order, Seek):
-            yield Found(order.serial, *sought(self.planner, order.targets, order.joints))
+            yield Found(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
             return
         request, serial = order.request, order.request.serial
         try:

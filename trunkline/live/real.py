@@ -30,7 +30,6 @@ from trunkline.live.robot import POSE, READY, Channel, RobotProcess, Standing
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.panda.shipped import JOINTS
 from trunkline.processes import end_with_parent
-from trunkline.teleop.following import Following
 from trunkline.teleop.trajectory import Limits
 
 URGENT = 40  # of SCHED_FIFO; asked for, and done without where there is no right to it
@@ -71,9 +70,6 @@ class RealRobot(RobotProcess):
             target=draw, args=(self._drawn, self.channel, simulation), daemon=True, name="twin"
         )
         self._twin.start()
-
-    def follow(self, following: Following) -> str:
-        return "follow: found a real machine, expected the simulated robot: what it follows was not previewed"
 
     @property
     def alive(self) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 
 from trunkline.live.foreseer import Found, Seek
 from trunkline.teleop.following import KNOT
-from trunkline.teleop.messages import Targets
+from trunkline.teleop.messages import Targets, World
 from trunkline.teleop.targets import why_not
 from trunkline.teleop.trajectory import JOINTS
 
@@ -31,14 +31,14 @@ class Seeking:
         """Let `dt` s pass."""
         self._now += dt
 
-    def seek(self, targets: Targets | None, joints: np.ndarray) -> None:
+    def seek(self, targets: Targets | None, joints: np.ndarray, world: World) -> None:
         """Every KNOT s, what `targets` ask for, near what was found last, at first near `joints` (7,), rad."""
         if self._now < self._last + KNOT:
             return
         self._serial, self._last = self._serial + 1, self._now
         self._times[self._serial] = self._now
         near = joints if self._near is None else self._near
-        self._order(Seek(self._serial, None if why_not(targets) else targets, near))
+        self._order(Seek(self._serial, None if why_not(targets) else targets, near, world))
 
     def begin(self) -> None:
         """The robot follows from now on, and hears what was found so far."""

@@ -19,7 +19,9 @@ import ruckig
 
 from trunkline.errors import InputError
 from trunkline.panda.collision import clearance
-from trunkline.teleop.messages import Targets
+from trunkline.teleop.messages import Targets, World
+from trunkline.teleop.obstacles import refuse
+from trunkline.teleop.plan import Plan
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.trajectory import JOINTS, Limits
 
@@ -27,15 +29,19 @@ KNOT = 0.1  # s between targets that are looked at, linear between: a hand that 
 SAMPLES = 24  # of a mean
 
 
-def sought(planner: Planner, targets: Targets | None, joints: np.ndarray) -> tuple[np.ndarray | None, str]:
-    """Axes (7 + K,), rad and m, that `targets` ask for, the nearest to `joints` (7,); None where there are none that
-    the robot may follow, and why they are refused, "" where they are not."""
+def sought(
+    planner: Planner, targets: Targets | None, joints: np.ndarray, world: World
+) -> tuple[np.ndarray | None, str]:
+    """Axes (7 + K,), rad and m, that `targets` ask for, the nearest to `joints` (7,), rad; None where there are none
+    that the robot may follow, and why they are refused, "" where they are not."""
     if targets is None:
         return None, ""
     try:
-        return np.concatenate(planner.goal(targets, joints)), ""
+        there, commands = planner.goal(targets, joints)
+        refuse(Plan(KNOT, there[None], commands[None], (), "", ""), world, planner.mount_offset, planner.chain)
     except InputError as error:
         return None, str(error)
+    return np.append(there, commands), ""
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ EVERY = 0.04  # s between poses of the arm that are looked at
 
 
 def refuse(plan: Plan, world: World, mount_offset: float, chain: Chain | None = None) -> None:
-    """Whether the way is free, of the arm only where its statics are known: the `chain`.
+    """Whether the way is free, of the arm only where its statics are known: the `chain`. A plan may be of one row.
 
     Raises:
         InputError: a joint beyond its limits, the robot touching itself, or one of its joints or the arm's axis in a
@@ -35,10 +35,8 @@ def refuse(plan: Plan, world: World, mount_offset: float, chain: Chain | None = 
             raise InputError(f"limit: joint {joint + 1} of the rigid robot would leave its range on the way")
     gaps = clearance(plan.joints, mount_offset)
     if gaps.min() <= 0:
-        when = plan.step * int(np.argmin(gaps))
-        raise InputError(
-            f"self-collision: the robot would touch itself after {when:.2f} s, by {-1e3 * gaps.min():.0f} mm"
-        )
+        when = _when(plan, int(np.argmin(gaps)))
+        raise InputError(f"self-collision: the robot would touch itself{when}, by {-1e3 * gaps.min():.0f} mm")
     frames, every = joint_frames(plan.joints), np.arange(len(plan.joints))
     mount = frames[-1].p + (FLANGE + mount_offset) * frames[-1].z
     moving = [
@@ -55,8 +53,11 @@ def refuse(plan: Plan, world: World, mount_offset: float, chain: Chain | None = 
             away = np.linalg.norm(np.maximum(np.maximum(box.low - places, places - box.high), 0.0), axis=2)
             inside = np.flatnonzero((away <= radius).any(axis=1))
             if len(inside):
-                when = plan.step * rows[inside[0]]
-                raise InputError(f"world: {name} would come into {box.name} after {when:.2f} s")
+                raise InputError(f"world: {name} would come into {box.name}{_when(plan, int(rows[inside[0]]))}")
+
+
+def _when(plan: Plan, row: int) -> str:
+    return f" after {plan.step * row:.2f} s" if len(plan.joints) > 1 else ""
 
 
 def _closes(plan: Plan) -> int:
