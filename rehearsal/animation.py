@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench
+from rehearsal.experiments.bench import Bench, perform
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.film import SHOTS_PER_SECOND, Shot, filming
 from trunkline.frames import rotation_from_wxyz
@@ -24,7 +24,7 @@ def animate(bench: Bench, names: list[str], seed: int, folder: Path) -> None:
     stills = {}
     for name in names:
         film = filming(bench)
-        result, _ = EXPERIMENTS[name](film, seed)
+        result, _ = perform(EXPERIMENTS[name](film, seed))
         write_gif(film.shots, name, folder / f"{name}.gif")
         stills[name] = film.shots[: telling(film.shots) + 1]
         told = "success" if result.success else result.cause

@@ -13,7 +13,7 @@ from dvc.repo import Repo
 from threadpoolctl import threadpool_limits
 
 from rehearsal.experiments.ablations import VARIANTS, varied
-from rehearsal.experiments.bench import Bench, bench_of
+from rehearsal.experiments.bench import Bench, bench_of, perform
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, append_result, read_results
 from trunkline.foresight.package import PACKAGES
@@ -84,7 +84,7 @@ def make_one(bench: Bench, run: Run) -> tuple[Result, float]:
     began = time.process_time()
     try:
         changed = varied(bench, run.experiment, run.variant) if run.variant else bench
-        result, _ = EXPERIMENTS[run.experiment](changed, run.seed)
+        result, _ = perform(EXPERIMENTS[run.experiment](changed, run.seed))
     except Exception as error:  # hours of other runs shall not end with it
         result = Result(run.experiment, run.seed, False, f"error: {type(error).__name__}: {error}")
     return replace(result, variant=run.variant), time.process_time() - began

@@ -39,7 +39,7 @@ class View:
     """What the operator sees at a frame, in the frame that the client takes for the Panda's base.
 
     thing, tip (3,): m, of the object and of the robot's tip. previewed: m, where the shown plan's tip comes to rest.
-    probability: that the shown plan's grasp holds. offer: the assistant's.
+    world: as the client believes it. probability: that the shown plan's grasp holds. offer: the assistant's.
     """
 
     now: float
@@ -47,6 +47,7 @@ class View:
     thing: np.ndarray
     tip: np.ndarray
     previewed: np.ndarray | None
+    world: World
     probability: float | None = None
     offer: Offer | None = None
 
@@ -121,7 +122,7 @@ class Session:
         tip = self.seen(self.robot.truth().tip)
         if intent.motion == "execute":
             self.tips.append((self.now - self.began, tip))
-        found = View(self.now, intent, self.seen(self.place(self.now)), tip, None)
+        found = View(self.now, intent, self.seen(self.place(self.now)), tip, None, self.world)
         if intent.mode in ("preview", "ready", "delay"):
             found.previewed = self.previewed
             if self.foreseen is not None:

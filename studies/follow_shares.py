@@ -16,14 +16,16 @@ are rows, too, of one who foresees nothing of the path, and of one whose errors 
 """
 
 import argparse
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, bench_of
-from rehearsal.experiments.follow import Run, run
+from rehearsal.experiments.bench import Bench, Seen, bench_of, rehearse
+from rehearsal.experiments.follow import Path as Way
+from rehearsal.experiments.follow import on_path
 from rehearsal.operator.hands import Person
+from rehearsal.session import Session, View
 from trunkline.foresight.package import only_package
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.panda.kinematics import mount_pose
@@ -33,6 +35,22 @@ from trunkline.statics.equilibria import actuated
 RATE = 60.0  # frames, Hz
 EVERY = 6  # frames of which the twin's rest is looked up; linear between
 SHARES = ("whole", "operator", "following", "model", "swinging", "alignment")
+
+
+@dataclass
+class Run:
+    """Of a script, `frames` from where the robot began to move, and all `views`."""
+
+    path: Way
+    session: Session
+    frames: list[Seen]
+    views: list[View]
+
+
+def run(bench: Bench, seed: int) -> Run:
+    path, staged = on_path(bench, seed)
+    _, frames, views = rehearse(staged.session, staged.script)
+    return Run(path, staged.session, frames, views)
 
 
 @recorded("follow_shares")

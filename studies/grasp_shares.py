@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from rehearsal.experiments.ablations import varied
-from rehearsal.experiments.bench import Bench, Seen, bench_of
-from rehearsal.experiments.grasp import run
+from rehearsal.experiments.bench import Bench, Seen, bench_of, rehearse
+from rehearsal.experiments.grasp import grasp
 from rehearsal.session import Session
 from trunkline.foresight.package import only_package
 from trunkline.panda.kinematics import mount_pose
@@ -45,7 +45,8 @@ def tell(bench: Bench, runs: int) -> None:
     print("|---|" + "---:|" * len(SHARES), flush=True)
     rows = []
     for seed in range(runs):
-        _, _, frames, session = run(bench, seed)
+        staged = grasp(bench, seed)
+        session, (_, frames, _) = staged.session, rehearse(staged.session, staged.script)
         if session.foreseen is None or not session.tips:
             continue
         rows.append(100 * np.array(shares(session, frames)) / bench.package.geometry.length)

@@ -1,6 +1,6 @@
 """What each part of the system is worth: an experiment with one thing taken away or made worse, by name.
 
-    result, _ = reach(varied(bench, "reach", "no_preview"), seed)
+    result, _ = perform(reach(varied(bench, "reach", "no_preview"), seed))
 
 A variant changes what runs share, so a run of it has the same object, path, operator and robot as the run of the same
 seed that has everything.

@@ -1,5 +1,6 @@
-"""What both experiments begin with: robot, hands and operator, drawn by a seed."""
+"""What all experiments begin with: robot, hands and operator, drawn by a seed; and how one is run and judged."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,8 +11,9 @@ from demo.plants.stranger import Stranger
 from demo.rig import ROOT as LAB
 from demo.rig import Config as Lab
 from rehearsal import settings
+from rehearsal.experiments.result import Result
 from rehearsal.operator.hands import Person, RayHand
-from rehearsal.operator.scripts import Operator, Script, offset_of
+from rehearsal.operator.scripts import Ending, Operator, Script, offset_of
 from rehearsal.robot.scene import Object, Scene
 from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
@@ -107,6 +109,35 @@ class Seen:
     joints: np.ndarray
     commands: np.ndarray
     units: np.ndarray
+
+
+@dataclass
+class Staged:
+    """An experiment that is ready to be run: where, and what the operator does there. judge: fills in a result of how
+    the script ended, the frames from where the robot began to move, and all views, and says why it failed, "" if it did
+    not. thing: what is grasped, in words."""
+
+    name: str
+    seed: int
+    session: Session
+    script: Script
+    judge: Callable[[Result, Ending, list[Seen], list[View]], str]
+    thing: str = ""
+
+    def judged(self, ending: object, frames: list[Seen], views: list[View], seconds: float) -> Result:
+        """What a run of `seconds` came to, whose script ended so."""
+        result = Result(self.name, self.seed, False, seconds=seconds, object=self.thing)
+        result.package = self.session.package.digest[:12]
+        ended = isinstance(ending, Ending)
+        result.cause = self.judge(result, ending, frames, views) if ended else "stopped: the run did not end"
+        result.success = not result.cause
+        return result
+
+
+def perform(staged: Staged) -> tuple[Result, list[Seen]]:
+    """One run, and its frames from where the robot began to move."""
+    ending, frames, views = rehearse(staged.session, staged.script)
+    return staged.judged(ending, frames, views, staged.session.now), frames
 
 
 def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list[View]]:

@@ -3,14 +3,12 @@
 The path is drawn: along each axis two sines, from rest. The object that is followed touches nothing.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, Seen, rehearse
+from rehearsal.experiments.bench import Bench, Seen, Staged
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
-from rehearsal.session import Session, View
+from rehearsal.session import View
 
 EASE = 2.0  # s in which the object begins to move
 
@@ -39,55 +37,40 @@ class Path:
         return now >= self.begun + self.seconds
 
 
-@dataclass
-class Run:
-    """What came of a script: its `ending`, None where it did not end, `frames` from where the robot began to move, and
-    all `views`."""
-
-    path: Path
-    session: Session
-    ending: object
-    frames: list[Seen]
-    views: list[View]
+def follow(bench: Bench, seed: int) -> Staged:
+    return on_path(bench, seed)[1]
 
 
-def run(bench: Bench, seed: int) -> Run:
-    """Follow the path that the seed draws, to its end."""
+def on_path(bench: Bench, seed: int) -> tuple[Path, Staged]:
+    """The path that the seed draws, and the experiment of following it to its end."""
     rng = np.random.default_rng([seed, 1])
-    s = bench.settings
+    s, delay = bench.settings, bench.config.core.follow_delay
     path = Path(bench.place(rng), s.path, s.path_hz, s.path_seconds, rng)
     operator = bench.operator(rng)
     session = bench.session(operator, None, seed, path)
-    delay = bench.config.core.follow_delay
     script = operator.follow(path.begin, lambda now: path.finished(now - delay), lambda now: session.seen(path(now)))
-    return Run(path, session, *rehearse(session, script))
+
+    def judge(result: Result, ending: Ending, frames: list[Seen], views: list[View]) -> str:
+        tell(result, path, delay, frames, views)
+        return interruption(views, session.refusals, path, s.interruption) if ending.done else ending.why
+
+    return path, Staged("follow", seed, session, script, judge)
 
 
-def follow(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
-    """One run, and its frames from where the robot began to move."""
-    found = run(bench, seed)
-    path, session, ending, frames, views = found.path, found.session, found.ending, found.frames, found.views
-    delay = bench.config.core.follow_delay
-    result = Result("follow", seed, False, seconds=session.now, package=session.package.digest[:12])
-    on_path = [frame for frame in frames if path.begun + delay <= frame.now <= path.begun + delay + path.seconds]
-    if on_path:
-        off = [float(np.linalg.norm(frame.truth.tip - path(frame.now - delay))) for frame in on_path]
-        result.tip_mm, result.worst_mm = (1e3 * float(value) for value in np.quantile(off, (0.5, 0.95)))
-        result.nearest_mm = 1e3 * min(off)
-        wanted = [
-            float(np.linalg.norm(view.tip - view.intent.follow.tip.position))
-            for view in views
-            if view.intent.follow is not None and view.now >= path.begun + delay
-        ]
-        result.robot_mm = 1e3 * float(np.median(wanted)) if wanted else float("nan")
-    if not isinstance(ending, Ending):
-        result.cause = "stopped: the run did not end"
-    elif not ending.done:
-        result.cause = ending.why
-    else:
-        result.cause = interruption(views, session.refusals, path, bench.settings.interruption)
-    result.success = not result.cause
-    return result, frames
+def tell(result: Result, path: Path, delay: float, frames: list[Seen], views: list[View]) -> None:
+    """How far the tip was from where the object had been, while that was on its way."""
+    during = [frame for frame in frames if path.begun + delay <= frame.now <= path.begun + delay + path.seconds]
+    if not during:
+        return
+    off = [float(np.linalg.norm(frame.truth.tip - path(frame.now - delay))) for frame in during]
+    result.tip_mm, result.worst_mm = (1e3 * float(value) for value in np.quantile(off, (0.5, 0.95)))
+    result.nearest_mm = 1e3 * min(off)
+    wanted = [
+        float(np.linalg.norm(view.tip - view.intent.follow.tip.position))
+        for view in views
+        if view.intent.follow is not None and view.now >= path.begun + delay
+    ]
+    result.robot_mm = 1e3 * float(np.median(wanted)) if wanted else float("nan")
 
 
 def interruption(views: list, refusals: list[tuple[float, str]], path: Path, longest: float) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
-from rehearsal.experiments.bench import FLOOR, FLOOR_BOX, START, Bench, Seen, rehearse
+from rehearsal.experiments.bench import FLOOR, FLOOR_BOX, START, Bench, Seen, Staged
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending, Operator
 from rehearsal.robot.scene import Object, Scene, Surface
@@ -18,7 +18,7 @@ from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import Session
 from trunkline.errors import InputError
 from trunkline.foresight.believing import make_world
-from trunkline.foresight.foresight import Foresight
+from trunkline.foresight.foresight import Foreseen, Foresight
 from trunkline.frames import wxyz_from_rotation
 from trunkline.hybrid.grasps import object_in_base
 from trunkline.teleop.messages import Box, Thing
@@ -120,27 +120,19 @@ def beside(bench: Bench, object: Offered) -> np.ndarray:
     return -centre[0] * object.towards - [0.0, 0.0, centre[2]]
 
 
-def run(bench: Bench, seed: int) -> tuple[Offered, object, list[Seen], Session]:
-    """One run: what was offered, how it ended, its frames from where the robot began to move, and the session."""
+def grasp(bench: Bench, seed: int) -> Staged:
     rng, s = np.random.default_rng([seed, 2]), settings.grasped()
     object = offered(bench, s, rng)
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed)
-    ending, frames, _ = rehearse(session, operator.grasp(beside(bench, object), s.accept, s.hold))
-    return object, ending, frames, session
 
+    def judge(result: Result, ending: Ending, frames: list[Seen], _) -> str:
+        cause = failure(ending, frames, s)
+        tell(result, ending, session, not cause)
+        return cause
 
-def grasp(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
-    """One run, and its frames from where the robot began to move."""
-    s, (object, ending, frames, session) = settings.grasped(), run(bench, seed)
-    result = Result("grasp", seed, False, seconds=session.now, object=object.name, package=session.package.digest[:12])
-    if not isinstance(ending, Ending):
-        result.cause = "stopped: the run did not end"
-        return result, frames
-    result.cause = failure(ending, frames, s)
-    result.success = not result.cause
-    tell(result, ending, session)
-    return result, frames
+    script = operator.grasp(beside(bench, object), s.accept, s.hold)
+    return Staged("grasp", seed, session, script, judge, object.name)
 
 
 def held_after(frames: list[Seen]) -> Seen | None:
@@ -149,18 +141,17 @@ def held_after(frames: list[Seen]) -> Seen | None:
     return next((after for frame, after in pairs if frame.mode == "execute" != after.mode), None)
 
 
-def tell(result: Result, ending: Ending, session: Session) -> None:
+def tell(result: Result, ending: Ending, session: Session, succeeded: bool) -> None:
     """What the preview had said, and how far off it was."""
     result.plans, result.probability = ending.plans, ending.probability
     if np.isfinite(ending.probability):
-        result.agreed = float((ending.probability >= 0.5) == result.success)
-        result.path_pct = 100 * tip_difference(session) / session.package.geometry.length
+        result.agreed = float((ending.probability >= 0.5) == succeeded)
+        if session.foreseen is not None:
+            result.path_pct = 100 * tip_difference(session, session.foreseen) / session.package.geometry.length
 
 
-def tip_difference(session: Session) -> float:
+def tip_difference(session: Session, foreseen: Foreseen) -> float:
     """Median distance between the robot's tip and the nominal preview's at the same time, m."""
-    foreseen = session.foreseen
-    assert foreseen is not None
     nominal, times = foreseen.preview.nominal, foreseen.begins + foreseen.preview.nominal.time
     took = np.array([time for time, _ in session.tips])
     tips = np.array([tip for _, tip in session.tips])

@@ -3,11 +3,12 @@
 import numpy as np
 
 from rehearsal import settings
-from rehearsal.experiments.bench import Bench, Seen, rehearse
+from rehearsal.experiments.bench import Bench, Seen, Staged
 from rehearsal.experiments.grasp import NAME, TABLE, beside, failure, held_after, offered, session_of, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.robot.scene import Scene, Surface
+from rehearsal.session import View
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.teleop.things import below_grip
 
@@ -22,27 +23,24 @@ def table_for(s: settings.Grasped, place: list[float], rng: np.random.Generator)
     return Surface(top, list(s.table))
 
 
-def handle(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
-    """One run, and its frames from where the robot began to move."""
+def handle(bench: Bench, seed: int) -> Staged:
     rng, s = np.random.default_rng([seed, 3]), settings.grasped()
     object = offered(bench, s, rng, STANDING)
     table = table_for(s, object.thing.position, rng)
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed, table)
 
-    def spot() -> np.ndarray:
+    def spot(view: View) -> np.ndarray:
         """Where the grip is when the lowest point of the thing, as it hangs in the arm, is above the table."""
-        return session.seen(np.array(table.top)) + [0.0, 0.0, below_grip(session.world.thing(NAME)) + s.drop]
+        return session.seen(np.array(table.top)) + [0.0, 0.0, below_grip(view.world.thing(NAME)) + s.drop]
 
-    ending, frames, _ = rehearse(session, operator.handle(beside(bench, object), spot, s.accept, s.calm))
-    result = Result("handle", seed, False, seconds=session.now, object=object.name, package=session.package.digest[:12])
-    if not isinstance(ending, Ending):
-        result.cause = "stopped: the run did not end"
-        return result, frames
-    result.cause = why_not(ending, frames, session.robot.scene, s)
-    result.success = not result.cause
-    tell(result, ending, session)
-    return result, frames
+    def judge(result: Result, ending: Ending, frames: list[Seen], _) -> str:
+        cause = why_not(ending, frames, session.robot.scene, s)
+        tell(result, ending, session, not cause)
+        return cause
+
+    script = operator.handle(beside(bench, object), spot, s.accept, s.calm)
+    return Staged("handle", seed, session, script, judge, object.name)
 
 
 def why_not(ending: Ending, frames: list[Seen], scene: Scene, s: settings.Grasped) -> str:

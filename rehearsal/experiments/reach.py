@@ -2,41 +2,39 @@
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, Seen, rehearse
+from rehearsal.experiments.bench import Bench, Seen, Staged
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 
 
-def reach(bench: Bench, seed: int) -> tuple[Result, list[Seen]]:
-    """One run, and its frames from where the robot began to move."""
+def reach(bench: Bench, seed: int) -> Staged:
     rng = np.random.default_rng([seed, 0])
     thing, operator = bench.place(rng), bench.operator(rng)
     session = bench.session(operator, thing, seed, lambda now: thing)
-    ending, frames, _ = rehearse(session, operator.reach())
-    result = Result("reach", seed, False, seconds=session.now, package=session.package.digest[:12])
-    if not isinstance(ending, Ending):
-        result.cause = "stopped: the run did not end"
-        return result, frames
-    result.plans = ending.plans
-    result.aimed_mm, result.previewed_mm = 1e3 * ending.aimed, 1e3 * ending.previewed
-    if not frames:
-        result.cause = ending.why if ending.why.startswith(("aim", "out of reach")) else f"plan refused: {ending.why}"
-        return result, frames
-    result.nearest_mm = 1e3 * min(float(np.linalg.norm(frame.truth.tip - thing)) for frame in frames)
+
+    def judge(result: Result, ending: Ending, frames: list[Seen], _) -> str:
+        result.plans = ending.plans
+        result.aimed_mm, result.previewed_mm = 1e3 * ending.aimed, 1e3 * ending.previewed
+        if not frames:
+            return ending.why if ending.why.startswith(("aim", "out of reach")) else f"plan refused: {ending.why}"
+        result.nearest_mm = 1e3 * min(float(np.linalg.norm(frame.truth.tip - thing)) for frame in frames)
+        return failure(bench, ending, frames)
+
+    return Staged("reach", seed, session, operator.reach(), judge)
+
+
+def failure(bench: Bench, ending: Ending, frames: list[Seen]) -> str:
+    """Why the tip never touched the object, "" if it did."""
     touching = [np.flatnonzero(np.linalg.norm(frame.truth.arm_thing, axis=1)) for frame in frames]
-    units = bench.arm.chain.units
-    result.success = any((units_touching >= units - bench.settings.tip_units).any() for units_touching in touching)
-    if not result.success:
-        touched = [units_touching for units_touching in touching if len(units_touching)]
-        world = any(np.linalg.norm(frame.truth.arm_world) > 0 for frame in frames)
-        if touched:
-            result.cause = f"collision: unit {touched[0][0] + 1} touched it first"
-        elif world:
-            result.cause = "collision: the arm touched the world"
-        elif not ending.done:
-            result.cause = ending.why
-        elif 1e3 * ending.aimed > 1e3 * bench.settings.diameter / 2:
-            result.cause = "aim: the tip target was beside the object"
-        else:
-            result.cause = "missed: the preview's tip was on the object, the robot's was not"
-    return result, frames
+    least = bench.arm.chain.units - bench.settings.tip_units
+    if any((units >= least).any() for units in touching):
+        return ""
+    if touched := [units for units in touching if len(units)]:
+        return f"collision: unit {touched[0][0] + 1} touched it first"
+    if any(np.linalg.norm(frame.truth.arm_world) > 0 for frame in frames):
+        return "collision: the arm touched the world"
+    if not ending.done:
+        return ending.why
+    if ending.aimed > bench.settings.diameter / 2:
+        return "aim: the tip target was beside the object"
+    return "missed: the preview's tip was on the object, the robot's was not"

@@ -2,16 +2,13 @@
 
 from collections.abc import Callable
 
-from rehearsal.experiments.bench import Bench, Seen
+from rehearsal.experiments.bench import Bench, Staged
 from rehearsal.experiments.follow import follow
 from rehearsal.experiments.grasp import grasp
 from rehearsal.experiments.handle import handle
 from rehearsal.experiments.reach import reach
-from rehearsal.experiments.result import Result
 
-Experiment = Callable[[Bench, int], tuple[Result, list[Seen]]]  # one run, of a seed
-
-EXPERIMENTS: dict[str, Experiment] = {
+EXPERIMENTS: dict[str, Callable[[Bench, int], Staged]] = {  # made of a seed, to be run
     "reach": reach,
     "follow": follow,
     "grasp": grasp,

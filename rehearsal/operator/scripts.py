@@ -137,7 +137,7 @@ class Operator:
                 view, ending.why = yield from self._place_at(view, lambda view: view.thing + beside)
         return ending
 
-    def handle(self, beside: np.ndarray, spot: Callable[[], np.ndarray], accept: float, watch: float) -> Script:
+    def handle(self, beside: np.ndarray, spot: Callable[[View], np.ndarray], accept: float, watch: float) -> Script:
         """Grasp, aim so that what is gripped will be at `spot`, as it appears with the thing as it then is in the arm,
         (3,), m, confirm what is sure enough to rest there, look on for `watch` s."""
         view = yield from self._until(lambda view: view.intent.mode == "aim")
@@ -150,7 +150,7 @@ class Operator:
             return ending
         ending.done, ending.probability = False, np.nan  # what was said of the grasp has come true
         for _ in range(HAND_OVERS):
-            view, ending.why = yield from self._place_thing(view, spot())
+            view, ending.why = yield from self._place_thing(view, spot(view))
             if ending.why:
                 return ending
             ending.plans += 1

@@ -35,6 +35,7 @@ def made(monkeypatch):
         return Result("touch", seed, seed % 2 == 0, "" if seed % 2 == 0 else "aim: beside it", nearest_mm=seed), []
 
     monkeypatch.setattr(runs, "EXPERIMENTS", {"touch": touch})
+    monkeypatch.setattr(runs, "perform", lambda run: run)
     monkeypatch.setitem(runs.VARIANTS, "touch", {"off by 5 mm": lambda bench: SimpleNamespace(name="off")})
     monkeypatch.setattr(runs, "bench_of", lambda package: SimpleNamespace(name="own"))
     return seeds

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from trunkline.foresight.settings import Previewing
 from trunkline.settings import settings
-from trunkline.teleop.messages import Thing
+from trunkline.teleop.messages import Box, Thing
 
 Metres = Annotated[float, Field(ge=-5, le=5)]
 
@@ -39,11 +39,13 @@ class Alignment:
 
 @settings
 class Config:
-    """rate: Hz. ready: of the mount at first, m. floor: its height, m. thing: what hangs there, or None."""
+    """rate: Hz. ready: of the mount at first, m. floor: its height, m. boxes: solids that stand there,
+    upright. thing: what may be grasped, or None."""
 
     rate: Annotated[float, Field(ge=20, le=240)]
     ready: Annotated[tuple[Metres, Metres, Metres], Field()]
     floor: Metres
+    boxes: tuple[Box, ...]
     thing: Thing | None
     journal: Journaling
     alignment: Alignment
