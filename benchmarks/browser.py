@@ -83,8 +83,8 @@ class Page:
 
 
 @contextlib.asynccontextmanager
-async def browsing(url: str, size: tuple[int, int]) -> AsyncIterator[Page]:
-    """A page at `url`, its window of `size` pixels, in a browser of its own.
+async def browsing(url: str, size: tuple[int, int], nice: int = 0) -> AsyncIterator[Page]:
+    """A page at `url`, its window of `size` pixels, in a browser of its own that is as `nice` to other processes.
 
     Raises:
         InputError: there is no browser.
@@ -95,8 +95,8 @@ async def browsing(url: str, size: tuple[int, int]) -> AsyncIterator[Page]:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         window = f"--window-size={size[0]},{size[1]}"
         browser = await asyncio.create_subprocess_exec(
-            program, *FLAGS, f"--user-data-dir={folder}", window, "about:blank", start_new_session=True,
-            stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,
+            "nice", "-n", str(nice), program, *FLAGS, f"--user-data-dir={folder}", window, "about:blank",
+            start_new_session=True, stdout=asyncio.subprocess.DEVNULL, stderr=asyncio.subprocess.DEVNULL,
         )  # fmt: skip
         try:
             port = await asyncio.wait_for(_port(Path(folder) / "DevToolsActivePort"), PATIENCE)

@@ -9,7 +9,7 @@ from tests.support import waiting
 from tests.support.motors import PLANTS, motor_settings
 from trunkline.errors import InputError
 from trunkline.execution import motors
-from trunkline.execution.on_bus import BankOnBus, BusMotors, open_bus
+from trunkline.execution.on_bus import BankInThread, BankOnBus, BusMotors, SimulatedMotors, open_bus
 
 until = partial(waiting.until, seconds=5.0)
 
@@ -17,7 +17,7 @@ until = partial(waiting.until, seconds=5.0)
 @pytest.fixture
 def joined(request, monkeypatch):
     monkeypatch.setattr(motors, "SILENT", 0.5)  # a busy machine is late
-    bank = BankOnBus(PLANTS, can.Bus(interface="virtual", channel=request.node.name))
+    bank = BankInThread(PLANTS, can.Bus(interface="virtual", channel=request.node.name))
     driver = BusMotors(motor_settings(), can.Bus(interface="virtual", channel=request.node.name))
     yield driver, bank
     driver.close()
@@ -35,6 +35,18 @@ def test_motors_are_driven_until_one_is_silent(joined):
     until(lambda: driver.fault, turn)
     assert "silent for" in driver.fault
     until(lambda: not any(motor.current for motor in bank.bank.motors), turn)
+
+
+def test_simulated_motors_turn_when_their_driver_does(request):
+    name = request.node.name
+    bank = BankOnBus(PLANTS, can.Bus(interface="virtual", channel=name))
+    driver = SimulatedMotors(motor_settings(), can.Bus(interface="virtual", channel=name), bank)
+    until(lambda: all(motor.current for motor in bank.bank.motors), lambda: driver.turn([0.0] * 3, [0.0] * 3))
+    before = [motor.reeled for motor in bank.bank.motors]
+    until(lambda: all(m.reeled > b for m, b in zip(bank.bank.motors, before, strict=True)),
+          lambda: driver.turn([0.0] * 3, [0.0] * 3))  # fmt: skip
+    assert driver.fault == ""
+    driver.close()
 
 
 def test_a_driver_that_stops_sending_leaves_no_current(joined):

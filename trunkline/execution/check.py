@@ -19,7 +19,7 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.execution.bank import Plant
 from trunkline.execution.gm6020 import COUNTS, RATE
 from trunkline.execution.motors import MotorSettings
-from trunkline.execution.on_bus import BankOnBus, BusMotors
+from trunkline.execution.on_bus import BankInThread, BusMotors
 from trunkline.execution.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -33,7 +33,7 @@ class Trial:
 
     def __init__(self, settings: MotorSettings, plants: list[Plant]) -> None:
         name = f"check {id(self)}"
-        self.bank = BankOnBus(plants, can.Bus(interface="virtual", channel=name))
+        self.bank = BankInThread(plants, can.Bus(interface="virtual", channel=name))
         self.driver = BusMotors(settings, can.Bus(interface="virtual", channel=name))
         self.turns: list[float] = []
 

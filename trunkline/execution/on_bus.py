@@ -77,36 +77,65 @@ class BusMotors:
 
 
 class BankOnBus:
-    """Simulated motors on `bus`, turned by a thread: python-can's bus "virtual" joins threads of one process only.
-
-    `lost`: share of frames, either way, that get lost. `reeled`: (s, (m, …)) of every turn. `driven`: s of the last
-    turn that ended with a motor driven.
-    """
+    """Simulated motors on the other end of `bus`. `lost`: share of frames, either way, that get lost."""
 
     def __init__(self, plants: Sequence[Plant], bus: can.BusABC, seed: int = 0) -> None:
-        self.bank, self.lost, self.reeled = Bank(plants, time.monotonic()), 0.0, []
-        self.driven = 0.0
-        self._bus, self._random, self._ended = bus, random.Random(seed), threading.Event()
+        self.bank, self.lost = Bank(plants, time.monotonic()), 0.0
+        self._bus, self._random = bus, random.Random(seed)
+
+    def turn(self) -> None:
+        """Hear, move until now, and say where they are."""
+        now = time.monotonic()
+        while (message := self._bus.recv(0)) is not None:
+            if self._random.random() >= self.lost:
+                self.bank.hear(message.arbitration_id, bytes(message.data), now)
+        for identifier, data in self.bank.advance(now):
+            if self._random.random() >= self.lost:
+                self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+
+    def close(self) -> None:
+        """Off the bus."""
+        self._bus.shutdown()
+
+
+class SimulatedMotors(BusMotors):
+    """Motors before a `bank` of simulated ones, which turns when they do: python-can's bus "virtual" is of one process
+    only, and two threads of it would wait for each other."""
+
+    def __init__(self, settings: MotorSettings, bus: can.BusABC, bank: BankOnBus) -> None:
+        super().__init__(settings, bus)
+        self._bank = bank
+
+    def turn(self, pulls: Sequence[float], speeds: Sequence[float]) -> None:
+        self._bank.turn()
+        super().turn(pulls, speeds)
+
+    def close(self) -> None:
+        super().close()
+        self._bank.close()
+
+
+class BankInThread(BankOnBus):
+    """A bank that turns by itself. `reeled`: (s, (m, …)) of every turn. `driven`: s of the last turn that ended with a
+    motor driven."""
+
+    def __init__(self, plants: Sequence[Plant], bus: can.BusABC, seed: int = 0) -> None:
+        super().__init__(plants, bus, seed)
+        self.reeled, self.driven, self._ended = [], 0.0, threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True, name="bank")
         self._thread.start()
 
     def close(self) -> None:
-        """Off the bus."""
         self._ended.set()
         self._thread.join()
-        self._bus.shutdown()
+        super().close()
 
     def _run(self) -> None:
         due = time.monotonic()
         while not self._ended.wait(max(due - time.monotonic(), 0.0)):
             now = time.monotonic()
             due = max(due + 1 / RATE, now - 0.1)
-            while (message := self._bus.recv(0)) is not None:
-                if self._random.random() >= self.lost:
-                    self.bank.hear(message.arbitration_id, bytes(message.data), now)
-            for identifier, data in self.bank.advance(now):
-                if self._random.random() >= self.lost:
-                    self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+            self.turn()
             if any(motor.current for motor in self.bank.motors):
                 self.driven = now
             self.reeled.append((now, tuple(motor.reeled for motor in self.bank.motors)))

@@ -22,7 +22,7 @@ from trunkline.execution.bank import Plant as PlantOfMotor
 from trunkline.execution.machine import Arm as ArmOfMachine
 from trunkline.execution.machine import Machine
 from trunkline.execution.motors import MotorSettings
-from trunkline.execution.on_bus import BankOnBus, BusMotors, open_bus
+from trunkline.execution.on_bus import BankOnBus, BusMotors, SimulatedMotors, open_bus
 from trunkline.execution.pace import PacedRobot
 from trunkline.execution.stream import LIMITS
 from trunkline.live.hardware import SIMULATED, Hardware
@@ -32,6 +32,8 @@ from trunkline.panda.shipped import JOINTS
 from trunkline.processes import end_with_parent
 from trunkline.teleop.trajectory import Limits
 
+RESTS, STILL = 2.0, 2e-4  # s in which no pose changes by more (m), after which the twin rests
+NICE = 5  # of the twin: a picture may wait
 URGENT = 40  # of SCHED_FIFO; asked for, and done without where there is no right to it
 
 
@@ -95,22 +97,19 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     parent = os.getppid()
     threadpool_limits(1)
-    bank, machine = None, None
+    if hardware.real:
+        with suppress(OSError, AttributeError):
+            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(URGENT))  # first: what it begins inherits it
+    machine = None
     try:
         arm = arm_of(hardware)
-        bus = open_bus(hardware.interface, hardware.bus) if hardware.bus else None
-        if hardware.bus == SIMULATED:
-            bank = BankOnBus(bank_of(hardware.motors), open_bus(hardware.interface, hardware.bus))
-        machine = Moved(arm, BusMotors(hardware.motors, bus) if bus is not None else None, begins.commands)
+        machine = Moved(arm, motors_of(hardware), begins.commands)
         joints = machine.begin(begins.joints)
         moved, limits = machine, LIMITS["fr3" if hardware.robot == "fr3" else "panda"]
         robot = PacedRobot(
             joints, begins.commands, begins.limits, begins.package, lambda q, c, _: moved.move(q, c), limits
         )  # fmt: skip
         gc.freeze()
-        if hardware.real:
-            with suppress(OSError, AttributeError):
-                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(URGENT))
         drive(Loop(channel, robot, machine), parent)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
@@ -118,8 +117,6 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
     finally:
         if machine is not None:
             machine.close()
-        if bank is not None:
-            bank.close()
 
 
 def arm_of(hardware: Hardware) -> ArmOfMachine | None:
@@ -129,6 +126,17 @@ def arm_of(hardware: Hardware) -> ArmOfMachine | None:
 
         return RosArm(hardware.ros)
     return Arm(hardware.arm, hardware.robot) if hardware.robot else None
+
+
+def motors_of(hardware: Hardware) -> BusMotors | None:
+    """The tendons' motors, or simulated ones; None where none are named."""
+    if not hardware.bus:
+        return None
+    bus = open_bus(hardware.interface, hardware.bus)
+    if hardware.bus != SIMULATED:
+        return BusMotors(hardware.motors, bus)
+    bank = BankOnBus(bank_of(hardware.motors), open_bus(hardware.interface, hardware.bus))
+    return SimulatedMotors(hardware.motors, bus, bank)
 
 
 def bank_of(settings: MotorSettings) -> list[PlantOfMotor]:
@@ -141,22 +149,30 @@ def bank_of(settings: MotorSettings) -> list[PlantOfMotor]:
 
 
 def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
-    """The twin's process: it goes where the machine's axes are sent, no faster than a plan would."""
+    """The twin's process: it goes where the machine's axes are sent, no faster than a plan would. Once it rests where
+    they rest, it is left alone: a preview needs the processor more."""
     os.environ["TRUNKLINE_THREADS"] = "1"
+    os.nice(NICE)
     threadpool_limits(1)
     end_with_parent()
     plant, limits = Plant(simulation), simulation.limits
     here, furthest = np.append(simulation.joints, simulation.commands), limits.velocity * plant.tick
-    due = time.monotonic()
+    due, poses, since = time.monotonic(), np.append(plant.thing(), plant.poses()), 0.0
     while True:
-        numbers = machine.hear()[0]
+        numbers, before = machine.hear()[0], here
         if numbers[READY] > 0:
             there = numbers[5 : 5 + len(here)]
             here = here + np.clip(there - here, -furthest, furthest)
-        plant.move(here[: len(JOINTS)], here[len(JOINTS) :])
+        if np.array_equal(here, before) and due - since > RESTS:
+            time.sleep(plant.tick)
+        else:
+            plant.move(here[: len(JOINTS)], here[len(JOINTS) :])
+            now = np.append(plant.thing(), plant.poses())
+            if not np.array_equal(here, before) or np.nanmax(np.abs(now - poses)) > STILL:
+                poses, since = now, due
         told = np.zeros(channel.size)
         told[READY] = 1.0
-        told[-POSE * (1 + channel.bodies) :] = np.append(plant.thing(), plant.poses())
+        told[-POSE * (1 + channel.bodies) :] = poses
         channel.tell(told, "")
         due = max(due + plant.tick, time.monotonic() - plant.tick)
         time.sleep(max(due - time.monotonic(), 0.0))

@@ -70,9 +70,15 @@ async def listening(server: Server, address: Address) -> AsyncIterator[None]:
 
 @contextlib.asynccontextmanager
 async def opened(
-    package: Path, address: Address, log: Callable[[str], None], hardware: Hardware | None = None
+    package: Path,
+    address: Address,
+    log: Callable[[str], None],
+    hardware: Hardware | None = None,
+    config: Config | None = None,
+    teleop: Teleop | None = None,
 ) -> AsyncIterator[tuple[Server, Made]]:
-    """A session that is ready, on the simulated robot where there is no hardware; its processes end with it.
+    """A session that is ready, on the simulated robot where there is no hardware, by conf/live and conf/teleop where
+    there is no `config` and `teleop`; its processes end with it.
 
     Raises:
         InputError: no package, a process that ends, a log that cannot be written, an address that cannot be had.
@@ -82,7 +88,8 @@ async def opened(
     def heard(answer: Answer | None) -> None:
         loop.call_soon_threadsafe(lambda: [server.foreseen(answer) for server in servers])
 
-    teleop, config = load_folder(Teleop, PROJECT / "conf/teleop"), load_folder(Config, PROJECT / "conf/live")
+    config = config or load_folder(Config, PROJECT / "conf/live")
+    teleop = teleop or load_folder(Teleop, PROJECT / "conf/teleop")
     alignment = alignment_for(hardware, config.alignment)
     anchors = Anchors(Path(alignment.anchors))
     made = await asyncio.to_thread(make, package, teleop, config, heard, hardware)

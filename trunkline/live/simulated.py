@@ -31,6 +31,8 @@ from trunkline.teleop.following import Following
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import Limits
 
+LISTENS = 0.2  # s from being woken within which a plan comes: a thread of the server's sends it
+TELLS = 0.004  # s between two tellings of a robot that is moved more often
 BEHIND = 0.25  # s that real time may run ahead of the simulation before it is let go
 NICE = -5  # asked for; without the right to it, none
 
@@ -144,10 +146,10 @@ class Loop:
     def __init__(self, channel: Channel, robot: SimulatedRobot, plant: Moved) -> None:
         self.channel, self.robot, self.plant = channel, robot, plant
         self.serial, self.fault, self.held = 0, "", 0.0
-        self._stops, self._holds = channel.asked[STOPS], False
+        self._stops, self._holds, self._listens = channel.asked[STOPS], False, 0.0
 
-    def turn(self, now: float) -> None:
-        """Obey what was asked since."""
+    def turn(self, now: float, woken: bool = True) -> None:
+        """Obey what was asked since; plans are looked for where it was `woken` of late."""
         asked = self.channel.asked
         stopped = asked[STOPS] != self._stops
         permitted = asked[PERMITTED] == self.serial and now - asked[PERMIT] <= DEAD_MAN
@@ -158,7 +160,10 @@ class Loop:
         if stopped or (holds and not self._holds):
             self.held = now
         self._holds = holds
-        self._hear(now)
+        if woken:
+            self._listens = now + LISTENS
+        if now <= self._listens:
+            self._hear(now)
 
     def advance(self) -> None:
         """One tick."""
@@ -200,17 +205,19 @@ class Loop:
 
 def drive(loop: Loop, parent: int) -> None:
     """Turn by turn, in real time, until the process `parent` is gone."""
-    due = time.monotonic()
+    due = told = time.monotonic()
     while os.getppid() == parent:
-        loop.channel.wake.acquire(timeout=max(due - time.monotonic(), 0.0))
+        woken = loop.channel.wake.acquire(timeout=max(due - time.monotonic(), 0.0))
         now = time.monotonic()
-        loop.turn(now)
+        loop.turn(now, woken)
         if now >= due:
             loop.advance()
             due += loop.plant.tick
             if now - due > BEHIND:
                 due = now
-        loop.tell(time.monotonic())
+        if woken or now >= told + TELLS:
+            told = now
+            loop.tell(time.monotonic())
 
 
 def run(channel: Channel, simulation: Simulation) -> None:

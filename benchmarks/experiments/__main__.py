@@ -1,0 +1,140 @@
+"""The paper's four experiments through page, server, franka-sim and motors on a virtual bus: a Markdown table.
+
+    ROBOT_PYTHON=fr3/bin/python python -m benchmarks.experiments [PACKAGE] [--runs N] [--only NAME]
+
+Seeds and operator are the rehearsal's. Each run is a live session of its own: the operator's hands go into the page in
+a headless browser, and the machines do what was confirmed there. What they did is then done again by the rehearsal's
+stand-in among true objects, from the session's log, and judged as the rehearsal is. Rates stand beside the rehearsal's
+own, where it has any for this package.
+
+ROBOT_PYTHON is of an environment with pylibfranka and franka-sim; franka-sim listens to every address, so the whole
+belongs in a network of its own (docs/execution.md). Runs are kept in build/experiments/runs.csv; stopped, they go on.
+"""
+
+import argparse
+import asyncio
+import contextlib
+import json
+import os
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from benchmarks.browser import browsing
+from benchmarks.experiments.at_page import AtPage
+from benchmarks.experiments.judging import done_again
+from benchmarks.experiments.machines import franka_sim, hardware
+from rehearsal import settings
+from rehearsal.experiments.bench import FLOOR, Bench, Staged, bench_of
+from rehearsal.experiments.registry import EXPERIMENTS
+from rehearsal.experiments.result import Result, append_result, causes, rate, read_results
+from rehearsal.runs import Source, source_of
+from trunkline.errors import InputError, in_one_line
+from trunkline.foresight.package import only_package
+from trunkline.live.session import Address, opened
+from trunkline.live.settings import Config
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.pipeline.results import recorded
+from trunkline.teleop.config import Config as Teleop
+
+ADDRESS, WINDOW, YIELDS = Address(8899), (320, 240), 15  # of the page: pixels, and how nice its browser is
+FEWEST = 20  # runs of each that are kept
+URGENT = -5  # of the server, where that is allowed; all else is nicer
+SILENCE = 0.6  # s for which the page may be silent: it shares the processor with two robots of 1000 cycles a second
+REHEARSED = Path("artifacts/rehearse/metrics.json")
+
+
+def config_of(bench: Bench, staged: Staged, folder: str) -> Config:
+    """A live session's settings where the experiment is staged."""
+    config, world = load_folder(Config, PROJECT / "conf/live"), staged.session.world
+    x, y, z = bench.settings.mount_ready
+    return replace(
+        config, ready=(x, y, z), floor=FLOOR, boxes=world.boxes[1:], thing=next(iter(world.things), None),
+        journal=replace(config.journal, folder=folder), preview=bench.previewing,
+    )  # fmt: skip
+
+
+def patient(bench: Bench) -> Teleop:
+    """Teleoperation that is set as the rehearsal's, but for SILENCE."""
+    core = bench.config.core
+    return replace(bench.config, core=replace(core, safety=replace(core.safety, silence=SILENCE)))
+
+
+async def perform(bench: Bench, staged: Staged, python: Path, package: Path) -> Result:
+    """One run in a session of its own."""
+    accept, session = settings.grasped().accept, staged.session
+    with tempfile.TemporaryDirectory() as folder:
+        config = config_of(bench, staged, folder)
+        async with franka_sim(python, session.robot.joints[0]):
+            asked = package, ADDRESS, lambda line: None, hardware(python), config, patient(bench)
+            async with opened(*asked) as (server, made):
+                url = f"{ADDRESS.url}/#token={server.house.token}"
+                async with browsing(url, WINDOW, YIELDS) as page:
+                    operator = AtPage(page, session, made.desk.journal.subject.tip, accept)
+                    ending, views = await operator.perform(staged)
+                    seconds = time.monotonic() - operator.begun
+            log = made.journal.path
+        frames = await asyncio.to_thread(done_again, session, log, operator.begun)
+    return staged.judged(ending, frames, views, seconds)
+
+
+def made_of(bench: Bench, name: str, seed: int, python: Path, package: Path) -> Result:
+    """A run; one that breaks off by an error failed, and its cause is the error."""
+    try:
+        return asyncio.run(perform(bench, EXPERIMENTS[name](bench, seed), python, package))
+    except (InputError, ArithmeticError, AssertionError, ValueError, TimeoutError) as error:
+        return Result(name, seed, False, f"error: {type(error).__name__}: {error}")
+
+
+def told(name: str, rows: list[Result], rehearsed: dict) -> str:
+    share, low, high = rate(rows)
+    other = rehearsed.get(name)
+    beside = f"{100 * other['rate']:.0f} % ({100 * other['low']:.0f} to {100 * other['high']:.0f})" if other else "none"
+    why = ", ".join(f"{kind} {count}" for kind, count in causes(rows).items())
+    mean = sum(row.seconds for row in rows) / len(rows)
+    own = f"{100 * share:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+    return f"| {name} | {len(rows)} | {own} | {beside} | {mean:.0f} | {why} |"
+
+
+def rehearsed_with(source: Source) -> dict:
+    """The rehearsal's rates, where they are of the same package."""
+    if not REHEARSED.is_file():
+        return {}
+    found = json.loads(REHEARSED.read_text())
+    return found if found.get("package") == source.package else {}
+
+
+@in_one_line
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="benchmarks.experiments", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("package", nargs="?", type=Path)
+    parser.add_argument("--runs", type=int, default=FEWEST, help="of each experiment, seeds 0, 1, ...")
+    parser.add_argument("--only", choices=sorted(EXPERIMENTS))
+    parser.add_argument("--out", type=Path, default=Path("build/experiments"))
+    given = parser.parse_args()
+    with contextlib.suppress(OSError):
+        os.nice(URGENT)
+    python = Path(os.environ.get("ROBOT_PYTHON", ""))
+    if not python.is_file():
+        raise InputError(f"ROBOT_PYTHON: found {str(python)!r}, expected the Python of pylibfranka and franka-sim")
+    package, table = given.package or only_package(), given.out / "runs.csv"
+    bench, source, names = bench_of(package), source_of(package), [given.only] if given.only else list(EXPERIMENTS)
+    with recorded("experiments", keep=given.runs >= FEWEST and not given.only):
+        print("| experiment | runs | success (95 %) | rehearsed | s a run | why it failed |")
+        print("|---|---:|---:|---:|---:|---|", flush=True)
+        for name in names:
+            rows = {row.seed: row for row in source.of(read_results(table)) if row.experiment == name}
+            for seed in range(given.runs):
+                if seed not in rows:
+                    found = made_of(bench, name, seed, python.absolute(), package)
+                    rows[seed] = replace(found, package=source.package, code=source.code)
+                    append_result(table, rows[seed])
+                    print(f"{name} {seed}: {found.cause or 'success'}; {found.seconds:.0f} s", file=sys.stderr)
+            print(told(name, [rows[seed] for seed in range(given.runs)], rehearsed_with(source)), flush=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
