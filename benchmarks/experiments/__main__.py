@@ -39,7 +39,7 @@ from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.pipeline.results import recorded
 from trunkline.teleop.config import Config as Teleop
 
-ADDRESS, WINDOW, YIELDS = Address(8899), (320, 240), 15  # of the page: pixels, and how nice its browser is
+ADDRESS, WINDOW, YIELDS = Address(8899), (320, 240), 3  # of the page: pixels, and how nice its browser is
 FEWEST = 20  # runs of each that are kept
 URGENT = -5  # of the server, where that is allowed; all else is nicer
 SILENCE = 0.6  # s for which the page may be silent: it shares the processor with two robots of 1000 cycles a second

@@ -39,7 +39,7 @@ globalThis.look = (hands) => {
   const row = (rows, index) => rows && Array.from(rows.slice(7 * index, 7 * index + 7));
   const last = drawn.bodies.indexOf(globalThis.tipBody);
   const rays = [0, 1].map((ray) => row(frame?.rows, drawn.count + ray));
-  const ghost = playback?.frames ? row(playback.rows, (playback.index * playback.width) / 7 + last) : null;
+  const ghost = playback?.whole ? row(playback.rows, ((playback.frames - 1) * playback.width) / 7 + last) : null;
   return JSON.stringify({ state, told, digest, rays, ghost, tip: row(frame?.rows, last), world: drawn.known });
 };
 """

@@ -97,9 +97,6 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     parent = os.getppid()
     threadpool_limits(1)
-    if hardware.real:
-        with suppress(OSError, AttributeError):
-            os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(URGENT))  # first: what it begins inherits it
     machine = None
     try:
         arm = arm_of(hardware)
@@ -110,6 +107,9 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
             joints, begins.commands, begins.limits, begins.package, lambda q, c, _: moved.move(q, c), limits
         )  # fmt: skip
         gc.freeze()
+        if hardware.real:  # not before: what loads at that priority is stopped by the kernel for 50 ms of each second
+            with suppress(OSError, AttributeError):
+                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(URGENT))
         drive(Loop(channel, robot, machine), parent)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
