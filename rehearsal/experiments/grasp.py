@@ -62,7 +62,7 @@ def offered(
     shape = kinds[rng.integers(len(kinds))]
     of, stands = s.shapes[shape], shape == "basket"
     diameter = float(rng.uniform(of.thin, of.wide))
-    heaviest = min(of.heavy, bench.config.handling.heaviest("basket" if stands else "hanging", diameter))
+    heaviest = min(of.heavy, bench.config.handling.heaviest(shape, diameter))
     radius, azimuth = np.sqrt(rng.uniform(s.near**2, s.far**2)), np.radians(rng.uniform(-s.side_deg, s.side_deg))
     place = np.array([radius * np.cos(azimuth), radius * np.sin(azimuth), rng.uniform(of.low, of.high)])
     yaw = azimuth + (np.radians(rng.uniform(-s.yaw_deg, s.yaw_deg)) if shape != "sphere" else 0.0)

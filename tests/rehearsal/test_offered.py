@@ -53,7 +53,7 @@ def test_what_is_gripped_is_level_across_the_way_of_the_arm_and_within_bounds(ob
         assert of.low <= grip[2] <= of.high
         assert s.near <= np.hypot(*grip[:2]) <= s.far
         assert of.thin <= thing.diameter <= of.wide
-        assert of.light <= thing.mass <= min(of.heavy, config().handling.heaviest(one.way, thing.diameter))
+        assert of.light <= thing.mass <= min(of.heavy, config().handling.heaviest(thing.shape, thing.diameter))
         axis = turn.apply([0, 1, 0] if thing.shape == "basket" else [0, 0, 1])
         assert abs(axis @ one.towards) < 1e-9
         assert abs(axis[2]) < 1e-9

@@ -35,7 +35,7 @@ from trunkline.teleop.vectors import DOWN, subtract
 GEOMETRY = spiral_chain(length=LENGTH, base_width=0.080, tip_width=0.012, units=24)
 GRIP, BY_THE_BAR = SideGrip(config().hanging, GEOMETRY), SideGrip(config().basket, GEOMETRY)
 HANDLING = config().handling
-BALL = Thing("the ball", "sphere", 0.05, 0.05, 0.1, (0.55, 0.1, 0.15))
+BALL = Thing("the ball", "cylinder", 0.05, 0.05, 0.1, (0.55, 0.1, 0.15))
 
 
 @pytest.fixture(scope="module")

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz
+from trunkline.hybrid.objects import Shape
 from trunkline.hybrid.placements import Grip, Placement
 from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.alignment import base_quaternion
@@ -19,7 +20,7 @@ from trunkline.teleop.vectors import DOWN, Vector, conjugate, rotate
 UP = np.array([0.0, 0.0, 1.0])
 Seconds = Annotated[float, Field(ge=0, le=30)]
 Metres = Annotated[float, Field(gt=0, le=1)]
-Mass = Annotated[float, Field(gt=0, le=20)]
+Mass = Annotated[float, Field(ge=0, le=20)]
 
 
 @dataclass
@@ -29,8 +30,8 @@ class Handling:
     close: s, at least, for the cables to close. calm: s for which all waits before it and after it.
     lift: m. carry: m/s, of the mount with something in the arm, on the average. above: m over its place from which a
     thing comes down. open: s, at least, in which the arm opens while the mount rises. beneath: m, at most, that a
-    thing may fall as it is let go. payload: of each way of grasping, rows of diameter, m, and the heaviest mass, kg,
-    that is grasped, linear between.
+    thing may fall as it is let go. payload: of each shape, rows of diameter, m, and the heaviest mass, kg, that is
+    grasped, linear between.
     """
 
     close: Seconds
@@ -40,7 +41,7 @@ class Handling:
     above: Metres
     open: Seconds
     beneath: Metres
-    payload: dict[str, Annotated[list[tuple[Metres, Mass]], Field(min_length=1, max_length=50)]]
+    payload: dict[Shape, Annotated[list[tuple[Metres, Mass]], Field(min_length=1, max_length=50)]]
 
     def __post_init__(self):
         for name, rows in self.payload.items():
@@ -48,9 +49,10 @@ class Handling:
             if diameters != sorted(set(diameters)):
                 raise ValueError(f"payload.{name}: found diameters {diameters}, expected them rising")
 
-    def heaviest(self, way: str, diameter: float) -> float:
-        """kg, of an object of `diameter` m that is grasped this way; none wider than the last row's can be held."""
-        diameters, masses = zip(*self.payload[way], strict=True)
+    def heaviest(self, shape: Shape, diameter: float) -> float:
+        """kg, of an object of `diameter` m; none of a shape that is not told of, or wider than its last row, can be
+        held."""
+        diameters, masses = zip(*self.payload.get(shape, [(diameter, 0.0)]), strict=True)
         return float(np.interp(diameter, diameters, masses, right=0.0))
 
 
@@ -96,7 +98,7 @@ class Grasping:
         h, name = self.handling, way_of_grasping(thing)
         if name not in self.grips:
             raise InputError(f"grasp: {thing.name} is {thing.support}, expected {' or '.join(self.grips)}")
-        most = h.heaviest(name, thing.diameter)
+        most = h.heaviest(thing.shape, thing.diameter)
         if thing.mass > most:
             raise InputError(
                 f"payload: {thing.name} weighs {thing.mass:g} kg, expected at most {most:.3g} kg "
