@@ -72,8 +72,8 @@ async def perform(bench: Bench, staged: Staged, python: Path, package: Path) -> 
             async with opened(*asked) as (server, made):
                 url = f"{ADDRESS.url}/#token={server.house.token}"
                 async with browsing(url, WINDOW, YIELDS) as page:
-                    operator = AtPage(page, session, made.desk.journal.subject.tip, accept)
-                    ending, views = await operator.perform(staged)
+                    operator = AtPage(page, staged, made.desk.journal.subject.tip, accept)
+                    ending, views = await operator.perform()
                     seconds = time.monotonic() - operator.begun
             log = made.journal.path
         frames = await asyncio.to_thread(done_again, session, log, operator.begun)

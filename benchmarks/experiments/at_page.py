@@ -16,7 +16,7 @@ from pydantic import TypeAdapter
 
 from benchmarks.browser import Page
 from rehearsal.experiments.bench import LONGEST, Staged
-from rehearsal.session import REFERENCE, Session, View
+from rehearsal.session import REFERENCE, View
 from trunkline.errors import InputError
 from trunkline.foresight.believing import make_world
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
@@ -32,6 +32,7 @@ HANDS = """
 globalThis.operator = null;
 const { desktop, renderer } = globalThis.trunkline, own = desktop.hands.bind(desktop);
 renderer.render = () => {};
+document.body.style.display = "none";
 desktop.hands = () => globalThis.operator ?? own();
 globalThis.look = (hands) => {
   globalThis.operator = hands;
@@ -51,25 +52,26 @@ class AtPage:
     for. begun: s of the server's clock at which the operator's begins; the latter stands while the batch is waited
     for, which takes its time beside so much else."""
 
-    def __init__(self, page: Page, session: Session, tip: tuple[str, Vector], accept: float) -> None:
-        self._page, self._session, self._tip, self._accept = page, session, tip, accept
+    def __init__(self, page: Page, staged: Staged, tip: tuple[str, Vector], accept: float) -> None:
+        self._page, self._script, self._session, self._tip = page, staged.script, staged.session, tip
+        self._accept = accept
         self._rays: list[Vector | None] = [None, None]
         self._foreseen: tuple[str, float] = "", 0.0  # digest, and since when
         self._waited, self.begun = 0.0, time.monotonic()
 
-    async def perform(self, staged: Staged) -> tuple[object, list[View]]:
+    async def perform(self) -> tuple[object, list[View]]:
         """How the operator's script ended, None where it did not, and all that was seen.
 
         Raises:
             InputError: the page never had the robot, or lost the server.
         """
-        page, views, script = self._page, [], staged.script
+        page, views, script = self._page, [], self._script
         await self._take_control()
         self.begun = time.monotonic()
         next(script)
         while (now := time.monotonic() - self.begun - self._waited) < LONGEST:
             hands = zip(("left", "right"), self._session.hands, self._rays, strict=True)
-            held = {side: _told(hand.controller(now, end)) for side, hand, end in hands}
+            held = {side: hand_of(hand.controller(now, end)) for side, hand, end in hands}
             seen = json.loads(await page.value(f"look({json.dumps(held)})"))
             if seen["state"] is None:
                 raise InputError("the page has lost the server")
@@ -141,7 +143,7 @@ def _said(seen: dict) -> dict | None:
     return told if seen["state"]["mode"] in SHOWS and told and told["digest"] == seen["digest"] else None
 
 
-def _told(controller: Controller) -> dict:
+def hand_of(controller: Controller) -> dict:
     """A hand in the base frame, as the page has hands."""
     turn = rotation_from_wxyz(np.array(REFERENCE.quaternion))
     place = turn.apply(controller.position) + REFERENCE.position

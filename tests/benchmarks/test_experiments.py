@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.experiments.at_page import _told
+from benchmarks.experiments.at_page import hand_of
 from benchmarks.experiments.judging import BEFORE, done_again
 from rehearsal.session import RATE, REFERENCE
 from tests.live.test_hindsight import Clocked
@@ -74,7 +74,7 @@ def test_a_log_without_what_was_measured_is_refused_by_name(tmp_path):
 
 def test_a_hand_goes_to_the_page_in_the_base_frame():
     held = Controller((0.1, 0.2, -0.3), (1.0, 0.0, 0.0, 0.0), trigger=True)
-    told, turn = _told(held), rotation_from_wxyz(np.array(REFERENCE.quaternion))
+    told, turn = hand_of(held), rotation_from_wxyz(np.array(REFERENCE.quaternion))
     np.testing.assert_allclose(told["position"], turn.apply(held.position) + REFERENCE.position)
     ray = rotation_from_wxyz(np.array(told["quaternion"])).apply([0.0, 0.0, -1.0])
     np.testing.assert_allclose(ray, turn.apply([0.0, 0.0, -1.0]), atol=1e-12)
