@@ -45,6 +45,17 @@ def test_setpoints_are_followed_when_they_are_due():
     np.testing.assert_allclose(sent, [way(n * DT) for n in range(2500)], atol=1e-9)
 
 
+def test_a_robot_whose_time_is_too_slow_is_a_fault_once_it_moves():
+    """At half its pace it rests for as long as it likes, and what it did not do meanwhile is not made up for."""
+    stream, sent = play(BEGINS + 0.05, dt=lambda now: DT / 2)
+    assert stream.fault == ""
+    stream, sent = play(3.0, at=lambda time: way(time - 1.0), dt=lambda now: DT / 2)
+    assert stream.fault.startswith("its cycles are too few: setpoints are played 30")
+    moved = np.flatnonzero(np.abs(np.diff(sent, axis=0)).max(axis=1) > 1e-6)[0]
+    assert moved * DT == pytest.approx(1.0 + BEGINS, abs=0.1)
+    assert not np.diff(sent[-5:], axis=0).any()
+
+
 def test_setpoints_that_come_late_but_before_they_are_due_change_nothing():
     """As a busy machine sends them: nothing for 20 ms, then all at once."""
     stream, waiting, sent = Stream(READY, PANDA), [], []

@@ -17,6 +17,8 @@ from trunkline.panda.kinematics import Q_MAX, Q_MIN
 from trunkline.panda.limits import ACCELERATION, JERK, VELOCITY
 
 SILENT = 0.05  # s without a setpoint
+BEHIND = 0.3  # s by which setpoints may be played late
+SAME = 1e-7  # rad within which setpoints are of one place
 NEAR = 2e-3  # rad by which the first setpoint may be off
 ROUNDING = 1.02  # share of a limit that differences may show of a way that keeps it
 BRAKING = 0.5  # share of accelerations and jerks with which it brakes
@@ -109,6 +111,14 @@ class Stream:
         else:
             self._behind += (now - self._clock - dt - self._behind) * min(dt / SMOOTH, 1.0)
             self._clock += dt * min(max(1.0 + GAIN * self._behind, SLOWEST), FASTEST)
+        if not self._speed.any():  # at rest nothing is missed by what is left out of it
+            while len(queue) > 1 and queue[1].due <= now and _same(queue[0], queue[1]):
+                queue.popleft()
+            self._clock = max(self._clock, min(queue[0].due, now))
+        if now - self._clock > BEHIND:
+            late = 1e3 * (now - self._clock)
+            self.brake(f"its cycles are too few: setpoints are played {late:.0f} ms late, expected {1e3 * BEHIND:.0f}")
+            return None
         while len(queue) > 1 and queue[1].due <= self._clock:
             queue.popleft()
         if len(queue) == 1:
@@ -152,3 +162,7 @@ class Stream:
         ended = (after * speed <= 0) & (np.abs(gain) <= 4 * jerk * dt)
         self._gain, self._speed = np.where(ended, 0.0, gain), np.where(ended, 0.0, after)
         self.joints = self.joints + self._speed * dt
+
+
+def _same(first: Setpoint, second: Setpoint) -> bool:
+    return all(abs(a - b) < SAME for a, b in zip(first.joints, second.joints, strict=True))
