@@ -25,7 +25,7 @@ def payload_figure(table: pd.DataFrame) -> Figure:
             style = MARKS[ways.index((pull, shortening)) % len(MARKS)]
             line = line.sort_values("diameter")
             axis.plot(1e3 * line["diameter"], 1e3 * line["mass"], style, color=COLOURS[shape], label=label, alpha=0.85)
-        axis.set(title=f"{support}, friction {friction:g}", xlabel="diameter (mm)", ylim=(0, None))
+        axis.set(title=f"{support}, friction {friction:g}", xlabel="diameter (mm)")
         axis.legend()
-    axes[0, 0].set_ylabel("heaviest mass held (g)")
+    axes[0, 0].set(ylabel="heaviest mass held (g)", ylim=(0, 1050 * max(table["mass"].max(), 0.1)))  # of all panels
     return figure
