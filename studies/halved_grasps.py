@@ -6,6 +6,7 @@ those that differ, the share that does with its Wilson 95 % interval, and how fa
 """
 
 import argparse
+import contextlib
 import sys
 import time
 from dataclasses import replace
@@ -39,9 +40,9 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0)
     options = parser.parse_args()
     chart, arm, rng = read_settings(False), read_spec(Path(MODEL)), np.random.default_rng(options.seed)
-    begun, outcomes, apart = time.process_time(), [], []
+    begun, outcomes, apart, changes = time.process_time(), [], [], []
     draws = -(-options.count // TOGETHER)
-    with progress(draws, "halved_grasps", "draws") as bar:
+    with contextlib.redirect_stdout(sys.stderr), progress(draws, "halved_grasps", "draws") as bar:
         for draw in range(draws):
             wrap = rng.uniform(*WRAPS)
             own = replace(chart, gap=rng.uniform(*GAPS), placements=TOGETHER, spread=SPREAD, seed=draw)
@@ -56,10 +57,10 @@ def main() -> int:
             both = held[0] & held[1]
             apart.append(np.linalg.norm(whole.path[both, -1] - half.path[both, -1], axis=1))
             for one, other in outcomes[-1][held[0] != held[1]]:
-                print(
-                    f"{cell.shape} {1e3 * cell.diameter:.0f} mm, {1e3 * mass[0]:.0f} g: held {one}, half step {other}"
-                )
+                what = f"{cell.shape} {1e3 * cell.diameter:.0f} mm, {1e3 * mass[0]:.0f} g"
+                changes.append(f"{what}: held {one}, half step {other}")
             bar.update(1)
+    print("\n".join(changes))
     found, apart = np.concatenate(outcomes), np.concatenate(apart)
     changed, count = int((found[:, 0] != found[:, 1]).sum()), len(found)
     low, high = wilson(changed, count)
