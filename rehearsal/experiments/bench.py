@@ -127,7 +127,6 @@ class Staged:
     def judged(self, ending: object, frames: list[Seen], views: list[View], seconds: float) -> Result:
         """What a run of `seconds` came to, whose script ended so."""
         result = Result(self.name, self.seed, False, seconds=seconds, object=self.thing)
-        result.package = self.session.package.digest[:12]
         ended = isinstance(ending, Ending)
         result.cause = self.judge(result, ending, frames, views) if ended else "stopped: the run did not end"
         result.success = not result.cause

@@ -10,7 +10,7 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.panda.collision import clearance
-from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, JointFrame, joint_frames
+from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN, joint_frames, mount_pose
 from trunkline.statics.chain import Chain
 from trunkline.statics.equilibria import actuated
 from trunkline.statics.placement import joint_places
@@ -47,7 +47,7 @@ def refuse(plan: Plan, world: World, mount_offset: float, chain: Chain | None = 
     moving.append(("mount of the rigid robot", mount.T[:, None], every, LINK_RADIUS))
     if chain is not None and (end := _closes(plan)):
         rows = np.unique(np.append(every[: end : max(round(EVERY / plan.step), 1)], end - 1))
-        moving.append(("the arm", _arm(plan, rows, frames[-1], mount, chain), rows, 0.0))
+        moving.append(("the arm", _arm(plan, rows, mount_offset, chain), rows, 0.0))
     for box in world.boxes:
         for name, places, rows, radius in moving:
             away = np.linalg.norm(np.maximum(np.maximum(box.low - places, places - box.high), 0.0), axis=2)
@@ -68,11 +68,11 @@ def _closes(plan: Plan) -> int:
     return phases["curl"] if "lift" in phases else len(plan.joints)
 
 
-def _arm(plan: Plan, rows: np.ndarray, flange: JointFrame, mount: np.ndarray, chain: Chain) -> np.ndarray:
-    """Joints and tip of the arm at rest at `rows` (N,), (N, P, 3), m, its base on the `mount` (3, all rows) half a turn
-    about x from the `flange`. Where it finds no rest it is left out: NaN."""
-    turn = np.stack([flange.x, -flange.y, -flange.z], axis=2).transpose(1, 0, 2)[rows]  # columns: axes of the soft base
+def _arm(plan: Plan, rows: np.ndarray, mount_offset: float, chain: Chain) -> np.ndarray:
+    """Joints and tip of the arm at rest at `rows` (N,), (N, P, 3), m. Where it finds no rest it is left out: NaN."""
+    mount, flange = mount_pose(plan.joints[rows], mount_offset)
+    turn = flange * [1, -1, -1]  # the soft base: half a turn about the flange's x
     rest = actuated(chain, plan.commands[rows], -STANDARD_GRAVITY * turn[:, 2])
     places = joint_places(chain, rest.qpos)
     places[~rest.converged] = np.nan
-    return mount.T[rows, None] + np.einsum("nij,npj->npi", turn, places)
+    return mount[:, None] + np.einsum("nij,npj->npi", turn, places)
