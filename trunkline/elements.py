@@ -5,7 +5,9 @@ tendons that tie them, which end in `_tie`, Jenkins elements, tendons named `<hi
 diagonals of a round joint, tendons named `<hinge>_diagonal_<number>` after its first hinge.
 `trunkline/arm/holes.py` gives a cable tendons by which it rubs on its holes, named `<cable>_hole_<number>`, and the
 model a number `capstan_friction`, their coefficient. Numbers `rate_limit` and `backlash` are those of the motors'
-winches (`trunkline/simulation/winch.py`); 0 stands for none.
+winches (`trunkline/simulation/winch.py`); 0 stands for none. `winding` and `preload` say what a logged command draws
+in: so many times its metres, and so many metres of each cable beyond the straight arm's where it is 0. `sections` are
+the numbers of units of an arm that is made of several.
 """
 
 from dataclasses import dataclass
@@ -19,6 +21,7 @@ TIE = "_tie"  # ends the name of a branch's tendon: in a Unity scene it may not 
 CAPSTAN_FRICTION = "capstan_friction"
 HINGE_SHARE, DIAGONAL_SHARE = 2 / 3, 1 / 6  # of the hardening K c of a round joint, see `trunkline/arm/joints.py`
 RATE_LIMIT, BACKLASH = "rate_limit", "backlash"  # of winches, m/s and m of cable
+WINDING, PRELOAD, SECTIONS = "winding", "preload", "sections"
 
 
 @dataclass(frozen=True)
@@ -139,6 +142,14 @@ def numeric(model: mujoco.MjModel, name: str) -> float:
     """The model's number of this name, 0 if it has none."""
     place = numeric_place(model, name)
     return 0.0 if place is None else float(model.numeric_data[place])
+
+
+def numbers_place(model: mujoco.MjModel, name: str) -> np.ndarray:
+    """Where among the model's `numeric_data` the numbers of this name are, none if it has none. Shape (k,)."""
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
+    if number < 0:
+        return np.zeros(0, dtype=int)
+    return model.numeric_adr[number] + np.arange(model.numeric_size[number])
 
 
 def capstan_friction(model: mujoco.MjModel) -> float:

@@ -15,7 +15,7 @@ from tests.support.workbench import ROOT
 from trunkline.arm.from_file import FromFile
 from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
-from trunkline.elements import BACKLASH, BRANCH, RATE_LIMIT, elements, holes
+from trunkline.elements import BACKLASH, BRANCH, PRELOAD, RATE_LIMIT, SECTIONS, WINDING, elements, holes
 from trunkline.errors import InputError
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
 from trunkline.identification.problem import Bounds
@@ -64,9 +64,7 @@ def test_the_stage_builds_it_and_the_statics_read_it(project, tmp_path):
     assert (tmp_path / "artifacts/build_mjcf/arm.png").stat().st_size > 10000
 
 
-@pytest.mark.parametrize("name", PARAMETERS)
-def test_it_can_be_identified(name):
-    """Every parameter can be set in it and saved."""
+def arm_with_every_part() -> mujoco.MjSpec:
     spec = mujoco.MjSpec.from_string(FromFile("mjcf", FILE).build(None, None, MODELS).spec.to_xml())
     add_elements(spec, Joints([Branch(0.3, 0.5), Branch(0.2, 2.0)], [Slider(0.2, 0.02)] * 3), 1e-5)
     add_holes(spec, Holes(0.1, 2))
@@ -74,6 +72,18 @@ def test_it_can_be_identified(name):
         spec.add_numeric(name=number, data=[0.01], size=1)
     for actuator in spec.actuators:
         actuator.nsample = 100
+    for number, values in ((WINDING, [1.0]), (PRELOAD, [0.0] * len(spec.actuators)), (SECTIONS, [1, 3])):
+        spec.add_numeric(name=number, data=values, size=len(values))
+    return spec
+
+
+OWN = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(arm_with_every_part().compile())]
+
+
+@pytest.mark.parametrize("name", OWN)
+def test_it_can_be_identified(name):
+    """Every parameter can be set in it and saved."""
+    spec = arm_with_every_part()
     model = spec.compile()
     value = 1.3 * PARAMETERS[name].read(model) or 0.02
     set_fields(model, candidate_fields(model, {name: np.array([value])}))

@@ -9,6 +9,7 @@ from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
 from trunkline.arm.mjcf import Solver, Tendons, build_spec, unit_name
 from trunkline.arm.spiral import spiral_chain
+from trunkline.arm.tendons import even_routes
 from trunkline.elements import BACKLASH, RATE_LIMIT, numeric, numeric_place
 from trunkline.frames import STANDARD_GRAVITY, gravity_in_base, rotation_from_wxyz
 
@@ -178,7 +179,7 @@ def test_turning_gravity_is_turning_the_base(tilt):
 def test_any_number_of_tendons_and_a_chain_that_is_no_spiral():
     chain = ChainGeometry(np.full(6, 0.03), np.full(6, 0.04), np.full(6, 0.5), 1.0)
     properties = unit_properties(chain, TPU_95A_MODULUS, TPU_95A_DENSITY, 0.3, 0.1)
-    tendons = Tendons(0.5, 2000, 60, 0.05, count=4, radius_ratio=0.8, kv=80)
+    tendons = Tendons(0.5, 2000, 60, 0.05, routes=even_routes(chain, 4, 0.8), kv=80)
     model = build_spec(chain, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT)).compile()
     assert (model.ntendon, model.nq) == (4, 12)
     np.testing.assert_allclose(

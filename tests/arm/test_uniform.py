@@ -10,7 +10,8 @@ from omegaconf import OmegaConf
 
 from stages.build_mjcf import Config, main
 from tests.support.small_arm import LIMIT
-from trunkline.arm.mjcf import Solver, Tendons, build_spec
+from trunkline.arm.mjcf import Marker, Solver, Tendons, build_spec
+from trunkline.arm.tendons import even_routes
 from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
@@ -18,13 +19,14 @@ from trunkline.pipeline.config import load_config
 
 CHAIN = uniform_chain(0.3, 0.05, 6, 0.5)
 SEGMENTS = {"1": 0.1, "2": 0.175, "end": 0.3}
+MARKERS = {name: Marker(distance) for name, distance in SEGMENTS.items()}
 
 
 def model_of(tip_load=0.0, masses=(0.02,), stiffness=0.5, tendons=0) -> mujoco.MjModel:
     properties = uniform_properties(CHAIN, masses, stiffness, 5.0)
     solver = Solver(0.002, 1e-5, *LIMIT, *LIMIT)
-    cables = Tendons(0.1, 200, 20, 0.1, count=tendons, radius_ratio=0.8, kv=10)
-    return build_spec(CHAIN, properties, cables, solver, tip_load, SEGMENTS).compile()
+    cables = Tendons(0.1, 200, 20, 0.1, routes=even_routes(CHAIN, tendons, 0.8), kv=10)
+    return build_spec(CHAIN, properties, cables, solver, tip_load, MARKERS).compile()
 
 
 def test_one_diameter_has_equal_joints():
@@ -77,7 +79,7 @@ def test_a_bent_rod_deflects_as_a_beam():
     units, bending = 60, 0.5
     chain = uniform_chain(0.3, 0.05, units, 0.5)
     properties = uniform_properties(chain, [1e-6], bending / chain.lengths[0], 0.3)
-    tendons = Tendons(0, 1, 1, 1, count=0, radius_ratio=0.8, kv=1)
+    tendons = Tendons(0, 1, 1, 1, routes=[], kv=1)
     spec = build_spec(chain, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT))
     model = spec.compile()
     jacobian, data = np.zeros((3, model.nv)), mujoco.MjData(model)

@@ -12,6 +12,7 @@ from trunkline.arm.joints import Branch, Joints, add_elements
 from trunkline.arm.material import unit_properties
 from trunkline.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.arm.spiral import spiral_chain
+from trunkline.arm.tendons import even_routes
 from trunkline.hybrid.settings import HybridSettings
 from trunkline.pipeline.config import compose_settings
 
@@ -34,8 +35,8 @@ def chain():
 def rubbing_arm(chain, stretches: int) -> mujoco.MjSpec:
     """With what the identified arm has: creeping joints, cables that rub, motors with a dead time."""
     properties = unit_properties(chain, 26e6, 1210.0, 0.24, 0.1)
-    tendons = Tendons(friction=0.0, kp=2000.0, max_force=18.0, time_constant=0.02, dead_time=0.02, count=3,
-                      radius_ratio=0.85, kv=7.0)  # fmt: skip
+    tendons = Tendons(friction=0.0, kp=2000.0, max_force=18.0, time_constant=0.02, dead_time=0.02, kv=7.0,
+                      routes=even_routes(chain, 3, 0.85))  # fmt: skip
     spec = build_spec(chain, properties, tendons, Solver(1 / 480, 1e-5, *STIFFER, *STIFFER))
     add_elements(spec, Joints(branches=[Branch(0.2, 0.3)]), 1e-5)
     add_holes(spec, Holes(0.12, stretches))

@@ -10,9 +10,16 @@ import pytest
 from tests.support.small_arm import small_spec
 from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
-from trunkline.elements import BRANCH, all_elements, arm_hinges
+from trunkline.elements import BRANCH, PRELOAD, SECTIONS, WINDING, all_elements, arm_hinges
 from trunkline.errors import InputError
-from trunkline.identification.parameters import PARAMETERS, Parameter, candidate_fields, set_fields, unit_of_hinge
+from trunkline.identification.parameters import (
+    PARAMETERS,
+    Parameter,
+    candidate_fields,
+    names_of,
+    set_fields,
+    unit_of_hinge,
+)
 from trunkline.identification.saving import save_model
 from trunkline.identification.setup import check_parameters
 
@@ -26,6 +33,9 @@ VALUES = {
     "rest_bend_x": 0.01, "rest_bend_y": -0.02, "rest_gradient_x": -0.01, "rest_gradient_y": 0.03,
     "dead_time": 0.04, "rate_limit": 0.3, "backlash": 0.002,
     "mount_tilt_x": 0.03, "mount_tilt_y": -0.02, "mount_twist": 0.05,
+    "winding": 1.2, "tendon_distance": 0.03, "section_stiffness_2": 0.7,
+    "preload_1": 0.003, "preload_2": -0.002, "preload_3": 0.001,
+    "tendon_angle_1": 0.1, "tendon_angle_2": 2.0, "tendon_angle_3": -2.2,
 }  # fmt: skip
 
 
@@ -38,6 +48,9 @@ def full_spec() -> mujoco.MjSpec:
     spec = small_spec(dead_time=0.02, rate_limit=0.1, backlash=0.001)
     add_elements(spec, ELEMENTS, 1e-5)
     add_holes(spec, Holes(0.1, 2))
+    spec.add_numeric(name=WINDING, data=[1.0], size=1)
+    spec.add_numeric(name=PRELOAD, data=[0.0, 0.001, 0.0], size=3)
+    spec.add_numeric(name=SECTIONS, data=[3, 5], size=2)
     return spec
 
 
@@ -68,8 +81,11 @@ def model_with(values: dict[str, float], factors=None, model: mujoco.MjModel | N
     return model
 
 
+OWN = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(start_model())]
+
+
 def test_every_parameter_has_a_case():
-    assert set(VALUES) == set(PARAMETERS)
+    assert set(VALUES) == set(OWN)
 
 
 @pytest.mark.parametrize("name", VALUES)
@@ -184,11 +200,16 @@ def test_units_without_a_line_have_no_joint_place(old, new, message):
         ("dead_time", "motors without, expected build_mjcf.actuation.dead_time of more than 0"),
         ("rate_limit", "winches without, expected build_mjcf.actuation.rate_limit of more than 0"),
         ("backlash", "winches without, expected build_mjcf.actuation.backlash of more than 0"),
+        ("winding", "evenly spread tendons, expected tendons that are described one by one"),
+        ("preload_2", "evenly spread tendons, expected tendons that are described one by one"),
+        ("preload_*", "evenly spread tendons, expected tendons that are described one by one"),
+        ("tendon_angle_4", "an arm without tendon 4, expected one for each tendon that it has"),
+        ("section_stiffness_*", "an arm without section 2, expected build_mjcf.arm of the kind sections"),
     ],
 )
 def test_a_parameter_of_what_the_arm_lacks_is_refused(name, message):
     config = SimpleNamespace(parameters=[name])
-    with pytest.raises(InputError, match=f"identify_control.parameters.{name}: found it for {message}"):
+    with pytest.raises(InputError, match=f"identify_control.parameters.{re.escape(name)}: found it for {message}"):
         check_parameters("identify_control", config, small_spec().compile())
 
 
@@ -196,6 +217,41 @@ def test_a_ratio_of_a_motor_that_the_arm_lacks_is_refused():
     config = SimpleNamespace(parameters=["kp_ratio_3"])
     with pytest.raises(InputError, match="kp_ratio_3: found it for an arm without motor 3"):
         check_parameters("identify_control", config, cantilever_spec(2, 1.0, 0.1).compile())
+
+
+def test_one_name_stands_for_all_tendons():
+    model = start_model()
+    assert names_of("preload_*", model) == ["preload_1", "preload_2", "preload_3"]
+    assert names_of("section_stiffness_*", model) == ["section_stiffness_2"]
+    assert names_of("kp", model) == ["kp"]
+
+
+def test_a_tendon_s_angle_turns_all_of_its_holes_and_keeps_their_distances():
+    start, model = start_model(), model_with({"tendon_angle_2": 1.0})
+    for index in range(start.nsite):
+        old, new, name = start.site_pos[index], model.site_pos[index], start.site(index).name
+        if name.endswith("_tendon_2"):
+            assert np.arctan2(new[1], new[0]) == pytest.approx(1.0)
+            assert np.hypot(*new[:2]) == pytest.approx(np.hypot(*old[:2]))
+            assert new[2] == old[2]
+        else:
+            assert (new == old).all()
+
+
+def test_the_tendons_distance_keeps_the_taper():
+    start, model = start_model(), model_with({"tendon_distance": 0.02})
+    holes = [index for index in range(start.nsite) if "_tendon_" in start.site(index).name]
+    scales = np.hypot(*model.site_pos[holes, :2].T) / np.hypot(*start.site_pos[holes, :2].T)
+    np.testing.assert_allclose(scales, scales[0])
+    assert np.hypot(*model.site("base_tendon_1").pos[:2]) == pytest.approx(0.02)
+
+
+def test_a_section_s_stiffness_leaves_the_others():
+    model = model_with({"section_stiffness_2": 0.5})
+    changed = model.jnt_stiffness[:16] / start_model().jnt_stiffness[:16]
+    np.testing.assert_allclose(changed[:6], 1.0)
+    np.testing.assert_allclose(changed[6:], changed[6])
+    assert model.jnt_stiffness[6] / model.jnt_stiffness[0] == pytest.approx(0.5)
 
 
 def test_candidates_do_not_mix():
@@ -253,7 +309,7 @@ def test_a_longer_friction_time_lets_a_hook_creep_straight_sooner():
     assert 1 > left[0] > 1.1 * left[1] > 2 * left[2] > 0
 
 
-@pytest.mark.parametrize("name", PARAMETERS)
+@pytest.mark.parametrize("name", OWN)
 def test_every_parameter_survives_saving(name):
     """Also one that is declared tomorrow: what it writes has a place in MJCF, alone or beside others."""
     spec = full_spec()

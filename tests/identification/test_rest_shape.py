@@ -20,7 +20,7 @@ POSE = np.array([0.02, -0.05, 0.01, 0.03, -0.04, 0.06, 0.0, 0.1])
 def spec():
     chain = uniform_chain(0.3, 0.05, 4, 1.0)
     properties = uniform_properties(chain, [0.02], 1.0, 5.0)
-    tendons = Tendons(0.1, 200, 20, 0.1, count=0, radius_ratio=0.8, kv=10)
+    tendons = Tendons(0.1, 200, 20, 0.1, routes=[], kv=10)
     return build_spec(chain, properties, tendons, Solver(0.002, 1e-5, *LIMIT, *LIMIT), 0.2)
 
 

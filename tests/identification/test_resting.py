@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import LIMIT
-from trunkline.arm.mjcf import Solver, Tendons, build_spec
+from trunkline.arm.mjcf import Marker, Solver, Tendons, build_spec
 from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
@@ -33,8 +33,8 @@ def straight_arm() -> mujoco.MjSpec:
     chain = uniform_chain(0.3, 0.05, 4, 1.0)
     return build_spec(
         chain, uniform_properties(chain, [0.02], 1.0, 2.0),
-        Tendons(0.1, 200, 20, 0.1, count=0, radius_ratio=0.8, kv=10), Solver(FRAME / 8, 1e-5, *LIMIT, *LIMIT),
-        0.1, {"1": 0.1, "2": 0.2, "3": 0.3},
+        Tendons(0.1, 200, 20, 0.1, routes=[], kv=10), Solver(FRAME / 8, 1e-5, *LIMIT, *LIMIT),
+        0.1, {"1": Marker(0.1), "2": Marker(0.2), "3": Marker(0.3)},
     )  # fmt: skip
 
 

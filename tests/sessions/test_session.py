@@ -48,6 +48,26 @@ def test_good_session(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("motor", "message"),
+    [
+        ({"unit": "deg", "tendons": {"tendon_1": 1}}, "motors.m1.*spool_radius: missing, expected that of a motor"),
+        ({"unit": "mm", "spool_radius": 0.1, "tendons": {"tendon_1": 1}}, "spool_radius: found 0.1, expected none"),
+        ({"unit": "inch", "tendons": {"tendon_1": 1}}, "motors.m1.unit: found 'inch', expected 'm', 'mm', 'rad' or"),
+        ({"unit": "m", "tendons": {}}, "motors.m1.tendons: "),
+    ],
+)
+def test_a_mistake_about_a_motor_is_named(tmp_path, motor, message):
+    with pytest.raises(InputError, match=message):
+        read_session(session(tmp_path, changed("motors", value={"m1": motor})))
+
+
+def test_motors_and_tendons_exclude_each_other(tmp_path):
+    content = changed("motors", value={"m1": {"unit": "m", "tendons": {"tendon_1": 1}}})
+    with pytest.raises(InputError, match="motors: found it beside `tendons`, expected one of the two"):
+        read_session(session(tmp_path, content | {"tendons": {"m1": "tendon_1"}}))
+
+
+@pytest.mark.parametrize(
     ("path", "value", "message"),
     [
         (

@@ -8,6 +8,7 @@ from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
 from trunkline.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.arm.spiral import spiral_chain
+from trunkline.arm.tendons import even_routes
 from trunkline.elements import DIAGONAL
 
 
@@ -20,7 +21,7 @@ def stump_spec(units: int = 7) -> mujoco.MjSpec:
     )
     properties = unit_properties(geometry, TPU_95A_MODULUS / 2, TPU_95A_DENSITY, 0.24, 0.1)
     tendons = Tendons(
-        count=3, radius_ratio=0.85, friction=0.5, kp=2000, kv=85, max_force=80, time_constant=0.05
+        routes=even_routes(geometry, 3, 0.85), friction=0.5, kp=2000, kv=85, max_force=80, time_constant=0.05
     )
     return build_spec(geometry, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT))
 

@@ -5,6 +5,7 @@ import mujoco
 from trunkline.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
 from trunkline.arm.mjcf import Solver, Tendons, build_spec
 from trunkline.arm.spiral import spiral_chain
+from trunkline.arm.tendons import even_routes
 
 LIMIT = ([0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0])  # solref, solimp
 
@@ -14,7 +15,7 @@ def small_spec(units: int = 8, **motors: float) -> mujoco.MjSpec:
     chain = spiral_chain(0.507, 0.080, 0.012, units)
     properties = unit_properties(chain, TPU_95A_MODULUS, TPU_95A_DENSITY, 0.24, 0.1)
     gains = {"kp": 2000, "kv": 85, "max_force": 80, "time_constant": 0.05}
-    tendons = Tendons(count=3, radius_ratio=0.85, friction=0.5, **gains | motors)
+    tendons = Tendons(routes=even_routes(chain, 3, 0.85), friction=0.5, **gains | motors)
     return build_spec(chain, properties, tendons, Solver(0.001, 1e-5, *LIMIT, *LIMIT))
 
 

@@ -94,6 +94,23 @@ def test_tendons_take_the_names_of_the_session(tmp_path):
     refused_curl(tmp_path, "command topic: found motor_1, motor_2, motor_3, expected 'motor_4' as in session.yaml")
 
 
+def test_a_motor_may_wind_several_tendons_by_degrees_of_its_drum(tmp_path):
+    plain, _ = curl(tmp_path)
+    curl(tmp_path, lambda m: replace(m, tendons=("m1", "m2", "m3")))
+    pair = "m1: {unit: deg, spool_radius: 0.02, tendons: {tendon_1: 1, tendon_2: -1}}"
+    edit_session(
+        tmp_path, "base: base", f"base: base\nmotors: {{m2: {{unit: mm, tendons: {{tendon_3: 0.5}}}}, {pair}}}"
+    )
+    take, _ = taken(tmp_path)[0]
+    turned = np.pi / 180 * 0.02 * plain.commands[:, 0]
+    assert take.tendons == ("tendon_3", "tendon_1", "tendon_2")
+    np.testing.assert_allclose(
+        take.commands, np.stack([5e-4 * plain.commands[:, 1], turned, -turned], axis=1), atol=1e-15
+    )
+    edit_session(tmp_path, "m2:", "m4:")
+    refused_curl(tmp_path, "command topic: found m1, m2, m3, expected 'm4' as in session.yaml")
+
+
 def test_commands_an_hour_off_are_refused_though_positions_are_there(tmp_path):
     def ahead(m):
         m.command_stamps[:] += 3_600_000_000_000

@@ -14,12 +14,14 @@ class ChainGeometry:
         widths: outer diameter of each unit at its proximal end, m. Shape (n,).
         joint_range: largest bend of each joint in each direction, rad. Shape (n,).
         ratio: scale from a unit to the next, α; 1 for a constant diameter.
+        sections: numbers of units of an arm that is made of several sections; none for others.
     """
 
     lengths: np.ndarray
     widths: np.ndarray
     joint_range: np.ndarray
     ratio: float
+    sections: tuple[int, ...] = ()
 
     @property
     def units(self) -> int:

@@ -14,7 +14,8 @@ from pydantic import Field
 
 from trunkline.arm.geometry import ChainGeometry
 from trunkline.arm.material import UnitProperties
-from trunkline.elements import BACKLASH, RATE_LIMIT
+from trunkline.arm.tendons import Route
+from trunkline.elements import BACKLASH, PRELOAD, RATE_LIMIT, SECTIONS, WINDING
 from trunkline.frames import STANDARD_GRAVITY
 
 TENDON_RGBA = (0.15, 0.15, 0.15, 1)
@@ -23,6 +24,7 @@ UNIT_RGBA = (0.93, 0.55, 0.2, 1)
 LOAD_RGBA = (0.4, 0.4, 0.45, 1)
 
 Coefficient = Annotated[float, Field(ge=-1e6, le=1e6)]  # negative ones are stiffness and damping themselves
+Aside = Annotated[float, Field(ge=-1, le=1)]
 Share = Annotated[float, Field(ge=0, le=1)]
 Solref = tuple[Coefficient, Coefficient]
 Solimp = tuple[Share, Share, Share, Share, Annotated[float, Field(ge=1, le=100)]]
@@ -52,17 +54,12 @@ class Actuation:
 
 @dataclass(kw_only=True)
 class Tendons(Actuation):
-    """Tendons through one hole a unit, evenly spread around the arm, tendon 1 over +x.
+    """routes: one a tendon, in their order. kv: velocity gain, N s/m. described: whether each was described by itself:
+    then the model has numbers for what commands draw in."""
 
-    Attributes:
-        count: number of tendons.
-        radius_ratio: distance of the holes from the axis over the unit's outer radius.
-        kv: velocity gain, N s/m.
-    """
-
-    count: int
-    radius_ratio: float
+    routes: list[Route]
     kv: float
+    described: bool = False
 
 
 @dataclass
@@ -84,6 +81,15 @@ class Solver:
     friction_solimp: Solimp
 
 
+@dataclass
+class Marker:
+    """distance: of a tracked point from the mount along the straight arm, m; beyond the tip it sticks out of the last
+    unit. aside: x and y of it from the axis, m."""
+
+    distance: Annotated[float, Field(gt=0, le=10)]
+    aside: tuple[Aside, Aside] = (0.0, 0.0)
+
+
 def unit_name(index: int) -> str:
     """Name of unit `index`, counted from 0 at the base: `unit_01` is the first."""
     return f"unit_{index + 1:02d}"
@@ -95,14 +101,14 @@ def build_spec(
     tendons: Tendons,
     solver: Solver,
     tip_load: float = 0.0,
-    segments: dict[str, float] | None = None,
+    segments: dict[str, Marker] | None = None,
     joint_place: float = 0.0,
 ) -> mujoco.MjSpec:
     """The arm hanging straight down from its mount, in SI units. Compile it with `.compile()`.
 
     Args:
         tip_load: kg that hangs at the tip.
-        segments: name of a tracked point to its distance from the mount along the straight arm, m.
+        segments: name of a tracked point to where its marker sits.
         joint_place: where a unit bends, as a share of its length from its upper end.
     """
     spec = mujoco.MjSpec()
@@ -112,25 +118,32 @@ def build_spec(
     spec.option.timestep = solver.timestep
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
     spec.option.gravity = [0, 0, -STANDARD_GRAVITY]
-    cables = [_add_cable(spec, index, tendons, solver) for index in range(tendons.count)]
+    cables = [_add_cable(spec, index, tendons, solver) for index in range(len(tendons.routes))]
     for name in (RATE_LIMIT, BACKLASH):  # MJCF has no such thing: the stepper reads it
         if cables and getattr(tendons, name):
             spec.add_numeric(name=name, data=[getattr(tendons, name)], size=1)
-    hole_radii = tendons.radius_ratio * chain.widths / 2
+
+    if tendons.described:
+        preload = [route.pretension / tendons.kp for route in tendons.routes]
+        spec.add_numeric(name=WINDING, data=[1.0], size=1)
+        spec.add_numeric(name=PRELOAD, data=preload, size=len(preload))
+    if chain.sections:
+        spec.add_numeric(name=SECTIONS, data=chain.sections, size=len(chain.sections))
 
     body = spec.worldbody.add_body(name="base")
     body.explicitinertial, body.mass, body.inertia = True, 1.0, [1e-3] * 3  # fixed: never felt
     _add_geom(body, "base", chain.widths[0] / 2, 0.005, (0, 0, 0.005))
     body.add_site(name="base_center")
-    _add_holes(body, "base", hole_radii[0], 0.0, cables)
+    _add_holes(body, "base", 0, 0.0, tendons.routes, cables)
     units = []
     for index in range(chain.units):
         body = _add_unit(body, index, chain, properties, solver, joint_place)
-        _add_holes(body, unit_name(index), hole_radii[index], -chain.lengths[index] / 2, cables)
+        _add_holes(body, unit_name(index), index + 1, -chain.lengths[index] / 2, tendons.routes, cables)
         units.append(body)
-    for name, distance in (segments or {}).items():
-        unit = chain.unit_at(distance)
-        units[unit].add_site(name=f"{name}_center", pos=[0, 0, chain.lengths[:unit].sum() - distance])
+    for name, marker in (segments or {}).items():
+        unit = chain.unit_at(marker.distance)
+        place = [*marker.aside, chain.lengths[:unit].sum() - marker.distance]
+        units[unit].add_site(name=f"{name}_center", pos=place)
     body.add_site(name="tip", pos=[0, 0, -chain.lengths[-1]])
     if tip_load:
         _add_load(body, tip_load, chain)
@@ -210,9 +223,12 @@ def _add_cable(spec: mujoco.MjSpec, index: int, tendons: Tendons, solver: Solver
     return cable
 
 
-def _add_holes(body, name: str, radius: float, height: float, cables: list) -> None:
-    for index, cable in enumerate(cables):
-        angle = 2 * np.pi * index / len(cables)
-        site = f"{name}_tendon_{index + 1}"
-        body.add_site(name=site, pos=[radius * np.cos(angle), radius * np.sin(angle), height], size=[0.0015] * 3)
+def _add_holes(body, name: str, place: int, height: float, routes: list[Route], cables: list) -> None:
+    """The holes of the mount, `place` 0, or of unit `place`, for the tendons that go as far."""
+    for number, (route, cable) in enumerate(zip(routes, cables, strict=True), start=1):
+        if place >= len(route.distances):
+            continue
+        site, radius = f"{name}_tendon_{number}", route.distances[place]
+        at = [radius * np.cos(route.angle), radius * np.sin(route.angle), height]
+        body.add_site(name=site, pos=at, size=[0.0015] * 3)
         cable.wrap_site(site)

@@ -65,12 +65,19 @@ def uniform_properties(
         damping_ratio: ζ.
     """
     each = np.broadcast_to(np.asarray(masses, dtype=float), (chain.units,)).copy()
+    return slender_properties(chain, each, np.full(chain.units, stiffness), damping_ratio)
+
+
+def slender_properties(
+    chain: ChainGeometry, masses: np.ndarray, stiffness: np.ndarray, damping_ratio: float
+) -> UnitProperties:
+    """As `uniform_properties`, of units that have masses, kg, and joints that have stiffness, N m/rad, of their own.
+    Each of shape (n,)."""
     radius = chain.widths / 2
-    joints = np.full(chain.units, stiffness)
     return UnitProperties(
-        masses=each,
-        transverse_inertia=each * (radius**2 / 4 + chain.lengths**2 / 12),
-        axial_inertia=each * radius**2 / 2,
-        stiffness=joints,
-        damping=joint_damping(joints, each.mean(), chain.lengths[0], damping_ratio),
+        masses=masses,
+        transverse_inertia=masses * (radius**2 / 4 + chain.lengths**2 / 12),
+        axial_inertia=masses * radius**2 / 2,
+        stiffness=stiffness,
+        damping=joint_damping(stiffness, masses.mean(), chain.lengths[0], damping_ratio),
     )

@@ -11,7 +11,7 @@ from scipy.ndimage import binary_dilation
 from trunkline.errors import InputError
 from trunkline.filtering.effect import Effect
 from trunkline.frames import make_continuous, tilt_of_gravity
-from trunkline.signals.base_frame import average_base, gravity_from_up, to_base_frame
+from trunkline.signals.base_frame import BasePose, average_base, gravity_from_up, to_base_frame
 from trunkline.signals.smoothing import bridged, fill_gaps, low_pass, outliers, resample
 from trunkline.trials.experiments import EXPERIMENTS, Kind
 from trunkline.trials.take import Take
@@ -50,6 +50,9 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
     """
     base = average_base(take.base_positions, take.base_quaternions)
     positions, quaternions = to_base_frame(base, take.positions, take.quaternions)
+    kind, motion = EXPERIMENTS[take.experiment], None
+    if kind.stepwise:
+        return _settled(take, positions, quaternions, base)
     grid = np.arange(int(take.time[-1] * settings.rate) + 1) / settings.rate
     frames, count = len(grid), len(take.segments)
     width = 3 if quaternions is None else 7
@@ -69,24 +72,8 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
 
     commands, wound = _on_pose_clock(take, grid)
     gravity = gravity_from_up(base, take.up)
-    trial = Trial(
-        name=take.name,
-        experiment=take.experiment,
-        split=take.split,
-        level=take.level,
-        load=take.load,
-        gravity=gravity,
-        time=grid,
-        segments=take.segments,
-        positions=columns[..., :3],
-        quaternions=None if quaternions is None else columns[..., 3:],
-        measured=measured,
-        tendons=take.tendons,
-        commands=commands,
-        tendon_positions=wound,
-        repairs=take.repairs,
-    )
-    kind, motion = EXPERIMENTS[take.experiment], None
+    quaternions = None if quaternions is None else columns[..., 3:]
+    trial = _trial(take, gravity, grid, columns[..., :3], quaternions, measured, commands, wound)
     if kind.static:
         motion = float(np.sqrt(np.mean(np.var(trial.positions, axis=0))))
         trial = average_static(trial)
@@ -107,6 +94,30 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
     return trial, effect
 
 
+def _trial(
+    take: Take, gravity: np.ndarray, time: np.ndarray, positions: np.ndarray, quaternions: np.ndarray | None,
+    measured: np.ndarray, commands: np.ndarray, wound: np.ndarray,
+) -> Trial:  # fmt: skip
+    """What the take was planned as, with these samples, shapes as in `Trial`."""
+    return Trial(
+        name=take.name,
+        experiment=take.experiment,
+        split=take.split,
+        level=take.level,
+        load=take.load,
+        gravity=gravity,
+        time=time,
+        segments=take.segments,
+        positions=positions,
+        quaternions=quaternions,
+        measured=measured,
+        tendons=take.tendons,
+        commands=commands,
+        tendon_positions=wound,
+        repairs=take.repairs,
+    )
+
+
 def start_of(trial: Trial, kind: Kind, settings: Filter) -> dict:
     """When a trial that went through the low-pass begins: its start and start_sigma, s, in_motion and swaying."""
     if kind.start is None:
@@ -117,6 +128,21 @@ def start_of(trial: Trial, kind: Kind, settings: Filter) -> dict:
     if kind.free is not None and settings.release == "free":
         found |= {"start": kind.free(trial, begun.time), "in_motion": True, "swaying": False}
     return found
+
+
+def _settled(
+    take: Take, positions: np.ndarray, quaternions: np.ndarray | None, base: BasePose
+) -> tuple[Trial, Effect]:
+    """A trial whose every frame is a shape at rest of its own: nothing to filter, and no clock but the frames' own."""
+    columns = positions if quaternions is None else np.concatenate([positions, quaternions], axis=2)
+    measured = np.isfinite(columns[..., 0]) & np.isfinite(columns[..., -1])
+    commands, wound = _on_pose_clock(take, take.time)
+    trial = _trial(take, gravity_from_up(base, take.up), take.time, positions, quaternions, measured, commands, wound)
+    effect = Effect(
+        samples=measured.size, gap_share=1 - float(measured.mean()), filled_share=0.0, outliers=0, position_noise=0.0,
+        angle_noise=None, tilt=tilt_of_gravity(trial.gravity), motion=0.0, base_shift=base.shift, base_turn=base.turn,
+    )  # fmt: skip
+    return trial, effect
 
 
 class _Segment(NamedTuple):

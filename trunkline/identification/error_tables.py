@@ -18,6 +18,7 @@ LABELS = {
     "null_straight": "null: straight arm",
     "null_held": "null: start held",
     "noise_floor": "noise floor",
+    "prompt": "identified, winches that wind as they are told",
 }
 
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from trunkline.elements import segment_sites
-from trunkline.identification.experiment import Experiment
+from trunkline.identification.experiment import Experiment, weights_for
 from trunkline.identification.loss import (
     RESIDUALS,
     LossWeights,
@@ -17,7 +17,7 @@ from trunkline.identification.loss import (
     velocity_error,
 )
 from trunkline.identification.population import Population
-from trunkline.trials.experiments import EXPERIMENTS
+from trunkline.trials.experiments import EXPERIMENTS, is_static, is_stepwise
 from trunkline.trials.splits import SPLITS
 
 SPECTRUM = 16  # times as many points as samples, so that a parabola through three of them finds a peak
@@ -93,8 +93,9 @@ def scores(
 ) -> dict[str, dict]:
     """By split the loss, if one is asked for, and the errors, each the mean over `trials` trials, some `_worst` too.
 
-    `by_experiment` has the same for every kind; `without_repaired` where `ingest` repaired some of the split's trials,
-    `repaired` of them. Where a simulation diverged, its segments count as the arm's length away along every axis.
+    `by_experiment` has the same for every kind; shapes at rest that follow each other have two errors of the tip more;
+    `without_repaired` where `ingest` repaired some of the split's trials, `repaired` of them. Where a simulation
+    diverged, its segments count as the arm's length away along every axis.
     """
     rows = trial_errors(Prediction(replayed, experiments), loss, weights)
     table: dict[str, dict] = {}
@@ -102,7 +103,22 @@ def scores(
         own = [(e, row) for e, row in rows if e.split == split]
         if own:
             table[split] = _summary(own)
+        paths = [
+            (survived(positions, replayed.length), e)
+            for positions, e in zip(replayed.positions, experiments, strict=True)
+            if e.split == split and is_stepwise(e.kind)
+        ]
+        if paths:
+            table[split] |= _tip_over_paths(paths, replayed.tip)
     return table
+
+
+def _tip_over_paths(paths: list[tuple[np.ndarray, Experiment]], tip: int) -> dict[str, float]:
+    """Root mean square of the tip's distance over all shapes of all trials, and that of what is left once the mean
+    offset is taken out, as quasi-static models of continuum robots are compared. Paths: positions (T, S, 3), m."""
+    off = np.concatenate([(found - e.positions)[:, tip][e.measured[:, tip]] for found, e in paths])
+    ways = {"e_tip_rms_mm": off, "e_tip_centred_rms_mm": off - off.mean(axis=0)}
+    return {name: float(np.sqrt(np.mean(np.sum(way**2, axis=1)))) * 1e3 for name, way in ways.items()}
 
 
 def _summary(rows: list[tuple[Experiment, dict[str, float]]]) -> dict:
@@ -169,8 +185,9 @@ def errors_of(
         found["e_tip"] = float(position_error(positions[:, one], real[:, one], measured[:, one]))
     row = {f"{name}_mm": error * 1e3 for name, error in found.items()}
     row |= {f"{name}_pct": error / length * 100 for name, error in found.items()}
-    in_order = experiment.frames == 1 or experiment.frame_step > 0  # else frames taken from here and there
-    if loss is not None and weights is not None and in_order:
+    in_order = experiment.frame_step > 0  # else frames taken from here and there, or shapes at rest
+    if loss is not None and weights is not None and (in_order or is_static(experiment.kind)):
+        weights = weights_for(experiment, weights)
         row["loss"] = float(loss_of(RESIDUALS[loss](positions[None], real, measured, weights))[0])
     if experiment.frames > 1 and in_order:
         row["e_velocity_mm_s"] = float(velocity_error(positions, real, measured, 1 / experiment.frame_step)) * 1e3

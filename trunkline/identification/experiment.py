@@ -7,8 +7,9 @@ import numpy as np
 
 from trunkline.elements import arm_hinges, cables
 from trunkline.errors import InputError
+from trunkline.identification.loss import LossWeights
 from trunkline.identification.pose_fit import PoseFit, fit_pose
-from trunkline.trials.experiments import is_static
+from trunkline.trials.experiments import is_static, is_stepwise
 from trunkline.trials.trial import Trial
 
 SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend takes up
@@ -25,7 +26,8 @@ SEEN_SHARE = 0.6  # of the segments that must be measured in the frame of the st
 
 @dataclass
 class Experiment:
-    """One simulation per candidate, of T frames at `frame_step` seconds; a static trial has T = 1.
+    """One simulation per candidate, of T frames at `frame_step` seconds. A static trial has T = 1, or T shapes at rest
+    with a `frame_step` of 0.
 
     Attributes:
         name, kind, split: as in the trial; kind is its experiment.
@@ -82,10 +84,10 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         InputError: if its segments and tendons are not those of the model, or too little was measured.
     """
     check_names(trial, model)
-    static = is_static(trial.experiment)
-    step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 else 0.0
+    static, stepwise = is_static(trial.experiment), is_stepwise(trial.experiment)
+    step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 and not static else 0.0
     held, seen = start_frames(trial)
-    window = slice(0, 1) if static else slice(held + 1, held + 1 + frames)
+    window = slice(None) if stepwise else slice(0, 1) if static else slice(held + 1, held + 1 + frames)
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
@@ -103,7 +105,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         start=start,
         velocity=velocity,
         lead=0.0 if static else _lead(trial, held),
-        controls=lengths[:1] if static else 0.5 * (lengths[:-1] + lengths[1:])[held : held + len(positions)],
+        controls=lengths[window] if static else 0.5 * (lengths[:-1] + lengths[1:])[held : held + len(positions)],
         positions=positions,
         measured=measured,
         frame_step=step,
@@ -111,6 +113,11 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         repaired=trial.repairs > 0,
         load=trial.load,
     )
+
+
+def weights_for(experiment: Experiment, weights: LossWeights) -> LossWeights:
+    """Those of the loss that are for a trial: shapes at rest that follow each other have no velocity."""
+    return replace(weights, weight_velocity=0.0) if is_stepwise(experiment.kind) else weights
 
 
 def own_starts(

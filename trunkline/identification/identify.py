@@ -19,6 +19,7 @@ from trunkline.identification.robust import reweighted
 from trunkline.identification.search import Convergence, Found, descend, search
 from trunkline.identification.surrogate import Surrogate, surrogate
 from trunkline.progress import progress
+from trunkline.trials.experiments import is_static
 from trunkline.trials.splits import IDENTIFY
 
 SEEN = 0.05  # share of the losses by which a surrogate may mistake those at a new estimate, and still serve there
@@ -72,7 +73,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
     searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}
     problems, found = [rough, exact], searches["coarse"]
     near, last = exact, "polish"
-    if method.rough.step_factor > 1 and any(e.frames > 1 for e in seen):  # at rest, the step changes nothing
+    if method.rough.step_factor > 1 and not all(is_static(e.kind) for e in seen):  # at rest, the step changes nothing
         near, last = fit.problem(model, seen, method.rough.step_factor), "whole"
         problems.append(near)
     found = _polish(near, found, method.polish, f"{label} near")

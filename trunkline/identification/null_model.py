@@ -12,7 +12,7 @@ import numpy as np
 from trunkline.identification.evaluation import Prediction, Replay, segment_positions
 from trunkline.identification.experiment import Experiment, measured_pose, start_frames
 from trunkline.identification.pose_fit import fit_pose
-from trunkline.trials.experiments import is_static
+from trunkline.trials.experiments import is_static, is_stepwise
 from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.trial import Trial
 
@@ -104,7 +104,10 @@ def _floor(trial: Trial, experiment: Experiment, model: mujoco.MjModel, count: i
 
 
 def _last_shape(experiment: Experiment) -> np.ndarray:
-    """Where each segment was measured last, m; nan where it never was. Shape (S, 3)."""
+    """Where each segment was measured last, of shapes at rest that follow each other their mean, m; nan where it never
+    was. Shape (S, 3)."""
+    if is_stepwise(experiment.kind):
+        return np.nanmean(np.where(experiment.measured[..., None], experiment.positions, np.nan), axis=0)
     frames, segments = experiment.measured.shape
     last = frames - 1 - np.argmax(experiment.measured[::-1], axis=0)
     shape = experiment.positions[last, np.arange(segments)]

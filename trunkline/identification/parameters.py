@@ -16,14 +16,18 @@ from trunkline.elements import (
     DIAGONAL,
     DIAGONAL_SHARE,
     HINGE_SHARE,
+    PRELOAD,
     RATE_LIMIT,
+    SECTIONS,
     SLIDER,
+    WINDING,
     all_elements,
     arm_hinges,
     cables,
     diagonal_lengths,
     elements,
     holes,
+    numbers_place,
     numeric,
     numeric_place,
 )
@@ -45,8 +49,10 @@ class Parameter:
         read: its value in a model.
         write: (fields, values (candidates,), model) sets it in every candidate.
         signed: whether it may be 0 or less. Only others are searched on a logarithmic scale.
+        scale: of a signed one, in its unit: what is searched is so many of it.
         part: what of an arm it belongs to, if not every arm has it: "tendons", their motors' "dead time", RATE_LIMIT or
-            BACKLASH, the "motor 2", …, a joint's "branch 1", "slider 1", …, or "holes" on which cables rub.
+            BACKLASH, the "motor 2", …, the "tendon 2", …, what commands draw in, WINDING and PRELOAD, the "section 2",
+            …, a joint's "branch 1", "slider 1", …, or "holes" on which cables rub.
         told_by: whether trials of a kind of experiment tell it: from others alone it comes out wrong, or anyhow.
     """
 
@@ -57,6 +63,7 @@ class Parameter:
     signed: bool = False
     part: str = ""
     told_by: Callable[[Kind], bool] = lambda kind: True
+    scale: float = 1.0
 
     def belongs_to(self, model: mujoco.MjModel) -> bool:
         """Whether the arm has the part of which this is."""
@@ -64,22 +71,24 @@ class Parameter:
             return bool(model.nhistory)
         if self.part == "holes":
             return holes(model).size > 0
-        if self.part in (RATE_LIMIT, BACKLASH):
+        if self.part in (RATE_LIMIT, BACKLASH, WINDING):
             return numeric_place(model, self.part) is not None
         kind, _, number = self.part.partition(" ")
-        if kind == "motor":
+        if kind in ("motor", "tendon"):
             return model.nu >= int(number)
+        if kind in (PRELOAD, "section"):
+            return len(numbers_place(model, PRELOAD if kind == PRELOAD else SECTIONS)) >= int(number)
         if number:
             return len(elements(model, kind, int(number)).tendon) > 0
         return not kind or model.nu > 0
 
     def coordinate(self, value):
-        """Where a value lies on the axis that is searched: its natural logarithm, or itself if signed."""
-        return np.asarray(value, dtype=float) if self.signed else np.log(value)
+        """Where a value lies on the axis that is searched: its natural logarithm, or over `scale` if signed."""
+        return np.asarray(value, dtype=float) / self.scale if self.signed else np.log(value)
 
     def value(self, coordinate):
         """The inverse of `coordinate`."""
-        return np.asarray(coordinate, dtype=float) if self.signed else np.exp(coordinate)
+        return np.asarray(coordinate, dtype=float) * self.scale if self.signed else np.exp(coordinate)
 
 
 def _moving(kind: Kind) -> bool:
@@ -325,14 +334,90 @@ def _rest_bend(axis: int, power: int) -> Parameter:
     return Parameter("rad", ("qpos_spring",), read, write, signed=True)
 
 
-def _number(name: str, unit: str, part: str) -> Parameter:
+def _number(name: str, unit: str, part: str, told_by: Callable[[Kind], bool] = _pulled_and_moving) -> Parameter:
     """One that is no field of MuJoCo's but a number of that name, which the stepper reads."""
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         fields["numeric_data"][:, numeric_place(model, name)] = values
 
     read = partial(numeric, name=name)
-    return Parameter(unit, ("numeric_data",), read, write, part=part, told_by=_pulled_and_moving)
+    return Parameter(unit, ("numeric_data",), read, write, part=part, told_by=told_by)
+
+
+def _winds(kind: Kind) -> bool:
+    """Backlash shows where tendons go to and fro."""
+    return kind.needs_motors and (not kind.static or kind.stepwise)
+
+
+def _preload(number: int) -> Parameter:
+    """How far cable `number` is drawn in beyond the straight arm's length where its command is 0; below 0 it is slack.
+    """
+
+    def read(model: mujoco.MjModel) -> float:
+        places = numbers_place(model, PRELOAD)
+        return float(model.numeric_data[places[number - 1]]) if len(places) >= number else 0.0
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        fields["numeric_data"][:, numbers_place(model, PRELOAD)[number - 1]] = values
+
+    return Parameter("m", ("numeric_data",), read, write, True, f"{PRELOAD} {number}", _pulled, scale=0.01)
+
+
+def _holes_of(model: mujoco.MjModel, number: int) -> np.ndarray:
+    """Numbers of the sites through which cable `number` runs, that of the mount first; none if there is no such cable.
+    """
+    if model.nu < number:
+        return np.zeros(0, dtype=int)
+    cable = cables(model)[number - 1]
+    return model.wrap_objid[model.tendon_adr[cable] : model.tendon_adr[cable] + model.tendon_num[cable]]
+
+
+def _angle(number: int) -> Parameter:
+    """At which angle about the arm's axis cable `number` runs, from +x towards +y, between -π and π."""
+
+    def read(model: mujoco.MjModel) -> float:
+        sites = _holes_of(model, number)
+        return float(np.arctan2(*model.site_pos[sites[0], 1::-1])) if len(sites) else 0.0
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        sites = _holes_of(model, number)
+        turns = values - read(model)
+        x, y = fields["site_pos"][:, sites, 0], fields["site_pos"][:, sites, 1]
+        cosine, sine = np.cos(turns)[:, None], np.sin(turns)[:, None]
+        fields["site_pos"][:, sites, :2] = np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
+
+    return Parameter("rad", ("site_pos",), read, write, True, f"tendon {number}", _pulled)
+
+
+def _read_distance(model: mujoco.MjModel) -> float:
+    sites = _holes_of(model, 1)
+    return float(np.hypot(*model.site_pos[sites[0], :2])) if len(sites) else 0.0
+
+
+def _write_distance(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+    """Of the first cable from the axis at the mount; all holes keep their ratios to it."""
+    sites = np.concatenate([_holes_of(model, number + 1) for number in range(model.nu)])
+    fields["site_pos"][:, sites, :2] *= (values / _read_distance(model))[:, None, None]
+
+
+def _section_stiffness(number: int) -> Parameter:
+    """Stiffness of the first joint of section `number` over that of the first section's; all of its joints keep their
+    ratios to it."""
+
+    def read(model: mujoco.MjModel) -> float:
+        units = np.cumsum(model.numeric_data[numbers_place(model, SECTIONS)]).astype(int)
+        if len(units) < number:
+            return 1.0
+        first = np.flatnonzero(unit_of_hinge(model) == units[number - 2])[0]
+        return float(model.jnt_stiffness[first] / model.jnt_stiffness[0])
+
+    def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
+        edges = np.append(0, np.cumsum(model.numeric_data[numbers_place(model, SECTIONS)]))
+        unit = unit_of_hinge(model)
+        own = (unit >= edges[number - 1]) & (unit < edges[number])
+        _scale_stiffness(fields, np.where(own, (values / read(model))[:, None], 1.0), model)
+
+    return Parameter("", STIFFNESS_FIELDS, read, write, part=f"section {number}")
 
 
 STIFFNESS_FIELDS = ("jnt_stiffness", "jnt_stiffnesspoly", "tendon_stiffness", "tendon_stiffnesspoly", "dof_damping")
@@ -410,11 +495,20 @@ PARAMETERS: dict[str, Parameter] = {
         part="dead time", told_by=_pulled_and_moving,
     ),
     "rate_limit": _number(RATE_LIMIT, "m/s", RATE_LIMIT),
-    "backlash": _number(BACKLASH, "m", BACKLASH),
+    "backlash": _number(BACKLASH, "m", BACKLASH, _winds),
+    # metres of cable that a commanded metre draws in: the drum's radius over what session.yaml takes it for
+    "winding": _number(WINDING, "", WINDING, _pulled),
+    "tendon_distance": Parameter("m", ("site_pos",), _read_distance, _write_distance, part="tendons", told_by=_pulled),
     "mount_tilt_x": _mount(0),
     "mount_tilt_y": _mount(1),
     "mount_twist": _mount(2),
 }  # fmt: skip
+MOST = 24  # tendons, and sections, of which each may have a parameter of its own
+NUMBERED: dict[str, tuple[Callable[[int], Parameter], int]] = {  # name to what makes one, and the first number
+    "tendon_angle": (_angle, 1), "preload": (_preload, 1), "section_stiffness": (_section_stiffness, 2),
+}  # fmt: skip
+PARAMETERS |= {f"{name}_{k}": make(k) for name, (make, first) in NUMBERED.items() for k in range(first, MOST + 1)}
+EVERY = "_*"  # ends the name of one of `NUMBERED` in params.yaml for all that the arm has
 
 # what a factor of each unit's own may scale: the fields, and how
 PER_JOINT = {"stiffness": (STIFFNESS_FIELDS, _scale_stiffness), "damping": (DAMPING_FIELDS, _scale_damping)}
@@ -423,8 +517,23 @@ if TYPE_CHECKING:
     ParameterName = str
     PerJointName = str
 else:  # so that whoever names another is told which there are
-    ParameterName = Literal[tuple(PARAMETERS)]
+    ParameterName = Literal[(*PARAMETERS, *(f"{name}{EVERY}" for name in NUMBERED))]
     PerJointName = Literal[tuple(PER_JOINT)]
+
+
+def parameter_named(name: str) -> Parameter:
+    """Of PARAMETERS; of a name that stands for several, the first."""
+    stem = name.removesuffix(EVERY)
+    return PARAMETERS[name if stem == name else f"{stem}_{NUMBERED[stem][1]}"]
+
+
+def names_of(name: str, model: mujoco.MjModel) -> list[str]:
+    """The parameters of an arm for which a name stands: itself, or one for each of its tendons or sections."""
+    stem = name.removesuffix(EVERY)
+    if stem == name:
+        return [name]
+    make, first = NUMBERED[stem]
+    return [f"{stem}_{k}" for k in range(first, MOST + 1) if make(k).belongs_to(model)]
 
 
 def candidate_fields(

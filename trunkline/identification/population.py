@@ -10,15 +10,14 @@ import numpy as np
 from mujoco.batch import Batch
 
 from trunkline.elements import SLIDER, all_elements, arm_hinges, cables, give_way, let_hang, let_slide, segment_sites
+from trunkline.identification.at_rest import shapes_at_rest
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
+from trunkline.identification.winding import wound_by_each
 from trunkline.simulation.load import hang
 from trunkline.simulation.motion import batch_of, hold, move
-from trunkline.simulation.rest import come_to_rest, lead_to_rest, relax
 from trunkline.simulation.winch import Winches
 from trunkline.trials.experiments import is_static
-
-SETTLE_TIME = 30.0  # s, the most; a shape that does not rest by then counts as diverged
 
 
 @dataclass
@@ -27,14 +26,15 @@ class Simulated:
 
     positions: per trial (C, T, S, 3), m; not finite from where a candidate diverged.
     diverged: which candidates left the physics in any trial, or made MuJoCo warn. Shape (C,).
-    steps: simulation steps taken.
-    rests: angles of the arm's hinges where the first candidate rests, rad; NaN for trials in motion. Shape (T, n).
+    steps: simulation steps taken, of trials at rest iterations of Newton's method.
+    rests: per trial angles of the arm's hinges where the first candidate rests, rad; NaN for trials in motion. Each
+        (T, n).
     """
 
     positions: list[np.ndarray]
     diverged: np.ndarray
     steps: int
-    rests: np.ndarray
+    rests: list[np.ndarray]
 
 
 class Group(NamedTuple):
@@ -67,7 +67,7 @@ class Population:
         self._step_factor = step_factor
         self._batches: dict[Group, Batch] = {}
 
-    def simulate(self, fields: Fields, rests: np.ndarray | None = None) -> Simulated:
+    def simulate(self, fields: Fields, rests: list[np.ndarray] | None = None) -> Simulated:
         """Run every candidate (the first axis of `fields`) through every experiment.
 
         Args:
@@ -75,15 +75,17 @@ class Population:
         """
         count = len(next(iter(fields.values())))
         positions: list = [None] * len(self._experiments)
-        found = np.full((len(self._experiments), arm_hinges(self._model)), np.nan)
+        found = [np.full((1, arm_hinges(self._model)), np.nan)] * len(self._experiments)
         steps = 0
         for group, chosen in self._groups.items():
             own = [self._experiments[i] for i in chosen]
-            batch = self._batch(group, own, fields, count)
             if group.static:
-                results, taken, found[chosen] = self._settle(batch, len(own), rests if rests is None else rests[chosen])
+                near = None if rests is None else [rests[i] for i in chosen]
+                results, angles, taken = shapes_at_rest(self._model, fields, own, self._sites, near)
+                for index, result in zip(chosen, angles, strict=True):
+                    found[index] = result
             else:
-                results, taken = self._run(batch, own, count)
+                results, taken = self._run(self._batch(group, own, fields, count), own, fields, count)
             steps += taken
             for index, result in zip(chosen, results, strict=True):
                 positions[index] = result
@@ -98,7 +100,7 @@ class Population:
         if batch is None or batch.nsim != count * len(experiments):
             model = _without_idle(self._model, group, fields)
             batch = self._batches[group] = batch_of(model, count * len(experiments))
-        if group.static or group.slack:  # cables do not rub, winches do not wind
+        if group.slack:  # cables do not rub, winches do not wind
             fields = {name: values for name, values in fields.items() if name != "numeric_data"}
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         for name, values in fields.items():
@@ -114,7 +116,8 @@ class Population:
         batch.bind("qvel")[:, :arm] = np.repeat([e.velocity for e in experiments], count, axis=0)
         self._remember(batch)
         if self._model.nu:
-            hold(batch, self._model, np.repeat([e.controls[0] for e in experiments], count, axis=0))
+            first = np.array([e.controls[:1] for e in experiments])
+            hold(batch, self._model, wound_by_each(self._model, fields, first)[:, 0])
         return batch
 
     def _remember(self, batch: Batch) -> None:
@@ -127,38 +130,15 @@ class Population:
             for end in (0, 1):  # of the spring's length at rest
                 batch.bind("plastic")[:, place + end] = bend - np.clip(bend, -give, give)
 
-    def _settle(
-        self, batch: Batch, trials: int, rests: np.ndarray | None
-    ) -> tuple[list[np.ndarray], int, np.ndarray]:
-        """Static shapes: friction off, heavily damped, from the measured pose, if not from near `rests` (T, n).
-
-        Returns:
-            Segments (C, 1, S, 3) of every trial, steps, and angles where the first candidate rests (T, n).
-        """
-        timestep, looks = relax(batch, self._model), 0
-        angles, sites, moving = batch.bind("qpos"), batch.bind("site_xpos"), np.arange(batch.nsim, dtype=np.int32)
-        if rests is not None:
-            begun = angles.copy()
-            angles[:, : rests.shape[1]] = np.repeat(rests, batch.nsim // trials, axis=0)
-            near = np.isfinite(angles).all(axis=1)
-            left, looks = lead_to_rest(batch, moving[near])
-            moving = np.union1d(left, moving[~near])
-            angles[moving] = begun[moving]
-        moving, steps = come_to_rest(batch, timestep, SETTLE_TIME, moving)
-        batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
-        shapes, ends = sites[:, None, self._sites], angles[:, : arm_hinges(self._model)].copy()
-        lost = np.union1d(moving, np.flatnonzero(batch.warning.any(axis=(1, 2))))
-        shapes[lost], ends[lost] = np.nan, np.nan
-        shapes = shapes.reshape(trials, -1, *shapes.shape[1:])
-        return list(shapes), steps + looks, ends[:: batch.nsim // trials]
-
-    def _run(self, batch: Batch, experiments: list[Experiment], count: int) -> tuple[list[np.ndarray], int]:
+    def _run(
+        self, batch: Batch, experiments: list[Experiment], fields: Fields, count: int
+    ) -> tuple[list[np.ndarray], int]:
         """Trials in motion: from the start to the first frame, then frame by frame."""
         frame_step, sites = experiments[0].frame_step, self._sites
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))
         timestep = batch.expand("opt.timestep")
         timestep[:] = np.repeat([e.lead / substeps for e in experiments], count)
-        first = np.repeat([e.controls[0] for e in experiments], count, axis=0)
+        first = wound_by_each(self._model, fields, np.array([e.controls[:1] for e in experiments]))[:, 0]
         winches = Winches(batch, first)
         move(batch, np.repeat(first[:, None], substeps, axis=1), ())
         timestep[:] = frame_step / substeps
@@ -166,7 +146,7 @@ class Population:
         results = [np.empty((count, frames, len(sites), 3)) for frames in lengths]
         for start, end in pairwise(sorted({1, *lengths})):  # trials that are over stay behind
             running = [e for e in experiments if e.frames >= end]
-            controls = np.repeat([e.controls[start:end] for e in running], count, axis=0)
+            controls = wound_by_each(self._model, fields, np.array([e.controls[start:end] for e in running]))
             ids = np.arange(len(controls), dtype=np.int32)
             rows = winches.deliver(np.repeat(controls, substeps, axis=1), ids)
             # a step sees the sites where they are before it: the first of a frame, where the last frame ended
@@ -184,13 +164,13 @@ class Population:
 
 
 def _without_idle(model: mujoco.MjModel, group: Group, fields: Fields) -> mujoco.MjModel:
-    """A copy of the model without what moves nothing in such trials and takes most of a step: friction of cables on
-    their holes where nothing pulls or the arm settles, and cables that are slack."""
+    """A copy of the model without what moves nothing in such trials and takes most of a step: where nothing pulls,
+    friction of cables on their holes, and the cables themselves."""
     model = copy.copy(model)
     own = (model.tendon_frictionloss, model.tendon_stiffness, model.tendon_damping)
     bare = "tendon_frictionloss" not in fields and not any(values[cables(model)].any() for values in own)
-    if group.slack and (bare or group.static):
+    if group.slack and bare:
         let_hang(model)
-    elif group.slack or group.static:
+    elif group.slack:
         let_slide(model)
     return model

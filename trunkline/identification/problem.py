@@ -9,11 +9,12 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.elements import capstan_friction
-from trunkline.identification.experiment import Experiment
+from trunkline.identification.experiment import Experiment, weights_for
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
 from trunkline.identification.parameters import PARAMETERS, candidate_fields, follow_rest, unit_of_hinge
 from trunkline.identification.population import Population
 from trunkline.identification.resting import RestShape, spring_references
+from trunkline.trials.experiments import is_static
 
 DIVERGED_LOSS = 1e3  # finite, and with sensible weights far above the loss of any arm that stays in one piece
 
@@ -63,14 +64,14 @@ class Problem:
         if self.trial_weights is None:
             self.trial_weights = np.ones(len(self.experiments))
         self._population = Population(self.model, self.experiments, self.segments, self.step_factor)
-        self._last: tuple[np.ndarray, np.ndarray] | None = None  # candidate that was alone, and where it rests
+        self._last: tuple[np.ndarray, list[np.ndarray]] | None = None  # candidate that was alone, and where it rests
         self.units = int(unit_of_hinge(self.model).max()) + 1
 
     @property
     def rubs(self) -> bool:
         """Whether cables that rub on their holes move the arm in any trial."""
         rubbing = capstan_friction(self.model) > 0
-        return rubbing and any(e.frames > 1 and not e.slack(self.model) for e in self.experiments)
+        return rubbing and any(not is_static(e.kind) and not e.slack(self.model) for e in self.experiments)
 
     def fields(self, vectors: np.ndarray) -> dict[str, np.ndarray]:
         """Model fields of candidates (C, P)."""
@@ -91,7 +92,7 @@ class Problem:
         Args:
             near: a candidate (P,) that is close to all of them, in whose shapes at rest theirs are looked for.
         """
-        rests = None if near is None or all(e.frames > 1 for e in self.experiments) else self._rests_at(near)
+        rests = None if near is None or not any(is_static(e.kind) for e in self.experiments) else self._rests_at(near)
         begun = time.perf_counter()
         simulated = self._population.simulate(self.fields(vectors), rests)
         if len(vectors) == 1:
@@ -105,15 +106,15 @@ class Problem:
         for positions, experiment, share in zip(simulated.positions, self.experiments, shares, strict=True):
             with np.errstate(invalid="ignore", over="ignore"):
                 block = share * RESIDUALS[self.loss](
-                    positions, experiment.positions, experiment.measured, self.weights
+                    positions, experiment.positions, experiment.measured, weights_for(experiment, self.weights)
                 )
             # a diverged candidate: every residual the same, and in sum the penalty
             block[simulated.diverged] = np.sqrt(2 * DIVERGED_LOSS / len(self.experiments) / block.shape[1])
             blocks.append(block)
         return blocks
 
-    def _rests_at(self, vector: np.ndarray) -> np.ndarray:
-        """Angles at which a candidate rests, rad; NaN for trials in motion. Shape (T, n)."""
+    def _rests_at(self, vector: np.ndarray) -> list[np.ndarray]:
+        """Angles at which a candidate rests, as `population.Simulated` has them."""
         if self._last is None or not np.array_equal(self._last[0], vector):
             simulated = self._population.simulate(self.fields(vector[None]))
             self._last = vector.copy(), simulated.rests

@@ -7,7 +7,7 @@ arm elsewhere each time; how far is what a prediction of the mean shape, the bes
 import numpy as np
 
 from trunkline.identification.resting import LAST, STILL
-from trunkline.trials.experiments import is_static
+from trunkline.trials.experiments import is_static, is_stepwise
 from trunkline.trials.trial import Trial
 
 SAME_GRAVITY = 0.035  # m/s², 0.2° of tilt: an arm held level sags by half a millimetre more or less then
@@ -47,7 +47,10 @@ def repeatability(trials: list[Trial], tip: int) -> dict[str, dict]:
 
 
 def end_shape(trial: Trial) -> np.ndarray | None:
-    """The mean shape of a trial's last half second, m, nan where not measured; None if it still moves. Shape (S, 3)."""
+    """The mean shape of a trial's last half second, m, nan where not measured; None if it still moves, or rests in many
+    shapes. Shape (S, 3)."""
+    if is_stepwise(trial.experiment):
+        return None
     if is_static(trial.experiment):
         return np.where(trial.measured[0][:, None], trial.positions[0], np.nan)
     last = trial.time >= trial.time[-1] - LAST

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from trunkline.identification.fit import Method
 from trunkline.identification.loss import Loss
-from trunkline.identification.parameters import PARAMETERS, ParameterName, PerJointName
+from trunkline.identification.parameters import ParameterName, PerJointName, parameter_named
 from trunkline.identification.problem import Bounds
 from trunkline.settings import settings
 from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
@@ -39,11 +39,12 @@ class IdentificationSettings(Method):
         if self.cross_validation_folds == 1:
             raise ValueError("cross_validation_folds: found 1, expected 0 (none) or at least 2")
         for name, span in self.parameters.items():
-            if span.low <= 0 and not PARAMETERS[name].signed:
+            parameter = parameter_named(name)
+            if span.low <= 0 and not parameter.signed:
                 raise ValueError(f"parameters.{name}.low: found {span.low}, expected more than 0")
-            telling = [kind for kind in EXPERIMENTS if PARAMETERS[name].told_by(EXPERIMENTS[kind])]
+            telling = [kind for kind in EXPERIMENTS if parameter.told_by(EXPERIMENTS[kind])]
             if not set(telling) & set(self.experiments):
                 found = f"found it to be identified from {' and '.join(self.experiments)} alone"
                 raise ValueError(f"parameters.{name}: {found}, expected one of {', '.join(telling)} too")
-            if self.rest_shape == "measured" and "qpos_spring" in PARAMETERS[name].fields:
+            if self.rest_shape == "measured" and "qpos_spring" in parameter.fields:
                 raise ValueError(f"parameters.{name}: found it beside rest_shape: measured, expected one of the two")

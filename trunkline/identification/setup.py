@@ -1,18 +1,22 @@
 """From settings, trials and a model to what a stage of identification works on."""
 
+from dataclasses import replace
 
 import mujoco
 
-from trunkline.elements import BACKLASH, RATE_LIMIT
+from trunkline.elements import BACKLASH, PRELOAD, RATE_LIMIT, WINDING
 from trunkline.errors import InputError
 from trunkline.identification.experiment import Experiment, prepare
 from trunkline.identification.fit import Fit
 from trunkline.identification.markers import with_measured_markers
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import EVERY, PARAMETERS, names_of, parameter_named
+from trunkline.identification.problem import Bounds
 from trunkline.identification.resting import resting_shape
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.trial import Trial
+
+EVERY_ANGLE = f"tendon_angle{EVERY}"
 
 
 def set_up(
@@ -37,10 +41,21 @@ def fit_of(config: IdentificationSettings, segments: tuple[str, ...]) -> Fit:
     )
 
 
+def with_every(config: IdentificationSettings, model: mujoco.MjModel) -> IdentificationSettings:
+    """The settings with a parameter for each of the arm's tendons or sections where a name stands for all of them. The
+    range of an angle is then about where the arm has each."""
+    spans: dict[str, Bounds] = {}
+    for name, span in config.parameters.items():
+        for one in names_of(name, model) or [name]:
+            middle = PARAMETERS[one].read(model) if name == EVERY_ANGLE else 0.0
+            spans[one] = Bounds(middle + span.low, middle + span.high)
+    return replace(config, parameters=spans)
+
+
 def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
     """Refuse parameters of what the arm has not got: tendons, motors, joints' elements, units of some length."""
     for name in config.parameters:
-        parameter, where = PARAMETERS[name], f"params.yaml: {stage}.parameters.{name}"
+        parameter, where = parameter_named(name), f"params.yaml: {stage}.parameters.{name}"
         if not parameter.belongs_to(model):
             raise InputError(f"{where}: {_lacking(parameter.part)}")
         try:
@@ -60,6 +75,13 @@ def _lacking(part: str) -> str:
         return f"{found}; of an arm that comes as MJCF, expected `delay` and `nsample` of its actuators in that file"
     if part in (RATE_LIMIT, BACKLASH):
         return f"found it for winches without, expected build_mjcf.actuation.{part} of more than 0"
+    kind = part.partition(" ")[0]
+    if kind in (WINDING, PRELOAD):
+        return "found it for evenly spread tendons, expected tendons that are described one by one in build_mjcf.arm"
+    if kind == "tendon":
+        return f"found it for an arm without {part}, expected one for each tendon that it has"
+    if kind == "section":
+        return f"found it for an arm without {part}, expected build_mjcf.arm of the kind sections"
     if part == "holes":
         return "found it for cables that do not rub, expected build_mjcf.holes: rubbing"
     return f"found it for joints without {part}, expected build_mjcf.joints with one"

@@ -1,5 +1,7 @@
 """The residuals around a minimum to second order, so that trials can be fitted again without simulating.
 
+Of many parameters it is the first order alone: the second asks for too many candidates, and hours of small fits.
+
 First order does not do: a wrong model leaves residuals, and their own curvature then counts beside JᵀJ. Nor do small
 differences: simulated curls move by small jumps as a parameter changes, where joint limits close.
 """
@@ -11,6 +13,7 @@ import numpy as np
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.problem import Problem
 
+FEW = 12  # parameters, up to which the second order is taken along
 REACH = 0.2  # of the differences, in ln(value): about as far as intervals reach, far beyond the jumps
 SIGNED_REACH = 0.02  # the same of signed values
 ITERATIONS = 40
@@ -24,7 +27,8 @@ SETTLED = 1e-12  # relative decrease of the loss
 
 @dataclass
 class Surrogate:
-    """Losses of T trials as ½ φᵀ G_t φ, with φ = (1, d_1 … d_P, d_i d_j for i ≤ j) at d from the estimate.
+    """Losses of T trials as ½ φᵀ G_t φ, with φ = (1, d_1 … d_P, d_i d_j for i ≤ j) at d from the estimate, without
+    the products where it is not of second order.
 
     grams: G, the residuals' coefficients times themselves: no loss is ever negative. Shape (T, F, F).
     weights: of the trials in the fit that it is around; ones if not given. Not in the grams. Shape (T,).
@@ -32,6 +36,7 @@ class Surrogate:
 
     grams: np.ndarray
     weights: np.ndarray = None  # type: ignore[assignment]
+    second: bool = True
 
     def __post_init__(self):
         if self.weights is None:
@@ -39,7 +44,9 @@ class Surrogate:
 
     @property
     def count(self) -> int:
-        """P, from F = (P + 1)(P + 2) / 2."""
+        """P, from F = (P + 1)(P + 2) / 2, or P + 1."""
+        if not self.second:
+            return self.grams.shape[1] - 1
         return round(np.sqrt(2 * self.grams.shape[1] + 0.25) - 1.5)
 
     def moves(self, weights: np.ndarray) -> np.ndarray:
@@ -48,13 +55,14 @@ class Surrogate:
 
     def losses(self, places: np.ndarray) -> np.ndarray:
         """Of every trial, unweighted, at places d (B, P). Shape (B, T)."""
-        return np.stack([_losses(gram[None], places) for gram in self.grams], axis=1)
+        return np.stack([_losses(gram[None], places, self.second) for gram in self.grams], axis=1)
 
     def moved(self, place: np.ndarray, weights: np.ndarray) -> "Surrogate":
         """The same losses as seen from `place` (P,), of a fit in which trials weigh `weights` (T,)."""
-        places = _stencil(np.ones(self.count))
-        shift = np.linalg.inv(features_at(places)) @ features_at(place + places)  # φ(place + d) = φ(d) @ shift
-        return Surrogate(shift @ self.grams @ shift.T, weights)
+        places = _stencil(np.ones(self.count), self.second)
+        # φ(place + d) = φ(d) @ shift
+        shift = np.linalg.inv(features_at(places, self.second)) @ features_at(place + places, self.second)
+        return Surrogate(shift @ self.grams @ shift.T, weights, self.second)
 
     def tells(self, weights: np.ndarray) -> np.ndarray:
         """Which parameters trials that weigh `weights` (T,) say anything about. Shape (P,)."""
@@ -71,16 +79,18 @@ class Surrogate:
         squares = np.diag(self.grams.sum(axis=0))[1 : self.count + 1]
         scale = np.sqrt(np.maximum(squares, max(LEAST_COLUMN**2 * squares.max(), 1e-300)))
         place, damping = np.zeros((len(weights), self.count)), np.full(len(weights), DAMPING)
-        loss, settled = _losses(grams, place), np.zeros(len(weights), dtype=bool)
+        loss, settled = _losses(grams, place, self.second), np.zeros(len(weights), dtype=bool)
         for _ in range(ITERATIONS):
-            slopes = slopes_at(place)
-            images = (grams @ features_at(place)[..., None])[..., 0]
+            slopes = slopes_at(place, self.second)
+            images = (grams @ features_at(place, self.second)[..., None])[..., 0]
             gradient = np.einsum("bf,bfp->bp", images, slopes) / scale
-            curvature = slopes.transpose(0, 2, 1) @ grams @ slopes + bends_of(images, self.count)
+            curvature = slopes.transpose(0, 2, 1) @ grams @ slopes
+            if self.second:
+                curvature += bends_of(images, self.count)
             damped = curvature / np.outer(scale, scale) + damping[:, None, None] * np.eye(self.count)
             tried = place - np.linalg.solve(damped, gradient[..., None])[..., 0] / scale
             tried = np.clip(tried, -LONGEST, LONGEST)
-            losses = _losses(grams, tried)
+            losses = _losses(grams, tried, self.second)
             better = losses < loss
             settled |= (better & (loss - losses <= SETTLED * loss)) | (damping > MOST_DAMPING)
             place, loss = np.where(better[:, None], tried, place), np.where(better, losses, loss)
@@ -91,19 +101,20 @@ class Surrogate:
 
 
 def surrogate(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] | None = None) -> Surrogate:
-    """Of the scalars `vector` (P,) of `problem`, from (P + 1)(P + 2) / 2 candidates.
+    """Of the scalars `vector` (P,) of `problem`, from (P + 1)(P + 2) / 2 candidates, or P + 1 where P is large.
 
     Args:
         residuals: those at `vector`, where they are known. Per trial (R,).
     """
-    places = _stencil(reaches(problem))
-    coefficients = np.linalg.inv(features_at(places))
+    second = len(vector) <= FEW
+    places = _stencil(reaches(problem), second)
+    coefficients = np.linalg.inv(features_at(places, second))
     if residuals is None:
         residuals = [block[0] for block in problem.residuals(vector[None])]
     others = problem.residuals(vector + places[1:], near=vector)
     blocks = [np.concatenate([base[None], block]) for base, block in zip(residuals, others, strict=True)]
     grams = np.stack([coefficients @ (block @ block.T) @ coefficients.T for block in blocks])
-    return Surrogate(grams / problem.trial_weights[:, None, None], problem.trial_weights)
+    return Surrogate(grams / problem.trial_weights[:, None, None], problem.trial_weights, second)
 
 
 def reaches(problem: Problem) -> np.ndarray:
@@ -111,27 +122,33 @@ def reaches(problem: Problem) -> np.ndarray:
     return np.array([SIGNED_REACH if PARAMETERS[name].signed else REACH for name in problem.parameters])
 
 
-def _stencil(reach: np.ndarray) -> np.ndarray:
+def _stencil(reach: np.ndarray, second: bool) -> np.ndarray:
     """As many places as there are features, of which the features are independent, for reaches (P,). Shape (F, P)."""
     steps = np.diag(reach)
+    if not second:
+        return np.concatenate([np.zeros((1, len(reach))), steps])
     rows, columns = np.tril_indices(len(reach), -1)
     return np.concatenate([np.zeros((1, len(reach))), steps, -steps, steps[rows] + steps[columns]])
 
 
-def _losses(grams: np.ndarray, places: np.ndarray) -> np.ndarray:
-    values = features_at(places)
+def _losses(grams: np.ndarray, places: np.ndarray, second: bool) -> np.ndarray:
+    values = features_at(places, second)
     return 0.5 * np.einsum("bf,bf->b", values, (grams @ values[..., None])[..., 0])
 
 
-def features_at(places: np.ndarray) -> np.ndarray:
+def features_at(places: np.ndarray, second: bool = True) -> np.ndarray:
     """φ at places d (B, P). Shape (B, F)."""
+    if not second:
+        return np.concatenate([np.ones((len(places), 1)), places], axis=1)
     rows, columns = np.triu_indices(places.shape[1])
     return np.concatenate([np.ones((len(places), 1)), places, places[:, rows] * places[:, columns]], axis=1)
 
 
-def slopes_at(places: np.ndarray) -> np.ndarray:
+def slopes_at(places: np.ndarray, second: bool = True) -> np.ndarray:
     """Derivatives of φ at places d (B, P). Shape (B, F, P)."""
     count = places.shape[1]
+    if not second:
+        return np.tile(np.eye(count + 1)[:, 1:], (len(places), 1, 1))
     rows, columns = np.triu_indices(count)
     slopes = np.zeros((len(places), 1 + count + len(rows), count))
     slopes[:, range(1, count + 1), range(count)] = 1

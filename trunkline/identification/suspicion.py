@@ -48,7 +48,7 @@ def suspicions(
 def started_off(simulated: np.ndarray, experiment: Experiment, fit: Fit) -> str:
     """Whether the motion (T, S, 3) m fits better when it begins earlier or later."""
     frames = experiment.frames
-    if frames == 1:
+    if is_static(experiment.kind):
         return ""
     most = min(round(LONGEST_SHIFT / experiment.frame_step), frames // 2)
     losses = {}

@@ -81,8 +81,8 @@ def validated(schema: type[Schema], values: dict, source: Path) -> Schema:
         return adapter.validate_json(json.dumps(values), strict=True)
     except ValidationError as error:
         first = min(error.errors(), key=rank)
-        where = ".".join([str(source), *map(str, path_of(first, values))])
-        raise InputError(f"{where}: {describe(first, adapter)}") from error
+        where = ".".join(map(str, path_of(first, values)))
+        raise InputError(f"{source}: {where}: {describe(first, adapter)}") from error
 
 
 def check_settings(root: str | Path = ".") -> list[str]:

@@ -21,7 +21,7 @@ from trunkline.identification.repeatability import repeatability
 from trunkline.identification.saving import save_model
 from trunkline.identification.scoring import Compared, fingerprints, predict, start_fit
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.identification.setup import check_folds, check_parameters, set_up
+from trunkline.identification.setup import check_folds, check_parameters, set_up, with_every
 from trunkline.identification.suspicion import suspicions
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json
@@ -46,6 +46,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     print(f"{stage}: reading the model and the trials", flush=True)
     spec = read_spec(model_path)
     model = spec.compile()
+    config = with_every(config, model)
     check_parameters(stage, config, model)
     reported = read_reported(config)
     # of an arm with tendons also the trials of later stages: a wrong name is told now, not after minutes
@@ -91,7 +92,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         "deciding_trials": len(result.influence.deciding()),
         "start_fit": start_fit(experiments),
     }
-    if any(e.frames > 1 for e in experiments):
+    if not all(is_static(e.kind) for e in experiments):
         found = predictions["identified"]
         halved = replay(models["identified"], found.experiments, segments, step_factor=0.5)
         metrics["halved_step"] = halved_step(found, Prediction(halved, found.experiments))
@@ -190,7 +191,7 @@ def write_plots(
         table.to_csv(folder / "shapes.csv", **CSV)
         save_figure(plots.shape_figure(table), folder / "shapes.png")
         return
-    moving = {name: prediction.of(lambda e: e.frames > 1) for name, prediction in validate.items()}
+    moving = {name: prediction.of(lambda e: not is_static(e.kind)) for name, prediction in validate.items()}
     experiments = moving["identified"].experiments
     if experiments:
         errors = curves.error_curves({name: moving[name] for name in ("null", "null_held", *shown)})

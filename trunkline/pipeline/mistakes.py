@@ -23,6 +23,9 @@ def path_of(problem: Any, composed: dict[str, Any]) -> list[str]:
     path, value = [], composed
     for place, part in enumerate(problem["loc"]):
         last = place == len(problem["loc"]) - 1
+        names_class = not last and isinstance(problem["loc"][place + 1], str)
+        if names_class and isinstance(value, dict) and value.get("kind") == part:
+            continue  # a class may be called as one of its keys
         if isinstance(value, dict) and (part in value or (last and problem["type"] == "missing")):
             within = value.get(part)
         elif isinstance(value, list) and isinstance(part, int):
@@ -44,7 +47,8 @@ def describe(problem: Any, adapter: TypeAdapter) -> str:
         schema = adapter.json_schema()
         classes = [schema, *schema.get("$defs", {}).values()]
         valid = [name for cls in classes for name in cls.get("properties", {})]
-        return "unknown key" + nearest(str(problem["loc"][-1]), valid)
+        found = str(problem["loc"][-1])
+        return "unknown key" + nearest(found, [name for name in valid if name != found])  # some may be of another class
     if problem["type"] == "missing":
         return "missing, expected a value"
     expected = problem["msg"].removeprefix("Input should be ").removeprefix("Value error, ")

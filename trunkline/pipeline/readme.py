@@ -34,8 +34,9 @@ PICTURES = {
     "artifacts/reachability/maps.png": "docs/maps.png",
     "artifacts/rehearse/still.png": "docs/rehearsal.png",
     "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
+    "examples/ftdcr/artifacts/identify_stiffness/shapes.png": "examples/ftdcr/shapes.png",
 }
-EXAMPLES = ("asl_trunk",)  # folders of examples/, each a block of the README and of its own README
+EXAMPLES = ("asl_trunk",)  # folders of examples/ with releases, each a block of the README and of its own README
 
 # E_internal of the paper's arm before and after identification, over 437 frames: its section "Parameter Identification"
 PAPER = {"cad": "89.8 mm (17 %)", "identified": "15.8 mm (3 %)"}
@@ -210,6 +211,34 @@ def example_table(folder: Path, all_splits: bool = True) -> str:
     return "\n".join(rows)
 
 
+PATHS = {"identified": "identified", "prompt": "identified, no backlash", "cad": "CAD",
+         "null": "null: mean shape", "null_straight": "null: straight arm"}  # fmt: skip
+
+
+def path_table(folder: Path) -> str:
+    """An example's static paths by split: root mean square of the tip's distance, raw and without its mean offset."""
+    scored = lookup(_metrics(folder, "score"), "identify_stiffness")
+    fitted = _metrics(folder, "identify_stiffness")
+    what = "poses: RMS of the tip's distance, without / with its mean offset, mm"
+    lines = [f"| {what} | {' | '.join(PATHS.values())} |"]
+    lines.append("|---" + "|---:" * len(PATHS) + "|")
+    for split, metrics in ((TEST, scored), *((split, fitted) for split in reversed(DECIDING))):
+        ways = [f"{split}.e_tip_{way}_mm" for way in ("centred_rms", "rms")]
+        cells = [" / ".join(_number(lookup(metrics, f"{model}.{way}")) for way in ways) for model in PATHS]
+        lines.append(f"| of `{split}` | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def path_sentence(folder: Path) -> str:
+    """The same of the split test, in a line."""
+    scored = lookup(_metrics(folder, "score"), "identify_stiffness")
+    found, null = (_number(lookup(scored, f"{model}.{TEST}.e_tip_centred_rms_mm")) for model in ("identified", "null"))
+    return (
+        f"Another, of three sections and nine tendons, the [FTDCR]({folder.parent.name}/{folder.name}): {found} mm RMS "
+        f"at the tip on poses of `{TEST}` (its authors' calibrated simulator 9.38, the mean shape {null})."
+    )
+
+
 def _metrics(root: Path, stage: str) -> dict | None:
     path = root / "artifacts" / stage / "metrics.json"
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
@@ -279,10 +308,12 @@ def generate(root: Path) -> dict[Path, str]:
     """README.md, the examples' own, the reference of sessions and the pages on results, with their generated blocks as
     they should be."""
     examples = {name: example_table(root / "examples" / name) for name in EXAMPLES}
+    examples["ftdcr"] = path_table(root / "examples" / "ftdcr")
     results = results_table(root / "tests" / "limits.yaml", RESULTS)
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
     own |= {"score": score_table(root), "rehearsal": rehearsal_block(root, variants=False)}
     own |= {name: example_table(root / "examples" / name, all_splits=False) for name in EXAMPLES}
+    own["ftdcr"] = path_sentence(root / "examples" / "ftdcr")
     blocks = {root / "README.md": own}
     blocks[root / "data" / "raw" / "README.md"] = {"experiments": experiment_table()}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}

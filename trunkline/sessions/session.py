@@ -46,12 +46,14 @@ class MocapFrame(Entry):
     """The motion-capture frame: which way is up in it, and the unit of its positions.
 
     name: for logs of transforms between several frames, the one that the poses are wanted in; by default the nearest
-    that holds them all.
+    that holds them all. gravity: "none" for an arm that is too light or too stiff to feel it; `up` then only says how
+    the frame is turned.
     """
 
     name: str | None = None
     up: Vector
     unit: Literal["m", "mm"] = "m"
+    gravity: Literal["standard", "none"] = "standard"
 
     @model_validator(mode="after")
     def _direction(self):
@@ -83,6 +85,36 @@ class Topics(Entry):
     poses: str | dict[str, str] | None = None
     commands: str | None = None
     tendon_positions: str | None = None
+
+
+UNITS = {"m": 1.0, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180}
+
+
+class Motor(Entry):
+    """What a motor's name in the log stands for, where that is not the pull of one tendon in metres.
+
+    unit: of its numbers. spool_radius: m, of the drum of one that turns. tendons: name in the model to how far the
+    motor winds it in, times what the number says; less than 0 for one that is paid out.
+    """
+
+    unit: Literal["m", "mm", "rad", "deg"]
+    spool_radius: Annotated[FiniteFloat, Field(gt=0, le=1)] | None = None
+    tendons: dict[str, FiniteFloat] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _drum(self):
+        turns = self.unit in ("rad", "deg")
+        if turns and self.spool_radius is None:
+            raise ValueError(f"spool_radius: missing, expected that of a motor that counts {self.unit}, m")
+        if not turns and self.spool_radius is not None:
+            raise ValueError(f"spool_radius: found {self.spool_radius}, expected none for a motor that counts "
+                             f"{self.unit}")
+        return self
+
+    @property
+    def metres(self) -> float:
+        """Of cable for each unit of its numbers."""
+        return UNITS[self.unit] * (self.spool_radius or 1.0)
 
 
 class TrialEntry(Entry):
@@ -128,6 +160,8 @@ class Session(Entry):
     bodies: names of the poses, in order, where messages hold them without. A list of tendons does the same for numbers.
     clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
     that the stamps show. With `log`, commands and tendon positions are dated by it too.
+    motors: name in the log to what it moves, in place of `tendons`, where motors count otherwise than in metres of a
+    tendon's pull, or move several.
     shared: what is to be said of trials that share data, by trial; see `check_shared`.
     """
 
@@ -135,11 +169,20 @@ class Session(Entry):
     base: str | FixedBase
     segments: dict[str, str] | None = Field(default=None, min_length=1)
     tendons: dict[str, str] | None = Field(default=None, min_length=1)
+    motors: dict[str, Motor] | None = Field(default=None, min_length=1)
     topics: Topics = Topics()
     bodies: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"
     trials: list[TrialEntry] = Field(min_length=1)
     _shared: dict[str, list[str]] = PrivateAttr(default_factory=dict)
+
+    def coupling(self) -> tuple[tuple[str, ...], np.ndarray]:
+        """Names of the tendons that `motors` moves, and by how much, m for each unit of a motor's numbers. Shape
+        (tendons, motors)."""
+        motors = list((self.motors or {}).values())
+        names = tuple(dict.fromkeys(name for motor in motors for name in motor.tendons))
+        moved = [[motor.metres * motor.tendons.get(name, 0.0) for motor in motors] for name in names]
+        return names, np.array(moved).reshape(len(names), len(motors))
 
     @property
     def shared(self) -> dict[str, list[str]]:
@@ -159,6 +202,8 @@ class Session(Entry):
 
     @model_validator(mode="after")
     def _one_to_one(self):
+        if self.motors is not None and self.tendons is not None:
+            raise ValueError("motors: found it beside `tendons`, expected one of the two")
         for key in ("segments", "tendons"):
             names = list((getattr(self, key) or {}).values())
             twice = next((name for name in names if names.count(name) > 1), None)

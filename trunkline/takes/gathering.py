@@ -9,7 +9,7 @@ from trunkline.sessions.session import FixedBase, Session, TrialEntry
 from trunkline.takes.agreement import MotorClock, align_clocks, settle_vertical
 from trunkline.takes.checks import Findings
 from trunkline.takes.plausible import Plausible, check_plausible
-from trunkline.trials.experiments import EXPERIMENTS
+from trunkline.trials.experiments import EXPERIMENTS, is_stepwise
 from trunkline.trials.splits import IDENTIFY, SPLITS, TEST, VALIDATE
 from trunkline.trials.take import Take
 
@@ -86,8 +86,8 @@ def _missing(takes: list[Take]) -> list[str]:
     splits, kinds = ({getattr(take, key) for take in takes} for key in ("split", "experiment"))
     done = {(take.experiment, take.split) for take in takes}
     said = [f"splits: no trial of the split {split}: {WITHOUT[split]}" for split in SPLITS if split not in splits]
-    lacking = [experiment for experiment in EXPERIMENTS if experiment not in kinds]
-    if lacking:
+    lacking = [name for name, kind in EXPERIMENTS.items() if name not in kinds and not kind.stepwise]
+    if lacking and not any(map(is_stepwise, kinds)):  # an arm that rests throughout needs no other
         told = "data/raw/README.md tells which settings do without"
         if len(lacking) == 1 and (way_out := EXPERIMENTS[lacking[0]].without):  # two that are missing need another
             told = f"in params.yaml {way_out}: data/raw/README.md"

@@ -3,6 +3,8 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from trunkline.errors import InputError
 from trunkline.sessions.session import Session, TrialEntry
 from trunkline.sessions.source import Source, open_log
@@ -13,7 +15,7 @@ from trunkline.takes.motors import check_motors, read_motors
 from trunkline.takes.reading import Stretch, check_seen, columns_of, read_stretch, split_base
 from trunkline.takes.reference import Reference, reference_of
 from trunkline.takes.repairs import drop_frozen, good_samples, untangle, with_lost_time
-from trunkline.trials.experiments import EXPERIMENTS
+from trunkline.trials.experiments import EXPERIMENTS, is_stepwise
 from trunkline.trials.take import Take
 
 
@@ -84,7 +86,8 @@ def _take(
         session, positions, quaternions, f"{where}: {source.pose_topic}"
     )
     untangle((base_positions, base_quaternions), positions, quaternions, reference, findings)
-    stretch.time = with_lost_time(stretch.time, positions, bool(source.joint_topics), findings)
+    if not is_stepwise(trial.experiment):  # there the arm jumps from frame to frame
+        stretch.time = with_lost_time(stretch.time, positions, bool(source.joint_topics), findings)
     motors = read_motors(source, session, stretch, limits, where, findings)
     if EXPERIMENTS[trial.experiment].needs_motors:
         check_motors(source, session, reference.joint_topics, motors, stretch, limits, where)
@@ -94,7 +97,7 @@ def _take(
         split=trial.split,
         level=trial.level,
         load=trial.load,
-        up=session.frame.up_direction(),
+        up=session.frame.up_direction() if session.frame.gravity == "standard" else np.zeros(3),
         time=stretch.time,
         segments=tuple(reference.segments.values()),
         positions=positions,

@@ -36,21 +36,27 @@ def read_motors(
     """
     streams = [source.commands, source.tendon_positions]
     tendons = next((stream.names for stream in streams if stream is not None), ())
+    mapped, coupling = session.tendons, None
     if session.tendons is not None:
         tendons = tuple(session.tendons.values())
+    if session.motors is not None:
+        mapped = {name: name for name in session.motors}
+        tendons, coupling = session.coupling()
     recorder = by_recorder(source, session)
     arrays = []
     for stream, role in zip(streams, ROLES, strict=True):
         if stream is None or not len(stream.stamps):
             arrays += [np.empty(0), np.empty((0, len(tendons)))]
             continue
-        columns = _columns(stream, session.tendons, tendons, f"{where}: {role} topic")
+        columns = _columns(stream, mapped, tendons, f"{where}: {role} topic")
         stamps = dated(stream, recorder, stretch)
         if recorder and session.clock != "log":
             findings.repairs.append(f"{role} messages dated by the recorder's clock, as not all have stamps")
         rows = in_order(stamps, limits.disorder, f"{where}: {role} topic", findings)
         seconds = (stamps[rows] - stretch.epoch) * 1e-9
         pulls = stream.positions[rows][:, columns]
+        if coupling is not None:
+            pulls = pulls @ coupling.T
         near = (seconds > -limits.clock_offset) & (seconds < stretch.time[-1] + limits.clock_offset)
         finite = np.isfinite(pulls).all(axis=1)
         if not finite.all():
@@ -119,7 +125,7 @@ def _columns(stream: JointStream, mapped: dict[str, str] | None, tendons: tuple[
     columns = []
     for logged, tendon in mapped.items():
         if logged not in names and tendon not in names:
-            raise InputError(f"{where}: found {', '.join(names)}, expected {logged!r} as in session.yaml: tendons")
+            raise InputError(f"{where}: found {', '.join(names)}, expected {logged!r} as in session.yaml")
         columns.append(names.index(logged if logged in names else tendon))
     return columns
 

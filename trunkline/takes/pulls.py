@@ -47,7 +47,7 @@ def check_pulls(take: Take, length: float, idle: float, factor: float, zeros: di
             if pulls.size and all(said):
                 return said[1]
     elif kind.needs_motors:
-        said = _held(take) if kind.static else []
+        said = _held(take) if kind.static and not kind.stepwise else []
         said += _beyond("commands", take.commands, length)
         said += _beyond("tendon positions", take.tendon_positions - take.tendon_positions[:1], length)
         if said:

@@ -39,6 +39,7 @@ class Kind:
     start: when a moving trial begins, by its filtered positions and commands, and the low-pass of the former; see
         the module `start`.
     free: when the last hand is off, s, where that may be later than `start` says.
+    stepwise: the arm rests in every frame of a static trial, moved in between: each is a shape of its own.
     hangs: at its end, the arm hangs at rest with nothing that pulls it.
     without: what to set for a session without it, where a stage identifies from it; "" where nothing helps.
     """
@@ -51,6 +52,7 @@ class Kind:
     words: tuple[str, ...]
     start: Callable[[Recording, Smooth], Start] | None = None
     free: Callable[[Recording, float], float] | None = None
+    stepwise: bool = False
     hangs: bool = False
     without: str = ""
 
@@ -94,6 +96,15 @@ EXPERIMENTS: dict[str, Kind] = {
         words=("pull",),
         without="`source: tilts` under identify_stiffness, and no `kp` there",
     ),
+    "static_path": Kind(
+        what="at rest in every frame, tendons moved a step in between",
+        plural="static paths",
+        level=None,
+        static=True,
+        needs_motors=True,
+        words=("path", "steps"),
+        stepwise=True,
+    ),
     "motion": Kind(
         what="anything else that is commanded, from rest",
         plural="motions",
@@ -110,6 +121,11 @@ if TYPE_CHECKING:
     ExperimentName = str
 else:
     ExperimentName = Literal[tuple(EXPERIMENTS)]  # so that whoever names another is told which there are
+
+
+def is_stepwise(experiment: str) -> bool:
+    """Whether every frame of a trial of this kind is a shape at rest of its own."""
+    return EXPERIMENTS[experiment].stepwise
 
 
 def is_static(experiment: str) -> bool:

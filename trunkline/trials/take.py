@@ -19,7 +19,7 @@ class Take(Recording):
 
     name, experiment, split, level, load: as planned, see `Planned`. segments: S names, tendons: K names, as in the
     model.
-    up: (3,) unit vector against gravity. time: (T,) s from the first frame.
+    up: (3,) unit vector against gravity, 0 where there is none. time: (T,) s from the first frame.
     positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None, base_positions (T, 3), base_quaternions (T, 4):
     in the motion-capture frame, NaN where there is no good sample.
     command_time (Tc,), tendon_time (Tm,): s on the motors' clock, which reads time - clock_offset.

@@ -1,0 +1,84 @@
+"""`python -m trunkline.describe`: an arm in words, before anything is recorded."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.arm.test_sections import ACTUATION, SOLVER, arm
+from trunkline.arm.tendons import Tendon
+from trunkline.describe.__main__ import main
+from trunkline.describe.words import doubt_lines, marker_lines, tendon_lines, unit_lines
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def model():
+    return arm().build(ACTUATION, SOLVER, ROOT).spec.compile()
+
+
+def test_units_that_are_alike_share_a_line(model):
+    assert unit_lines(model) == [
+        "5 units, 160 mm, 260 g",
+        "  units 1 to 2: 50 mm long, 30 mm wide, 100 g, 10 N m/rad, bends by 40° to each side",
+        "  units 3 to 5: 20 mm long, 20 mm wide, 20 g, 4 N m/rad, bends by 40° to each side",
+    ]
+
+
+def test_tendons_are_told_with_their_moment_arms(model):
+    first, second, third = tendon_lines(model)[1:]
+    # a unit that bends by 1° about its hinge takes up 1° of the distance, in both units that it crosses
+    assert "tendon_1: at 0.0°, 12 mm from the axis, ends at unit 2, 75.0 mm long, 0.419 mm for 1°" in first
+    assert "tendon_2: at 90.0°, 12 to 8 mm from the axis, ends at unit 5" in second
+    assert third.endswith("2000 N/m up to 50 N, 3 N at command 0")
+
+
+def test_markers_beside_the_axis_are_told(model):
+    assert marker_lines(model)[1:] == ["  tip: 170 mm from the mount, 5.39 mm aside"]
+
+
+def test_what_no_log_will_tell_is_said():
+    one_side = arm(tendons=[Tendon(0.0), Tendon(40.0), Tendon(-40.0)]).build(ACTUATION, SOLVER, ROOT).spec.compile()
+    said = doubt_lines(one_side, None, None, False)
+    assert said[0].startswith("masses are as described")
+    assert said[1] == "no tendon bends the arm towards -180°: neighbours are 280° apart"
+    said = "\n".join(doubt_lines(one_side, {"static_path"}, 1, True))
+    assert "tells joint_friction, damping, tendon_friction, friction_time, kv, time_constant" in said
+    assert "stiffness and kp show in their ratio alone" in said
+    assert "one tracked point" in said
+    whole = doubt_lines(one_side, {"static_tilt", "release", "motion"}, None, False)
+    assert not any("tells" in line and "no trial" in line for line in whole)
+
+
+def test_the_command_describes_a_file_and_draws_it(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main([str(ROOT / "conf/build_mjcf/arm/ftdcr.yaml")]) == 0
+    told = capsys.readouterr().out
+    assert "15 units, 186.5 mm" in told
+    assert "tendon_9: at -122.5°" in told
+    assert (tmp_path / "ftdcr.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tendons": [{"angle": 0, "distanse": 0.01}]}, "distanse: unknown key"),
+        ({"sections": []}, "arm.sections: "),
+        ({"kind": "cone"}, "arm: "),
+    ],
+)
+def test_a_mistake_in_a_description_is_one_line(tmp_path, capsys, change, message):
+    described = yaml.safe_load((ROOT / "conf/build_mjcf/arm/ftdcr.yaml").read_text()) | change
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(described))
+    assert main([str(path)]) == 1
+    error = capsys.readouterr().err
+    assert error.startswith("error: ")
+    assert message in error
+    assert error.count("\n") == 1
+
+
+def test_another_file_is_refused(tmp_path, capsys):
+    assert main([str(tmp_path / "arm.stl")]) == 1
+    assert "expected an arm's description, .yaml, or a model in MJCF, .xml" in capsys.readouterr().err

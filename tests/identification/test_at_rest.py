@@ -1,0 +1,96 @@
+"""Trials at rest by the statics: as MuJoCo settles, from either side of a winch's play, with what commands draw in."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from tests.arm.test_sections import ACTUATION, SOLVER, arm
+from trunkline.arm.tendons import Tendon
+from trunkline.elements import PRELOAD, WINDING, numbers_place, numeric_place, segment_sites
+from trunkline.frames import STANDARD_GRAVITY
+from trunkline.identification.at_rest import shapes_at_rest
+from trunkline.identification.experiment import Experiment
+from trunkline.identification.parameters import candidate_fields
+from trunkline.identification.pose_fit import PoseFit
+from trunkline.simulation.rest import settle
+from trunkline.statics.chain import read_chain
+from trunkline.statics.equilibria import actuated
+from trunkline.statics.restart import actuated_from
+
+FOUR = [Tendon(angle, 0.012, end) for angle, end in ((0.0, 2), (120.0, 0), (-120.0, 0), (60.0, 0))]
+DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+
+
+def made(**motors) -> mujoco.MjModel:
+    return arm(tendons=FOUR).build(replace(ACTUATION, **motors), SOLVER, Path(".")).spec.compile()
+
+
+def path_of(model: mujoco.MjModel, pulls: np.ndarray, load: float = 0.0, gravity: np.ndarray = DOWN) -> Experiment:
+    """A trial whose every frame is at rest with these pulls (T, 4), m."""
+    frames, hinges = len(pulls), model.nq
+    return Experiment(
+        name="path", kind="static_path", split="identify", gravity=gravity, start=np.zeros(hinges),
+        velocity=np.zeros(hinges), lead=0.0, controls=model.tendon_length0 - pulls,
+        positions=np.zeros((frames, 1, 3)), measured=np.ones((frames, 1), dtype=bool), frame_step=0.0,
+        fit=PoseFit(np.zeros(hinges), np.zeros(1), 0, True), load=load,
+    )  # fmt: skip
+
+
+def tips(model: mujoco.MjModel, experiment: Experiment, values: dict[str, float] | None = None) -> np.ndarray:
+    fields = candidate_fields(model, {k: np.array([v]) for k, v in (values or {"kp": 2000.0}).items()})
+    return shapes_at_rest(model, fields, [experiment], segment_sites(model, ("tip",)), None).positions[0][0, :, 0]
+
+
+PULLS = np.random.default_rng(3).uniform(-0.002, 0.006, (5, 4))
+
+
+@pytest.mark.parametrize("load", [0.0, 0.1])
+def test_it_is_where_mujoco_settles(load):
+    model = made()
+    found = tips(model, path_of(model, PULLS, load))
+    heavy = arm(tendons=FOUR, tip_load=load).build(ACTUATION, SOLVER, Path(".")).spec.compile()
+    heavy.actuator_gainprm[:], heavy.actuator_biasprm[:] = model.actuator_gainprm, model.actuator_biasprm
+    settled = settle(heavy, model.tendon_length0 - PULLS, DOWN)
+    assert settled.rested.all()
+    data = mujoco.MjData(heavy)
+    for qpos, tip in zip(settled.qpos, found, strict=True):
+        data.qpos[:] = qpos
+        mujoco.mj_kinematics(heavy, data)
+        np.testing.assert_allclose(tip, data.site("tip_center").xpos, atol=1e-7)
+
+
+def test_a_first_guess_leads_to_the_same_rest():
+    model = made()
+    chain = read_chain(model)
+    commands = model.tendon_length0 - PULLS
+    followed = actuated(chain, commands, DOWN)
+    again = actuated_from(chain, followed.qpos + 0.01, commands, DOWN)
+    assert again.converged.all()
+    np.testing.assert_allclose(again.qpos, followed.qpos, atol=1e-7)
+    np.testing.assert_allclose(again.tensions, followed.tensions, atol=1e-6)
+
+
+def test_where_it_rests_depends_on_the_way_by_the_winch_s_play():
+    play = 1e-3
+    model = made(backlash=play)
+    there_and_back = np.zeros((3, 4))
+    there_and_back[:, 1] = 0.002, 0.006, 0.002
+    found = tips(model, path_of(model, there_and_back), {"backlash": play})
+    plain = made()
+    behind = np.zeros((3, 4))  # after the first frame the cable trails by half the play, on either side
+    behind[:, 1] = 0.002, 0.006 - play / 2, 0.002 + play / 2
+    np.testing.assert_allclose(found, tips(plain, path_of(plain, behind)), atol=1e-9)
+
+
+def test_commands_draw_in_what_the_model_says():
+    model, other = made(), made()
+    model.numeric_data[numeric_place(model, WINDING)] = 0.8
+    model.numeric_data[numbers_place(model, PRELOAD)] = [0.001, 0.0, -0.0005, 0.0]
+    found = tips(model, path_of(model, PULLS))
+    drawn = 0.8 * PULLS + [0.001, 0.0, -0.0005, 0.0]
+    np.testing.assert_allclose(found, tips(other, path_of(other, drawn)), atol=1e-9)
+    as_searched = tips(other, path_of(other, PULLS), {"winding": 0.8, "preload_1": 0.001, "preload_3": -0.0005})
+    np.testing.assert_allclose(found, as_searched, atol=1e-9)

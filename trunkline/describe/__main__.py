@@ -1,0 +1,47 @@
+"""What an arm's description gives: `python -m trunkline.describe ARM`
+
+ARM is a description, a YAML of `conf/build_mjcf/arm/`, or a model in MJCF. Prints its units, its tendons with their
+moment arms, its tracked points, and what no log will tell of it; with --session, of that session's logs. Draws it.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+from trunkline.describe.drawing import read_drawing
+from trunkline.describe.words import doubt_lines, marker_lines, tendon_lines, unit_lines
+from trunkline.errors import in_one_line
+from trunkline.figures.arm import arm_figure
+from trunkline.figures.style import save_figure
+from trunkline.sessions.session import read_session
+from trunkline.statics.chain import read_chain
+
+
+@in_one_line
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m trunkline.describe", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("arm", type=Path, metavar="ARM", help="an arm's YAML, or a model in MJCF")
+    parser.add_argument("--session", type=Path, metavar="FOLDER", help="of logs and session.yaml")
+    parser.add_argument("--out", type=Path, metavar="PNG", help="the drawing; default: <ARM's name>.png here")
+    told = parser.parse_args(arguments)
+    model = read_drawing(told.arm, Path("."))
+    if model.nu:
+        read_chain(model)  # what the statics cannot solve is told here
+    kinds, points, weightless = None, None, False
+    if told.session is not None:
+        session = read_session(told.session)
+        kinds = {trial.experiment for trial in session.trials}
+        points, weightless = len(session.segments or {}) or None, session.frame.gravity == "none"
+    for lines in (unit_lines(model), tendon_lines(model), marker_lines(model)):
+        print("\n".join(lines))
+    print("\n".join(f"note: {line}" for line in doubt_lines(model, kinds, points, weightless)))
+    out = told.out or Path(f"{told.arm.stem}.png")
+    save_figure(arm_figure(model), out)
+    print(f"drawn in {out}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,37 @@
+"""From what a log says was commanded to the lengths of cable that a model's motors are sent.
+
+A log counts pulls from the straight arm's path lengths, L = L_0 - u. Drums may be of another size than session.yaml
+has it, and cables tight or slack where commands are 0: a model that says so (`winding` w, `preload` p) is sent
+
+    L = L_0 - w u - p
+"""
+
+import mujoco
+import numpy as np
+
+from trunkline.elements import PRELOAD, WINDING, numbers_place, numeric_place
+from trunkline.identification.parameters import Fields
+
+
+def wound(model: mujoco.MjModel, controls: np.ndarray) -> np.ndarray:
+    """Lengths that the actuators of `model` are sent where a log commands `controls`, m. Shapes (..., nu)."""
+    place = numeric_place(model, WINDING)
+    if place is None:
+        return controls
+    return _wound(model, controls, model.numeric_data[place], model.numeric_data[numbers_place(model, PRELOAD)])
+
+
+def wound_by_each(model: mujoco.MjModel, fields: Fields, controls: np.ndarray) -> np.ndarray:
+    """As `wound`, by every candidate: (E, T, nu) of E trials → (E C, T, nu), a trial's candidates one after another."""
+    place, count = numeric_place(model, WINDING), len(next(iter(fields.values())))
+    each = np.repeat(controls, count, axis=0)
+    if place is None:
+        return each
+    numbers = fields.get("numeric_data", np.repeat(model.numeric_data[None], count, axis=0))
+    numbers = np.tile(numbers, (len(controls), 1))[:, None]
+    return _wound(model, each, numbers[..., [place]], numbers[..., numbers_place(model, PRELOAD)])
+
+
+def _wound(model: mujoco.MjModel, controls: np.ndarray, winding, preload: np.ndarray) -> np.ndarray:
+    straight = model.tendon_length0[model.actuator_trnid[:, 0]]
+    return straight - winding * (straight - controls) - preload
