@@ -18,6 +18,7 @@ from mcap_ros2.writer import Writer
 from trunkline.errors import InputError, in_one_line
 from trunkline.logs.definitions import JOINT_STATE, MARKERS
 from trunkline.pipeline.stage import output_folder
+from trunkline.trials.splits import IDENTIFY, TEST, VALIDATE
 
 HERE = Path(__file__).parent
 SESSION = HERE / "data" / "raw" / "ftdcr"
@@ -81,7 +82,7 @@ def trials_of(file: str, poses: list[Pose], split: str) -> list[dict]:
     entries = []
     for number, (pattern, group) in enumerate(groupby(poses, key=lambda pose: pose.pattern)):
         times = [pose.time - poses[0].time for pose in group]
-        own = "validate" if split == "identify" and number % VALIDATED == VALIDATED - 1 else split
+        own = VALIDATE if split == IDENTIFY and number % VALIDATED == VALIDATED - 1 else split
         window = [round(times[0] - MARGIN, 3), round(times[-1] + MARGIN, 3)]
         entries.append({"name": pattern, "file": file, "window": window, "experiment": "static_path", "split": own})
     return entries
@@ -91,7 +92,7 @@ def make_session(source: Path, session: Path = SESSION) -> int:
     """Fill the folder `session` from `source`; the number of trials. Raises InputError where a file is not right."""
     with output_folder(session) as folder:
         entries = []
-        for stem, split in (("train", "identify"), ("val", "test")):
+        for stem, split in (("train", IDENTIFY), ("val", TEST)):
             poses = read_csv(source / f"{stem}.csv")
             write_log(folder / f"{stem}.mcap", poses)
             entries += trials_of(f"{stem}.mcap", poses, split)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from trunkline.identification.linearisation import Linearisation
-from trunkline.identification.surrogate import LONGEST, surrogate
+from trunkline.identification.surrogate import LONGEST, Surrogate, surrogate
 
 TRIALS, ROWS = 6, 40
 CURVATURE = 0.6  # of the residuals, beside slopes of about 1 and residuals of about 0.5
@@ -93,3 +93,19 @@ def test_seen_from_another_place_losses_and_minima_are_the_same():
     np.testing.assert_allclose(moved.losses(ahead), surrogate_there.losses(place + ahead), rtol=1e-9)
     np.testing.assert_allclose(moved.minima(weights[None]) + place, surrogate_there.minima(weights[None]), atol=1e-6)
     np.testing.assert_array_equal(moved.weights, weights)
+
+
+def test_of_first_order_its_minima_are_those_of_weighted_least_squares():
+    rng = np.random.default_rng(5)
+    jacobians, residuals = rng.normal(size=(6, 40, 15)), rng.normal(size=(6, 40))
+    rows = np.concatenate([residuals[..., None], jacobians], axis=2)  # r + J d = rows @ (1, d)
+    first = Surrogate(rows.transpose(0, 2, 1) @ rows, second=False)
+    weights = rng.uniform(0.2, 1.0, (3, 6))
+    for weight, found in zip(weights, first.minima(weights), strict=True):
+        root = np.sqrt(weight)[:, None]
+        stacked = (root[..., None] * jacobians).reshape(-1, 15), -(root * residuals).ravel()
+        np.testing.assert_allclose(found, np.linalg.lstsq(*stacked)[0], atol=1e-8)
+    place = rng.normal(size=15)
+    seen = first.moved(place, np.ones(6))
+    np.testing.assert_allclose(seen.losses(np.zeros((1, 15))), first.losses(place[None]))
+    np.testing.assert_allclose(seen.losses(np.ones((1, 15))), first.losses(1 + place[None]))

@@ -73,7 +73,7 @@ def test_the_library_needs_its_dependencies_alone():
 @pytest.mark.parametrize(
     ("extra", "folders"),
     [
-        ("pipeline,teleop,live,motors,ros2", ["trunkline", "stages", "demo", "examples/asl_trunk"]),
+        ("pipeline,teleop,live,motors,ros2", ["trunkline", "stages", "demo", "examples/asl_trunk", "examples/ftdcr"]),
         ("teleop", ["rehearsal"]),
         ("bench,live", ["benchmarks", "studies"]),
         ("test", ["tests"]),

@@ -34,7 +34,7 @@ PICTURES = {
     "artifacts/reachability/maps.png": "docs/maps.png",
     "artifacts/rehearse/still.png": "docs/rehearsal.png",
     "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
-    "examples/ftdcr/artifacts/identify_stiffness/shapes.png": "examples/ftdcr/shapes.png",
+    "examples/ftdcr/artifacts/score/errors.png": "examples/ftdcr/errors.png",
 }
 EXAMPLES = ("asl_trunk",)  # folders of examples/ with releases, each a block of the README and of its own README
 
