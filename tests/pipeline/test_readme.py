@@ -148,8 +148,8 @@ def test_which_intervals_of_the_demo_session_hold_the_truth():
         "relaxation_time": None,
         "kp": True,
         "kv": False,
-        "time_constant": True,
-        "dead_time": True,
+        "time_constant": False,
+        "dead_time": False,
         "force_range": False,
         "capstan_friction": True,
     }

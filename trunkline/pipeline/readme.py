@@ -235,7 +235,7 @@ def path_sentence(folder: Path) -> str:
     found, null = (_number(lookup(scored, f"{model}.{TEST}.e_tip_centred_rms_mm")) for model in ("identified", "null"))
     return (
         f"Another, of three sections and nine tendons, the [FTDCR]({folder.parent.name}/{folder.name}): {found} mm RMS "
-        f"at the tip on poses of `{TEST}` (its authors' calibrated simulator 9.38, the mean shape {null})."
+        f"at the tip\non poses of `{TEST}` (its authors' calibrated simulator 9.38, the mean shape {null})."
     )
 
 
