@@ -84,7 +84,7 @@ def tendon_lines(model: mujoco.MjModel) -> list[str]:
         apart = [1e3 * np.hypot(*place[:2]) for place in (first, last)]
         away = f"{apart[0]:.3g} mm" if np.isclose(*apart, rtol=ALIKE) else f"{apart[0]:.3g} to {apart[1]:.3g} mm"
         said = [
-            f"at {np.degrees(np.arctan2(first[1], first[0])):.1f}°", f"{away} from the axis", f"ends at unit {end}",
+            f"at {_angle(model, cable):.1f}°", f"{away} from the axis", f"ends at unit {end}",
             f"{1e3 * model.tendon_length0[cable]:.1f} mm long",
             f"{1e3 * np.radians(1) * crossed.sum():.3g} mm for 1° of each joint that it crosses",
             f"{model.actuator_gainprm[motor, 0]:.4g} N/m up to {-model.actuator_forcerange[motor, 0]:.4g} N",
