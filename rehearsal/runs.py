@@ -60,10 +60,12 @@ def source_of(package: Path) -> Source:
 
 
 def wanted(runs: dict[str, int], of_variants: int) -> list[Run]:
-    """Seeds 0, 1, ... of each experiment, so many each, then of each of its variants."""
+    """Seeds 0, 1, ... of each experiment, so many each, then of each of its variants; seed by seed, so that a stopped
+    rehearsal has about as many of each."""
     plain = [Run(name, seed) for name, count in runs.items() for seed in range(count)]
-    variants = [(name, variant) for name in runs for variant in VARIANTS.get(name, {})]
-    return plain + [Run(name, seed, variant) for name, variant in variants for seed in range(of_variants)]
+    kinds = [(name, variant) for name in runs for variant in VARIANTS.get(name, {})]
+    variants = [Run(name, seed, variant) for seed in range(of_variants) for name, variant in kinds]
+    return sorted(plain, key=lambda run: run.seed) + variants
 
 
 def make(runs: list[Run], package: Path, source: Source, table: Path, workers: int) -> list[Result]:

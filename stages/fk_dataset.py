@@ -12,14 +12,18 @@ from trunkline.progress import progress
 from trunkline.settings import settings
 from trunkline.statics.chain import read_chain
 
-MODEL = Path("artifacts/identify_control/arm.xml")
 DATA, ARTIFACTS = Path("data/processed/fk_dataset"), Path("artifacts/fk_dataset")
 
-Config = settings(Sampling)
+
+@settings
+class Config(Sampling):
+    """See conf/fk_dataset/config.yaml. model: MJCF file of the arm."""
+
+    model: str
 
 
-def main(config: Sampling) -> None:
-    model = read_model(MODEL)
+def main(config: Config) -> None:
+    model = read_model(Path(config.model))
     chain = read_chain(model).smooth
     with progress(len(config.gravity.downs), "fk_dataset", "gravities") as bar:
         found = gather(model, chain, config, lambda **counts: bar.update(1, **counts))

@@ -11,7 +11,7 @@ from trunkline.progress import progress
 from trunkline.sessions.session import SessionName, read_session
 from trunkline.settings import settings
 from trunkline.takes.checks import Limits
-from trunkline.takes.gathering import Refusal, gather
+from trunkline.takes.gathering import Refusal, gather, require_enough
 from trunkline.takes.intake import take_in
 from trunkline.takes.plausible import Plausible
 from trunkline.takes.quality import by_sentence, judge, remarks, report, summary
@@ -39,6 +39,7 @@ def main(config: Config) -> None:
             taken.append((trial, take, found))
             bar.update(1, trial=trial.name)
     gathered = gather(taken, session, config.plausible, config.refused_trials, f"{folder}")
+    require_enough(gathered, session.trials)
     qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
     for take, found in zip(gathered.takes, gathered.findings, strict=True):
         take.repairs = len(found.repairs)
@@ -49,6 +50,8 @@ def main(config: Config) -> None:
         write_json(artifacts / "quality.json", report(qualities, gathered))
         write_json(artifacts / "metrics.json", summary(qualities, gathered))
         save_figure(quality_figure(qualities, gathered), artifacts / "quality.png")
+    for said in gathered.refused.values():
+        print(f"ingest: warning: left out: {said}", file=sys.stderr)
     for line in by_sentence(qualities, lambda found: found.warnings):
         print(f"ingest: warning: {line}", file=sys.stderr)
 

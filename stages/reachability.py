@@ -17,16 +17,19 @@ from trunkline.reachability.survey import Survey, survey
 from trunkline.settings import settings
 from trunkline.statics.chain import read_chain
 
-MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
 ARTIFACTS = Path("artifacts/reachability")
 
 
-Config = settings(Survey)
+@settings
+class Config(Survey):
+    """See conf/reachability/config.yaml. model: MJCF file of the arm."""
+
+    model: str
 
 
-def main(config: Survey) -> None:
-    chain = read_chain(read_model(MODEL)).smooth
+def main(config: Config) -> None:
+    chain = read_chain(read_model(Path(config.model))).smooth
     tips_at = read_tips(SAMPLES, chain, config.soft, config.seed)
     with progress(config.parts(tips_at), "reachability", "parts") as bar:
         maps, check = survey(tips_at, config, lambda part: bar.update(1, done=part))

@@ -16,15 +16,19 @@ from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.settings import settings
 from trunkline.statics.chain import read_chain
 
-MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
 ARTIFACTS = Path("artifacts/train_ik")
 
-Config = settings(Learning)
+
+@settings
+class Config(Learning):
+    """See conf/train_ik/config.yaml. model: MJCF file of the arm."""
+
+    model: str
 
 
-def main(config: Learning) -> None:
-    model = read_model(MODEL)
+def main(config: Config) -> None:
+    model = read_model(Path(config.model))
     chain = read_chain(model).smooth
     table = read_samples(SAMPLES, chain.tendons, "split")
     rig = None if config.rig is None else load_rig("train_ik.rig", config.rig)

@@ -68,12 +68,15 @@ STAGES = {
     "stiffness": Searched(
         {
             "stiffness": 2.0, "hardening": 1.5, "joint_place": 0.3, "mount_tilt_x": 0.02, "mount_tilt_y": -0.03,
-            "rest_bend_x": 0.01, "rest_bend_y": -0.01, "kp": 600.0,
+            "rest_bend_x": 0.01, "rest_bend_y": -0.01, "rest_gradient_x": 0.02, "rest_gradient_y": -0.02,
+            "kp": 600.0,
         }, statics,
     ),
     "damping": Searched(
-        {"stiffness": 2.0, "damping": 0.07, "relaxation": 0.3, "relaxation_time": 0.2}, releases,
-        joints=Joints([Branch(0.3, 0.5)]),
+        {
+            "stiffness": 2.0, "damping": 0.07, "relaxation": 0.3, "relaxation_time": 0.2, "relaxation_2": 0.15,
+            "relaxation_time_2": 0.03,
+        }, releases, joints=Joints([Branch(0.3, 0.5), Branch(0.1, 0.03)]),
     ),
     "control": Searched(
         {"kp": 600.0, "kv": 25.0, "time_constant": 0.05, "dead_time": 0.02, "force_range": 1.6}, driven,
@@ -88,12 +91,15 @@ def settings_of(name: str) -> IdentificationSettings:
 
 
 def bounds_of(name: str) -> dict[str, Bounds]:
-    """The ranges of a stage's parameters."""
-    committed = settings_of(name).parameters
-    return {
-        key: committed[key] if PARAMETERS[key].signed else Bounds(value / RANGE, value * RANGE)
-        for key, value in STAGES[name].true.items()
-    }
+    """The ranges of a stage's parameters: about the truth, and no wider than the committed ones that hold it, which
+    keep a slow branch and a fast one apart."""
+    found = {}
+    for key, value in STAGES[name].true.items():
+        own = settings_of(name).parameters[key]
+        low = max(own.low, value / RANGE) if own.low < value else value / RANGE
+        high = min(own.high, value * RANGE) if own.high > value else value * RANGE
+        found[key] = own if PARAMETERS[key].signed else Bounds(low, high)
+    return found
 
 
 @dataclass

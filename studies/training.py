@@ -21,8 +21,8 @@ import torch
 from trunkline.dataset.columns import command_columns, length_columns, tension_columns
 from trunkline.dataset.table import command_by_tension, tip_by_tension, turn_by_tension
 from trunkline.errors import in_one_line
-from trunkline.ik.inputs import inputs_of, told_of_gravity
-from trunkline.ik.learn import Unseen, unseen_targets
+from trunkline.ik.inputs import inputs_of
+from trunkline.ik.learn import Unseen, known_gravities, unseen_targets
 from trunkline.ik.score import tip_errors
 from trunkline.ik.tip_loss import tip_loss
 from trunkline.ik.training import Training, train
@@ -62,8 +62,7 @@ def main() -> int:
     pose = np.concatenate([tip_by_tension(table, tendons), LEVER * turn_by_tension(table, tendons)], axis=1)
     loss = tip_loss(table[tension_columns(tendons)].to_numpy(), pose, command_by_tension(table, chain.gain))
     inputs_read = inputs_of(table)
-    known = told_of_gravity(table[inputs_read].drop_duplicates(inputs_read[:-7]).to_numpy())
-    unseen = unseen_targets(chain, known, replace(UNSEEN, samples=arguments.targets), 1)
+    unseen = unseen_targets(chain, known_gravities(table), replace(UNSEEN, samples=arguments.targets), 1)
     held_out = table[table["split"] == "validate"]
     targets = [held_out.sample(min(arguments.targets, len(held_out)), random_state=1), unseen]
     sets = (inputs_read, command_columns(tendons), length_columns(tendons))

@@ -134,8 +134,8 @@ def actuators(model: mujoco.MjModel) -> np.ndarray:
 
 def numeric_place(model: mujoco.MjModel, name: str) -> int | None:
     """Where among the model's `numeric_data` the number of this name is; None if it has none."""
-    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name)
-    return int(model.numeric_adr[number]) if number >= 0 else None
+    places = numbers_place(model, name)
+    return int(places[0]) if len(places) else None
 
 
 def numeric(model: mujoco.MjModel, name: str) -> float:

@@ -113,7 +113,7 @@ test("keys move the chosen target by a step, and the grip let go holds the robot
   await page.keyboard.press("Enter");
   await inMode(page, "execute");
   await page.keyboard.up("KeyG");
-  await inMode(page, "hold");
+  await passed(page, server, ["execute", "hold", "aim"]);
 });
 
 test("the robot follows while the grip is held, and the page says why it holds then", async (t) => {
@@ -133,9 +133,9 @@ test("the robot follows while the grip is held, and the page says why it holds t
   for (let n = 0; n < 3; n++) await page.keyboard.press("ArrowUp");
   await until(page, (z) => globalThis.trunkline.state.targets.rigid.position[2] > z + 0.02, before[2]);
   await page.keyboard.up("KeyG");
-  await inMode(page, "hold");
-  await until(page, () => globalThis.trunkline.state.robot === "idle");
   await until(page, () => /grips let go/.test(document.querySelector("#notice").textContent));
+  await passed(page, server, ["follow", "hold", "aim"]);
+  await until(page, () => globalThis.trunkline.state.robot === "idle");
 });
 
 test("out of reach is told in words, by a ring and by an offer that R takes", async (t) => {

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from examples.asl_trunk.session import COLUMNS, SESSION, make_session, read_csv
+from examples.asl_trunk.session import COLUMNS, SESSION, make_loaded_session, make_session, read_releases
 from trunkline.errors import InputError
 from trunkline.sessions.session import read_session
 from trunkline.takes.checks import Limits
@@ -37,7 +37,7 @@ def test_the_public_csv_becomes_a_session_that_ingest_reads(public, tmp_path):
     assert make_session(public, folder) == 13
     session = read_session(folder)
     assert [trial.split for trial in session.trials] == ["identify", "identify", "test"] * 3 + ["validate"] * 4
-    positions = read_csv(public)
+    positions = read_releases(public)
     for number, (_, take, found) in enumerate(take_in(folder, session, LIMITS)):
         assert (take.segments, take.tendons, take.quaternions) == (("1", "2", "3"), (), None)
         np.testing.assert_array_equal(take.positions, positions[number][: len(take.time)])  # to the last bit
@@ -52,12 +52,24 @@ def test_a_folder_of_logs_is_taken_as_it_is(public, tmp_path):
         assert (tmp_path / "second" / log.name).read_bytes() == log.read_bytes()
 
 
+def test_releases_with_another_load_are_a_session_of_their_own(public, tmp_path):
+    folder = tmp_path / "session"
+    assert make_loaded_session(public, 0.1, folder) == 13
+    make_session(public, tmp_path / "first")
+    session, first = read_session(folder), read_session(tmp_path / "first")
+    assert (session.frame, session.base) == (first.frame, first.base)
+    assert {(trial.experiment, trial.split, trial.load) for trial in session.trials} == {("release", "test", 0.1)}
+    positions = read_releases(public)
+    for number, (_, take, _) in enumerate(take_in(folder, session, LIMITS)):
+        np.testing.assert_array_equal(take.positions, positions[number][: len(take.time)])
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (lambda text: text.replace("x1", "a1"), "row 1: found ID, a1"),
         (lambda text: text.replace("\n0,", "\n0,x", 1), "row 2: could not convert"),
-        (lambda text: text.replace("\n0,", "\n0,1.0,", 1), "row 2: found 10 coordinates, expected 9"),
+        (lambda text: text.replace("\n0,", "\n0,1.0,", 1), "row 2: found 11 cells, expected 10"),
         (lambda text: "", "row 1: found nothing"),
     ],
 )

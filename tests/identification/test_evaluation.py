@@ -91,6 +91,28 @@ def test_the_period_of_a_swing_that_dies_away(longer):
     assert period_error(swing(0.8 * longer), real, measured) == pytest.approx(abs(longer - 1), abs=2e-3)
 
 
+def test_a_swing_is_compared_about_where_each_trial_rests():
+    model = small_model(4)
+    (experiment,) = [prepare(release(model, 0.2, frames=437), model, 437)]
+    time = experiment.frame_step * np.arange(len(experiment.positions))
+    wave = (np.exp(-4 * time) * np.cos(8 * time))[:, None, None] * 0.05
+    experiment.positions = experiment.positions[-1:] + wave
+    moved = experiment.positions + [0.003, 0.004, 0.0]
+    found = replay(model, [experiment], segments_of(model))
+    found.positions[0] = moved
+    row = scores(found, [experiment])["identify"]
+    assert row["e_position_mm"] == pytest.approx(5.0)
+    assert row["e_tip_about_rest_mm"] == pytest.approx(0.0, abs=1e-9)
+    assert row["e_late_speed_pct"] == pytest.approx(0.0, abs=1e-6)
+    found.positions[0] = moved + 0.5 * wave
+    row = scores(found, [experiment])["identify"]
+    assert row["e_late_speed_pct"] == pytest.approx(50.0)
+    off = 500 * np.sqrt(3) * np.abs(wave[:, 0, 0] - wave[-60:].mean()).mean()
+    assert row["e_position_about_rest_mm"] == pytest.approx(off, rel=0.01)
+    experiment.positions = experiment.positions + 0.01 * np.sin(8 * time)[:, None, None]
+    assert "e_late_speed_pct" not in scores(found, [experiment])["identify"], "this arm never rests"
+
+
 def test_an_arm_that_hangs_still_has_no_period():
     model = small_model(4)
     experiments = [prepare(release(model, 0.2, frames=60), model, 60)]

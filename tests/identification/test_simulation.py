@@ -15,7 +15,7 @@ from trunkline.identification.evaluation import replay
 from trunkline.identification.experiment import prepare
 from trunkline.identification.loss import position_error
 from trunkline.identification.parameters import candidate_fields
-from trunkline.identification.population import Group, Population
+from trunkline.identification.population import Population
 from trunkline.identification.pose_fit import fit_pose
 
 
@@ -231,8 +231,7 @@ def test_what_joints_remember_begins_as_the_hand_left_it():
         controls=np.zeros((1, 3)), slack=lambda _: False,
     )  # fmt: skip
     population = Population(model, [experiment], ())
-    moving = Group(static=False, slack=False)
-    batch = population._batch(moving, [experiment], {"jnt_stiffness": model.jnt_stiffness[None]}, 1)
+    batch = population._batch(False, [experiment], {"jnt_stiffness": model.jnt_stiffness[None]}, 1)
     branch, slider = elements(model, BRANCH), elements(model, SLIDER)
     np.testing.assert_allclose(batch.bind("qpos")[0, branch.own], start)
     places = model.tendon_plasticadr[slider.tendon]

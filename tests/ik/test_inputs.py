@@ -123,6 +123,6 @@ def test_exact_commands_settle_on_targets_under_gravity_from_any_side(model, cha
 
 
 def test_far_targets_have_any_gravity():
-    far = outside_targets(500, 0.5, np.random.default_rng(0), directed=True)
+    far = outside_targets(500, 0.5, np.random.default_rng(0), told=3)
     assert far.shape == (500, len(DIRECTION))
     np.testing.assert_allclose(np.linalg.norm(told_of_gravity(far), axis=1), 1)

@@ -195,6 +195,7 @@ def test_a_learning_rate_that_diverges_is_an_error_of_one_line(chain, samples):
 
 def test_a_single_gravity_angle_is_refused_before_anything_is_trained(tmp_path):
     samples = pd.DataFrame(np.zeros((3, 16)), columns=[*TILT, *DOWN, "l1", "l2", "c1", "c2", "split"])
+    samples["gz"] = -1.0
     samples.to_parquet(tmp_path / "samples.parquet")
     with pytest.raises(InputError, match="samples.parquet: found 1 gravity angle, expected at least 2"):
         read_samples(tmp_path / "samples.parquet", 2)

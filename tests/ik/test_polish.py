@@ -62,7 +62,7 @@ def test_restart_finds_the_equilibrium_that_the_loads_lead_to(chain):
 
 
 def test_far_targets_are_far_and_what_is_beyond_the_range_is_seen():
-    targets = outside_targets(2000, 0.5, np.random.default_rng(0), directed=False)
+    targets = outside_targets(2000, 0.5, np.random.default_rng(0), told=1)
     assert (np.linalg.norm(targets[:, 1:4], axis=1) > 0.5).mean() > 0.9
     np.testing.assert_allclose(np.linalg.norm(targets[:, 4:], axis=1), 1)
     known = np.array([[0.3, 0.4], [0.5, 0.6]])

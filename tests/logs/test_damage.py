@@ -57,6 +57,21 @@ def right(tmp_path_factory):
     return session(tmp_path_factory.mktemp("session") / "right")[0]
 
 
+def test_of_three_discs_one_may_be_lost_as_another_takes_its_place():
+    """As in a real log: disc 3 is at disc 1's place while nothing is said of disc 1, so two distances have to do."""
+    discs = np.array([[0, 0, 0], [0, 0, -0.1], [0, 0, -0.2], [0, 0, -0.32]])
+    swing = 0.1 * np.sin(np.linspace(0, 9, 200))[:, None, None] * np.array([1.0, 0, 0]) * [[0], [0.2], [0.5], [1]]
+    seen = discs + swing
+    usual = usual_distances([seen])
+    wrong = seen.copy()
+    wrong[50:56, 3], wrong[50:56, 1] = seen[50:56, 1], np.nan
+    wrong[90, 3], wrong[90, 1] = seen[90, 1], np.nan  # for a frame alone, it may be an outlier
+    (found,) = find_swaps(wrong, usual, marked_base=False)
+    assert (found.bodies, np.flatnonzero(found.frames).tolist()) == ((1, 3), list(range(50, 56)))
+    seen[60:70, 1] = np.nan
+    assert find_swaps(seen, usual, marked_base=False) == []
+
+
 @pytest.mark.parametrize("frames", [slice(60, 110), slice(60, 61), slice(200, None), slice(0, 250)])
 @pytest.mark.parametrize("bodies", [(1, 2), (2, 3), (3, 4), (1, 2, 3)])
 def test_bodies_taken_for_each_other_are_put_right(tmp_path, right, frames, bodies):

@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import pytest
+import yaml
 from omegaconf import OmegaConf
 from pydantic import Field, TypeAdapter, ValidationError
 
+from trunkline.arm import kinds
 from trunkline.errors import InputError
 from trunkline.identification.settings import IdentificationSettings
-from trunkline.pipeline.config import check_settings, compose_settings, group_options, load_config
+from trunkline.pipeline.config import check_settings, compose_settings, group_options, load_config, validated
 from trunkline.pipeline.settings import check_once, require_session
 from trunkline.settings import settings
 
@@ -212,7 +214,7 @@ def test_a_mistaken_range_of_a_parameter(tmp_path, old, new, message):
 
 
 # of source: what it does not tell of the parameters in params.yaml
-UNTOLD = {"tilts": ("kp",), "releases": ("joint_place", "kp", "rest_bend")}
+UNTOLD = {"tilts": ("kp",), "releases": ("joint_place", "kp", "rest_bend", "rest_gradient")}
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -368,7 +370,7 @@ def test_a_rule_between_fields_names_the_key_and_the_file_that_set_it(tmp_path):
     ("old", "new", "message"),
     [
         ("samples: 200000", "samples: 1000000000000", "samples: found 1000000000000, expected 1000 to 10000000"),
-        ("gravity: direction ", "gravity: sideways ", "gravity: found 'sideways', expected one of direction, tilt"),
+        ("gravity: direction ", "gravity: sideways ", "found 'sideways', expected one of direction, none, tilt"),
         ("seed: 1\n\ntrain_ik", "seed: 9223372036854775808\n\ntrain_ik", "expected 0 to 4294967295"),
     ],
 )
@@ -413,3 +415,20 @@ def test_what_is_pulled_is_this_pipeline_and_its_sessions(tmp_path):
             command = ["make", "--no-print-directory", "--dry-run", "-f", str(ROOT / "Makefile"), verb]
             said = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False).stdout
             assert said.splitlines()[-1] == f"dvc {verb} dvc.yaml {wanted}"
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("distance", 15, "mine.yaml: tendons.2.distance: found 15, expected less than or equal to 1"),
+        ("distance", [0.01, 20], "mine.yaml: tendons.2.distance.1: found 20, expected less than or equal to 1"),
+        ("pretension", "4 N", "mine.yaml: tendons.2.pretension: found '4 N', expected a valid number"),
+    ],
+)
+def test_of_a_value_that_may_have_several_forms_the_mistake_within_one_is_named(key, value, message):
+    """`tendons` is a number or a list of descriptions, `distance` a number or a pair."""
+    arm = yaml.safe_load((ROOT / "conf/build_mjcf/arm/pairs.yaml").read_text())
+    arm["tendons"][2][key] = value
+    with pytest.raises(InputError) as caught:
+        validated(kinds.Arm, arm, Path("mine.yaml"))
+    assert str(caught.value) == message

@@ -60,6 +60,9 @@ def imported(files: list[Path]) -> dict[str, set[str]]:
     return found
 
 
+EXAMPLES = ["examples/asl_motion", "examples/asl_trunk", "examples/ftdcr", "examples/pairs"]
+
+
 def files(*folders: str) -> list[Path]:
     return [file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))]
 
@@ -73,7 +76,7 @@ def test_the_library_needs_its_dependencies_alone():
 @pytest.mark.parametrize(
     ("extra", "folders"),
     [
-        ("pipeline,teleop,live,motors,ros2", ["trunkline", "stages", "demo", "examples/asl_trunk", "examples/ftdcr"]),
+        ("pipeline,teleop,live,motors,ros2", ["trunkline", "stages", "demo", *EXAMPLES]),
         ("teleop", ["rehearsal"]),
         ("bench,live", ["benchmarks", "studies"]),
         ("test", ["tests"]),

@@ -37,7 +37,11 @@ MAY_NAME = {
     "trunkline/identification/evaluation.py": {"SPLITS"},  # sorts what it is given
     "trunkline/takes/gathering.py": {"SPLITS", "TEST"},  # says which of them a session lacks
     "trunkline/identification/scoring.py": {"TEST"},  # what the stage `score` calls
-    "examples/ftdcr/session.py": {"TEST"},  # writes it into session.yaml
+    "trunkline/check/recorded.py": {"SPLITS"},  # counts its trials
+    "examples/asl_motion/session.py": {"TEST"},  # writes it into session.yaml
+    "examples/asl_trunk/session.py": {"TEST"},  # likewise
+    "examples/ftdcr/session.py": {"TEST"},  # likewise
+    "examples/pairs/session.py": {"TEST"},  # likewise
     "trunkline/pipeline/readme.py": {"TEST"},  # shows it
     "trunkline/pipeline/truth_table.py": {"TEST"},  # shows it
 }

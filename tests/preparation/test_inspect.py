@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,6 +40,18 @@ def test_a_lab_session_is_described_and_its_proposal_is_the_session(tmp_path, ca
     found = {trial.file: (trial.experiment, trial.level) for trial in session.trials}
     assert found == {trial.file: (trial.experiment, trial.level) for trial in right.trials}
     assert all(not isinstance(take, Exception) for _, take, _ in take_in(tmp_path, session, LIMITS))
+
+
+def test_it_says_what_it_cannot_know(tmp_path, capsys):
+    """Which way is up where the mount may be turned, and what motors wind in whose names are not those of tendons."""
+    truth = motion_truth()
+    motors = tuple(f"m{number + 1}" for number in range(len(truth.tendons)))
+    record(tmp_path, [replace(truth, tendons=motors)], instruments())
+    said = inspect(capsys, tmp_path)[1].splitlines()
+    assert sum("no log tells it of a mount that is turned" in line for line in said) == 1
+    (told,) = [line for line in said if "`motors` is to say what each winds in" in line]
+    assert told.startswith("#")
+    assert "m1, m2, m3" in told
 
 
 def test_experiments_are_told_apart_without_names(tmp_path, capsys):

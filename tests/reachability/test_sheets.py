@@ -154,7 +154,7 @@ def test_samples_say_whether_maps_are_of_one_tilt_or_of_gravity_from_any_side(ch
     rng = np.random.default_rng(0)
     downs = [downwards(angle, azimuth) for angle in (0.0, np.radians(70))]
     samples = pd.concat([sample_table(chain, down, 30, 8, 8, rng)[0] for down in downs])
-    samples.to_parquet(tmp_path / "samples.parquet")
+    samples.assign(split="train").to_parquet(tmp_path / "samples.parquet")
     tips_at = read_tips(tmp_path / "samples.parquet", chain, SOFT, 0)
     if azimuth:
         assert tips_at.largest == pytest.approx(np.radians(70))

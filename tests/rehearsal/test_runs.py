@@ -51,6 +51,14 @@ def test_a_stopped_rehearsal_goes_on(made, tmp_path):
     assert len(make(wanted({"touch": 2}, 0), Path("package.tgz"), SOURCE, table, workers=1)) == 2  # as asked, no more
 
 
+def test_a_stopped_rehearsal_has_about_as_many_runs_of_each():
+    chosen = wanted({"reach": 2, "follow": 3}, 2)
+    plain = [("reach", 0), ("follow", 0), ("reach", 1), ("follow", 1), ("follow", 2)]
+    assert chosen[:5] == [Run(name, seed) for name, seed in plain]
+    assert [run.seed for run in chosen[5:]] == sorted(run.seed for run in chosen[5:])
+    assert {run.experiment for run in chosen[5 : 5 + len(chosen[5:]) // 2]} == {"reach", "follow"}
+
+
 @pytest.mark.parametrize("other", [replace(SOURCE, package="another"), replace(SOURCE, code="another")])
 def test_rows_of_another_package_or_code_do_not_count(made, tmp_path, other):
     table = tmp_path / "runs.csv"

@@ -131,6 +131,9 @@ def turned_by_nothing(number, content):
         body.pose.orientation.w *= 3
 
 
+SHORT = "{name: short, file: curl_40.mcap, window: [0, 0.2], experiment: curl, level: 40, split: validate}"
+
+
 def twice(number, content):
     content.rigidbodies = [*content.rigidbodies, *content.rigidbodies]
 
@@ -152,6 +155,7 @@ def twice(number, content):
 )
 def test_bad_session_ends_in_one_line_and_leaves_nothing(project, capsys, spoil, culprits):
     spoil(project / "data/raw/demo")
+    set_param(project, "ingest:\n", "ingest:\n  refused_trials: stop\n")
     code, stderr = run(capsys)
     assert code == 1
     assert stderr.startswith("error: ")
@@ -171,13 +175,26 @@ def test_a_failing_run_keeps_the_results_of_the_one_before(project, capsys):
 
 
 def test_a_trial_can_be_left_out_and_is_reported(project, capsys):
-    truncate(project / "data/raw/demo")
-    set_param(project, "ingest:\n", "ingest:\n  refused_trials: leave_out\n")
-    assert run(capsys)[0] == 0
+    plan = project / "data/raw/demo/session.yaml"
+    plan.write_text(f"{plan.read_text()}  - {SHORT}\n")
+    code, stderr = run(capsys)
+    assert code == 0
+    assert "ingest: warning: left out: data/raw/demo/curl_40.mcap: trial short: found 0." in stderr
     report = json.loads((ingest.ARTIFACTS / "quality.json").read_text())
-    assert list(report["refused"]) == ["curl_40"]
-    assert "cut off at byte 3000" in report["refused"]["curl_40"]
+    assert list(report["refused"]) == ["short"]
     assert json.loads((ingest.ARTIFACTS / "metrics.json").read_text())["clock_spread_ms"] < 1, "of the others"
+    set_param(project, "ingest:\n", "ingest:\n  refused_trials: stop\n")
+    code, stderr = run(capsys)
+    assert (code, stderr.count("\n")) == (1, 1), "a setting can have it stop"
+    assert "trial short: found 0." in stderr
+
+
+def test_what_is_left_without_a_refused_trial_has_to_be_enough(project, capsys):
+    truncate(project / "data/raw/demo")
+    code, stderr = run(capsys)
+    assert code == 1
+    assert "cut off at byte 3000" in stderr
+    assert stderr.endswith("expected another curl of the split validate to go on with\n")
     for log in (project / "data/raw/demo").glob("*.mcap"):
         log.write_bytes(b"")
     code, stderr = run(capsys)

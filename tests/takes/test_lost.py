@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trunkline.takes.lost import Lost, find_lost, put_back
+from trunkline.takes.lost import Lost, find_lost, put_back, unbroken
 
 RATE = 100.0
 TIME = np.arange(300) / RATE
@@ -45,6 +45,22 @@ def test_outliers_swaps_and_hidden_bodies_are_no_loss():
     positions[130:133, 1] = np.nan
     positions[160:, :] += 0.004  # a knock against the mount
     assert find_lost(TIME, positions, 1e-5) == []
+
+
+def test_a_gap_that_cannot_be_counted_parts_a_recording():
+    time = np.arange(0, 4, 0.001)
+    positions = swing(time)
+    assert unbroken(TIME, swing(TIME)) == slice(0, 300)
+    part = np.r_[np.zeros((20, 3, 3)) + positions[0], positions[150::10]]  # held, then let go 150 ms before it is seen
+    even = np.arange(len(part)) / RATE
+    assert unbroken(even, part) == slice(20, len(part))
+    lost = [Lost(40, 6)]
+    true, positions = lose(lost)
+    assert unbroken(true, positions) == slice(0, 300), "what was counted is no gap any more"
+    outlying = swing(TIME)
+    outlying[50, 2] += 0.02
+    outlying[90:100, 1] = np.nan
+    assert unbroken(TIME, outlying) == slice(0, 300)
 
 
 def test_a_gap_that_the_stamps_show_is_not_found_again():

@@ -11,7 +11,9 @@ from pydantic import Field
 
 from trunkline.dataset.deviation import mujoco_deviation
 from trunkline.dataset.gravities import Gravities
+from trunkline.dataset.sampling import sections
 from trunkline.dataset.table import Density, sample_table, split
+from trunkline.errors import InputError
 from trunkline.settings import Seed
 from trunkline.statics.chain import Chain
 
@@ -20,11 +22,13 @@ from trunkline.statics.chain import Chain
 class Sampling:
     """See conf/fk_dataset/config.yaml.
 
-    samples: in all, about. gravity: from where it pulls. check: samples that are compared with MuJoCo.
+    samples: in all, about. gravity: from where it pulls. stroke: m, how far motors draw in at most, for an arm of
+    several sections; None for as far as their force goes. check: samples that are compared with MuJoCo.
     """
 
     samples: Annotated[int, Field(ge=1000, le=10_000_000)]
     gravity: Gravities
+    stroke: Annotated[float, Field(gt=0, le=1)] | None
     seed: Seed
     validate_share: Annotated[float, Field(gt=0, lt=1)]
     check: Annotated[int, Field(ge=1, le=100000)]
@@ -47,14 +51,17 @@ def gather(model: mujoco.MjModel, chain: Chain, sampling: Sampling, done: Callab
         done: hears of each gravity how many samples there are by then, and how many it dropped.
 
     Raises:
-        InputError: if too few samples are left for the check.
+        InputError: if too few samples are left for the check, or an arm of one section has a stroke.
     """
+    if sampling.stroke is not None and len(sections(chain)) == 1:
+        raise InputError(f"fk_dataset.stroke: found {sampling.stroke:g}, expected null for an arm of one section")
+    deepest = None if sampling.stroke is None else np.full(chain.tendons, sampling.stroke)
     rng = np.random.default_rng(sampling.seed)
     gravity, downs = sampling.gravity, sampling.gravity.downs
     tables, densities = [], []
     for down in downs:
         count = sampling.samples // len(downs)
-        table, density = sample_table(chain, down, count, gravity.directions, gravity.steps, rng)
+        table, density = sample_table(chain, down, count, gravity.directions, gravity.steps, rng, deepest)
         tables.append(table)
         densities.append(density)
         done(kept=sum(map(len, tables)), dropped=density.failed + density.snapped)

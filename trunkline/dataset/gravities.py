@@ -1,4 +1,4 @@
-"""The directions of gravity at which samples are drawn: angles of one tilt, as in the paper, or from any side."""
+"""The directions of gravity at which samples are drawn: angles of one tilt, as in the paper, from any side, or none."""
 
 from dataclasses import dataclass
 from itertools import pairwise
@@ -51,7 +51,19 @@ class Directions(Rays):
         return spread(self.count, np.radians(self.largest_deg))
 
 
-Gravities = Annotated[Tilts | Directions, Field(discriminator="kind")]
+@dataclass
+class Weightless(Rays):
+    """No gravity: for an arm so stiff or so light that its session says `gravity: none`."""
+
+    kind: Literal["none"]
+
+    @property
+    def downs(self) -> np.ndarray:
+        """A direction of no length. Shape (1, 3)."""
+        return np.zeros((1, 3))
+
+
+Gravities = Annotated[Tilts | Directions | Weightless, Field(discriminator="kind")]
 
 
 def spread(count: int, largest: float, crowd: bool = False) -> np.ndarray:

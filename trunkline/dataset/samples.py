@@ -13,7 +13,7 @@ ALIKE = 1e-9  # by which directions of gravity may differ and be the same
 
 
 def read_samples(path: Path, tendons: int, *columns: str) -> pd.DataFrame:
-    """The table at `path`, of an arm of `tendons`, at two gravity angles or more.
+    """The table at `path`, of an arm of `tendons`, at two gravity angles or more, or without gravity.
 
     Args:
         columns: that must be there, beside gravity, the tip's pose, the tendons' lengths and commands.
@@ -28,12 +28,19 @@ def read_samples(path: Path, tendons: int, *columns: str) -> pd.DataFrame:
         if name not in table:
             raise InputError(f"{path}: found no column {name!r}, expected samples of an arm of {tendons} tendons")
     angles = table["theta_g"].nunique()
-    if angles < 2:
+    if angles < 2 and not weightless(table):
         raise InputError(f"{path}: found {angles} gravity angle, expected at least 2: others lie between them")
     return table
 
 
+def weightless(table: pd.DataFrame) -> bool:
+    """Whether nothing pulls but the tendons in these samples."""
+    return not table[DOWN].to_numpy().any()
+
+
 def from_any_side(table: pd.DataFrame) -> bool:
     """Whether gravity leaves the plane of tilt in these samples, so that no angle about base +y tells of it."""
+    if weightless(table):
+        return False
     tilts = downwards(table["theta_g"].to_numpy(), np.zeros(len(table)))
     return bool(np.abs(table[DOWN].to_numpy() - tilts).max() > ALIKE)

@@ -5,6 +5,9 @@ presses the units together, and above a few newtons a straight arm buckles under
 equilibria, which one depends on history, and no function gives lengths from poses. With one tendon slack the
 equilibrium was found to be unique. So, per direction of gravity, two neighbouring tendons pull, in any proportion, up
 to their largest force: tips form a surface, each point of which has one set of path lengths.
+
+Of an arm of several sections, each with tendons of its own that end there, two neighbouring ones of each section pull.
+No single way leads through so many dimensions: forces are drawn at random, evenly over each section's pulls.
 """
 
 from dataclasses import dataclass
@@ -13,7 +16,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.statics.chain import Chain
-from trunkline.statics.equilibria import Equilibrium, equilibrium_paths
+from trunkline.statics.equilibria import Equilibrium, equilibrium, equilibrium_paths
 
 COARSE_STEPS = 48  # of the first look at a path, to space the second one evenly along the tip's way
 SHEET_LOOK = 2  # rays of a sheet, of which one is looked at: places are along neighbouring rays as good as the same
@@ -27,7 +30,8 @@ class Candidates:
     Attributes:
         gravity: in the base frame, m/s². Shape (3,).
         equilibrium: the N equilibria.
-        kind: "general", "dorsal" (tendon 1 alone) or "ventral" (tendons 2 and 3 alike). Shape (N,).
+        kind: "general", or of an arm of three tendons "dorsal" (tendon 1 alone) or "ventral" (tendons 2 and 3 alike).
+            Shape (N,).
         failed: samples dropped because Newton's method found no stable equilibrium.
         snapped: samples dropped because the arm jumped on the way there.
     """
@@ -40,16 +44,29 @@ class Candidates:
 
 
 def sample_at(
-    chain: Chain, gravity: np.ndarray, directions: int, steps: int, rng: np.random.Generator, look_every: int = 1
+    chain: Chain,
+    gravity: np.ndarray,
+    directions: int,
+    steps: int,
+    rng: np.random.Generator,
+    look_every: int = 1,
+    deepest: np.ndarray | None = None,
 ) -> Candidates:
     """Follow the arm along rays of growing tension, samples evenly spaced along the tip's way on each.
+
+    An arm of several sections is pulled at random instead, directions * steps times, see `in_sections`.
 
     Args:
         gravity: in the base frame, m/s². Shape (3,).
         directions: rays, their bending moments evenly spread around the arm.
         steps: samples on each ray, at random in equal shares of its length; four times as many on the planar rays.
         look_every: the first look goes along one ray in so many; between them, the tip's way is interpolated.
+        deepest: of each tendon of an arm of several sections, how far its motor draws it in at most, m; None for as
+            far as its force goes. Shape (K,).
     """
+    if len(sections(chain)) > 1:
+        whole, within = in_sections(chain, gravity, directions * steps, deepest, rng)
+        return _candidates(gravity, whole[within], np.full(int(within.sum()), "general"))
     rays = pull_directions(chain, (np.arange(directions) + rng.random()) / directions * 2 * np.pi)
     planar, kinds = planar_directions(chain)
     parts = [_follow(chain, gravity, rays, steps, rng, look_every), _follow(chain, gravity, planar, 4 * steps, rng)]
@@ -57,6 +74,10 @@ def sample_at(
     whole = Equilibrium(
         **{name: np.concatenate([values, vars(parts[1])[name]]) for name, values in vars(parts[0]).items()}
     )
+    return _candidates(gravity, whole, kind)
+
+
+def _candidates(gravity: np.ndarray, whole: Equilibrium, kind: np.ndarray) -> Candidates:
     good = whole.converged & ~whole.snapped
     failed = int(np.sum(~whole.converged))
     return Candidates(gravity, whole[good], kind[good], failed, int(np.sum(~good)) - failed)
@@ -87,28 +108,45 @@ def sheet_at(chain: Chain, gravity: np.ndarray, around: int, along: int) -> np.n
     return found.position.reshape(around, along, 3)
 
 
-def pull_directions(chain: Chain, angles: np.ndarray) -> np.ndarray:
+def sections(chain: Chain) -> list[np.ndarray]:
+    """The tendons that end at one unit, section by section from the base."""
+    ends = chain.units - 1 - np.argmax(chain.crosses[::-1], axis=0)
+    return [np.flatnonzero(ends == end) for end in np.unique(ends)]
+
+
+def pull_directions(
+    chain: Chain, angles: np.ndarray, section: np.ndarray | None = None, most: np.ndarray | None = None
+) -> np.ndarray:
     """Two neighbouring tendons' tensions whose moment points at `angles` (rad) around the arm, one at its limit.
 
+    Args:
+        section: the tendons from which to choose; None for all.
+        most: N, or any other unit of a pull; None for the motors' largest force. Shape (K,).
+
     Returns:
-        Tensions in N. Shape (len(angles), K).
+        Tensions in N, or in the unit of `most`. Shape (len(angles), K).
 
     Raises:
         InputError: if fewer than three tendons surround the arm.
     """
+    section = np.arange(chain.tendons) if section is None else section
+    most = chain.max_tension if most is None else most
     holes = _first_holes(chain)
-    around = np.arctan2(holes[:, 1], holes[:, 0])
-    order = np.argsort(around)
-    gaps = np.diff(np.append(around[order], around[order[0]] + 2 * np.pi))
-    if chain.tendons < 3 or gaps.max() >= np.pi - 1e-6:
-        raise InputError(f"arm: found {chain.tendons} tendons, expected 3 or more all around, to reach every way")
+    around = np.arctan2(holes[section, 1], holes[section, 0])
+    order = section[np.argsort(around)]
+    around = np.sort(around)
+    gaps = np.diff(np.append(around, around[0] + 2 * np.pi))
+    if len(section) < 3 or gaps.max() >= np.pi - 1e-6:
+        raise InputError(
+            f"arm: found {len(section)} tendons that end at one unit, expected 3 or more all around, to reach every way"
+        )
     tensions = np.zeros((len(angles), chain.tendons))
     for row, angle in enumerate(angles):
-        place = np.searchsorted(around[order], np.arctan2(np.sin(angle), np.cos(angle))) - 1
+        place = np.searchsorted(around, np.arctan2(np.sin(angle), np.cos(angle))) - 1
         pair = order[[place % len(order), (place + 1) % len(order)]]
         moment = np.linalg.solve(holes[pair, :2].T, [np.cos(angle), np.sin(angle)])
         tensions[row, pair] = np.maximum(moment, 0)
-    share = (tensions / chain.max_tension).max(axis=1, keepdims=True)
+    share = (tensions / most).max(axis=1, keepdims=True)
     return tensions / share
 
 
@@ -131,6 +169,43 @@ def _first_holes(chain: Chain) -> np.ndarray:
     holes = chain.hole_in[0] + chain.offset[0]
     across = holes - np.outer(holes @ chain.tip, chain.tip) / (chain.tip @ chain.tip)
     return across / np.linalg.norm(across, axis=1, keepdims=True)
+
+
+def in_sections(
+    chain: Chain, gravity: np.ndarray, count: int, deepest: np.ndarray | None, rng: np.random.Generator
+) -> tuple[Equilibrium, np.ndarray]:
+    """Equilibria of an arm whose every section is pulled at random, evenly over all ways and forces: of each tendon up
+    to the one by which its motor, pulling alone, draws it in by `deepest`.
+
+    Args:
+        gravity: in the base frame, m/s². Shape (3,) or (count, 3).
+        deepest: m; None for as far as the motors' force goes. Shape (K,).
+
+    Returns:
+        `count` equilibria, and in which of them no motor draws in further than `deepest`. Shape (count,).
+    """
+    most = chain.max_tension if deepest is None else _forces(chain, deepest)
+    tensions = np.zeros((count, chain.tendons))
+    for section in sections(chain):
+        ways = pull_directions(chain, rng.uniform(-np.pi, np.pi, count), section, most)
+        tensions += np.sqrt(rng.random((count, 1))) * ways
+    found = equilibrium(chain, tensions, gravity)
+    if deepest is None:
+        return found, np.ones(count, bool)
+    return found, np.all(chain.straight_lengths - found.commands <= deepest, axis=1)
+
+
+def _forces(chain: Chain, deepest: np.ndarray) -> np.ndarray:
+    """By which each motor draws its tendon in by `deepest`, m (K,), without gravity, none of the others pulling: N,
+    at most its largest. Shape (K,)."""
+    shares, forces = np.linspace(0, 1, COARSE_STEPS) ** COARSE_POWER, np.empty(chain.tendons)
+    for tendon in range(chain.tendons):
+        ray = np.zeros((1, COARSE_STEPS, chain.tendons))
+        ray[0, :, tendon] = shares * chain.max_tension[tendon]
+        found = equilibrium_paths(chain, ray, np.zeros(3))
+        pulls = chain.straight_lengths[tendon] - found.commands[found.converged, tendon]
+        forces[tendon] = np.interp(deepest[tendon], pulls, ray[0, found.converged, tendon])
+    return forces
 
 
 def _follow(

@@ -30,8 +30,8 @@ class Density:
 
     @property
     def angle(self) -> float:
-        """Of gravity to the straight arm, rad."""
-        return tilt_of_gravity(self.down)
+        """Of gravity to the straight arm, rad; 0 without it."""
+        return angle_of(self.down)
 
     def unevenness(self) -> tuple[float, float]:
         """Standard deviation over mean of the number of tips in occupied cells of 2 cm, before and after."""
@@ -40,7 +40,13 @@ class Density:
 
 
 def sample_table(
-    chain: Chain, down: np.ndarray, count: int, directions: int, steps: int, rng: np.random.Generator
+    chain: Chain,
+    down: np.ndarray,
+    count: int,
+    directions: int,
+    steps: int,
+    rng: np.random.Generator,
+    deepest: np.ndarray | None = None,
 ) -> tuple[pd.DataFrame, Density]:
     """About `count` samples under one gravity, thinned in the space of tips.
 
@@ -50,10 +56,10 @@ def sample_table(
     The planar sets are kept beside the thinned samples, thinned along their own curves.
 
     Args:
-        down: direction of gravity in the base frame, of unit length. Shape (3,).
-        directions, steps: of the candidates, see `sample_at`.
+        down: direction of gravity in the base frame, of unit length, or zero without it. Shape (3,).
+        directions, steps, deepest: of the candidates, see `sample_at`.
     """
-    candidates = sample_at(chain, STANDARD_GRAVITY * down, directions, steps, rng)
+    candidates = sample_at(chain, STANDARD_GRAVITY * down, directions, steps, rng, deepest=deepest)
     tips = candidates.equilibrium.position
     planar = {kind: np.flatnonzero(candidates.kind == kind) for kind in ("dorsal", "ventral")}
     on_curves = [rows[thin(tips[rows], max(1, count // 50), rng)] for rows in planar.values() if len(rows)]
@@ -67,7 +73,7 @@ def sample_table(
 def _table(chain: Chain, down: np.ndarray, candidates: Candidates, kept: np.ndarray) -> pd.DataFrame:
     rest = candidates.equilibrium[kept]
     slopes = sensitivity(chain, rest.qpos, rest.tensions, candidates.gravity)
-    columns = {"theta_g": np.full(len(kept), tilt_of_gravity(down))}
+    columns = {"theta_g": np.full(len(kept), angle_of(down))}
     columns |= {name: np.full(len(kept), part) for name, part in zip(DOWN, down, strict=True)}
     columns |= dict(zip(POSE, np.concatenate([rest.position, rest.quaternion], axis=1).T, strict=True))
     columns |= dict(zip(length_columns(chain.tendons), rest.lengths.T, strict=True))
@@ -79,6 +85,11 @@ def _table(chain: Chain, down: np.ndarray, candidates: Candidates, kept: np.ndar
         columns |= {f"r{axis}_df{t + 1}": slopes.turn_by_tension[:, k, t] for k, axis in enumerate(AXES)}
         columns |= {f"dl{s + 1}_df{t + 1}": slopes.length_by_tension[:, s, t] for s in range(chain.tendons)}
     return pd.DataFrame(columns)
+
+
+def angle_of(down: np.ndarray) -> float:
+    """Of gravity in the direction `down` (3,) to the straight arm, rad; 0 where there is none."""
+    return tilt_of_gravity(down) if down.any() else 0.0
 
 
 def tip_by_tension(table: pd.DataFrame, tendons: int) -> np.ndarray:

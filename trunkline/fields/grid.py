@@ -101,6 +101,8 @@ def blend(fields: np.ndarray, angles: np.ndarray, angle: float) -> np.ndarray:
         angles: gravity angles of the fields, in rad.
         angle: in rad; outside the range of `angles` the nearest field holds.
     """
+    if len(angles) == 1:
+        return fields[0]
     upper = int(np.clip(np.searchsorted(angles, angle), 1, len(angles) - 1))
     share = np.clip((angle - angles[upper - 1]) / (angles[upper] - angles[upper - 1]), 0.0, 1.0)
     low, high = fields[upper - 1], fields[upper]

@@ -5,7 +5,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from trunkline.dataset.table import Density
-from trunkline.figures.style import BASE, IDENTIFIED, INITIAL, VALIDATE, plt
+from trunkline.figures.style import BASE, IDENTIFIED, INITIAL, LEAST_WIDTH, VALIDATE, plt
 from trunkline.frames import in_plane_of_tilt
 
 SLICE = 0.008  # m, half thickness of the slices shown
@@ -15,20 +15,14 @@ GOAL_MM = 0.02  # median distance of the statics from MuJoCo at rest
 
 def density_figure(densities: list[Density]) -> Figure:
     """Tips in the plane of tilt before and after thinning, and how many share a cell, at up to four gravity angles;
-    below, at every gravity angle how uneven they are."""
+    below, at every gravity angle how uneven they are. Without gravity there is one, in the plane of x and z."""
+    several, along = len(densities) > 1, "towards gravity (mm)" if len(densities) > 1 else "x (mm)"
     shown = [densities[i] for i in np.unique(np.linspace(0, len(densities) - 1, 4).round().astype(int))]
-    figure = plt.figure(figsize=(3.1 * len(shown), 11.5))
-    grid = figure.add_gridspec(4, len(shown))
+    figure = plt.figure(figsize=(max(3.1 * len(shown), LEAST_WIDTH), 11.5 if several else 10.0))
+    grid = figure.add_gridspec(3 + several, len(shown))
     axes = np.array([[figure.add_subplot(grid[row, column]) for column in range(len(shown))] for row in range(3)])
-    every = figure.add_subplot(grid[3, :])
-    densities = sorted(densities, key=lambda density: density.angle)
-    angles = [np.degrees(d.angle) for d in densities]
-    for values, color, label in zip(
-        np.array([d.unevenness() for d in densities]).T, (INITIAL, IDENTIFIED), ("before", "after"), strict=True
-    ):
-        every.plot(angles, values, "o-", markersize=4, color=color, label=label)
-    every.set(ylim=(0, None), xlabel="gravity angle θ_G (°)", ylabel="tips a cell: standard\ndeviation over mean")
-    every.legend()
+    if several:
+        _add_unevenness(figure.add_subplot(grid[3, :]), densities)
     points = np.concatenate([_in_plane(d.before, d.down) for d in shown])[:, [0, 2]] * 1e3
     thickness = SLICE if len(densities[0].after) > FEW else 4 * SLICE
     low, high = points.min(axis=0) - 15, points.max(axis=0) + 15
@@ -41,8 +35,9 @@ def density_figure(densities: list[Density]) -> Figure:
             near = turned[np.abs(turned[:, 1]) < thickness] * 1e3
             ax.scatter(near[:, 0], near[:, 2], s=2, color=color, linewidths=0)
             ax.plot(0, 0, "^", color=BASE, markersize=5)
-            ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="towards gravity (mm)")
-            ax.set_title(f"θ_G = {np.degrees(density.angle):.0f}°, {label}\n{len(tips)} tips", fontsize=9)
+            ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel=along)
+            under = f"θ_G = {np.degrees(density.angle):.0f}°" if several else "no gravity"
+            ax.set_title(f"{under}, {label}\n{len(tips)} tips", fontsize=9)
         for tips, color, label in ((density.before, INITIAL, "before"), (density.after, IDENTIFIED, "after")):
             counts = np.sort(_per_cell(tips))
             column[2].plot(np.linspace(0, 100, len(counts)), counts / counts.mean(), color=color, label=label)
@@ -51,8 +46,20 @@ def density_figure(densities: list[Density]) -> Figure:
     axes[1, 0].set_ylabel("z (mm)")
     axes[2, 0].set_ylabel("tips in the cell over the mean")
     axes[2, 0].legend()
-    figure.suptitle(f"Tips within {thickness * 1e3:.0f} mm of the plane of tilt, and how evenly they lie")
+    plane = "plane of tilt" if several else "plane of x and z"
+    figure.suptitle(f"Tips within {thickness * 1e3:.0f} mm of the {plane}, and how evenly they lie")
     return figure
+
+
+def _add_unevenness(axes, densities: list[Density]) -> None:
+    densities = sorted(densities, key=lambda density: density.angle)
+    angles = [np.degrees(d.angle) for d in densities]
+    for values, color, label in zip(
+        np.array([d.unevenness() for d in densities]).T, (INITIAL, IDENTIFIED), ("before", "after"), strict=True
+    ):
+        axes.plot(angles, values, "o-", markersize=4, color=color, label=label)
+    axes.set(ylim=(0, None), xlabel="gravity angle θ_G (°)", ylabel="tips a cell: standard\ndeviation over mean")
+    axes.legend()
 
 
 def _in_plane(tips: np.ndarray, down: np.ndarray) -> np.ndarray:

@@ -48,19 +48,19 @@ def maps_figure(maps: Maps, tips: list[np.ndarray]) -> Figure:
     frame(a, [maps.rigid.mesh.vertices])
 
     nearest = [int(np.abs(maps.soft.mesh_angles - np.radians(d)).argmin()) for d in SHOWN_DEG]
-    b = space(figure, 222, f"(b) Soft arm, gravity at {np.degrees(maps.soft.mesh_angles[nearest[0]]):.0f}°")
+    b = space(figure, 222, "(b) Soft arm" + _under(maps, nearest[:1]))
     b.yaxis.set_major_locator(MaxNLocator(3))
     add_surface(b, maps.soft.meshes[nearest[0]], SOFT, 0.35)
     add_line(b, np.array([[0, 0, 0], [0, 0, -length]]), MEASURED, 4)
     frame(b, [maps.soft.meshes[nearest[0]].vertices, np.zeros((1, 3))])
 
-    c = space(figure, 223, "(c) Soft arm, gravity at " + ", ".join(
-        f"{np.degrees(maps.soft.mesh_angles[i]):.0f}°" for i in sorted(set(nearest))))
+    c = space(figure, 223, "(c) Soft arm" + _under(maps, sorted(set(nearest))))
     c.view_init(elev=12, azim=-80)
     c.yaxis.set_major_locator(MaxNLocator(2))
     for index, color in zip(sorted(set(nearest)), (SOFT, VALIDATE, IDENTIFIED), strict=False):
         add_surface(c, maps.soft.meshes[index], color, 0.40)
-        _add_gravity(c, maps.soft.mesh_angles[index], length, color)
+        if len(set(nearest)) > 1:
+            _add_gravity(c, maps.soft.mesh_angles[index], length, color)
     add_line(c, np.array([[0, 0, 0.06], [0, 0, 0]]), MEASURED, 6)
     arrows = [GRAVITY_ARROW * length * _down(maps.soft.mesh_angles[i])[None] for i in nearest]
     frame(c, [maps.soft.meshes[i].vertices for i in nearest] + arrows)
@@ -96,10 +96,11 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
         angle = float(maps.soft.mesh_angles[index])
         soft.contour(x, z, maps.soft.at(angle)[:, middle].T, levels=[0.0], colors=[color], linewidths=1.4)
         near = tips[index][np.abs(tips[index][:, 1]) < maps.soft.lattice.spacing / 2]
-        soft.scatter(near[:, 0], near[:, 2], s=2, color=color, label=f"{np.degrees(angle):.0f}°")
+        told = f"{np.degrees(angle):.0f}°" if len(shown) > 1 else "no gravity"
+        soft.scatter(near[:, 0], near[:, 2], s=2, color=color, label=told)
     soft.plot(0, 0, "^", color=BASE, markersize=8)
     soft.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=5, fontsize=8, markerscale=4,
-                title="lines: maps, dots: tips, at gravity angle")
+                title="lines: maps, dots: tips" + (", at gravity angle" if len(shown) > 1 else ""))
     soft.set(title="Soft: the shell of its tips", xlabel="x (m)", ylabel="z (m)")
 
     _fill_slice(hybrid, maps.hybrid, HYBRID)
@@ -144,6 +145,13 @@ def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
         ax.set_xlabel("gravity angle, between the maps (°)")
         ax.legend(loc=place)
     return figure
+
+
+def _under(maps: Maps, shown: list[int]) -> str:
+    """Which gravity the soft maps `shown` are for; nothing where there is none."""
+    if len(maps.soft.mesh_angles) == 1:
+        return ""
+    return ", gravity at " + ", ".join(f"{np.degrees(maps.soft.mesh_angles[i]):.0f}°" for i in shown)
 
 
 def _add_gravity(axes, angle: float, length: float, color: str) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from trunkline.figures.style import BASE, IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt
+from trunkline.figures.style import BASE, IDENTIFIED, INITIAL, LEAST_WIDTH, MEASURED, VALIDATE, plt
 from trunkline.frames import in_plane_of_tilt
 
 SLICE = 0.016  # m, half thickness of the slices shown
@@ -55,7 +55,9 @@ def error_map_figure(targets: pd.DataFrame) -> Figure:
     targets = targets.assign(x=x, y=y)
     angles = np.unique(targets["theta_g"])
     shown = angles[np.unique(np.linspace(0, len(angles) - 1, 4).round().astype(int))]
-    figure, axes = plt.subplots(1, len(shown), figsize=(3.1 * len(shown), 3.6), squeeze=False, sharey=True)
+    several = len(shown) > 1
+    size = max(3.1 * len(shown), LEAST_WIDTH), 3.6
+    figure, axes = plt.subplots(1, len(shown), figsize=size, squeeze=False, sharey=True)
     extent = targets[["x", "z"]].agg(["min", "max"]) * 1e3 + np.array([[-20], [20]])
     for ax, angle in zip(axes[0], shown, strict=True):
         near = (targets["theta_g"] - angle).abs() < BAND
@@ -64,11 +66,13 @@ def error_map_figure(targets: pd.DataFrame) -> Figure:
         dots = ax.scatter(rows["x"] * 1e3, rows["z"] * 1e3, c=np.log10(rows["error_mm"] + 1e-3), s=6, linewidths=0,
                           vmin=-1.5, vmax=1)
         ax.plot(0, 0, "^", color=BASE, markersize=5)
-        ax.set(aspect="equal", xlim=extent["x"], ylim=extent["z"], xlabel="towards gravity (mm)")
-        ax.set_title(f"θ_G = {np.degrees(angle):.0f}°")
+        ax.set(aspect="equal", xlim=extent["x"], ylim=extent["z"])
+        ax.set_xlabel("towards gravity (mm)" if several else "x (mm)")
+        ax.set_title(f"θ_G = {np.degrees(angle):.0f}°" if several else "no gravity")
     axes[0, 0].set_ylabel("z (mm), base at the triangle")
     bar = figure.colorbar(dots, ax=axes[0], shrink=0.8, ticks=[-1, 0, 1])
     bar.ax.set_yticklabels(["0.1", "1", "10"])
     bar.set_label("tip error (mm)")
-    figure.suptitle("Where the network errs: held-out targets near the plane of tilt")
+    plane = "plane of tilt" if several else "plane of x and z"
+    figure.suptitle(f"Where the network errs: held-out targets near the {plane}")
     return figure

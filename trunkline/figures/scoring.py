@@ -21,13 +21,14 @@ MODELS = {
     LABELS["noise_floor"]: (MEASURED, ":", "x"),
 }
 ERRORS = {"e_position_mm": "mean position error (mm)", "e_tip_mm": "tip error (mm)"}
+LEAST_WIDTH = 6.6  # inches that the legend takes
 
 
 def trial_figure(tables: dict[str, pd.DataFrame]) -> Figure:
     """Position and tip error of every trial, a dot a model; a column of panels for each of the `tables`, by title."""
     widths = [max(4.2, 1.2 + 0.22 * table.trial.nunique()) if len(table) else 4.2 for table in tables.values()]
     figure, axes = plt.subplots(
-        2, len(tables), figsize=(sum(widths), 7), squeeze=False, sharex="col", width_ratios=widths
+        2, len(tables), figsize=(max(sum(widths), LEAST_WIDTH), 7), squeeze=False, sharex="col", width_ratios=widths
     )
     for column, (title, table) in zip(axes.T, tables.items(), strict=True):
         column[0].set_title(title)
@@ -51,7 +52,7 @@ def segment_figure(tables: dict[str, pd.DataFrame]) -> Figure:
     panels = [(title, kind, rows) for title, table in tables.items() if len(table)
               for kind, rows in table.groupby("experiment", sort=False)]  # fmt: skip
     count = max(len(panels), 1)
-    figure, axes = plt.subplots(1, count, figsize=(4.2 * count, 4.4), squeeze=False, sharey=True)
+    figure, axes = plt.subplots(1, count, figsize=(max(4.2 * count, LEAST_WIDTH), 4.4), squeeze=False, sharey=True)
     for axis, (title, kind, rows) in zip(axes[0], panels, strict=False):
         for model, (color, line, _) in _shown(rows).items():
             own = rows[rows.model == model]

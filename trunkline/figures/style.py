@@ -24,6 +24,7 @@ UNSEEN, PARTLY, SEEN = INITIAL, VALIDATE, "#d7e3ea"
 DOUBTFUL = "#999999"
 GRID, BACKGROUND = "#e4e4e4", "#ffffff"
 SEQUENTIAL = "viridis"
+LEAST_WIDTH = 6.0  # inches, which a title takes
 
 plt.rcParams.update(
     {

@@ -11,7 +11,7 @@ from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields, set_fields
 from trunkline.identification.winding import wound
 from trunkline.simulation.winch import wind
-from trunkline.statics.chain import Chain, read_chain
+from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import actuated
 from trunkline.statics.restart import actuated_from
 
@@ -60,7 +60,7 @@ def shapes_at_rest(
         sent = np.concatenate([_sent(own, e) for e in experiments])
         qpos = np.full(angles.shape, np.nan)
         for load in np.unique(loads):
-            chosen, loaded = np.flatnonzero(loads == load), with_load(chain, load)
+            chosen, loaded = np.flatnonzero(loads == load), chain.loaded(load)
             guessed = chosen[np.isfinite(starts[chosen]).all(axis=1)]
             found = actuated_from(loaded, starts[guessed], sent[guessed], turned[guessed])
             qpos[guessed[found.converged]] = found.qpos[found.converged]
@@ -99,13 +99,3 @@ def _sent(model: mujoco.MjModel, experiment: Experiment) -> np.ndarray:
         held = controls[:1].copy()
         controls = wind(controls[None], held, held.copy(), np.array([np.inf]), np.array([play]))[0]
     return controls
-
-
-def with_load(chain: Chain, load: float) -> Chain:
-    """The chain with a point mass at its tip, kg."""
-    if not load:
-        return chain
-    mass, center = chain.mass.copy(), chain.center.copy()
-    mass[-1] += load
-    center[-1] += (load / mass[-1]) * (chain.tip - center[-1])
-    return chain._replace(mass=mass, center=center)

@@ -17,10 +17,12 @@ from trunkline.identification.loss import (
     velocity_error,
 )
 from trunkline.identification.population import Population
+from trunkline.identification.resting import LAST, STILL
 from trunkline.trials.experiments import EXPERIMENTS, is_static, is_stepwise
 from trunkline.trials.splits import SPLITS
 
 SPECTRUM = 16  # times as many points as samples, so that a parabola through three of them finds a peak
+LATE = (1.0, 2.0)  # s from the first frame, when a swing has nearly died away
 STRUCTURE = "jnt_stiffness"  # any field: a population of one is the model itself
 
 
@@ -194,6 +196,30 @@ def errors_of(
         swings = EXPERIMENTS[experiment.kind].hangs and np.ptp(positions[:, tip], axis=0).any()
         if swings and measured[:, tip].any():
             row["e_swing_period_pct"] = 100 * period_error(positions[:, tip], real[:, tip], measured[:, tip])
+            row |= about_rest(positions, experiment, tip, length)
+    return row
+
+
+def about_rest(positions: np.ndarray, experiment: Experiment, tip: int, length: float) -> dict[str, float]:
+    """What is left of the errors of a swing, simulated as `positions` (T, S, 3) m, once each segment is moved by where
+    it rests at the end of this trial: how it swings, wherever it comes to rest. And by which share of itself the tip's
+    speed is off from `LATE`. Nothing of a trial that does not come to rest.
+    """
+    real, measured, step = experiment.positions, experiment.measured, experiment.frame_step
+    last = slice(-max(round(LAST / step), 1), None)
+    if not measured[last].any(axis=0).all() or np.ptp(real[last, tip][measured[last, tip]], axis=0).max() > STILL:
+        return {}
+    seen = measured[last][..., None]
+    offset = np.where(seen, positions[last] - real[last], 0).sum(axis=0) / seen.sum(axis=0)
+    away = np.linalg.norm(positions - real - offset, axis=-1)
+    found = {"e_position_about_rest": float(away[measured].mean()),
+             "e_tip_about_rest": float(away[:, tip][measured[:, tip]].mean())}  # fmt: skip
+    row = {f"{name}_mm": 1e3 * error for name, error in found.items()}
+    row |= {f"{name}_pct": 100 * error / length for name, error in found.items()}
+    late = slice(*(round(at / step) for at in LATE))
+    speeds = [np.linalg.norm(np.diff(way[late, tip], axis=0), axis=1) for way in (positions, real)]
+    if len(speeds[1]) and measured[late, tip].all():
+        row["e_late_speed_pct"] = 100 * abs(float(speeds[0].mean() / speeds[1].mean()) - 1)
     return row
 
 

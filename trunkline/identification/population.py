@@ -3,7 +3,6 @@
 import copy
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
@@ -37,13 +36,6 @@ class Simulated:
     rests: list[np.ndarray]
 
 
-class Group(NamedTuple):
-    """Trials that one batch simulates: whether they are at rest, and whether all cables are slack in them."""
-
-    static: bool
-    slack: bool
-
-
 class Population:
     """Simulates candidates of one model on a fixed list of experiments of the same segments.
 
@@ -59,13 +51,14 @@ class Population:
         self._sites = segment_sites(model, segments)
         # longest first, so that those still running are a prefix of each candidate's trials
         order = sorted(range(len(experiments)), key=lambda i: -experiments[i].frames)
-        self._groups: dict[Group, list[int]] = {}
-        for i in order:
-            group = Group(is_static(experiments[i].kind), experiments[i].slack(model))
-            self._groups.setdefault(group, []).append(i)
+        self._at_rest = [i for i in order if is_static(experiments[i].kind)]
+        moving = [i for i in order if not is_static(experiments[i].kind)]
+        # those in which all cables are slack are cheaper, and simulated by themselves
+        slack = {i: experiments[i].slack(model) for i in moving}
+        self._moving = {group: [i for i in moving if slack[i] == group] for group in sorted(set(slack.values()))}
         self._experiments = experiments
         self._step_factor = step_factor
-        self._batches: dict[Group, Batch] = {}
+        self._batches: dict[bool, Batch] = {}
 
     def simulate(self, fields: Fields, rests: list[np.ndarray] | None = None) -> Simulated:
         """Run every candidate (the first axis of `fields`) through every experiment.
@@ -77,15 +70,15 @@ class Population:
         positions: list = [None] * len(self._experiments)
         found = [np.full((1, arm_hinges(self._model)), np.nan)] * len(self._experiments)
         steps = 0
-        for group, chosen in self._groups.items():
+        if self._at_rest:
+            own = [self._experiments[i] for i in self._at_rest]
+            near = None if rests is None else [rests[i] for i in self._at_rest]
+            results, angles, steps = shapes_at_rest(self._model, fields, own, self._sites, near)
+            for index, result, angle in zip(self._at_rest, results, angles, strict=True):
+                positions[index], found[index] = result, angle
+        for slack, chosen in self._moving.items():
             own = [self._experiments[i] for i in chosen]
-            if group.static:
-                near = None if rests is None else [rests[i] for i in chosen]
-                results, angles, taken = shapes_at_rest(self._model, fields, own, self._sites, near)
-                for index, result in zip(chosen, angles, strict=True):
-                    found[index] = result
-            else:
-                results, taken = self._run(self._batch(group, own, fields, count), own, fields, count)
+            results, taken = self._run(slack, own, fields, count)
             steps += taken
             for index, result in zip(chosen, results, strict=True):
                 positions[index] = result
@@ -94,13 +87,14 @@ class Population:
             diverged |= ~np.isfinite(result).all(axis=(1, 2, 3))
         return Simulated(positions, diverged, steps, found)
 
-    def _batch(self, group: Group, experiments: list[Experiment], fields: Fields, count: int) -> Batch:
-        """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start."""
-        batch = self._batches.get(group)
+    def _batch(self, slack: bool, experiments: list[Experiment], fields: Fields, count: int) -> Batch:
+        """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start, its motors yet to be set.
+        """
+        batch = self._batches.get(slack)
         if batch is None or batch.nsim != count * len(experiments):
-            model = _without_idle(self._model, group, fields)
-            batch = self._batches[group] = batch_of(model, count * len(experiments))
-        if group.slack:  # cables do not rub, winches do not wind
+            model = _without_idle(self._model, slack, fields)
+            batch = self._batches[slack] = batch_of(model, count * len(experiments))
+        if slack:  # cables do not rub, winches do not wind
             fields = {name: values for name, values in fields.items() if name != "numeric_data"}
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
         for name, values in fields.items():
@@ -115,9 +109,6 @@ class Population:
         batch.bind("qpos")[:, :arm] = np.repeat([e.start for e in experiments], count, axis=0)
         batch.bind("qvel")[:, :arm] = np.repeat([e.velocity for e in experiments], count, axis=0)
         self._remember(batch)
-        if self._model.nu:
-            first = np.array([e.controls[:1] for e in experiments])
-            hold(batch, self._model, wound_by_each(self._model, fields, first)[:, 0])
         return batch
 
     def _remember(self, batch: Batch) -> None:
@@ -131,14 +122,18 @@ class Population:
                 batch.bind("plastic")[:, place + end] = bend - np.clip(bend, -give, give)
 
     def _run(
-        self, batch: Batch, experiments: list[Experiment], fields: Fields, count: int
+        self, slack: bool, experiments: list[Experiment], fields: Fields, count: int
     ) -> tuple[list[np.ndarray], int]:
-        """Trials in motion: from the start to the first frame, then frame by frame."""
+        """Trials in motion, all cables slack in all of them or in none: from the start to the first frame, then frame
+        by frame."""
+        batch = self._batch(slack, experiments, fields, count)
         frame_step, sites = experiments[0].frame_step, self._sites
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))
         timestep = batch.expand("opt.timestep")
         timestep[:] = np.repeat([e.lead / substeps for e in experiments], count)
         first = wound_by_each(self._model, fields, np.array([e.controls[:1] for e in experiments]))[:, 0]
+        if self._model.nu:
+            hold(batch, self._model, first)
         winches = Winches(batch, first)
         move(batch, np.repeat(first[:, None], substeps, axis=1), ())
         timestep[:] = frame_step / substeps
@@ -163,14 +158,14 @@ class Population:
         return results, substeps * sum(lengths) * count
 
 
-def _without_idle(model: mujoco.MjModel, group: Group, fields: Fields) -> mujoco.MjModel:
-    """A copy of the model without what moves nothing in such trials and takes most of a step: where nothing pulls,
-    friction of cables on their holes, and the cables themselves."""
+def _without_idle(model: mujoco.MjModel, slack: bool, fields: Fields) -> mujoco.MjModel:
+    """A copy of the model without what moves nothing where all cables are slack and takes most of a step: their
+    friction on the holes, and the cables themselves."""
     model = copy.copy(model)
     own = (model.tendon_frictionloss, model.tendon_stiffness, model.tendon_damping)
     bare = "tendon_frictionloss" not in fields and not any(values[cables(model)].any() for values in own)
-    if group.slack and bare:
+    if slack and bare:
         let_hang(model)
-    elif group.slack:
+    elif slack:
         let_slide(model)
     return model

@@ -14,11 +14,8 @@ from trunkline.identification.parameters import Fields
 
 
 def wound(model: mujoco.MjModel, controls: np.ndarray) -> np.ndarray:
-    """Lengths that the actuators of `model` are sent where a log commands `controls`, m. Shapes (..., nu)."""
-    place = numeric_place(model, WINDING)
-    if place is None:
-        return controls
-    return _wound(model, controls, model.numeric_data[place], model.numeric_data[numbers_place(model, PRELOAD)])
+    """Lengths that the actuators of `model` are sent where a log commands `controls`, m. Shapes (T, nu)."""
+    return wound_by_each(model, {"numeric_data": model.numeric_data[None]}, controls[None])[0]
 
 
 def wound_by_each(model: mujoco.MjModel, fields: Fields, controls: np.ndarray) -> np.ndarray:
@@ -29,9 +26,5 @@ def wound_by_each(model: mujoco.MjModel, fields: Fields, controls: np.ndarray) -
         return each
     numbers = fields.get("numeric_data", np.repeat(model.numeric_data[None], count, axis=0))
     numbers = np.tile(numbers, (len(controls), 1))[:, None]
-    return _wound(model, each, numbers[..., [place]], numbers[..., numbers_place(model, PRELOAD)])
-
-
-def _wound(model: mujoco.MjModel, controls: np.ndarray, winding, preload: np.ndarray) -> np.ndarray:
     straight = model.tendon_length0[model.actuator_trnid[:, 0]]
-    return straight - winding * (straight - controls) - preload
+    return straight - numbers[..., [place]] * (straight - each) - numbers[..., numbers_place(model, PRELOAD)]

@@ -1,7 +1,7 @@
 """What a user gets: the network's commands sent to MuJoCo, which is stepped until the arm rests.
 
 Targets are poses in which MuJoCo itself came to rest, under gravities that no sample has, one or two neighbouring
-motors pulling by random amounts. No statics of ours is part of the score.
+motors of every section pulling by random amounts. No statics of ours is part of the score.
 """
 
 from collections.abc import Callable
@@ -12,7 +12,8 @@ import mujoco
 import numpy as np
 from pydantic import Field, PositiveFloat
 
-from trunkline.dataset.sampling import around_the_arm
+from trunkline.dataset.columns import POSE
+from trunkline.dataset.sampling import around_the_arm, in_sections, sections
 from trunkline.elements import BACKLASH, SLIDER, actuators, all_elements, capstan_friction, numeric
 from trunkline.ik.inputs import draw_gravity, gravity_of, position_of
 from trunkline.simulation.drive import drive, has_friction
@@ -52,7 +53,7 @@ class Drawn:
     """Poses in which an arm rests, of those that were drawn.
 
     Attributes:
-        targets: inputs of the network. Shape (N, 8 or 10).
+        targets: inputs of the network. Shape (N, 7, 8 or 10).
         near_limit: how many were left out in which a motor is near its limit.
         unrested: how many were left out in which the arm had not come to rest, whatever its motors then did.
     """
@@ -75,17 +76,18 @@ def draw_targets(
     rng: np.random.Generator,
     others_pay_out: bool = True,
 ) -> Drawn:
-    """Poses in which MuJoCo rests without friction under one or two neighbouring motors, none near its limit.
+    """Poses in which MuJoCo rests without friction under one or two neighbouring motors of every section, none near
+    its limit.
 
     Args:
-        known: what samples tell of gravity; others are drawn between them, see `inputs.draw_gravity`. Shape (G, 1 or
-            3).
+        known: what samples tell of gravity; others are drawn between them, see `inputs.draw_gravity`. Shape (G, 0, 1
+            or 3).
         deepest: of each tendon, how far it is drawn in at most, m. Shape (K,).
         others_pay_out: whether motors that do not pull give way; else they stay where the straight arm has them, and
             pull against the others as the arm bends: shapes that the data set has none of.
     """
     told, commands = draw_commands(chain, known, deepest, count, rng, others_pay_out)
-    rest = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity_of(np.pad(told, [(0, 0), (0, 7)])), PATIENCE)
+    rest = settle(model, commands[:, model.actuator_trnid[:, 0]], _gravity_told(told), PATIENCE)
     tensions = rest.tensions[:, actuators(model)]
     near_limit = ~(tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
     found = np.column_stack([told, rest.position, rest.quaternion])[rest.rested & ~near_limit]
@@ -95,8 +97,13 @@ def draw_targets(
 def draw_commands(
     chain: Chain, known: np.ndarray, deepest: np.ndarray, count: int, rng: np.random.Generator, others_pay_out: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Gravities (count, 1 or 3) and commands, m (count, K), as `draw_targets` has them; its words."""
+    """Gravities (count, 0, 1 or 3) and commands, m (count, K), as `draw_targets` has them; its words. Of an arm of
+    several sections, as many of them as its motors reach."""
     told = draw_gravity(known, count, rng)
+    if len(sections(chain)) > 1:
+        found, within = in_sections(chain, _gravity_told(told), count, deepest, rng)
+        idle = chain.straight_lengths + others_pay_out * chain.length
+        return told[within], np.where(found.tensions == 0, idle, found.commands)[within]
     first = rng.integers(chain.tendons, size=count)
     order = around_the_arm(chain)
     place = np.argsort(order)
@@ -107,6 +114,11 @@ def draw_commands(
     idle = pulls == 0
     commands = chain.straight_lengths - pulls * deepest + idle * others_pay_out * chain.length
     return told, commands
+
+
+def _gravity_told(told: np.ndarray) -> np.ndarray:
+    """Gravity, m/s² (N, 3), from what is told of it, (N, 0, 1 or 3)."""
+    return gravity_of(np.pad(told, [(0, 0), (0, len(POSE))]))
 
 
 @dataclass

@@ -19,7 +19,7 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
 
     Args:
         poses: gravity (angle in rad, or a unit vector), tip position (m) and unit quaternion (w first, either sign) in
-            the base frame, as the file's `inputs` name them. Shape (N, 8 or 10).
+            the base frame, as the file's `inputs` name them. Shape (N, 7, 8 or 10).
 
     Raises:
         InputError: the shape is another, a number is not finite, a quaternion or direction is not of unit length, or

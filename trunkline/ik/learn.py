@@ -17,7 +17,7 @@ from trunkline.dataset.table import command_by_tension, sample_table, tip_by_ten
 from trunkline.frames import downwards
 from trunkline.ik.as_controls import DOUBT, AsControls, Rig, score
 from trunkline.ik.ask import ask
-from trunkline.ik.inputs import DIRECTION, draw_gravity, inputs_of, told_of_gravity
+from trunkline.ik.inputs import draw_gravity, inputs_of, told_of_gravity
 from trunkline.ik.network import OUTPUTS, InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.polish import polish
@@ -38,7 +38,7 @@ from trunkline.statics.chain import Chain
 @dataclass
 class Unseen:
     """Targets between the gravities of the data set: of how many, where there is more than a tilt; pulls around the
-    arm, tips along each, how many in all."""
+    arm, tips along each, how many in all. Without gravity, targets that are drawn anew."""
 
     gravities: Annotated[int, Field(ge=1, le=10_000)]
     directions: Annotated[int, Field(ge=8, le=10000)]
@@ -107,8 +107,10 @@ def learn(
     network, curve = fit(table, chain, learning)
     columns = inputs_of(table)
     held_out = table[table["split"] == "validate"]
-    known = told_of_gravity(table[columns].drop_duplicates(columns[:-7]).to_numpy())
-    unseen = unseen_targets(chain, known, learning.unseen, learning.seed)
+    known = known_gravities(table)
+    sent_before = table.loc[table["split"] == "train", command_columns(chain.tendons)].to_numpy()
+    deepest = chain.straight_lengths - sent_before.min(axis=0)
+    unseen = unseen_targets(chain, known, learning.unseen, learning.seed, deepest)
     exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], DOUBT * chain.length)
     runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
     errors, difference, found = {}, 0.0, {}
@@ -123,10 +125,8 @@ def learn(
     as_lengths = length_errors(chain, unseen[columns].to_numpy(), found["lengths"].astype(float))
     polished = polished_errors(chain, held_out[columns], runtime, learning.polish, learning.seed)
     rng = np.random.default_rng(learning.seed)
-    far = ask(runtime, outside_targets(learning.outside, chain.length, rng, columns == DIRECTION))["commands"]
-    sent_before = table.loc[table["split"] == "train", command_columns(chain.tendons)].to_numpy()
+    far = ask(runtime, outside_targets(learning.outside, chain.length, rng, known.shape[1]))["commands"]
     print("train_ik: sending commands to MuJoCo until the arm rests", flush=True)
-    deepest = chain.straight_lengths - sent_before.min(axis=0)
     sent, on_plant = score(model, chain, partial(ask, runtime), known, deepest, learning.as_controls, rng, rig)
     return Learned(
         network=network,
@@ -181,15 +181,28 @@ def polished_errors(chain: Chain, held_out: pd.DataFrame, runtime, polishing: Po
     return TipErrors(found.position_error, found.orientation_error)
 
 
-def unseen_targets(chain: Chain, known: np.ndarray, unseen: Unseen, seed: int) -> pd.DataFrame:
-    """Targets under gravities that the data set has none of, `known` (G, 1 or 3): half way between its angles, or at
-    random."""
+def known_gravities(table: pd.DataFrame) -> np.ndarray:
+    """What the samples tell of gravity, each once. Shape (G, 0, 1 or 3)."""
+    columns = inputs_of(table)
+    told = table.drop_duplicates(columns[:-7]) if columns[:-7] else table[:1]
+    return told_of_gravity(told[columns].to_numpy())
+
+
+def unseen_targets(
+    chain: Chain, known: np.ndarray, unseen: Unseen, seed: int, deepest: np.ndarray | None = None
+) -> pd.DataFrame:
+    """Targets under gravities that the data set has none of, `known` (G, 0, 1 or 3): half way between its angles, or
+    at random. `deepest` as for `sample_table`."""
     rng = np.random.default_rng(seed)
-    if known.shape[1] == 1:
+    if known.shape[1] == 0:
+        between = np.zeros((1, 3))
+    elif known.shape[1] == 1:
         angles = np.sort(known[:, 0])
         between = downwards((angles[1:] + angles[:-1]) / 2, np.zeros(len(angles) - 1))
     else:
         between = draw_gravity(known, unseen.gravities, rng)
     count = unseen.samples // max(1, len(between))
-    tables = [sample_table(chain, down, count, unseen.directions, unseen.steps, rng)[0] for down in between]
+    tables = [
+        sample_table(chain, down, count, unseen.directions, unseen.steps, rng, deepest)[0] for down in between
+    ]
     return pd.concat(tables, ignore_index=True)

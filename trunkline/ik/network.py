@@ -48,7 +48,7 @@ class InverseKinematics(nn.Module):
     tip_half_range: torch.Tensor
 
     def __init__(self, width: int, inputs: np.ndarray, commands: np.ndarray, lengths: np.ndarray):
-        """Args: width: of each hidden layer; inputs (N, 8 or 10), commands, lengths (N, K): the training set."""
+        """Args: width: of each hidden layer; inputs (N, 7, 8 or 10), commands, lengths (N, K): the training set."""
         super().__init__()
         raw = features(torch.tensor(inputs, dtype=torch.float64))
         buffers = {"mean": raw.mean(dim=0), "scale": 1 / raw.std(dim=0).clamp_min(1e-6)}
@@ -81,12 +81,12 @@ class InverseKinematics(nn.Module):
         return self.middle + self.half_range * commands, self.most_stretch * stretches
 
     def foresee(self, pulling: torch.Tensor, pulls: torch.Tensor) -> torch.Tensor:
-        """Where the tip rests, m, under the `gravity_features` (B, 2 or 3) and commands as shares of their range,
+        """Where the tip rests, m, under the `gravity_features` (B, 0, 2 or 3) and commands as shares of their range,
         (B, K)."""
         return self.tip_middle + self.tip_half_range * self.tip_layers(torch.cat([pulling, pulls], dim=1))
 
     def forward(self, inputs: torch.Tensor) -> Answer:
-        """From inputs (B, 8 or 10)."""
+        """From inputs (B, 7, 8 or 10)."""
         commands, stretches = self.layers(self.normalise(inputs)).chunk(2, dim=1)
         pulls = commands.clamp(-1, 1)
         commands = self.middle + self.half_range * pulls
@@ -102,7 +102,7 @@ def _range(values: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
 
 def features(inputs: torch.Tensor) -> torch.Tensor:
     """Gravity, position, products of quaternion components, and of a direction of gravity with these: where gravity
-    pulls as the tip sees it is linear in them. Shape (B, 15 or 55) from (B, 8 or 10)."""
+    pulls as the tip sees it is linear in them. Shape (B, 13, 15 or 55) from (B, 7, 8 or 10)."""
     gravity = gravity_features(inputs)
     pose = torch.cat([inputs[:, -7:-4], inputs[:, FIRST] * inputs[:, SECOND]], dim=1)
     parts = [gravity, pose]
@@ -112,6 +112,7 @@ def features(inputs: torch.Tensor) -> torch.Tensor:
 
 
 def gravity_features(inputs: torch.Tensor) -> torch.Tensor:
-    """sin θ_G, cos θ_G of inputs (B, 8), the direction of gravity of inputs (B, 10). Shape (B, 2 or 3)."""
+    """sin θ_G, cos θ_G of inputs (B, 8), the direction of gravity of inputs (B, 10), nothing of inputs (B, 7). Shape
+    (B, 2, 3 or 0)."""
     told = inputs[:, :-7]
     return torch.cat([torch.sin(told), torch.cos(told)], dim=1) if told.shape[1] == 1 else told

@@ -7,19 +7,21 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 from torch import nn
 
+from trunkline.dataset.columns import POSE
 from trunkline.ik.inputs import DIRECTION, TILT, UNITS
 from trunkline.ik.network import FIRST, OUTPUTS, SECOND, InverseKinematics
 
 OPSET = 15
 IR_VERSION = 8  # of the ONNX release that brought opset 15
 GRAVITY = {
+    len(POSE): "none: nothing pulls but the tendons",
     len(TILT): "theta_g, rad: angle between the straight arm and gravity, the mount tilting about base +y",
     len(DIRECTION): "gx, gy, gz: direction of gravity in the base frame, of unit length",
 }
 
 
 def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> onnx.ModelProto:
-    """A model with input `pose` (N, 8 or 10) and outputs `commands` (N, K), `lengths` (N, K) and `tip` (N, 3), float32.
+    """A model from `pose` (N, 7, 8 or 10) to `commands` (N, K), `lengths` (N, K) and `tip` (N, 3), float32.
 
     Args:
         tendons: names, in the order of the columns of commands and lengths.
@@ -42,10 +44,11 @@ def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float)
     inputs = _inputs(network)
     position = gather([-7, -6, -5], "position")
     products = node("Mul", [gather(FIRST, "first"), gather(SECOND, "second")], "quaternion_products")
+    pulling = []
     if inputs == TILT:
         angle = gather([0], "theta_g")
         pulling = [node("Sin", [angle], "sin_theta_g"), node("Cos", [angle], "cos_theta_g")]
-    else:
+    elif inputs == DIRECTION:
         pulling = [gather([0, 1, 2], "gravity")]
     seen = [*pulling, position, products]
     if inputs == DIRECTION:
@@ -98,7 +101,7 @@ def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float)
 
 
 def _inputs(network: InverseKinematics) -> list[str]:
-    return TILT if network.inputs == len(TILT) else DIRECTION
+    return next(inputs for inputs in (POSE, TILT, DIRECTION) if len(inputs) == network.inputs)
 
 
 def _meaning(network: InverseKinematics, tendons: list[str], doubt_beyond: float) -> dict[str, str]:

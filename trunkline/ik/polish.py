@@ -3,10 +3,10 @@
 With r the pose that is missing (position in m, turn in rad times a lever) and P = ∂(pose)/∂T, C = ∂l/∂T at the
 equilibrium, a step is
 
-    min |r - P δT|²   over  0 ≤ T + δT ≤ F, no more than two tendons taut,     l ← l + C δT.
+    min |r - P δT|²   over  0 ≤ T + δT ≤ F, no more than two tendons of a section taut,     l ← l + C δT.
 
 Tensions say which tendons are taut, lengths are what the tip follows most evenly; so the
-step is found in the first and taken in the second. Two taut tendons are as many as the data set has.
+step is found in the first and taken in the second. Two taut tendons a section are as many as the data set has.
 """
 
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
+from trunkline.dataset.sampling import sections
 from trunkline.frames import rotation_from_wxyz
 from trunkline.ik.bounded_least_squares import bounded_least_squares
 from trunkline.ik.inputs import gravity_of, position_of, quaternion_of
@@ -23,6 +24,7 @@ from trunkline.statics.restart import restart
 from trunkline.statics.sensitivity import sensitivity
 
 SPARE = 2e-3  # m that slack tendons get beyond the path foreseen, so that none pulls where the tip turns out elsewhere
+SWEEPS = 12  # over the sections of an arm that has several, each solved while the others hold
 NEGLIGIBLE = 1e-6  # m, pose error below which no further step is taken
 
 
@@ -51,12 +53,14 @@ def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 
     """Lengths that bring the tip nearer to its targets, never further from them.
 
     Args:
-        targets: gravity, tip position in m and quaternion (w first) in the base frame. Shape (N, 8 or 10).
+        targets: gravity, tip position in m and quaternion (w first) in the base frame. Shape (N, 7, 8 or 10).
         lengths: first answers, m, for instance the network's. Shape (N, K).
         steps: most Gauss-Newton steps for each target.
         lever: m; a turn of the tip by 1 rad counts as this much distance.
     """
     gravity = gravity_of(targets)
+    if len(sections(chain)) > 1:
+        lengths = _slackened(chain, lengths)
     best = forward(chain, lengths, gravity)
     error = _missing_pose(best, targets, lever)
     size = np.where(best.converged, np.linalg.norm(error, axis=1), np.inf)
@@ -86,6 +90,16 @@ def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 
     )
 
 
+def _slackened(chain: Chain, lengths: np.ndarray) -> np.ndarray:
+    """Lengths (N, K), of each section that of the tendon drawn in least paid out: three a little too short have no
+    equilibrium at all where they run at one distance from the axis."""
+    lengths, pulls = lengths.copy(), chain.straight_lengths - lengths
+    for section in sections(chain):
+        least = section[pulls[:, section].argmin(axis=1)]
+        lengths[np.arange(len(lengths)), least] = chain.straight_lengths[least] + chain.length
+    return lengths
+
+
 def _missing_pose(found: Equilibrium, targets: np.ndarray, lever: float) -> np.ndarray:
     """Position and turn from the tip to its target, m. Shape (N, 6)."""
     quaternion = np.where(found.converged[:, None], found.quaternion, [1.0, 0, 0, 0])
@@ -93,17 +107,43 @@ def _missing_pose(found: Equilibrium, targets: np.ndarray, lever: float) -> np.n
     return np.concatenate([position_of(targets) - found.position, lever * turn], axis=1)
 
 
+def _tensions_of(section, tensions, pose, error, here: Equilibrium, chain) -> np.ndarray:
+    """Best `tensions` of a `section` (S,) whose every pair is tried, those of the others as they are. Shape (N, S)."""
+    held = tensions.copy()
+    held[:, section] = 0.0
+    best, least = np.zeros((len(error), len(section))), np.full(len(error), np.inf)
+    wanted = error + np.einsum("nkt,nt->nk", pose, here.tensions - held)  # pose missing if it did not pull
+    for pair in combinations(range(len(section)), min(2, len(section))):
+        taut, trial = section[list(pair)], np.zeros_like(best)
+        trial[:, pair] = bounded_least_squares(pose[:, :, taut], wanted, chain.max_tension[taut])
+        left = np.linalg.norm(wanted - np.einsum("nkt,nt->nk", pose[:, :, section], trial), axis=1)
+        nearer = left < least
+        best[nearer], least[nearer] = trial[nearer], left[nearer]
+    return best
+
+
+def _together(tensions, pose, error, here: Equilibrium, chain) -> np.ndarray:
+    """`tensions` (N, K) after the last bit of the way: those between their bounds solved for at once, by least squares,
+    where all of them stay there."""
+    free = (tensions > 0) & (tensions < chain.max_tension)
+    columns = pose * free[:, None, :]
+    left = error - np.einsum("nkt,nt->nk", pose, tensions - here.tensions)
+    square = np.einsum("nki,nkj->nij", columns, columns)
+    ridge = 1e-12 * np.trace(square, axis1=1, axis2=2)[:, None] + ~free
+    square += ridge[:, :, None] * np.eye(chain.tendons)
+    moved = tensions + np.linalg.solve(square, np.einsum("nkt,nk->nt", columns, left)[:, :, None])[:, :, 0]
+    inside = ((moved >= 0) & (moved <= chain.max_tension)).all(axis=1)
+    return np.where(inside[:, None], moved, tensions)
+
+
 def _step(chain, here: Equilibrium, error, gravity, lever) -> tuple[np.ndarray, np.ndarray]:
     """Tensions (N, K) that the step foresees, and the lengths (N, K) to hold."""
     slopes = sensitivity(chain, here.qpos, here.tensions, gravity)
     pose = np.concatenate([slopes.tip_by_tension, lever * slopes.turn_by_tension], axis=1)  # (N, 6, K)
-    tensions, least = here.tensions.copy(), np.full(len(error), np.inf)
-    wanted = error + np.einsum("nkt,nt->nk", pose, here.tensions)  # pose missing if nothing pulled, to first order
-    for taut in combinations(range(chain.tendons), min(2, chain.tendons)):
-        trial = np.zeros_like(tensions)
-        trial[:, taut] = bounded_least_squares(pose[:, :, taut], wanted, chain.max_tension[list(taut)])
-        left = np.linalg.norm(wanted - np.einsum("nkt,nt->nk", pose, trial), axis=1)
-        nearer = left < least
-        tensions[nearer], least[nearer] = trial[nearer], left[nearer]
+    tensions, parts = here.tensions.copy(), sections(chain)
+    for section in parts * (SWEEPS if len(parts) > 1 else 1):
+        tensions[:, section] = _tensions_of(section, tensions, pose, error, here, chain)
+    if len(parts) > 1:
+        tensions = _together(tensions, pose, error, here, chain)
     lengths = here.lengths + np.einsum("nst,nt->ns", slopes.length_by_tension, tensions - here.tensions)
     return tensions, lengths + np.where(tensions > 0, 0.0, SPARE)

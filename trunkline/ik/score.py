@@ -53,7 +53,7 @@ class TipErrors:
 
 
 def tip_errors(chain: Chain, inputs: np.ndarray, commands: np.ndarray) -> TipErrors:
-    """Errors of predicted commands (N, K), m, for targets `inputs` (N, 8 or 10)."""
+    """Errors of predicted commands (N, K), m, for targets `inputs` (N, 7, 8 or 10)."""
     return _errors(actuated(chain, commands, gravity_of(inputs)), inputs)
 
 
@@ -72,13 +72,14 @@ def _errors(found: Equilibrium, inputs: np.ndarray) -> TipErrors:
     return TipErrors(position, orientation)
 
 
-def outside_targets(count: int, length: float, rng: np.random.Generator, directed: bool) -> np.ndarray:
+def outside_targets(count: int, length: float, rng: np.random.Generator, told: int) -> np.ndarray:
     """Poses that have nothing to do with the arm: any orientation, any gravity angle up to π, positions in a box
-    of four arm `length`s (m) around the base. Shape (count, 8), or if gravity comes from any side too, (count, 10)."""
+    of four arm `length`s (m) around the base, gravity in `told` columns, 0, 1 or 3. Shape (count, told + 7)."""
     angles = rng.uniform(0, np.pi, count)
     quaternions = rng.normal(size=(count, 4))
+    gravity = downwards(angles, rng.uniform(0, 2 * np.pi, count)) if told == 3 else angles[:, None]
     return np.column_stack([
-        downwards(angles, rng.uniform(0, 2 * np.pi, count)) if directed else angles,
+        gravity[:, :told],
         rng.uniform(-2 * length, 2 * length, (count, 3)),
         quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True),
     ])

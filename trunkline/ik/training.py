@@ -43,9 +43,9 @@ class Training:
 class Samples(NamedTuple):
     """What training reads of N samples.
 
-    x: normalised features (N, 15 or 55). pulling: what `network.gravity_features` says (N, 2 or 3). tip: m (N, 3).
-    command: m (N, K). stretch: length over command, m (N, K). pulls: commands as shares of their range (N, K). spare:
-    most by which slack tendons are paid out where the tip is foreseen, likewise (N, K).
+    x: normalised features (N, 13, 15 or 55). pulling: what `network.gravity_features` says (N, 0, 2 or 3).
+    tip: m (N, 3). command: m (N, K). stretch: length over command, m (N, K). pulls: commands as shares of their range
+    (N, K). spare: most by which slack tendons are paid out where the tip is foreseen, likewise (N, K).
     """
 
     x: torch.Tensor
@@ -93,7 +93,7 @@ def train(
     One thread a part of a batch: sums in another order would give other last digits, and then other networks.
 
     Args:
-        inputs: as `inputs` has them. Shape (N, 8 or 10).
+        inputs: as `inputs` has them. Shape (N, 7, 8 or 10).
         commands, lengths: m, equal where a tendon is slack. Shape (N, K).
         report: called with epoch, mean tip error in m of the training and of the other samples.
 

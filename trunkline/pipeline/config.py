@@ -19,7 +19,7 @@ from pydantic import TypeAdapter, ValidationError
 from yaml import YAMLError
 
 from trunkline.errors import InputError, nearest
-from trunkline.pipeline.mistakes import describe, path_of, rank
+from trunkline.pipeline.mistakes import describe, in_order, path_of
 from trunkline.settings import read_yaml
 
 Schema = TypeVar("Schema")
@@ -47,7 +47,7 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
     try:
         return adapter.validate_json(json.dumps(composed), strict=True)
     except ValidationError as error:
-        problems = sorted(error.errors(), key=rank)
+        problems = in_order(error.errors(), composed)
         first, more = problems[0], len(problems) - 1
         path, described = [stage, *map(str, path_of(first, composed))], describe(first, adapter)
         ruled = described.split(":")[0]  # a rule between the stage's fields names the one that breaks it
@@ -80,7 +80,7 @@ def validated(schema: type[Schema], values: dict, source: Path) -> Schema:
     try:
         return adapter.validate_json(json.dumps(values), strict=True)
     except ValidationError as error:
-        first = min(error.errors(), key=rank)
+        first = in_order(error.errors(), values)[0]
         where = ".".join(map(str, path_of(first, values)))
         raise InputError(f"{source}: {where}: {describe(first, adapter)}") from error
 

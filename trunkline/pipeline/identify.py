@@ -108,6 +108,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     for doubt in doubts(result, fit.parameters, looks):
         print(f"{stage}: {doubt}")
     artifacts = Path("artifacts") / stage
+    rests = any(EXPERIMENTS[kind].static or EXPERIMENTS[kind].hangs for kind in config.reported)
     with output_folder(artifacts) as folder:
         (folder / "arm.xml").write_text(identified)
         table = parameter_table(result, fit.parameters) | {"compared": vars(Compared.of(config))}
@@ -115,7 +116,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         write_json(folder / "parameters.json", table)
         write_json(folder / "metrics.json", metrics)
         write_tables(folder, predictions, segments)
-        write_plots(folder, result, fit.parameters, segments, predictions, shapes=model_path == CAD_MODEL)
+        write_plots(folder, result, fit.parameters, segments, predictions, shapes=model_path == CAD_MODEL and rests)
 
 
 def has_factors(stage: str) -> bool:

@@ -37,9 +37,21 @@ def path_of(problem: Any, composed: dict[str, Any]) -> list[str]:
     return path
 
 
-def rank(problem: Any) -> int:
-    """Unknown keys first, for they explain missing ones, and those explain the rest."""
-    return {UNKNOWN_KEY: 0, "missing": 1}.get(problem["type"], 2)
+def in_order(problems: list[Any], composed: dict[str, Any]) -> list[Any]:
+    """Unknown keys first, for they explain missing ones, and those explain the rest.
+
+    Of a value that may have several forms pydantic says all that it is not. Where it is wrong within one of them, it
+    has that form, and the others are left out.
+    """
+    paths = [path_of(problem, composed) for problem in problems]
+
+    def another_form(place: int) -> bool:
+        path = paths[place]
+        within = any(len(other) > len(path) and other[: len(path)] == path for other in paths)
+        return within and problems[place]["type"].endswith("_type")
+
+    left = [problem for place, problem in enumerate(problems) if not another_form(place)]
+    return sorted(left, key=lambda problem: {UNKNOWN_KEY: 0, "missing": 1}.get(problem["type"], 2))
 
 
 def describe(problem: Any, adapter: TypeAdapter) -> str:

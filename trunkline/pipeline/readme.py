@@ -12,6 +12,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import networkx
+import pandas as pd
 from dvc.repo import Repo
 
 from trunkline.errors import in_one_line
@@ -33,8 +34,10 @@ PICTURES = {
     "artifacts/identify_control/distances.png": "docs/distances.png",
     "artifacts/reachability/maps.png": "docs/maps.png",
     "artifacts/rehearse/still.png": "docs/rehearsal.png",
+    "examples/asl_motion/artifacts/identify_stiffness/paths.png": "examples/asl_motion/paths.png",
     "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
     "examples/ftdcr/artifacts/score/errors.png": "examples/ftdcr/errors.png",
+    "examples/pairs/artifacts/identify_stiffness/paths.png": "examples/pairs/paths.png",
 }
 EXAMPLES = ("asl_trunk",)  # folders of examples/ with releases, each a block of the README and of its own README
 
@@ -196,17 +199,21 @@ def rehearsal_block(root: Path, variants: bool) -> str:
 
 
 def example_table(folder: Path, all_splits: bool = True) -> str:
-    """An example's releases by split, beside what an identified model stands beside, and the arm's repeatability."""
+    """An example's releases by split, beside what an identified model stands beside, and the arm's repeatability; then
+    its error with each trial's own mean rest offset taken out, and that of the tip's speed 1 to 2 s after release."""
     scored = lookup(_metrics(folder, "score"), "identify_damping")
     fitted = _metrics(folder, "identify_damping")
     head, line = _head("releases")
-    rows = [head + " repeatability |", line + "---:|"]
+    rows = [head + " repeatability | about each one's rest | late tip speed off by |", line + "---:|" * 3]
     fits = [(split, fitted) for split in reversed(DECIDING)] if all_splits else []
     for split, metrics in ((TEST, scored), *fits):
         scatter = [_number(lookup(metrics, f"repeatability_mm.release.{key}_mm")) for key in ("mean", "tip")]
         for words, at in (("", f"{split}."), (", without repaired trials", f"{split}.without_repaired.")):
             if not words or lookup(metrics, f"identified.{at}trials") is not None:
                 cells = [*_beside(metrics, at), " / ".join(scatter) if set(scatter) != {"–"} else "–"]
+                about = [lookup(metrics, f"identified.{at}e_{what}_about_rest_mm") for what in ("position", "tip")]
+                late = lookup(metrics, f"identified.{at}e_late_speed_pct")
+                cells += [" / ".join(map(_number, about)), _number(late) + (" %" if late is not None else "")]
                 rows.append(f"| of `{split}`{words} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
@@ -229,13 +236,64 @@ def path_table(folder: Path) -> str:
     return "\n".join(lines)
 
 
-def path_sentence(folder: Path) -> str:
-    """The same of the split test, in a line."""
-    scored = lookup(_metrics(folder, "score"), "identify_stiffness")
-    found, null = (_number(lookup(scored, f"{model}.{TEST}.e_tip_centred_rms_mm")) for model in ("identified", "null"))
+# stage: [(what it is, dotted key in metrics.json, unit)], of an example
+NETWORK = {
+    "fk_dataset": [("FK against MuJoCo settled to rest: median", "mujoco_deviation_mm.median", "mm")],
+    "train_ik": [
+        ("IK, tip of settled MuJoCo: median", "as_controls.frictionless.position_error_mm.median", "mm"),
+        ("… 95th percentile", "as_controls.frictionless.position_error_mm.p95", "mm"),
+        ("… reachable poses that it calls doubtful", "as_controls.frictionless.doubted", ""),
+        ("… sent at once, with the winches' backlash", "as_controls.friction.position_error_mm.median", "mm"),
+        ("IK, samples held out: median", "position_error_mm.median", "mm"),
+        ("… after 3 Gauss-Newton steps: median", "polished.position_error_mm.median", "mm"),
+        ("… 95th percentile", "polished.position_error_mm.p95", "mm"),
+    ],
+    "reachability": [
+        ("Soft map: unseen tips that it calls reachable", "soft.heldout_reachable_min", ""),
+        ("… points 30 mm from every tip that it calls so", "soft.heldout_beyond_max", ""),
+        ("Hybrid map: points inside for which a pose was found", "hybrid.found_inside", ""),
+    ],
+}
+
+
+def network_table(folder: Path) -> str:
+    """What an example's samples, network and maps are worth."""
+    rows = ["| kinematics | |", "|---|---:|"]
+    for stage, entries in NETWORK.items():
+        metrics = _metrics(folder, stage)
+        rows += [f"| {what} | {_number(lookup(metrics, key))} {unit} |" for what, key, unit in entries]
+    return "\n".join(rows)
+
+
+def log_table(folder: Path) -> str:
+    """An example's trials of `test` by the log that they are pieces of: each model's mean position / tip error, mm."""
+    file = folder / "artifacts" / "score" / "trials.csv"
+    names = [LABELS[name] for name in ("identified", *BESIDE)]
+    lines = [f"| log: position / tip error, mm | trials | {' | '.join(names)} |", f"|---{'|---:' * (len(names) + 1)}|"]
+    if not file.is_file():
+        return "\n".join(lines)
+    rows = pd.read_csv(file)
+    rows["log"] = rows["trial"].str.rpartition("_")[0]
+    for log, group in rows.groupby("log", sort=False):
+        means = group.groupby("model")[["e_position_mm", "e_tip_mm"]].mean()
+        cells = [" / ".join(map(_number, means.loc[name])) if name in means.index else "–" for name in names]
+        lines.append(f"| `{log}` | {group['trial'].nunique()} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def other_arms(examples: Path) -> str:
+    """What became of the examples that are moved by motors, on trials of `test`: a line each."""
+    scored = [_metrics(examples / name, "score") for name in ("asl_motion", "ftdcr")]
+    moved, paths = (lookup(metrics, "identify_stiffness") for metrics in scored)
+    found, share = (_number(lookup(moved, f"identified.{TEST}.e_position_{unit}")) for unit in ("mm", "pct"))
+    tip = _number(lookup(paths, f"identified.{TEST}.e_tip_centred_rms_mm"))
+    nulls = lookup(moved, f"null.{TEST}.e_position_mm"), lookup(paths, f"null.{TEST}.e_tip_centred_rms_mm")
+    own, other = map(_number, nulls)
     return (
-        f"Another, of three sections and nine tendons, the [FTDCR]({folder.parent.name}/{folder.name}): {found} mm RMS "
-        f"at the tip\non poses of `{TEST}` (its authors' calibrated simulator 9.38, the mean shape {null})."
+        f"[Moved by its motors](examples/asl_motion), without and with a load: {found} mm ({share} %) on `{TEST}` "
+        f"(mean shape {own}).\n"
+        f"The [FTDCR](examples/ftdcr), nine tendons: tip {tip} mm RMS on `{TEST}` (its authors' simulator 9.38, "
+        f"mean shape {other})."
     )
 
 
@@ -308,15 +366,17 @@ def generate(root: Path) -> dict[Path, str]:
     """README.md, the examples' own, the reference of sessions and the pages on results, with their generated blocks as
     they should be."""
     examples = {name: example_table(root / "examples" / name) for name in EXAMPLES}
-    examples["ftdcr"] = path_table(root / "examples" / "ftdcr")
+    examples |= {name: log_table(root / "examples" / name) for name in ("asl_motion", "pairs")}
     results = results_table(root / "tests" / "limits.yaml", RESULTS)
     own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
     own |= {"score": score_table(root), "rehearsal": rehearsal_block(root, variants=False)}
     own |= {name: example_table(root / "examples" / name, all_splits=False) for name in EXAMPLES}
-    own["ftdcr"] = path_sentence(root / "examples" / "ftdcr")
+    own["arms"] = other_arms(root / "examples")
     blocks = {root / "README.md": own}
     blocks[root / "data" / "raw" / "README.md"] = {"experiments": experiment_table()}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
+    ftdcr = root / "examples" / "ftdcr"
+    blocks[ftdcr / "README.md"] = {"ftdcr": path_table(ftdcr), "network": network_table(ftdcr)}
     for page in sorted((root / "docs").rglob("*.md")):
         names = re.findall(r"^<!-- (results/\w+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
         if names:

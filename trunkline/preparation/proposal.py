@@ -12,6 +12,7 @@ from trunkline.trials.experiments import EXPERIMENTS, PULL, TILT
 from trunkline.trials.splits import IDENTIFY, VALIDATE
 
 BASE_NAMES = ("base", "mount", "root", "origin")
+GUESSED = "  # up as if the arm hangs: no log tells it of a mount that is turned"
 RESTING = 5e-3  # m; a trial whose every body stays within this, but for its worst hundredth, is at rest
 
 
@@ -28,13 +29,13 @@ def propose(surveys: list[Survey], up: tuple[int, int, int] | None = None) -> st
     unit = likely_unit([stream.positions for stream in streams]) or "m"
     scale = 1e-3 if unit == "mm" else 1.0
     base = next((name for word in BASE_NAMES for name in poses.names if word in name.lower()), None)
-    up = up or _up(poses, base)
+    guessed, up = up is None, up or _up(poses, base)
     frame = f"up: {list(up)}, unit: {unit}"
     if len(poses.parents) > 1:
         frame += f", name: {poses.parents[0]}"
     lines = [
         "# Proposed from the logs. Check `up` (against gravity), each trial's experiment, level and split.",
-        f"frame: {{{frame}}}",
+        f"frame: {{{frame}}}{GUESSED if guessed else ''}",
     ]
     if base is not None:
         lines.append(f"base: {_quoted(base)}")
@@ -48,6 +49,8 @@ def propose(surveys: list[Survey], up: tuple[int, int, int] | None = None) -> st
     if any(stream.unnamed is not None for stream in joints):
         names = next(stream.names for stream in joints if stream.unnamed is not None)
         lines.append(f"tendons: {_list(f'tendon_{name}' for name in names)}")
+    elif joints and not any(name.startswith("tendon_") for name in joints[0].names):
+        lines.append(f"# The logs have {_list(joints[0].names)}: `tendons` or `motors` is to say what each winds in.")
     lines.append("trials:")
     trials = [
         (survey.log.path, *_experiment(survey, stream, base, np.array(up), scale)) for survey, stream in usable

@@ -18,7 +18,7 @@ from trunkline.reachability.reach_signal import HeldOut, held_out, packed
 from trunkline.reachability.sheet_check import check_sheets
 from trunkline.reachability.soft import SoftSettings
 from trunkline.reachability.tilted import find_tilted
-from trunkline.reachability.tips import ArmTips, Tips, TipSource
+from trunkline.reachability.tips import ArmTips, Tips
 from trunkline.statics.chain import Chain
 
 
@@ -102,12 +102,13 @@ def check_maps(
     return Check(agreement(claimed, reachable), points, claimed, reachable, heldout, found, moved)
 
 
-def check_soft(maps: Maps, tips_at: TipSource, spot_check: SpotCheckSettings, seed: int, done) -> list[HeldOut]:
-    """What a headset gets half-way between each two angles, where blending is at its worst."""
+def check_soft(maps: Maps, tips_at: ArmTips, spot_check: SpotCheckSettings, seed: int, done) -> list[HeldOut]:
+    """What a headset gets half-way between each two angles, where blending is at its worst; without gravity, against
+    tips that the map was not made of."""
     soft, results = maps.soft, []
     fields = packed(soft.fields)
-    for angle in (soft.angles[1:] + soft.angles[:-1]) / 2:
-        tips = tips_at(angle).positions
+    for angle in (soft.angles[1:] + soft.angles[:-1]) / 2 if len(soft.angles) > 1 else soft.angles:
+        tips = (tips_at.unseen or tips_at(angle)).positions
         results.append(held_out(fields, soft.angles, soft.lattice, soft.shape, tips, angle,
                                 beyond=spot_check.outside, count=10 * spot_check.count, seed=seed))
         done(f"held-out {np.degrees(angle):g}°")
@@ -115,15 +116,16 @@ def check_soft(maps: Maps, tips_at: TipSource, spot_check: SpotCheckSettings, se
 
 
 def check_hybrid(
-    maps: Maps, chain: Chain, tips_at: TipSource, spot_check: SpotCheckSettings, seed: int
+    maps: Maps, chain: Chain, tips_at: ArmTips, spot_check: SpotCheckSettings, seed: int
 ) -> dict[str, tuple[float, float]]:
     """By hybrid map, shares of points inside and outside to which both arms together bring the soft tip."""
+    weight = tips_at.unseen is None
     how = {"seed": seed, "mount_offset": maps.mount_offset, "avoid_collisions": maps.self_collision}
 
     def shares(one: Map, tips: Tips, find: Callable[[np.ndarray], Poses]) -> tuple[float, float]:
         sets = draw_inside_and_outside(one.field, one.lattice, spot_check.outside, spot_check.count, seed)
         inside, outside = (
-            float(verified(p, find(p), tips.lengths, chain, maps.mount_offset).mean()) for p in sets
+            float(verified(p, find(p), tips.lengths, chain, maps.mount_offset, weight).mean()) for p in sets
         )
         return inside, outside
 

@@ -81,14 +81,16 @@ def find_poses(
     return poses
 
 
-def verified(points: np.ndarray, poses: Poses, lengths: np.ndarray, chain: Chain, mount_offset: float) -> np.ndarray:
+def verified(
+    points: np.ndarray, poses: Poses, lengths: np.ndarray, chain: Chain, mount_offset: float, weight: bool = True
+) -> np.ndarray:
     """Whether joint angles and tendon lengths alone bring the tip to each of `points` (N, 3). Shape (N,).
 
     The Panda's joint angles say where the mount is and how gravity pulls on the soft arm; the statics say where the
     tip then rests under the lengths.
 
     Args:
-        lengths: of the soft samples, (M, K) in m.
+        lengths: of the soft samples, (M, K) in m. weight: whether the soft arm has any.
     """
     good = np.zeros(len(points), bool)
     rows = np.flatnonzero(poses.found)
@@ -96,7 +98,7 @@ def verified(points: np.ndarray, poses: Poses, lengths: np.ndarray, chain: Chain
         return good
     mount, rotation = mount_pose(poses.q[rows], mount_offset)
     base = rotation * np.array([1.0, -1.0, -1.0])  # axes of the soft arm's base frame, in columns
-    gravity = -STANDARD_GRAVITY * base[:, 2]
+    gravity = -STANDARD_GRAVITY * weight * base[:, 2]
     rest = forward(chain, lengths[poses.tip[rows]], gravity)
     tip = mount + np.einsum("nij,nj->ni", base, rest.position)
     pulled = (rest.tensions <= (1 + FORCE_ROUNDING) * chain.max_tension).all(axis=1)

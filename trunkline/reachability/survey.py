@@ -35,7 +35,7 @@ class Survey:
         if tips_at.largest is not None:
             fields, checks = fields + self.soft.sheets.directions, self.soft.sheets.heldout
         else:
-            checks = fields - 1
+            checks = max(1, fields - 1)
         return fields + checks + 5 + len(self.hybrid.tilts)
 
     def step(self, tips_at: ArmTips) -> float:

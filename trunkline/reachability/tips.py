@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trunkline.dataset.sampling import sample_at
+from trunkline.dataset.sampling import sample_at, sections
 from trunkline.frames import gravity_in_base
 from trunkline.statics.chain import Chain
 
@@ -29,7 +29,8 @@ class ArmTips:
 
     `angles` (A,) in rad, ascending, and `samples` at each; `directions` and `steps` as in
     `dataset.sampling.sample_at`; `seed` of the fresh ones, the same for an angle whatever others are asked. `largest`:
-    rad, of gravity from any side, if the samples have that; then `angles` are those that are shown.
+    rad, of gravity from any side, if the samples have that; then `angles` are those that are shown. `unseen`: of an arm
+    without gravity, whose one angle stands for all: samples that no map is made of. `deepest` as for `sample_at`.
     """
 
     chain: Chain
@@ -39,8 +40,12 @@ class ArmTips:
     steps: int
     seed: int
     largest: float | None = None
+    unseen: Tips | None = None
+    deepest: np.ndarray | None = None
 
     def __call__(self, angle: float) -> Tips:
+        if self.unseen is not None:
+            return self.samples[0]
         sampled = np.flatnonzero(np.abs(self.angles - angle) < 1e-6)
         if sampled.size:
             return self.samples[sampled[0]]
@@ -50,5 +55,11 @@ class ArmTips:
         """Equilibria under gravity at `angle` (rad), the mount tilting about base +y."""
         rng = np.random.default_rng([self.seed, round(1e6 * angle)])
         gravity = gravity_in_base(angle)
-        found = sample_at(self.chain, gravity, self.directions, self.steps, rng, LOOK_EVERY).equilibrium
-        return Tips(found.position, found.lengths)
+        found = sample_at(self.chain, gravity, self.directions, self.steps, rng, LOOK_EVERY, self.deepest).equilibrium
+        return Tips(found.position, held_by(self.chain, found.lengths, found.tensions))
+
+
+def held_by(chain: Chain, lengths: np.ndarray, tensions: np.ndarray) -> np.ndarray:
+    """Lengths (N, K), m, of cables that hold equilibria of path `lengths`: of an arm of several sections, what is slack
+    is paid out, as cables that run at one distance from the axis are else drawn in against each other."""
+    return lengths + (tensions == 0) * chain.length if len(sections(chain)) > 1 else lengths

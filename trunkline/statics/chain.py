@@ -75,6 +75,15 @@ class Chain(NamedTuple):
         """The same arm, its tendons sliding without friction: its rest is between what friction can hold."""
         return self._replace(capstan=0.0)
 
+    def loaded(self, load: float) -> "Chain":
+        """The same arm with a point mass at its tip, kg, as `simulation.load.hang` gives it to a batch."""
+        if not load:
+            return self
+        mass, center = self.mass.copy(), self.center.copy()
+        mass[-1] += load
+        center[-1] += (load / mass[-1]) * (self.tip - center[-1])
+        return self._replace(mass=mass, center=center)
+
     @property
     def units(self) -> int:
         return len(self.mass)

@@ -81,6 +81,15 @@ def gather(
     return gathered
 
 
+def require_enough(gathered: Gathered, planned: list[TrialEntry]) -> None:
+    """Refuse what is left of a session that had trials of an experiment in a split, all of which were refused."""
+    left = {(take.experiment, take.split) for take in gathered.takes}
+    for trial in planned:
+        if trial.name in gathered.refused and (trial.experiment, trial.split) not in left:
+            expected = f"expected another {trial.experiment} of the split {trial.split} to go on with"
+            raise InputError(f"{gathered.refused[trial.name]}; {expected}")
+
+
 def _missing(takes: list[Take]) -> list[str]:
     """Splits and experiments that the session lacks, and experiments that one of its splits lacks, a sentence each."""
     splits, kinds = ({getattr(take, key) for take in takes} for key in ("split", "experiment"))

@@ -14,7 +14,7 @@ from trunkline.takes.delivery import logged_offset
 from trunkline.takes.motors import check_motors, read_motors
 from trunkline.takes.reading import Stretch, check_seen, columns_of, read_stretch, split_base
 from trunkline.takes.reference import Reference, reference_of
-from trunkline.takes.repairs import drop_frozen, good_samples, untangle, with_lost_time
+from trunkline.takes.repairs import drop_frozen, good_samples, longest_part, untangle, with_lost_time
 from trunkline.trials.experiments import EXPERIMENTS, is_stepwise
 from trunkline.trials.take import Take
 
@@ -88,6 +88,11 @@ def _take(
     untangle((base_positions, base_quaternions), positions, quaternions, reference, findings)
     if not is_stepwise(trial.experiment):  # there the arm jumps from frame to frame
         stretch.time = with_lost_time(stretch.time, positions, bool(source.joint_topics), findings)
+        if not source.joint_topics:
+            part = longest_part(stretch.time, positions, findings)
+            positions, base_positions, base_quaternions = positions[part], base_positions[part], base_quaternions[part]
+            quaternions = None if quaternions is None else quaternions[part]
+            stretch = stretch.part(part)
     motors = read_motors(source, session, stretch, limits, where, findings)
     if EXPERIMENTS[trial.experiment].needs_motors:
         check_motors(source, session, reference.joint_topics, motors, stretch, limits, where)

@@ -8,6 +8,7 @@ SIDE = 3  # frames before and after a jump whose motion a parabola describes
 MOST = 9  # frames, one more than are looked for at one place; by then an arm has gone round a bend
 GAIN = 3.0  # how much better the parabola fits with the frames put back
 LEAST, NOISES = 3e-4, 5.0  # m, and times the noise, of a body's misfit without them: below, it tells nothing
+SUDDEN, AWAY = 4.0, 0.005  # times a body's steps nearby, and m, by which it jumps where no number of frames explains it
 EVEN = 0.01  # share of a frame by which stamps differ that were counted and not measured
 
 
@@ -54,6 +55,27 @@ def find_lost(time: np.ndarray, positions: np.ndarray, noise: float) -> list[Los
             found.append(Lost(after, best))
             shift[after + 1 :] += best
     return found
+
+
+def unbroken(time: np.ndarray, positions: np.ndarray) -> slice:
+    """The longest part without a gap that nobody can count: where several bodies are much faster for one step than
+    around it, more was lost than `find_lost` looks for.
+
+    Args:
+        time: (T,) s, with what could be counted put back. positions: (T, S, 3) m, NaN where not seen.
+    """
+    passed = np.diff(time)
+    steps = np.linalg.norm(np.diff(positions, axis=0), axis=2) * (np.median(passed) / passed)[:, None]
+    edges = [0]
+    for after in range(1, len(steps) - 1):
+        nearby = np.r_[steps[max(after - SIDE, 0) : after], steps[after + 1 : after + 1 + SIDE]]
+        usual = np.nanmax(np.where(np.isfinite(nearby), nearby, 0.0), axis=0)
+        jumped = (steps[after] > SUDDEN * usual) & (steps[after] > AWAY)
+        if jumped.sum() > 1:
+            edges.append(after + 1)
+    edges.append(len(positions))
+    longest = int(np.argmax(np.diff(edges)))
+    return slice(edges[longest], edges[longest + 1])
 
 
 def _misfit(frames: np.ndarray) -> np.ndarray:

@@ -28,6 +28,12 @@ class Stretch:
     epoch: int
     logged: int
 
+    def part(self, frames: slice) -> "Stretch":
+        """Some of its frames, one after the other."""
+        begin = float(self.time[frames.start])
+        passed = round(begin * 1e9)
+        return Stretch(self.rows[frames], self.time[frames] - begin, self.epoch + passed, self.logged + passed)
+
 
 def read_stretch(
     source: Source, trial: TrialEntry, session: Session, limits: Limits, findings: Findings

@@ -7,7 +7,7 @@ from trunkline.logs.transforms import is_rotation
 from trunkline.signals.smoothing import noise_level
 from trunkline.takes.checks import Findings
 from trunkline.takes.frozen import frozen
-from trunkline.takes.lost import find_lost, put_back
+from trunkline.takes.lost import find_lost, put_back, unbroken
 from trunkline.takes.reference import FARTHEST, Reference
 from trunkline.takes.swaps import find_swaps
 
@@ -102,6 +102,19 @@ def with_lost_time(time: np.ndarray, positions: np.ndarray, motors: bool, findin
         return time
     findings.repairs.append(f"{told}; their time put back")
     return put_back(time, lost)
+
+
+def longest_part(time: np.ndarray, positions: np.ndarray, findings: Findings) -> slice:
+    """What to keep of a trial in which so many frames were lost at once that their time cannot be put back."""
+    part = unbroken(time, positions)
+    for begin, end in ((0, part.start), (part.stop, len(time))):
+        if end > begin:
+            at = time[part.start if begin == 0 else part.stop - 1]
+            findings.repairs.append(
+                f"more frames lost at {at:.2f} s than can be counted, though the stamps go on evenly; {end - begin} "
+                f"frames {'before' if begin == 0 else 'after'} it left out"
+            )
+    return part
 
 
 def _tell_dropped(bad: np.ndarray, what: str, names: list[str], findings: Findings) -> None:

@@ -93,7 +93,7 @@ def _misfit(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -
 def _exchanged(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -> np.ndarray:
     """(T,) frames in which the labels `bodies` fit their neighbours only when each is taken for the next.
 
-    Where but one of them is seen, an outlier may look like it, and it has to last.
+    Where but one of them is seen, an outlier may look like it, and it has to last; then two distances are enough.
     """
     nearness = np.where(np.isfinite(usual), usual, np.inf)[list(bodies)].sum(axis=0)
     others = [b for b in np.argsort(nearness, kind="stable").tolist() if b not in bodies]
@@ -110,6 +110,6 @@ def _exchanged(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]
         contrast += np.sum(np.where(seen, abs(own - other), 0), axis=1)
         terms += seen.sum(axis=1)
         both += seen.any(axis=1)
-    told = (terms >= 3) & (contrast > LEAST_CONTRAST * terms)
+    told = ((terms >= 3) | ((terms == 2) & (both == 1))) & (contrast > LEAST_CONTRAST * terms)
     flagged = told & (kept > 0.5 * contrast) & (exchanged < CLEAR * kept)
     return flagged & ((both == len(bodies)) | lasting(flagged, LONE))

@@ -106,7 +106,7 @@ EXPERIMENTS: dict[str, Kind] = {
         stepwise=True,
     ),
     "motion": Kind(
-        what="anything else that is commanded, from rest",
+        what="anything else that is commanded",
         plural="motions",
         level=None,
         static=False,

@@ -19,6 +19,7 @@ LEAVING = ((2, 3), (2, 2.5, 3))  # powers of time in which a released arm leaves
 PLAINLY = 0.5  # share of the residual that is left by then, or the arm leaves in the simpler way
 TRIES = 4  # a frame
 FAR = 0.05  # share of the largest range by which a command is far from its initial value
+RESTED = 0.1  # s, for which a command has to stand at first, or the arm is on its way already
 NOISES, EXACT = 5.0, 1e-6  # times its median departure, and m, by which a command that rests may depart
 SWAYING = 0.03  # share of the top speed from which on a hand gives the arm a start of its own
 
@@ -157,7 +158,8 @@ def robust_length(vectors: np.ndarray) -> np.ndarray:
 
 
 def cycle_time(time: np.ndarray, commands: np.ndarray) -> Start:
-    """When a command (T, K) m first leaves its initial value; at 0 s if none does.
+    """When a command (T, K) m first leaves its initial value; at 0 s if none does, and in motion if it
+    never rested: then the trial is a piece of a longer motion.
 
     That is before it is far from it. A command that is sent rests exactly until then, measured tendon positions in its
     place have noise: as much as in the first half of that time.
@@ -172,4 +174,7 @@ def cycle_time(time: np.ndarray, commands: np.ndarray) -> Start:
     left = np.abs(before - np.median(early, axis=0))
     noise = np.median(left[: len(early)], axis=0)
     resting = np.flatnonzero(np.all(left <= NOISES * noise + EXACT, axis=1))
-    return Start(float(time[resting[-1] if len(resting) else 0]) + step / 2, step / np.sqrt(12))
+    last = float(time[resting[-1]]) if len(resting) else 0.0
+    if last < RESTED:
+        return Start(0.0, step / np.sqrt(12), in_motion=True)
+    return Start(last + step / 2, step / np.sqrt(12))

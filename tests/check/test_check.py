@@ -1,0 +1,116 @@
+"""`python -m trunkline.check`: what a session will tell, before any fit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.identification.test_stage import settings
+from tests.support.matched_plant import curl, motion, release, small_model, static_pull, tilt
+from tests.support.workbench import workbench
+from trunkline.check.__main__ import main
+from trunkline.check.recorded import missing_lines, recorded_lines
+from trunkline.check.told import told_by, untold
+from trunkline.identification.search import search
+from trunkline.identification.setup import set_up
+from trunkline.trials.trial import Trial
+
+
+@pytest.fixture(scope="module")
+def model():
+    return small_model(4)
+
+
+def turned(trial: Trial, degrees: float) -> Trial:
+    """The trial, the arm turned about its axis."""
+    cosine, sine = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+    return replace(trial, gravity=turn @ trial.gravity, positions=trial.positions @ turn.T)
+
+
+def test_what_was_recorded_is_counted_by_kind_and_split(model):
+    trials = [tilt(model, 30), tilt(model, 60, "validate"), replace(release(model, 0.2), load=0.05),
+              curl(model, 40), tilt(model, 90, "test")]  # fmt: skip
+    assert recorded_lines(trials) == [
+        "static tilts: 1 identify, 1 validate, 1 test; tilted by 30 to 60°",
+        "releases: 1 identify, 0 validate, 0 test; loads of 50 g",
+        "curls: 1 identify, 0 validate, 0 test; pulls of up to 40 mm",
+    ]
+
+
+def test_sides_that_no_trial_shows_are_named(model):
+    one = tilt(model, 30)
+    (alone,) = missing_lines([one, tilt(model, 60), turned(tilt(model, 40, "validate"), 120)])
+    assert alone.startswith("tilts: gravity pulls the arm towards ")
+    assert alone.endswith("° alone (base +x is 0°)"), "a trial of another split does not help the fit"
+    assert missing_lines([one, turned(one, 120), turned(one, 240)]) == []
+    (plane,) = missing_lines([one, turned(one, 180)])
+    assert plane.endswith("all in one plane")
+    (half,) = missing_lines([release(model, 0.2), turned(release(model, 0.3), 60)])
+    assert half.startswith("releases: the arm is held to no side within 149° of ")
+
+
+def test_tendons_that_never_pull_are_named(model):
+    assert missing_lines([curl(model, 40)]) == [
+        "never pulled: tendon_2, tendon_3",
+        "only one tendon is pulled at a time: how several share the load is not seen",
+    ]
+    assert missing_lines([static_pull(model, (30, 30, 0)), static_pull(model, (0, 0, 20))]) == []
+    assert missing_lines([replace(curl(model, 40), commands=np.full((150, 3), -0.3))]) == ["no tendon is pulled"]
+
+
+def test_what_shows_in_no_trial_and_what_shows_as_one_is_told(model):
+    ranges = {"stiffness": (0.1, 10.0), "kp": (10.0, 1e4), "force_range": (5.0, 1e4)}
+    pulls = [static_pull(model, (level, 0, 0)) for level in (10, 20)]
+    told, pairs = told_by(settings(["static_pull"], ["static_pull"], ranges), model, pulls, 0.005)
+    by_name = {one.name: one for one in told}
+    assert by_name["force_range"].words() == "force_range shows in no trial"
+    assert np.isfinite(by_name["kp"].half_width)
+    sure, _ = told_by(settings(["static_pull"], ["static_pull"], ranges), model, pulls, 0.0025)
+    np.testing.assert_allclose(2 * sure[0].half_width, told[0].half_width)
+    moving = settings(["motion"], ["motion"], {"dead_time": (1e-3, 0.1), "time_constant": (1e-3, 0.1)})
+    slow = small_model(4, dead_time=0.02)
+    _, pairs = told_by(moving, slow, [motion(slow, reach_mm=10)], 0.005)
+    assert pairs == ["dead_time and time_constant trade off"]
+
+
+def test_the_expected_width_is_that_of_fits_to_trials_that_are_off_so(model):
+    """Forty arms whose shapes are off at random by a share of each point's distance, each fitted: their scatter."""
+    share, rng = 0.01, np.random.default_rng(0)
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3 * model.jnt_stiffness[0], 30.0)})
+    clean = [tilt(model, angle) for angle in (20, 40, 60, 80)]
+    (told,), _ = told_by(config, model, clean, share)
+    found = []
+    for _ in range(40):
+        off = [rng.normal(size=3) * share / np.sqrt(3) for _ in clean]
+        trials = [
+            replace(t, positions=t.positions + np.linalg.norm(t.positions, axis=2, keepdims=True) * e)
+            for t, e in zip(clean, off, strict=True)
+        ]
+        found.append(fitted(config, model, trials))
+    assert 0.4 < 1.96 * np.std(np.log(found)) / told.half_width < 2.5
+
+
+def fitted(config, model, trials) -> float:
+    model, experiments, fit = set_up(config, trials, model)
+    problem = fit.problem(model, experiments)
+    return float(np.exp(search(problem, config.optimizer, 1, lambda best: None).vector[0]))
+
+
+def test_a_stage_without_its_trials_says_what_to_set(model):
+    config = settings(["static_tilt", "static_pull"], ["static_tilt", "static_pull"], {"stiffness": (0.1, 10.0)})
+    (line,) = untold(config, [tilt(model, 30)])
+    assert line.startswith("no static_pull of the split identify: `source: tilts` under identify_stiffness")
+
+
+def test_the_command_reads_logs_and_writes_nothing(tmp_path, monkeypatch, capsys):
+    workbench(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    assert main(["data/raw/demo"]) == 0
+    told = capsys.readouterr().out
+    assert "static tilts: 1 identify" in told
+    assert "identify_stiffness, from 1 trials:\n  no static_pull of the split identify" in told
+    assert "identify_damping, from" in told
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["conf", "data", "params.yaml"]
+    assert main(["data/raw/nowhere"]) == 1
+    assert "no such folder" in capsys.readouterr().err

@@ -1,0 +1,77 @@
+"""What a session will and will not tell, in seconds: `python -m trunkline.check SESSION`
+
+Reads the logs as the stages do, says what was recorded and what is missing, and how well each parameter in params.yaml
+will be told if the fitted model is off by half a percent of each point's distance from the base. Fits and writes
+nothing.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import mujoco
+
+from trunkline.arm.holes import add_holes
+from trunkline.arm.joints import add_elements
+from trunkline.check.recorded import missing_lines, recorded_lines
+from trunkline.check.told import told_by, untold
+from trunkline.errors import in_one_line
+from trunkline.evaluate.session import trials_of
+from trunkline.identification.checks import check_trials
+from trunkline.identification.setup import check_parameters
+from trunkline.pipeline.config import own_or_project, settings_of
+from trunkline.settings import read_yaml
+from trunkline.trials.splits import DECIDING, IDENTIFY
+
+MODELS = "build_mjcf/mjcf"  # folder below conf/ of arms that come as MJCF
+STAGES = ("identify_stiffness", "identify_damping", "identify_control")
+
+
+@in_one_line
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog="python -m trunkline.check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("session", type=Path, metavar="SESSION",
+                        help="folder of logs and session.yaml, or of filtered trials")  # fmt: skip
+    parser.add_argument("--error", type=float, default=0.5, metavar="PERCENT",
+                        help="by which the fitted model will be off, of a point's distance from the base")  # fmt: skip
+    parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
+                        help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
+    told = parser.parse_args(arguments)
+    trials = trials_of(told.session, told.settings)
+    model = cad_model(told.settings)
+    check_trials([trial for trial in trials if trial.split in DECIDING], model)
+    print("\n".join(["recorded:", *(f"  {line}" for line in recorded_lines(trials))]))
+    if missing := missing_lines(trials):
+        print("\n".join(["missing:", *(f"  {line}" for line in missing)]))
+    given = read_yaml(told.settings / "params.yaml")
+    for stage in (stage for stage in STAGES if stage in given):
+        config = settings_of(stage, told.settings)
+        check_parameters(stage, config, model)
+        lacking = untold(config, trials)
+        chosen = [t for t in trials if t.experiment in config.experiments and t.split == IDENTIFY]
+        print(f"{stage}, from {len(chosen)} trials:", flush=True)
+        for line in lacking:
+            print(f"  {line}")
+        if lacking:
+            continue
+        found, pairs = told_by(config, model, trials, told.error / 100)
+        for one in sorted(found, key=lambda one: -one.share):
+            print(f"  {one.words()}")
+        for pair in pairs:
+            print(f"  hardly told apart: {pair}")
+    return 0
+
+
+def cad_model(root: Path) -> mujoco.MjModel:
+    """The arm in params.yaml, from its description alone, as the stage `build_mjcf` makes it."""
+    config = settings_of("build_mjcf", root)
+    spec = config.arm.build(config.actuation, config.solver, own_or_project(root, "conf") / MODELS).spec
+    add_elements(spec, config.joints, config.solver.armature)
+    add_holes(spec, config.holes)
+    return spec.compile()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,89 @@
+"""How well each stage's parameters will be told, before any fit: the residuals to first order, around the CAD model.
+
+With a model that is off by a share s of each point's distance from the base, the same way throughout a trial, T trials
+count as `NUMBERS` T independent numbers, and the covariance of the estimate is s² (JᵀJ)⁻¹ / (NUMBERS T), J the
+Jacobian of the loss' residuals, whose squares sum to a mean over trials. That is a guess of the size, good for what is
+left open; after a fit, the jackknife of `identification.certainty` says it from what is left of the trials.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from trunkline.identification.linearisation import linearise
+from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.setup import set_up, with_every
+from trunkline.trials.experiments import EXPERIMENTS, is_static
+from trunkline.trials.splits import IDENTIFY
+from trunkline.trials.trial import Trial
+
+NUMBERS = 3  # that a trial tells
+FRAMES = 180  # of a moving trial that are looked at
+TWO_SIDED = 1.96
+ALIKE = 0.95  # correlation of two estimates, from which on trials tell hardly more than one of them
+
+
+@dataclass
+class Told:
+    """How well a parameter will be told.
+
+    half_width: of its expected 95 % interval, where it is searched: of its logarithm, or over the scale of a signed
+        one; infinite if it shows in no trial. share: that over half of its range; 1 leaves it open.
+    """
+
+    name: str
+    half_width: float
+    share: float
+
+    def words(self) -> str:
+        parameter = PARAMETERS[self.name]
+        if not np.isfinite(self.share):
+            return f"{self.name} shows in no trial"
+        if self.share >= 1:
+            return f"{self.name} stays undetermined within its range"
+        if parameter.signed:
+            return f"{self.name} to ± {self.half_width * parameter.scale:.2g} {parameter.unit}".rstrip()
+        return f"{self.name} to within a factor of {np.exp(self.half_width):.2f}"
+
+
+def told_by(
+    config: IdentificationSettings, model: mujoco.MjModel, trials: list[Trial], share: float
+) -> tuple[list[Told], list[str]]:
+    """What a stage's trials tell of its parameters, and which two they hardly tell apart, a few words a pair.
+
+    Args:
+        model: to begin with. trials: of the session, in any split; those to identify from must be there.
+        share: by which the fitted model will be off, of a point's distance from the base.
+    """
+    config = with_every(config, model)
+    own = [trial for trial in trials if trial.experiment in config.experiments and trial.split == IDENTIFY]
+    model, experiments, fit = set_up(config, own, model)
+    problem = fit.problem(model, [e if is_static(e.kind) else e.shortened(FRAMES) for e in experiments])
+    normal = linearise(problem, problem.start()).normals().sum(axis=0)
+    scale = 1 / np.sqrt(np.where(np.diag(normal) > 0, np.diag(normal), np.inf))
+    inverse = np.linalg.pinv(normal * np.outer(scale, scale), rcond=1e-12, hermitian=True)
+    spread = np.sqrt(np.diag(inverse))
+    half = TWO_SIDED * share / np.sqrt(NUMBERS * len(own)) * np.where(scale > 0, spread * scale, np.inf)
+    low, high = problem.bounds()
+    names = list(fit.parameters)
+    told = [Told(name, *row) for name, *row in zip(names, half, half / (0.5 * (high - low)), strict=True)]
+    alike = inverse / np.maximum(np.outer(spread, spread), 1e-300)
+    pairs = [
+        f"{names[i]} and {names[j]} {'rise together' if alike[i, j] > 0 else 'trade off'}"
+        for i, j in zip(*np.triu_indices(len(names), 1), strict=True)
+        if abs(alike[i, j]) > ALIKE
+    ]
+    return told, pairs
+
+
+def untold(config: IdentificationSettings, trials: list[Trial]) -> list[str]:
+    """Why a stage has nothing to identify from, a sentence each."""
+    found = {trial.experiment for trial in trials if trial.split == IDENTIFY}
+    lines = []
+    for kind in config.experiments:
+        if kind not in found:
+            way_out = EXPERIMENTS[kind].without
+            lines.append(f"no {kind} of the split identify" + (f": {way_out}" if way_out else ""))
+    return lines
