@@ -4,7 +4,7 @@ import hashlib
 import json
 import multiprocessing
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -70,15 +70,15 @@ def wanted(runs: dict[str, int], of_variants: int) -> list[Run]:
 
 def make(runs: list[Run], package: Path, source: Source, table: Path, workers: int) -> list[Result]:
     """Those of `runs` that `table` has not, of this source; then all of `runs` that it has."""
-    made = {_run_of(result) for result in source.of(read_results(table))}
+    made = {run_of(result) for result in source.of(read_results(table))}
     missing = [run for run in runs if run not in made]
-    for number, (result, seconds) in enumerate(_made(missing, package, workers), start=1):
+    for number, (result, seconds) in enumerate(performed(missing, package, workers), start=1):
         append_result(table, replace(result, package=source.package, code=source.code))
         told = "success" if result.success else result.cause
         name = f"{result.experiment}, {result.variant}" if result.variant else result.experiment
         print(f"{number} of {len(missing)}: {name} {result.seed}: {told}; {seconds:.0f} s of processor", flush=True)
     chosen = set(runs)
-    return [result for result in source.of(read_results(table)) if _run_of(result) in chosen]
+    return [result for result in source.of(read_results(table)) if run_of(result) in chosen]
 
 
 def make_one(bench: Bench, run: Run) -> tuple[Result, float]:
@@ -92,8 +92,8 @@ def make_one(bench: Bench, run: Run) -> tuple[Result, float]:
     return replace(result, variant=run.variant), time.process_time() - began
 
 
-def _made(runs: list[Run], package: Path, workers: int):
-    """Each run as it ends."""
+def performed(runs: list[Run], package: Path, workers: int) -> Iterator[tuple[Result, float]]:
+    """Each run as it ends, and its seconds of processor; of no package or code yet."""
     if not runs:
         return
     if workers == 1 or len(runs) == 1:
@@ -125,5 +125,5 @@ def _next(run: Run) -> tuple[Result, float]:
     return make_one(_bench, run)
 
 
-def _run_of(result: Result) -> Run:
+def run_of(result: Result) -> Run:
     return Run(result.experiment, result.seed, result.variant)

@@ -76,8 +76,12 @@ def append_result(path: Path, result: Result) -> None:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         if new:
             writer.writeheader()
-        row = {name: f"{value:.4g}" if isinstance(value, float) else value for name, value in asdict(result).items()}
-        writer.writerow(row)
+        writer.writerow(as_row(result))
+
+
+def as_row(result: Result) -> dict[str, str]:
+    """As a table has it: floats to four digits."""
+    return {name: f"{value:.4g}" if isinstance(value, float) else str(value) for name, value in asdict(result).items()}
 
 
 def rewrite_results(path: Path, results: list[Result]) -> None:
