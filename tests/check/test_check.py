@@ -10,7 +10,7 @@ from tests.support.matched_plant import curl, motion, release, small_model, stat
 from tests.support.workbench import workbench
 from trunkline.check.__main__ import main
 from trunkline.check.recorded import missing_lines, recorded_lines
-from trunkline.check.told import told_by, untold
+from trunkline.check.told import described_lines, told_by, untold
 from trunkline.identification.search import search
 from trunkline.identification.setup import set_up
 from trunkline.trials.trial import Trial
@@ -72,6 +72,18 @@ def test_what_shows_in_no_trial_and_what_shows_as_one_is_told(model):
     slow = small_model(4, dead_time=0.02)
     _, pairs = told_by(moving, slow, [motion(slow, reach_mm=10)], 0.005)
     assert pairs == ["dead_time and time_constant trade off"]
+
+
+def test_a_session_that_says_down_for_up_is_seen(model):
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.1, 10.0)})
+    trials = [tilt(model, angle) for angle in (20, 60)]
+    (line,) = described_lines(config, model, trials)
+    assert line.startswith("as described, it is ")
+    off, still = (float(part.split(" mm")[0].split(" ")[-1]) for part in line.split(", a straight arm"))
+    assert off < 0.01 * still, "the arm that made them"
+    wrong = [replace(trial, gravity=-trial.gravity) for trial in trials]
+    line, doubt = described_lines(config, model, wrong)
+    assert doubt.startswith("no nearer than a straight arm: look at `up`")
 
 
 def test_the_expected_width_is_that_of_fits_to_trials_that_are_off_so(model):

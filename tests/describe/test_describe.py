@@ -1,11 +1,12 @@
 """`python -m trunkline.describe`: an arm in words, before anything is recorded."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import yaml
 
-from tests.arm.test_sections import ACTUATION, SOLVER, arm
+from tests.arm.test_sections import ACTUATION, SOLVER, TWO, arm
 from trunkline.arm.tendons import Tendon
 from trunkline.describe.__main__ import main
 from trunkline.describe.words import doubt_lines, marker_lines, tendon_lines, unit_lines
@@ -49,6 +50,17 @@ def test_what_no_log_will_tell_is_said():
     assert "one tracked point" in said
     whole = doubt_lines(one_side, {"static_tilt", "release", "motion"}, None, False)
     assert not any("tells" in line and "no trial" in line for line in whole)
+
+
+def test_what_is_hardly_meant_is_noted():
+    heavy = replace(TWO[1], mass=60.0)
+    tendons = [Tendon(0.0, 0.012), Tendon(120.0, pretension=80.0), Tendon(-120.0)]
+    model = arm(sections=[TWO[0], heavy], tendons=tendons).build(ACTUATION, SOLVER, ROOT).spec.compile()
+    assert doubt_lines(model, None, None, False)[:5] == [
+        *(f"unit {n} has 3.18e+06 kg/m³, more than lead: is its mass in kg, its width in m?" for n in (3, 4, 5)),
+        "tendon_1 runs outside unit 3, 20 mm wide: 12 mm from the axis",
+        "tendon_2 is to hold 80 N at command 0, its motor holds 50 N at most",
+    ]
 
 
 def test_the_command_describes_a_file_and_draws_it(tmp_path, monkeypatch, capsys):

@@ -200,7 +200,7 @@ def test_a_changed_range_in_the_library_is_checked_again(whole_project, tmp_path
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("    stiffness:", "    stifness:", "found 'stifness', expected 'stiffness', 'joint_place', "),
+        ("    stiffness:", "    stifness:", " names, did you mean 'stiffness'?"),
         ("{low: 0.3,", "{low: 30.0,", "parameters.stiffness: low: found 30.0, expected less than high, 12.0"),
         ("{low: 0.3,", "{lwo: 0.3,", "parameters.stiffness.lwo: unknown key, did you mean 'low'?"),
         ("{low: 0.3,", "{low: .nan,", "parameters.stiffness.low: found nan, expected a finite number"),

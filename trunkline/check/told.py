@@ -11,7 +11,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from trunkline.identification.evaluation import Prediction, replay
+from trunkline.identification.experiment import Experiment
+from trunkline.identification.fit import Fit
 from trunkline.identification.linearisation import linearise
+from trunkline.identification.null_model import straight
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import set_up, with_every
@@ -57,15 +61,13 @@ def told_by(
         model: to begin with. trials: of the session, in any split; those to identify from must be there.
         share: by which the fitted model will be off, of a point's distance from the base.
     """
-    config = with_every(config, model)
-    own = [trial for trial in trials if trial.experiment in config.experiments and trial.split == IDENTIFY]
-    model, experiments, fit = set_up(config, own, model)
-    problem = fit.problem(model, [e if is_static(e.kind) else e.shortened(FRAMES) for e in experiments])
+    model, experiments, fit = _to_identify_from(config, model, trials)
+    problem = fit.problem(model, experiments)
     normal = linearise(problem, problem.start()).normals().sum(axis=0)
     scale = 1 / np.sqrt(np.where(np.diag(normal) > 0, np.diag(normal), np.inf))
     inverse = np.linalg.pinv(normal * np.outer(scale, scale), rcond=1e-12, hermitian=True)
     spread = np.sqrt(np.diag(inverse))
-    half = TWO_SIDED * share / np.sqrt(NUMBERS * len(own)) * np.where(scale > 0, spread * scale, np.inf)
+    half = TWO_SIDED * share / np.sqrt(NUMBERS * len(experiments)) * np.where(scale > 0, spread * scale, np.inf)
     low, high = problem.bounds()
     names = list(fit.parameters)
     told = [Told(name, *row) for name, *row in zip(names, half, half / (0.5 * (high - low)), strict=True)]
@@ -76,6 +78,29 @@ def told_by(
         if abs(alike[i, j]) > ALIKE
     ]
     return told, pairs
+
+
+def described_lines(config: IdentificationSettings, model: mujoco.MjModel, trials: list[Trial]) -> list[str]:
+    """How far the model to begin with is from a stage's trials, beside a straight arm; and what to look at where it is
+    no nearer."""
+    model, experiments, fit = _to_identify_from(config, model, trials)
+    found = replay(model, experiments, fit.segments)
+    off, still = (Prediction(one, experiments).overall() for one in (found, straight(experiments, found)))
+    told = f"as described, it is {off['e_position_mm']:.3g} mm off ({off['e_position_pct']:.2g} % of length)"
+    lines = [f"{told}, a straight arm {still['e_position_mm']:.3g} mm"]
+    if off["e_position_mm"] >= still["e_position_mm"]:
+        lines.append("no nearer than a straight arm: look at `up`, the masses, and which motor pulls which tendon")
+    return lines
+
+
+def _to_identify_from(
+    config: IdentificationSettings, model: mujoco.MjModel, trials: list[Trial]
+) -> tuple[mujoco.MjModel, list[Experiment], Fit]:
+    """As `set_up`, moving trials by their beginning alone."""
+    config = with_every(config, model)
+    own = [trial for trial in trials if trial.experiment in config.experiments and trial.split == IDENTIFY]
+    model, experiments, fit = set_up(config, own, model)
+    return model, [e if is_static(e.kind) else e.shortened(FRAMES) for e in experiments], fit
 
 
 def untold(config: IdentificationSettings, trials: list[Trial]) -> list[str]:

@@ -10,6 +10,7 @@ from trunkline.identification.parameters import PARAMETERS
 from trunkline.trials.experiments import EXPERIMENTS
 
 WIDEST = 180.0  # deg between neighbouring tendons, from which on they cannot bend the arm to every side
+DENSEST = 11_340.0  # kg/m³, lead
 ALIKE = 1e-3  # share by which neighbouring units may differ and stand in one line
 
 
@@ -73,12 +74,12 @@ def tendon_lines(model: mujoco.MjModel) -> list[str]:
     jacobian = np.zeros((model.ntendon, model.nv))
     mujoco.mju_sparse2dense(jacobian, data.ten_J, model.ten_J_rownnz, model.ten_J_rowadr, model.ten_J_colind)
     preload = model.numeric_data[numbers_place(model, PRELOAD)]
-    bodies = list(np.unique(model.jnt_bodyid[: arm_hinges(model)]))
+    bodies = _bodies(model)
     lines = [f"{model.nu} tendons"]
     for index, (cable, motor) in enumerate(zip(cables(model), actuators(model), strict=True)):
-        sites = model.wrap_objid[model.tendon_adr[cable] : model.tendon_adr[cable] + model.tendon_num[cable]]
+        sites = _sites(model, cable)
         first, last = model.site_pos[sites[0]], model.site_pos[sites[-1]]
-        end = bodies.index(model.site_bodyid[sites[-1]]) + 1 if model.site_bodyid[sites[-1]] in bodies else 0
+        end = bodies.get(model.site_bodyid[sites[-1]], 0)
         arms = np.hypot(*jacobian[cable, : arm_hinges(model)].reshape(-1, 2).T)
         crossed = arms[arms > 0]
         apart = [1e3 * np.hypot(*place[:2]) for place in (first, last)]
@@ -116,7 +117,7 @@ def doubt_lines(model: mujoco.MjModel, kinds: set[str] | None, points: int | Non
         kinds: of the session's experiments, None without a session. points: that it tracks, None if not said.
         weightless: whether the session's arm does not feel gravity.
     """
-    lines = ["masses are as described: no log tells them; weigh the arm"]
+    lines = [*_hardly_meant(model), "masses are as described: no log tells them; weigh the arm"]
     angles = np.sort([_angle(model, cable) for cable in cables(model)])
     if len(angles):
         gaps = np.diff(np.append(angles, angles[0] + 360))
@@ -138,6 +139,41 @@ def doubt_lines(model: mujoco.MjModel, kinds: set[str] | None, points: int | Non
     if numeric(model, RATE_LIMIT) == 0 and numeric(model, BACKLASH) == 0 and model.nu and "motion" in kinds:
         lines.append("winches are taken to wind as they are told: `rate_limit` and `backlash` of `actuation` are 0")
     return lines
+
+
+def _hardly_meant(model: mujoco.MjModel) -> list[str]:
+    """Masses, places and forces that look like another unit or a slip."""
+    units, lines = units_of(model), []
+    bodies = _bodies(model)
+    for number, unit in enumerate(units, start=1):
+        density = unit.mass / (np.pi / 4 * unit.width**2 * unit.length) * 1e6  # kg/m³
+        if density > DENSEST:
+            lines.append(f"unit {number} has {density:.3g} kg/m³, more than lead: is its mass in kg, its width in m?")
+    preload = model.numeric_data[numbers_place(model, PRELOAD)]
+    for index, (cable, motor) in enumerate(zip(cables(model), actuators(model), strict=True)):
+        name = model.tendon(cable).name
+        for site in _sites(model, cable):
+            unit, apart = bodies.get(model.site_bodyid[site], 0), 1e3 * np.hypot(*model.site_pos[site, :2])
+            if unit and apart > units[unit - 1].width / 2:
+                wide = units[unit - 1].width
+                lines.append(f"{name} runs outside unit {unit}, {wide:.3g} mm wide: {apart:.3g} mm from the axis")
+                break
+        force = preload[index] * model.actuator_gainprm[motor, 0] if len(preload) else 0.0
+        if force > -model.actuator_forcerange[motor, 0]:
+            strongest = -model.actuator_forcerange[motor, 0]
+            lines.append(
+                f"{name} is to hold {force:.3g} N at command 0, its motor holds {strongest:.3g} N at most"
+            )
+    return lines
+
+
+def _bodies(model: mujoco.MjModel) -> dict[int, int]:
+    """The number of the unit, from 1, that each of the arm's bodies is."""
+    return {int(body): k for k, body in enumerate(np.unique(model.jnt_bodyid[: arm_hinges(model)]), start=1)}
+
+
+def _sites(model: mujoco.MjModel, cable: int) -> np.ndarray:
+    return model.wrap_objid[model.tendon_adr[cable] : model.tendon_adr[cable] + model.tendon_num[cable]]
 
 
 def _angle(model: mujoco.MjModel, cable: int) -> float:

@@ -9,6 +9,7 @@ from pydantic import TypeAdapter
 from trunkline.errors import nearest
 
 UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
+MANY = 12  # names, of which the one that was meant is told alone
 # pydantic's names for a number out of its range, and JSON schema's for the end that it passed
 BEYOND = {
     "greater_than": "exclusiveMinimum",
@@ -77,7 +78,10 @@ def describe(problem: Any, adapter: TypeAdapter) -> str:
     if problem["type"] in BEYOND:
         expected = _range(problem, adapter) or expected
     valid = re.findall(r"'([^']*)'", expected) if problem["type"] == "literal_error" else []
-    return f"found {found!r}, expected {expected}" + nearest(str(found), valid)
+    meant = nearest(str(found), valid)
+    if meant and len(valid) > MANY:
+        expected = f"one of {len(valid)} names"
+    return f"found {found!r}, expected {expected}{meant}"
 
 
 def _range(problem: Any, adapter: TypeAdapter) -> str:
