@@ -5,6 +5,7 @@ more (0.1) and nothing else changed; beside that the same without the load, null
 table. Run the example's stages first.
 """
 
+import argparse
 import contextlib
 import io
 import sys
@@ -58,11 +59,15 @@ def show(source: Path, load: float) -> None:
 
 
 @in_one_line
-def main(arguments: list[str]) -> int:
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("source", type=Path, metavar="CSV")
+    parser.add_argument("load", type=float, nargs="?", default=0.1, metavar="LOAD", help="kg")
+    given = parser.parse_args()
     with recorded("loaded_releases"):
-        show(Path(arguments[0]), float(arguments[1]) if len(arguments) > 1 else 0.1)
+        show(given.source, given.load)
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())
