@@ -46,7 +46,7 @@ PUBLISHED = {
     "asl_trunk": [],
     "asl_motion": [
         ("learnt: control-augmented spectral submanifold", "150 short pieces of motion of a later trunk, each from its"
-         " measured state: not comparable", 2.8, "Wolff et al., arXiv 2603.23044, ICRA 2026, as an index of results has it"),
+         " measured state: not comparable", 2.8, "Wolff et al., arXiv 2603.23044, as an index of results has it"),
     ],
     "ftdcr": [
         ("the authors' simulator, calibrated", "train.csv", 6.68, "ContinuumRoboticsLab/opencr-mujoco"),
