@@ -29,7 +29,7 @@ def main() -> int:
     results = [one for one in read_results(existing(OUT / "runs.csv")) if not one.variant]
     previewed = [one for one in results if np.isfinite(one.probability)]
     with recorded("fidelity"):
-        print("| experiment | previews | agree with what happened | Brier score | … of the base rate | paths apart, of length |")
+        print("| experiment | previews | came out so | Brier score | … of the base rate | paths apart, of length |")
         print("|---|---:|---:|---:|---:|---:|")
         for name in dict.fromkeys(one.experiment for one in previewed):
             print(row(name, [one for one in previewed if one.experiment == name]))

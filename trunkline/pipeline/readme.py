@@ -57,7 +57,6 @@ MODELS = {
 RESULTS = {
     "fk_dataset": [
         ("FK against MuJoCo settled to rest, without friction: median", "mujoco_deviation_mm.median", "mm"),
-        ("Band in which friction may hold the tip: median", "friction_band_mm.median", "mm"),
     ],
     "train_ik": [
         (
@@ -67,10 +66,7 @@ RESULTS = {
         ),
         ("… 95th percentile", "as_controls.frictionless.position_error_mm.p95", "mm"),
         ("… with friction, all sent at once: median", "as_controls.friction.position_error_mm.median", "mm"),
-        ("… 95th percentile", "as_controls.friction.position_error_mm.p95", "mm"),
-        ("… seconds until the arm rests: median", "as_controls.friction.seconds_to_rest.median", "s"),
         ("… sent to the lab's own arm: median", "on_plant.position_error_mm.median", "mm"),
-        ("… 95th percentile", "on_plant.position_error_mm.p95", "mm"),
     ],
     "reachability": [
         ("Rigid map: share of points on which inverse kinematics of the same Panda agrees", "rigid.accuracy", ""),
