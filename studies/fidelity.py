@@ -1,4 +1,4 @@
-"""How true previews were: `python -m rehearsal.fidelity`
+"""How true previews were: `python -m studies.fidelity`
 
 Of the runs that `dvc repro rehearsal/dvc.yaml` made and that were previewed, by experiment: how often preview and
 execution agree, the Brier score of the stated probabilities beside that of always saying the base rate, and the median
