@@ -1,5 +1,6 @@
 using System;
 using System.Collections.Generic;
+using System.Globalization;
 using Trunkline;
 
 /// <summary>What was answered beside what Python answered, both as JSON: words alike, numbers within 1e-5 of
@@ -29,7 +30,7 @@ internal sealed class Comparison {
     } else if (expected is double number && found is double value) {
       double off = Math.Abs(value - number);
       if (!(off <= Math.Max(_relative * Math.Abs(number), _absolute))) {
-        throw new InputError($"{where}: found {value:R}, expected {number:R}");
+        throw new InputError($"{where}: found {Digits(value)}, expected {Digits(number)}");
       }
       Greatest = Math.Max(Greatest, off / Math.Max(Math.Abs(number), _absolute / _relative));
       Numbers++;
@@ -37,6 +38,8 @@ internal sealed class Comparison {
       Same(where, expected, found);
     }
   }
+
+  private static string Digits(double value) => value.ToString("R", CultureInfo.InvariantCulture);
 
   private static void Same(string where, object expected, object found) {
     if (!Equals(expected, found)) {

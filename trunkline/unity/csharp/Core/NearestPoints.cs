@@ -8,7 +8,8 @@ public sealed class NearestPoints {
 
   private readonly double[] _points;
   private readonly int[] _order;
-  private readonly byte[] _axes;  // by which a range is halved, at its middle
+  private readonly byte[] _axes;  // along which a range is halved, at its middle
+  private readonly double[] _halves;  // where: no point before the middle is beyond, none from it on before
 
   /// <param name="points">x, y, z of each, m.</param>
   public NearestPoints(double[] points) {
@@ -18,6 +19,7 @@ public sealed class NearestPoints {
       _order[i] = i;
     }
     _axes = new byte[_order.Length];
+    _halves = new double[_order.Length];
     Build(0, _order.Length);
   }
 
@@ -50,7 +52,7 @@ public sealed class NearestPoints {
     }
     int middle = (first + end) / 2, axis = _axes[middle];
     double own = axis == 0 ? place.X : axis == 1 ? place.Y : place.Z;
-    double beyond = own - _points[3 * _order[middle] + axis];
+    double beyond = own - _halves[middle];
     if (beyond < 0) {
       Search(first, middle, place, ref least, ref found);
     } else {
@@ -73,6 +75,7 @@ public sealed class NearestPoints {
     int middle = (first + end) / 2, axis = Widest(first, end);
     Select(first, end - 1, middle, axis);
     _axes[middle] = (byte)axis;
+    _halves[middle] = _points[3 * _order[middle] + axis];
     Build(first, middle);
     Build(middle, end);
   }

@@ -37,12 +37,12 @@ public static class Unpacked {
     string first = null;
     foreach (string name in reach.Texts("grids")) {
       first = first ?? name;
-      maps.Add(Grid(files, grids, name));
-      SignedMap one = maps[0], other = maps[maps.Count - 1];
-      bool alike = one.CountX == other.CountX && one.CountY == other.CountY && one.CountZ == other.CountZ;
-      if (!alike || one.Origin != other.Origin || one.Spacing != other.Spacing) {
-        throw new InputError($"{name}: found another lattice than that of {first}, expected one for all soft grids");
+      foreach (string key in new[] { "shape", "origin", "spacing" }) {
+        if (!Same(grids.Block(name).Numbers(key), grids.Block(first).Numbers(key))) {
+          throw new InputError($"{name}: found another {key} than that of {first}, expected one lattice for all soft maps");
+        }
       }
+      maps.Add(Grid(files, grids, name));
     }
     var rigid = Grid(files, grids, "rigid");
     return reach.Has("sheets")
@@ -56,6 +56,14 @@ public static class Unpacked {
     var block = Manifest(files).Block("network");
     return new ArmKinematics(network, block.Texts("input_order"), block.Texts("output_order"),
                              block.Number("doubt_beyond"));
+  }
+
+  private static bool Same(double[] one, double[] other) {
+    bool same = one.Length == other.Length;
+    for (int i = 0; same && i < one.Length; i++) {
+      same = one[i] == other[i];
+    }
+    return same;
   }
 
   private static SignedMap Grid(IReadOnlyDictionary<string, byte[]> files, JsonBlock grids, string name) {
