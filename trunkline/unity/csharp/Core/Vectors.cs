@@ -66,7 +66,7 @@ public static class Vectors {
 
   public static double Distance(Vector a, Vector b) => Norm(Subtract(a, b));
 
-  /// <summary><paramref name="angle"/> in [-π, π), rad.</summary>
+  /// <summary><paramref name="angle"/> from -π to less than π, rad.</summary>
   public static double Wrapped(double angle) {
     double turned = (angle + Math.PI) % (2 * Math.PI);
     return (turned < 0 ? turned + 2 * Math.PI : turned) - Math.PI;
