@@ -262,7 +262,8 @@ internal static class Program {
 
     private void Time() {
       foreach (string name in new[] { "rigid_reach", "soft_reach" }) {
-        var asked = List(Block(Read($"Tests/Vectors/{name}.json"))["cases"]).ConvertAll(one => Block(Block(one)["question"]));
+        var cases = List(Block(Read($"Tests/Vectors/{name}.json"))["cases"]);
+        var asked = cases.ConvertAll(one => Block(Block(one)["question"]));
         bool rigid = name == "rigid_reach";
         var points = asked.ConvertAll(one => Vector(one[rigid ? "mount" : "tip"]));
         var directions = asked.ConvertAll(one => Vector(one[rigid ? "pointing" : "gravity"]));
@@ -297,8 +298,9 @@ internal static class Program {
         took[i % _calls] = 1e6 * (Stopwatch.GetTimestamp() - before) / Stopwatch.Frequency;
       }
       Array.Sort(took);
-      Console.WriteLine(string.Format(CultureInfo.InvariantCulture, "{0}: {1:0.0} µs median, {2:0.0} µs 95th percentile",
-                                      name, took[_calls / 2], took[_calls * 95 / 100]));
+      string words = "{0}: {1:0.0} µs median, {2:0.0} µs 95th percentile";
+      double half = took[_calls / 2], most = took[_calls * 95 / 100];
+      Console.WriteLine(string.Format(CultureInfo.InvariantCulture, words, name, half, most));
     }
   }
 }

@@ -4,9 +4,9 @@ using static Trunkline.Vectors;
 
 namespace Trunkline {
 
-/// <summary>From touches to where the headset's frame stands in the robot's base: the fit of trunkline/live/aligning.py.
-/// What is touched is a mark on the flange, whose place the robot itself knows. Both frames are right-handed, m;
-/// `Frames` converts from Unity's.</summary>
+/// <summary>From touches to where the headset's frame stands in the robot's base: the fit of
+/// trunkline/live/aligning.py. What is touched is a mark on the flange, whose place the robot itself knows. Both frames
+/// are right-handed, m; `Frames` converts from Unity's.</summary>
 public static class Aligning {
   private const int _fewest = 4;  // touches, of which one may be left out
   private const double _flat = 0.03;  // m, root mean square by which touches must leave the nearest plane, or line
@@ -27,8 +27,7 @@ public static class Aligning {
     return Nearest(reference, robotBase);
   }
 
-  /// <summary>Of three touches: none can be told to be wrong, and height above their plane counts on both
-  /// frames' turning the same way.</summary>
+  /// <summary>The same of three touches. None is left over then to tell that one of them is wrong.</summary>
   /// <exception cref="InputError">There are fewer, or they lie on a line.</exception>
   public static Pose FitThree(IReadOnlyList<Vector> reference, IReadOnlyList<Vector> robotBase) {
     if (robotBase.Count < 3) {
@@ -54,8 +53,8 @@ public static class Aligning {
     return found;
   }
 
-  /// <summary>Of the fit at <paramref name="point"/> of the base, m, root mean square (Fitzpatrick, West, Maurer, 1998);
-  /// the equation is in trunkline/live/aligning.py.</summary>
+  /// <summary>Of the fit at <paramref name="point"/> of the base, m, root mean square (Fitzpatrick, West, Maurer,
+  /// 1998); the equation is in trunkline/live/aligning.py.</summary>
   public static double ExpectedError(Pose pose, IReadOnlyList<Vector> reference, IReadOnlyList<Vector> robotBase,
                                      Vector point) {
     int count = robotBase.Count;
@@ -138,7 +137,7 @@ public static class Aligning {
     return Scale(sum, 1.0 / points.Count);
   }
 
-  // Root mean square by which points leave the plane nearest to them (`smaller` 2), or the line (1), about.
+  // Root mean square by which points leave the plane nearest to them (`smaller` 2), or their line, aside (1).
   private static double Spread(IReadOnlyList<Vector> points, int smaller) {
     Eigen(Scatter(points), out var values, out _);
     Array.Sort(values);

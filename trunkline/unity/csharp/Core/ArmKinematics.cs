@@ -17,8 +17,8 @@ public interface INetwork {
   IReadOnlyDictionary<string, float[]> Run(float[] poses, int count);
 }
 
-/// <summary>What the network answers of one pose: the motors' commands and the tendons' path lengths, m, in the order of
-/// network.output_order, where the tip will come to rest, m, base frame, and whether that is so far from its target
+/// <summary>What the network answers of one pose: the motors' commands and the tendons' path lengths, m, in the order
+/// of network.output_order, where the tip will come to rest, m, base frame, and whether that is so far from its target
 /// that the arm cannot take the pose.</summary>
 public sealed class Answer {
   public readonly double[] Commands, Lengths;
@@ -76,7 +76,8 @@ public sealed class ArmKinematics {
     var given = Checked(poses);
     var answers = _network.Run(given, poses.Length);
     float[] commands = Output(answers, "commands", _tendons, poses.Length);
-    float[] lengths = Output(answers, "lengths", _tendons, poses.Length), tips = Output(answers, "tip", 3, poses.Length);
+    float[] lengths = Output(answers, "lengths", _tendons, poses.Length);
+    float[] tips = Output(answers, "tip", 3, poses.Length);
     var found = new Answer[poses.Length];
     for (int row = 0; row < found.Length; row++) {
       var tip = new Vector(tips[3 * row], tips[3 * row + 1], tips[3 * row + 2]);
@@ -111,7 +112,8 @@ public sealed class ArmKinematics {
       double half = Radians(-330 + 2 * i) / 2;
       var pose = poses[i] = new double[told.Length + 7];
       told.CopyTo(pose, 0);
-      new[] { tip.X, tip.Y, tip.Z, Math.Cos(half), Math.Sin(half) * x, Math.Sin(half) * y, 0 }.CopyTo(pose, told.Length);
+      double cos = Math.Cos(half), sin = Math.Sin(half);
+      new[] { tip.X, tip.Y, tip.Z, cos, sin * x, sin * y, 0 }.CopyTo(pose, told.Length);
     }
     Answer best = null;
     foreach (var one in Ask(poses)) {
@@ -129,8 +131,8 @@ public sealed class ArmKinematics {
       turns = (int)Math.Round(azimuth / TiltReach.Symmetry);
       double off = azimuth - turns * TiltReach.Symmetry;
       if (level * Math.Abs(Math.Sin(off)) > Math.Sin(TiltReach.Azimuth)) {
-        throw new InputError($"gravity: comes {Formats.Fixed(off * (180 / Math.PI), 0)}° beside a tendon's plane, which "
-            + "the package does not know");
+        throw new InputError($"gravity: comes {Formats.Fixed(off * (180 / Math.PI), 0)}° beside a tendon's plane, "
+            + "which the package does not know");
       }
     }
     double cos = Math.Cos(turns * TiltReach.Symmetry), sin = Math.Sin(turns * TiltReach.Symmetry);
@@ -162,8 +164,8 @@ public sealed class ArmKinematics {
       double value = poses[i / width][i % width];
       single[i] = (float)value;
       if (float.IsNaN(single[i]) || float.IsInfinity(single[i])) {
-        throw new InputError($"pose {i / width}: {_inputs[i % width]}: found {Formats.General(value)}, expected a finite "
-            + "number");
+        throw new InputError($"pose {i / width}: {_inputs[i % width]}: found {Formats.General(value)}, expected a "
+            + "finite number");
       }
     }
     RequireUnit("quaternion", poses, width - 4, 4);

@@ -54,8 +54,8 @@ public static class Events {
     }
   }
 
-  /// <summary>The targets before the trigger's jerk; the oldest there are where none is old enough; null where there are
-  /// none.</summary>
+  /// <summary>The targets before the trigger's jerk; the oldest there are where none is old enough; null where there
+  /// are none.</summary>
   public static Targets LookedBack(State state, Teleop settings) =>
       state.Before(settings.LookBack) ?? (state.History.Count > 0 ? state.History[0].Targets : null);
 

@@ -1,7 +1,7 @@
 namespace Trunkline {
 
-/// <summary>From MuJoCo's frame (right-handed, z up) to Unity's (left-handed, y up), and back: y and z change places, so
-/// each of these is its own inverse. Port of trunkline/unity/frame.py.
+/// <summary>From MuJoCo's frame (right-handed, z up) to Unity's (left-handed, y up), and back: y and z change places,
+/// so each of these is its own inverse. Port of trunkline/unity/frame.py.
 ///
 /// The map is a reflection, so rotations keep their axis, mapped, and turn the other way.</summary>
 public static class Frames {

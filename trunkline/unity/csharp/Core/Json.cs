@@ -33,7 +33,7 @@ public sealed class Json {
   private InputError Error() => new InputError($"{_source}: found no JSON at character {_at}, expected some");
 
   private void Space() {
-    while (_at < _text.Length && (_text[_at] == ' ' || _text[_at] == '\n' || _text[_at] == '\r' || _text[_at] == '\t')) {
+    while (_at < _text.Length && " \n\r\t".IndexOf(_text[_at]) >= 0) {
       _at++;
     }
   }
@@ -195,7 +195,8 @@ public readonly struct JsonBlock {
   private List<object> List(string name) => Raw(name) as List<object> ?? throw Missing(name, "a list");
 
   private object Raw(string name) =>
-      _values.TryGetValue(name, out object value) ? value : throw new InputError($"{_source}: found no {name}, expected one");
+      _values.TryGetValue(name, out object value) ? value
+          : throw new InputError($"{_source}: found no {name}, expected one");
 
   private InputError Missing(string name, string expected) =>
       new InputError($"{_source}: {name}: found something else, expected {expected}");

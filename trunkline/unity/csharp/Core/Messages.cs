@@ -21,8 +21,8 @@ public enum Support { Hanging, Standing, Held }
 
 public enum ExecutorMode { Idle, Running, Done, Fault }
 
-/// <summary>One tracked controller: its pose in the reference frame, its stick (x right, y forward, -1 to 1) and what is
-/// held.</summary>
+/// <summary>One tracked controller: its pose in the reference frame, its stick (x right, y forward, -1 to 1) and what
+/// is held.</summary>
 public sealed class Controller {
   public readonly Vector Position;
   public readonly Quaternion Quaternion;

@@ -37,7 +37,8 @@ public sealed class OneEuro {
   private static double Share(double cutoff, double dt) => 1 / (1 + 1 / (2 * Math.PI * cutoff * dt));
 }
 
-/// <summary>A pose as filtered: position (m) and quaternion, their low-passed velocity (m/s) and spin (rad/s).</summary>
+/// <summary>A pose as filtered: position (m) and quaternion, their low-passed velocity (m/s) and spin
+/// (rad/s).</summary>
 public sealed class Smoothed {
   public readonly Vector Position, Velocity;
   public readonly Quaternion Quaternion;

@@ -36,8 +36,8 @@ public sealed class Orientation {
   }
 }
 
-/// <summary>Half-planes in which the arm bends, rad, from tendon 1 about the arm's axis; by how much less the wrist must
-/// turn for another than for the one in use, rad; m from the axis within which the tip target has no
+/// <summary>Half-planes in which the arm bends, rad, from tendon 1 about the arm's axis; by how much less the wrist
+/// must turn for another than for the one in use, rad; m from the axis within which the tip target has no
 /// direction.</summary>
 public sealed class BendingPlane {
   public readonly IReadOnlyList<double> HalfPlanes;

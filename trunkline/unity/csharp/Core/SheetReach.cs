@@ -76,20 +76,33 @@ public sealed class SheetReach : ISoftReach {
     _terms[count + 2] = gravity.Y;
     _terms[count + 3] = gravity.Z;
     Array.Clear(_sheet, 0, _sheet.Length);
-    for (int j = 0; j < count; j++) {
-      double weight = 0;
-      for (int k = 0; k < _terms.Length; k++) {
-        weight += _matrix[j * _terms.Length + k] * _terms[k];
+    int size = _sheet.Length, first = 0;
+    for (; first + 4 <= count; first += 4) {  // four at once: each sum in the same order, with a quarter of the stores
+      double a = Weight(first), b = Weight(first + 1), c = Weight(first + 2), d = Weight(first + 3);
+      for (int i = 0, at = first * size; i < size; i++, at++) {
+        _sheet[i] = _sheet[i] + a * _points[at] + b * _points[at + size] + c * _points[at + 2 * size]
+            + d * _points[at + 3 * size];
       }
-      int at = j * _sheet.Length;
-      for (int i = 0; i < _sheet.Length; i++) {
-        _sheet[i] += weight * _points[at + i];
+    }
+    for (; first < count; first++) {
+      double weight = Weight(first);
+      for (int i = 0; i < size; i++) {
+        _sheet[i] += weight * _points[first * size + i];
       }
     }
     for (int block = 0; block < _blocksAround * _blocksAlong; block++) {
       Enclose(block);
     }
     _last = gravity;
+  }
+
+  private double Weight(int direction) {
+    double weight = 0;
+    int row = direction * _terms.Length;
+    for (int k = 0; k < _terms.Length; k++) {
+      weight += _matrix[row + k] * _terms[k];
+    }
+    return weight;
   }
 
   // The cells of a block: ways around the arm from `ray` to before `rayEnd`, places from `step` to before `stepEnd`.

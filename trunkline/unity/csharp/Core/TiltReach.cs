@@ -25,7 +25,7 @@ public sealed class TiltReach : ISoftReach {
       ascending &= angles[i] > angles[i - 1];
     }
     if (maps.Count != angles.Count || maps.Count < 2 || !ascending) {
-      string found = string.Join(", ", Array.ConvertAll(new List<double>(angles).ToArray(), one => Formats.General(one)));
+      string found = string.Join(", ", new List<double>(angles).ConvertAll(one => Formats.General(one)));
       throw new InputError($"soft maps: found {maps.Count} maps at angles [{found}], expected as many, ascending");
     }
     _maps = maps;

@@ -39,7 +39,8 @@ public static class Unpacked {
       first = first ?? name;
       foreach (string key in new[] { "shape", "origin", "spacing" }) {
         if (!Same(grids.Block(name).Numbers(key), grids.Block(first).Numbers(key))) {
-          throw new InputError($"{name}: found another {key} than that of {first}, expected one lattice for all soft maps");
+          throw new InputError($"{name}: found another {key} than that of {first}, expected one lattice for all soft "
+              + "maps");
         }
       }
       maps.Add(Grid(files, grids, name));
