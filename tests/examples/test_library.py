@@ -59,7 +59,8 @@ def python(wheel, tmp_path_factory) -> Path:
 def test_the_wheel_is_the_library_with_the_unity_sources(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0].partition("-")[0] for name in names} == {"trunkline"}
-    assert any(name.startswith("trunkline/unity/csharp/") for name in names)
+    for file in ("SoftReach.cs", "Core/Teleoperation.cs", "Core/Trunkline.Core.asmdef"):
+        assert f"trunkline/unity/csharp/{file}" in names
 
 
 def test_the_example_runs_outside_of_a_checkout(python, tmp_path):

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 
 from tests.support.operator import config
 from tests.teleop.test_bad_input import LINES
-from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, grids, sheets_of_a_ball, sources_in
+from tests.unity.test_twin import LABEL, TRAJECTORY, sources_in
 from trunkline.errors import InputError
 from trunkline.hybrid.robots import FixedMount
 from trunkline.teleop.messages import Input, from_json
@@ -26,26 +26,6 @@ from trunkline.unity.unpacked import package_digest, robot_of
 BUILT = sorted((Path(__file__).parents[2] / "artifacts/package_unity").glob("*.tgz"))
 CASES = ("alignment", "rigid_reach", "soft_reach", "targets", "network")
 MOST = 1_500_000  # bytes of all, unpacked
-
-
-@pytest.fixture(scope="module")
-def plain(tmp_path_factory):
-    """A package of balls without shared vectors."""
-    sources = sources_in(tmp_path_factory.mktemp("balls"))
-    np.savez(sources.grids, **grids(), **sheets_of_a_ball().arrays())
-    return assemble(LABEL, sources, TRAJECTORY, ROBOT)[0]
-
-
-@pytest.fixture(scope="module")
-def of_one_tilt(tmp_path_factory):
-    """The same with maps of the paper's gravity alone."""
-    sources = sources_in(tmp_path_factory.mktemp("one_tilt"))
-    axis = np.linspace(-0.8, 0.8, 17)
-    points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1)
-    soft = np.linalg.norm(points - [0, 0, -0.3], axis=-1) - 0.2
-    arrays = {"soft_030": soft, "soft_035": soft - 0.02, "rigid": np.linalg.norm(points - 0.4, axis=-1) - 0.3}
-    np.savez(sources.grids, **grids() | arrays | {"origin": np.full(3, -0.8), "spacing": np.full(3, 0.1)})
-    return assemble(LABEL, sources, TRAJECTORY, ROBOT)[0]
 
 
 @pytest.fixture(scope="module", params=["plain", "of_one_tilt", "built"])

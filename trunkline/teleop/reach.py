@@ -68,9 +68,19 @@ class MapReach:
         return cls(lattice("rigid", "rigid"), soft)
 
     def rigid(self, mount: Vector, pointing: Vector) -> Reading:
+        _require("mount", mount)
         if dot(pointing, DOWN) < math.cos(TILT):
             return Reading("unknown")
         return read(self._rigid.slope, self._rigid_points, mount)
 
     def soft(self, tip: Vector, gravity: Vector) -> Reading:
+        _require("tip", tip)
+        _require("gravity", gravity)
         return self._soft.read(tip, gravity)
+
+
+def _require(name: str, given: Vector) -> None:
+    """Raises InputError where it is no place."""
+    x, y, z = given
+    if not (math.isfinite(x) and math.isfinite(y) and math.isfinite(z)):
+        raise InputError(f"{name}: found ({x:g}, {y:g}, {z:g}), expected finite numbers")

@@ -25,8 +25,8 @@ MODEL = "Runtime/Model/arm.xml"
 CALIBRATED, PARAMETERS = "Runtime/Model/calibrated.xml", "Runtime/Model/parameters.json"
 NETWORK = "Runtime/Network/ik.onnx"
 MANIFEST = "Runtime/manifest.json"
-SCRIPT_NAMES = ("CalibratedSprings.cs", "SoftReach.cs", "Trunkline.asmdef")
-SCRIPTS = [Path(__file__).parent / "csharp" / name for name in SCRIPT_NAMES]
+CSHARP = Path(__file__).parent / "csharp"
+SCRIPTS = sorted(path for path in CSHARP.rglob("*") if path.suffix in (".cs", ".asmdef"))
 
 
 @dataclass
@@ -112,7 +112,7 @@ def assemble(
         PARAMETERS: identified(sources.parameters),
         NETWORK: network,
     }
-    files |= {f"Runtime/{path.name}": path.read_bytes() for path in SCRIPTS}
+    files |= {f"Runtime/{path.relative_to(CSHARP).as_posix()}": path.read_bytes() for path in SCRIPTS}
     manifest = Manifest(
         name=label.name,
         versions=Versions(

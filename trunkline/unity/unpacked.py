@@ -3,6 +3,7 @@ model that Unity shows, and what a preview needs: the calibrated arm, what holds
 
 import hashlib
 import json
+import math
 from pathlib import Path
 
 import mujoco
@@ -51,14 +52,23 @@ def package_digest(files: dict[str, bytes]) -> str:
 
 def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
     """The arrays that `teleop.reach.MapReach.from_arrays` takes: `rigid`, the soft maps and their lattices,
-    and the sheets where gravity comes from any side."""
+    and the sheets where gravity comes from any side.
+
+    Raises:
+        InputError: a file is missing or of another size, or soft maps do not share a lattice.
+    """
     manifest = _manifest(files)
     arrays: dict[str, np.ndarray] = {"soft_angles": np.array(manifest["reach"]["angles"])}
-    for name in ("rigid", *manifest["reach"]["grids"]):
+    soft = manifest["reach"]["grids"]
+    for name in soft:
+        for key in ("shape", "origin", "spacing"):
+            if manifest["grids"][name][key] != manifest["grids"][soft[0]][key]:
+                found = f"found another {key} than that of {soft[0]}"
+                raise InputError(f"{name}: {found}, expected one lattice for all soft maps")
+    for name in (*soft, "rigid"):
         block = manifest["grids"][name]
         nx, ny, nz = block["shape"]  # along Unity's axes, x fastest
-        values = np.frombuffer(files[block["file"]], dtype="<f2").reshape(nz, ny, nx).transpose(2, 0, 1)
-        arrays[name] = values
+        arrays[name] = _numbers(files, block["file"], "<f2", (nz, ny, nx)).transpose(2, 0, 1)
         group = name.split("_")[0]
         arrays[f"{group}_origin"] = unity_position(block["origin"])  # the change of axes is its own inverse
         arrays[f"{group}_spacing"] = np.array(block["spacing"][0])
@@ -66,8 +76,8 @@ def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
     if sheets := manifest["reach"].get("sheets"):
         downs = unity_position(np.array(sheets["directions"]).reshape(-1, 3))
         shape = (len(downs), sheets["around"], sheets["along"], 3)
-        matrix = np.frombuffer(files[sheets["weights"]], dtype="<f8").reshape(len(downs), -1)
-        arrays["sheets_points"] = unity_position(np.frombuffer(files[sheets["file"]], dtype="<f2").reshape(shape))
+        arrays["sheets_points"] = unity_position(_numbers(files, sheets["file"], "<f2", shape))
+        matrix = _numbers(files, sheets["weights"], "<f8", (len(downs), len(downs) + 4))
         arrays["sheets_downs"] = downs
         arrays["sheets_matrix"] = np.column_stack([matrix[:, :-3], unity_position(matrix[:, -3:])])  # of g itself
     return arrays
@@ -110,6 +120,15 @@ def _hybrid(files: dict[str, bytes]) -> dict:
     if "hybrid" not in manifest:
         raise InputError(f"{MANIFEST}: found no block hybrid, expected a package that a preview can be made of")
     return manifest["hybrid"]
+
+
+def _numbers(files: dict[str, bytes], path: str, kind: str, shape: tuple[int, ...]) -> np.ndarray:
+    """A file's numbers of a `kind`, raw, in this shape."""
+    expected = np.dtype(kind).itemsize * math.prod(shape)
+    if path not in files or len(files[path]) != expected:
+        found = f"found {len(files[path])} bytes" if path in files else "no such file"
+        raise InputError(f"{path}: {found}, expected {expected} as the manifest's lattice says")
+    return np.frombuffer(files[path], dtype=kind).reshape(shape)
 
 
 def _manifest(files: dict[str, bytes]) -> dict:

@@ -1,0 +1,305 @@
+"""The package's C# core, compiled by Mono: it answers the shared vectors, and what they leave out, as Python does."""
+
+import hashlib
+import json
+import math
+import shutil
+import subprocess
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.support.operator import config
+from tests.unity.test_shared_vectors import BUILT, CASES
+from tests.unity.test_twin import network
+from trunkline.errors import InputError
+from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
+from trunkline.hybrid.basket import Basket
+from trunkline.ik.inputs import TILT
+from trunkline.live.aligning import after, expected_error, fit, inverse, pose_of, residuals, tilt
+from trunkline.teleop.alignment import Aligned, wrist_of
+from trunkline.teleop.messages import Box, Thing, World
+from trunkline.teleop.reach import MapReach
+from trunkline.teleop.targets import bring, place
+from trunkline.teleop.tendons import Network, bend, network_of
+from trunkline.teleop.vectors import add
+from trunkline.unity.answers import TARGETS, answers_of
+from trunkline.unity.frame import unity_position, unity_quaternion
+from trunkline.unity.network import describe_network
+from trunkline.unity.package import read_tarball
+from trunkline.unity.shared_vectors import with_shared_vectors
+from trunkline.unity.twin import CSHARP, MANIFEST, NETWORK
+from trunkline.unity.unpacked import maps_of, package_digest, robot_of
+
+TESTS = Path(__file__).parent / "csharp"
+CORE = sorted((CSHARP / "Core").glob("*.cs"))
+NAN = float("nan")
+STEP = 0.01  # s, over which a turning frame is looked at
+BENDS = 6  # targets that the network is asked to bend to
+
+
+@pytest.fixture(scope="module")
+def program(tmp_path_factory):
+    """The test program, of the core as a library of its own."""
+    for name in ("mcs", "mono"):
+        if shutil.which(name) is None:
+            pytest.fail(f"{name}: no such program; `make mono` installs Debian's Mono", pytrace=False)
+    folder = tmp_path_factory.mktemp("csharp")
+    compiled = ["mcs", "-langversion:7.2", "-warnaserror+", "-nologo"]
+    library = [*compiled, "-noconfig", "-target:library", f"-out:{folder / 'core.dll'}", *map(str, CORE)]
+    tests = [*compiled, f"-r:{folder / 'core.dll'}", f"-out:{folder / 'vectors.exe'}"]
+    for command in (library, [*tests, *map(str, sorted(TESTS.glob("*.cs")))]):
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+    return folder / "vectors.exe"
+
+
+def run(program: Path, files: dict[str, bytes], folder: Path, *options: str) -> subprocess.CompletedProcess:
+    """The program's answer to a package of these `files`."""
+    for path, data in files.items():
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_bytes(data)
+    return subprocess.run(["mono", str(program), str(folder), *options], capture_output=True, text=True)
+
+
+@pytest.fixture(scope="module", params=["plain", "of_one_tilt", "built"])
+def files(request):
+    """Small packages with shared vectors, and the one that the stage made last."""
+    if request.param != "built":
+        return with_shared_vectors(request.getfixturevalue(request.param), config().core)
+    if not BUILT:
+        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
+    return read_tarball(BUILT[0])
+
+
+def test_the_core_answers_the_shared_vectors_and_what_they_leave_out(program, files, tmp_path):
+    (tmp_path / "more.json").write_text(json.dumps(more(files)).replace("NaN", "null"))
+    done = run(program, files, tmp_path / "package", "--more", str(tmp_path / "more.json"))
+    assert done.returncode == 0, done.stdout + done.stderr
+    told = {line.split()[0]: int(line.split()[1]) for line in done.stdout.splitlines()}
+    assert set(told) == {*CASES, "steps", "frames", "fit", "bend", "things", "refusals"}
+    for name in CASES:
+        assert told[name] == len(json.loads(files[f"Tests/Vectors/{name}.json"])["cases"])
+    recorded = json.loads(files["Tests/Vectors/steps.json"])["sequences"]
+    assert told["steps"] == sum(len(one["steps"]) for one in recorded)
+
+
+@pytest.mark.parametrize("name", [*CASES, "steps"])
+def test_a_vector_that_says_otherwise_is_named(program, plain, tmp_path, name):
+    """A test that cannot fail is none: the last number of each file that is not small, moved by a part in 10 000. The
+    network's own answers are given to the core, which adds whether they are doubtful."""
+    files = with_shared_vectors(plain, config().core)
+    path = f"Tests/Vectors/{name}.json"
+    told = json.loads(files[path])
+    steps = told["sequences"][-1]["steps"] if name == "steps" else told["cases"]
+    answers = [one["intent" if name == "steps" else "answer"] for one in reversed(steps)]
+    if name == "network":
+        answers[0]["doubtful"] = not answers[0]["doubtful"]
+    else:
+        assert any(moved_a_little(one) for one in answers)
+    data = json.dumps(told).replace("NaN", "null").encode()
+    done = run(program, rehashed(files | {path: data}), tmp_path)
+    assert done.returncode == 1
+    assert done.stdout.splitlines()[-1].startswith(f"error: {name}")
+
+
+def moved_a_little(answer) -> bool:
+    """Whether a number that is not small was found in it, and moved."""
+    for key, value in reversed(answer.items() if isinstance(answer, dict) else list(enumerate(answer))):
+        if isinstance(value, dict | list) and moved_a_little(value):
+            return True
+        if isinstance(value, float) and abs(value) > 1e-3:
+            answer[key] = value * 1.0001
+            return True
+    return False
+
+
+def rehashed(files: dict[str, bytes]) -> dict[str, bytes]:
+    """The package whose manifest means these files."""
+    manifest = json.loads(files[MANIFEST])
+    manifest["sha256"] = {path: hashlib.sha256(data).hexdigest() for path, data in files.items() if path != MANIFEST}
+    return files | {MANIFEST: json.dumps(manifest).encode()}
+
+
+def damaged(files: dict[str, bytes], name: str) -> dict[str, bytes]:
+    manifest = json.loads(files[MANIFEST])
+    grid = manifest["grids"]["soft_035"]
+    if name == "another byte":
+        return files | {grid["file"]: files[grid["file"]][:-1] + b"\x01"}
+    if name == "no grid":
+        return {path: data for path, data in files.items() if path != grid["file"]}
+    if name == "no manifest":
+        return {path: data for path, data in files.items() if path != MANIFEST}
+    if name == "a short grid":
+        return rehashed(files | {grid["file"]: files[grid["file"]][:-2]})
+    key, change = name.split()
+    grid[key] = json.loads(change)
+    return files | {MANIFEST: json.dumps(manifest).encode()}
+
+
+BAD = ["another byte", "no grid", "no manifest", "a short grid", "origin [0.1,0.1,0.1]", "spacing [0.2,0.2,0.2]",
+       "shape [5,9,8]"]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_package_that_is_not_sound_is_refused_in_the_same_words(program, of_one_tilt, tmp_path, name):
+    files = damaged(of_one_tilt, name)
+    refused = said_by(lambda: (package_digest(files), maps_of(files)))
+    steps = with_shared_vectors(of_one_tilt, config().core)["Tests/Vectors/steps.json"]
+    done = run(program, files | {"Tests/Vectors/steps.json": steps}, tmp_path)
+    assert (done.returncode, done.stdout) == (1, f"error: {refused}\n")
+
+
+# --- what the shared vectors leave out
+
+
+def more(files: dict[str, bytes]) -> dict[str, list]:
+    """Questions and answers, by what answers them."""
+    rng = np.random.default_rng(0)
+    recorded = json.loads(files["Tests/Vectors/steps.json"])
+    core = answers_of(files, config().core, recorded["mount_offset"]).core
+    return {
+        "frames": [a_frame(rng) for _ in range(20)],
+        "fit": [a_fit(rng, count) for count in (3, 3, 4, 6, 12) for _ in range(4)],
+        "bend": bends(files, rng),
+        "things": [of_things(core, files, rng, held) for held in (False, True) for _ in range(8)],
+        "refusals": refusals(files),
+    }
+
+
+def case(question: dict, answer: dict) -> dict:
+    return {"question": question, "answer": answer}
+
+
+def a_frame(rng: np.random.Generator) -> dict:
+    """The spin is that of the turning frame in Unity's axes, by its rotations a moment apart."""
+    position, spin, first = rng.normal(size=3), rng.normal(size=3), Rotation.random(random_state=int(rng.integers(99)))
+    then = Rotation.from_rotvec(STEP * spin) * first
+    q, later = (unity_quaternion(wxyz_from_rotation(one)) for one in (first, then))
+    turned = Rotation.from_quat(later) * Rotation.from_quat(q).inv()
+    answer = {"position": unity_position(position).tolist(), "quaternion": q.tolist(),
+              "spin": (turned.as_rotvec() / STEP).tolist()}  # fmt: skip
+    return case({"position": position.tolist(), "quaternion": wxyz_from_rotation(first).tolist(),
+                 "spin": spin.tolist()}, answer)  # fmt: skip
+
+
+def a_fit(rng: np.random.Generator, count: int) -> dict:
+    robot = rng.uniform(-0.4, 0.6, (count, 3))
+    turn = Rotation.random(random_state=int(rng.integers(99)))
+    reference = turn.inv().apply(robot - [1.0, 0.2, -0.3]) + rng.normal(scale=1e-3, size=(count, 3))
+    at = rng.uniform(-0.5, 0.5, 3)
+    if count > 3:
+        pose = fit(reference, robot)
+    else:
+        found = Rotation.align_vectors(robot - robot.mean(axis=0), reference - reference.mean(axis=0))[0]
+        pose = pose_of(robot.mean(axis=0) - found.apply(reference.mean(axis=0)), found)
+    answer = {
+        "pose": asdict(pose), "inverse": asdict(inverse(pose)), "after": asdict(after(pose, pose)),
+        "residuals": residuals(pose, reference, robot).tolist(),
+        "expected_error": expected_error(pose, reference, robot, at), "tilt": tilt(pose),
+    }  # fmt: skip
+    return case({"reference": reference.tolist(), "base": robot.tolist(), "at": at.tolist()}, answer)
+
+
+def bends(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
+    """Calls of `bend`, with what the network was asked and answered."""
+    known, found, asked = network_of(files[NETWORK]), [], []
+
+    def recording(poses: np.ndarray) -> dict[str, np.ndarray]:
+        asked[:] = [poses, known.ask(poses)]
+        return asked[1]
+
+    for number in range(BENDS):
+        angle, azimuth = float(rng.uniform(0.1, 0.8)), 2 * math.pi / 3 * (number % 3)
+        gravity = (math.sin(angle) * math.cos(azimuth), math.sin(angle) * math.sin(azimuth), -math.cos(angle))
+        tip = tuple(rng.uniform([-0.3, -0.3, -0.5], [0.3, 0.3, 0.0]).tolist())
+        bent = bend(Network(recording, known.inputs), tip, gravity, tolerance=100.0)
+        poses, answers = asked
+        told = {name: answers[name].astype(float).ravel().tolist() for name in ("commands", "lengths", "tip")}
+        question = {"tip": tip, "gravity": gravity, "tolerance": 100.0, "poses": poses.tolist(), "network": told}
+        found.append(case(question, {name: values.tolist() for name, values in bent._asdict().items()}))
+    return found
+
+
+def of_things(core, files: dict[str, bytes], rng: np.random.Generator, held: bool) -> dict:
+    """Targets where a thing is near: one that hangs is marked, one that is held is brought along."""
+    joints = tuple(float(angle) for angle in robot_of(files).ready)
+    rigid, pointing, last = tuple(rng.uniform([0.3, -0.3, 0.3], [0.6, 0.3, 0.6]).tolist()), (0.0, 0.0, -1.0), None
+    tip = add(rigid, tuple(rng.uniform([-0.2, -0.2, -0.4], [0.2, 0.2, -0.2]).tolist()))
+    away = tuple(rng.uniform(-0.06, 0.06, 3).tolist())
+    shapes = [("sphere", away), ("basket", add(away, (0.0, 0.0, -0.25)))]
+    support = "held" if held else "hanging"
+    things = tuple(
+        Thing(shape, shape, 0.03, 0.1, 0.2, add(tip, off), tuple(Rotation.random(random_state=number).as_quat()),
+              support, Basket(0.1, 0.2, 0.25))
+        for number, (shape, off) in enumerate(shapes)
+    )  # fmt: skip
+    boxes = (Box("the shelf", add(tip, (-0.05,) * 3), add(tip, (0.0, 0.05, 0.05))),)
+    world, last = World("world", boxes, things), Aligned(0.0, 0, 0.0)
+    wrist = wrist_of(joints, core.mount_offset)
+    if held:
+        found = bring(things[0], rigid, pointing, False, wrist, 1, world, core.reach)
+    else:
+        found = place(rigid, tip, pointing, False, wrist, last, world, core.reach, core.settings)
+    question = {"rigid": rigid, "tip": tip, "pointing": pointing, "joints": joints, "last": last._asdict(),
+                "boxes": [asdict(box) for box in boxes], "things": [asdict(thing) for thing in things]}  # fmt: skip
+    return case(question, TARGETS.dump_python(found, mode="json"))
+
+
+def refusals(files: dict[str, bytes]) -> list[dict]:
+    """What is no question, and what Python says to it."""
+    reach, known = MapReach.from_arrays(maps_of(files)), network_of(files[NETWORK])
+    flat = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.3, 0.3, 0.01], [0.1, 0.2, 0.0]]
+    told = [0.0] if known.inputs == len(TILT) else [0.0, 0.0, -1.0]
+    pose, down = [*told, 0.1, 0.0, -0.3, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0]
+    wrong = [pose[:-1], [*pose[:-1], NAN], [NAN, *pose[1:]], [*pose[:-4], 2.0, 0.0, 0.0, 0.0], [1e39, *pose[1:]]]
+    wrong += [[0.0, 0.5, -1.0, *pose[3:]]] if len(told) == 3 else []
+    calls = {
+        "rigid_reach": [(reach.rigid, {"mount": [NAN, 0.0, 0.5], "pointing": down})],
+        "soft_reach": [
+            (reach.soft, {"tip": [0.0, -1.5, NAN], "gravity": down}),
+            (reach.soft, {"tip": [0.0, 0.0, 0.0], "gravity": [NAN] * 3}),
+        ],
+        "fit": [(lambda reference, base, at: fit(np.array(reference), np.array(base)),
+                 {"reference": flat, "base": flat, "at": [0.0, 0.0, 0.0]})],
+        "network": [(lambda pose: known.ask(np.array([pose])), {"pose": one}) for one in wrong],
+    }  # fmt: skip
+    found = [
+        case({"of": name} | question, {"says": said_by(partial(ask, **question))})
+        for name, asked in calls.items()
+        for ask, question in asked
+    ]
+    if known.inputs == len(TILT):
+        tendons = ["tendon_1", "tendon_2", "tendon_3"]
+        describe = partial(describe_network, network(inputs=7), NETWORK, tendons, "network")
+        found.append(case({"of": "other network"}, {"says": said_by(describe)}))
+    for one in bends(files, np.random.default_rng(1))[:1]:
+        question = one["question"] | {"tolerance": 1e-6}
+        tip, gravity = question["tip"], question["gravity"]
+        says = said_by(lambda tip=tip, gravity=gravity: bend(known, tip, gravity, 1e-6))
+        found.append(case({"of": "bend"} | question, {"says": says}))
+    if known.inputs == len(TILT):
+        aside = (math.sin(0.6) * math.cos(0.5), math.sin(0.6) * math.sin(0.5), -math.cos(0.6))
+        question |= {"gravity": aside}
+        says = said_by(lambda: bend(known, tip, aside, 1.0))
+        found.append(case({"of": "bend"} | question, {"says": says}))
+    return found
+
+
+def said_by(call) -> str:
+    with pytest.raises(InputError) as refused:
+        call()
+    return str(refused.value)
+
+
+def test_rotations_of_the_fits_are_those_of_the_base():
+    """`a_fit`'s answers mean what they say: a pose takes a touch of the headset's frame into the base."""
+    found = a_fit(np.random.default_rng(3), 6)
+    pose = found["answer"]["pose"]
+    turn = rotation_from_wxyz(np.array(pose["quaternion"]))
+    moved = turn.apply(found["question"]["reference"]) + pose["position"]
+    np.testing.assert_allclose(moved, found["question"]["base"], atol=0.01)

@@ -1,0 +1,215 @@
+using System;
+using System.Collections.Generic;
+using static Trunkline.Vectors;
+
+namespace Trunkline {
+
+/// <summary>What runs the file of the package's network: Unity's inference engine, ONNX's runtime.</summary>
+public interface INetwork {
+  /// <summary>How many numbers its input takes, 8 or 10.</summary>
+  int Inputs { get; }
+
+  /// <summary>How many its outputs give: commands, lengths, tip.</summary>
+  IReadOnlyList<int> Outputs { get; }
+
+  /// <summary>What it answers to so many <paramref name="poses"/>, one after the other: by the output's name, one
+  /// answer after the other.</summary>
+  IReadOnlyDictionary<string, float[]> Run(float[] poses, int count);
+}
+
+/// <summary>What the network answers of one pose: the motors' commands and the tendons' path lengths, m, in the order
+/// of network.output_order, where the tip will come to rest, m, base frame, and whether that is so far from its target
+/// that the arm cannot take the pose.</summary>
+public sealed class Answer {
+  public readonly double[] Commands, Lengths;
+  public readonly Vector Tip;
+  public readonly bool Doubtful;
+
+  public Answer(double[] commands, double[] lengths, Vector tip, bool doubtful) {
+    Commands = commands;
+    Lengths = lengths;
+    Tip = tip;
+    Doubtful = doubtful;
+  }
+}
+
+/// <summary>Gravity and tip to the motors' commands, by the package's network. Port of trunkline/ik/ask.py and of
+/// trunkline/teleop/tendons.py but for its correction by the arm's statics.</summary>
+public sealed class ArmKinematics {
+  private const double _unit = 1e-3;  // by which the length of a quaternion or direction may differ from 1
+  private const int _tilt = 8;  // inputs of a network that is told an angle of gravity, not its direction
+  private const int _bends = 331;  // of the tip in its plane, from -330° on, 2° apart
+
+  private readonly INetwork _network;
+  private readonly IReadOnlyList<string> _inputs;
+  private readonly int _tendons;
+  private readonly double _doubtBeyond;
+
+  /// <param name="network">Runs the package's file.</param>
+  /// <param name="inputs">Names of its inputs: the manifest's network.input_order.</param>
+  /// <param name="tendons">Names of the columns of commands and lengths: network.output_order.</param>
+  /// <param name="doubtBeyond">m: network.doubt_beyond.</param>
+  /// <exception cref="InputError">The network is of other inputs or outputs.</exception>
+  public ArmKinematics(INetwork network, IReadOnlyList<string> inputs, IReadOnlyList<string> tendons,
+                       double doubtBeyond) {
+    var outputs = network.Outputs;
+    int count = tendons.Count;
+    bool known = outputs.Count == 3 && outputs[0] == count && outputs[1] == count && outputs[2] == 3;
+    if (network.Inputs != inputs.Count || !known) {
+      throw new InputError($"network: found inputs of width [{network.Inputs}] and outputs of width "
+          + $"[{string.Join(", ", outputs)}], expected one input ({string.Join(", ", inputs)}) and commands and lengths"
+          + $" of {string.Join(", ", tendons)}, and a tip");
+    }
+    _network = network;
+    _inputs = inputs;
+    _tendons = count;
+    _doubtBeyond = doubtBeyond;
+  }
+
+  /// <summary>What the network answers of one pose: gravity (angle in rad, or a unit vector), tip position (m) and unit
+  /// quaternion (w first, either sign) in the soft arm's base frame, as network.input_order names them.</summary>
+  /// <exception cref="InputError">It is no pose, or the network has no finite answer.</exception>
+  public Answer Ask(params double[] pose) => Ask(new[] { pose })[0];
+
+  /// <summary>Of several poses at once.</summary>
+  public Answer[] Ask(double[][] poses) {
+    var given = Checked(poses);
+    var answers = _network.Run(given, poses.Length);
+    float[] commands = Output(answers, "commands", _tendons, poses.Length);
+    float[] lengths = Output(answers, "lengths", _tendons, poses.Length);
+    float[] tips = Output(answers, "tip", 3, poses.Length);
+    var found = new Answer[poses.Length];
+    for (int row = 0; row < found.Length; row++) {
+      var tip = new Vector(tips[3 * row], tips[3 * row + 1], tips[3 * row + 2]);
+      int at = (row + 1) * _inputs.Count - 7;
+      double missed = Distance(tip, new Vector(given[at], given[at + 1], given[at + 2]));
+      found[row] = new Answer(Row(commands, row), Row(lengths, row), tip, missed > _doubtBeyond);
+    }
+    return found;
+  }
+
+  /// <summary>Commands that bring the tip to <paramref name="tip"/>, m, within <paramref name="tolerance"/> m, under
+  /// <paramref name="gravity"/> (unit vector), all in the soft arm's base frame.
+  ///
+  /// The network wants a whole tip pose: it is asked for the target at many bends, and the answer is taken for which it
+  /// foresees the tip nearest.</summary>
+  /// <exception cref="InputError">No bend comes so near, or a network of one tilt is asked about gravity out of its
+  /// plane.</exception>
+  public Answer Bend(Vector tip, Vector gravity, double tolerance) {
+    var found = _inputs.Count == _tilt ? AtTilt(tip, gravity) : Asked(tip, gravity.X, gravity.Y, gravity.Z);
+    double missed = Distance(found.Tip, tip);
+    if (missed > tolerance) {
+      throw new InputError("out of reach: the soft arm's tip comes no nearer to its target than "
+          + $"{Formats.Fixed(1e3 * missed, 0)} mm");
+    }
+    return found;
+  }
+
+  private Answer Asked(Vector tip, params double[] told) {
+    double plane = Math.Atan2(tip.Y, tip.X), x = -Math.Sin(plane), y = Math.Cos(plane);
+    var poses = new double[_bends][];
+    for (int i = 0; i < _bends; i++) {
+      double half = Radians(-330 + 2 * i) / 2;
+      var pose = poses[i] = new double[told.Length + 7];
+      told.CopyTo(pose, 0);
+      double cos = Math.Cos(half), sin = Math.Sin(half);
+      new[] { tip.X, tip.Y, tip.Z, cos, sin * x, sin * y, 0 }.CopyTo(pose, told.Length);
+    }
+    Answer best = null;
+    foreach (var one in Ask(poses)) {
+      best = best == null || Distance(one.Tip, tip) < Distance(best.Tip, tip) ? one : best;
+    }
+    return best;
+  }
+
+  // Of a network that knows tilts about +y alone: gravity in another tendon's plane is the same arm, turned.
+  private Answer AtTilt(Vector tip, Vector gravity) {
+    double level = Hypot(gravity.X, gravity.Y), angle = Math.Atan2(level, -gravity.Z);
+    int turns = 0;
+    if (angle > TiltReach.StraightDown) {
+      double azimuth = Math.Atan2(gravity.Y, gravity.X);
+      turns = (int)Math.Round(azimuth / TiltReach.Symmetry);
+      double off = azimuth - turns * TiltReach.Symmetry;
+      if (level * Math.Abs(Math.Sin(off)) > Math.Sin(TiltReach.Azimuth)) {
+        throw new InputError($"gravity: comes {Formats.Fixed(off * (180 / Math.PI), 0)}° beside a tendon's plane, "
+            + "which the package does not know");
+      }
+    }
+    double cos = Math.Cos(turns * TiltReach.Symmetry), sin = Math.Sin(turns * TiltReach.Symmetry);
+    var found = Asked(new Vector(cos * tip.X + sin * tip.Y, -sin * tip.X + cos * tip.Y, tip.Z), angle);
+    var there = new Vector(cos * found.Tip.X - sin * found.Tip.Y, sin * found.Tip.X + cos * found.Tip.Y, found.Tip.Z);
+    // A tendon that stands where another one did does what that one did.
+    return new Answer(Rolled(found.Commands, turns), Rolled(found.Lengths, turns), there, found.Doubtful);
+  }
+
+  private static double[] Rolled(double[] values, int turns) {
+    var found = new double[values.Length];
+    for (int i = 0; i < found.Length; i++) {
+      found[((i + turns) % found.Length + found.Length) % found.Length] = values[i];
+    }
+    return found;
+  }
+
+  // The poses in the network's precision, if they are poses.
+  private float[] Checked(double[][] poses) {
+    int width = _inputs.Count;
+    var single = new float[poses.Length * width];
+    foreach (var pose in poses) {
+      if (pose.Length != width) {
+        throw new InputError($"poses: found shape ({poses.Length}, {pose.Length}), expected (N, {width}): "
+            + string.Join(", ", _inputs));
+      }
+    }
+    for (int i = 0; i < single.Length; i++) {
+      double value = poses[i / width][i % width];
+      single[i] = (float)value;
+      if (float.IsNaN(single[i]) || float.IsInfinity(single[i])) {
+        throw new InputError($"pose {i / width}: {_inputs[i % width]}: found {Formats.General(value)}, expected a "
+            + "finite number");
+      }
+    }
+    RequireUnit("quaternion", poses, width - 4, 4);
+    if (width > _tilt) {
+      RequireUnit("direction of gravity", poses, 0, width - 7);
+    }
+    return single;
+  }
+
+  private static void RequireUnit(string name, double[][] poses, int first, int count) {
+    for (int row = 0; row < poses.Length; row++) {
+      double squared = 0;
+      for (int i = first; i < first + count; i++) {
+        squared += poses[row][i] * poses[row][i];
+      }
+      if (Math.Abs(Math.Sqrt(squared) - 1) > _unit) {
+        throw new InputError($"pose {row}: found a {name} of length {Formats.General(Math.Sqrt(squared), 4)}, expected "
+            + "unit length");
+      }
+    }
+  }
+
+  private static float[] Output(IReadOnlyDictionary<string, float[]> answers, string name, int width, int count) {
+    if (!answers.TryGetValue(name, out var values) || values.Length != width * count) {
+      throw new InputError($"network: found no {name} of shape ({count}, {width}) among its answers, expected one");
+    }
+    for (int i = 0; i < values.Length; i++) {
+      if (float.IsNaN(values[i]) || float.IsInfinity(values[i])) {
+        var row = new string[width];
+        for (int column = 0; column < width; column++) {
+          row[column] = Formats.General(values[i / width * width + column]);
+        }
+        throw new InputError($"pose {i / width}: found {name} [{string.Join(" ", row)}], expected finite numbers");
+      }
+    }
+    return values;
+  }
+
+  private double[] Row(float[] values, int row) {
+    var found = new double[_tendons];
+    for (int i = 0; i < found.Length; i++) {
+      found[i] = values[row * found.Length + i];
+    }
+    return found;
+  }
+}
+}

@@ -1,0 +1,366 @@
+using System.Collections.Generic;
+
+namespace Trunkline {
+
+// What goes into the core and what comes out: trunkline/teleop/messages.py.
+//
+// Frames: `reference` is the headset's, right-handed, any that stands still; `base` is the rigid robot's, z up. A
+// controller's pose is that of its ray: origin at the device, the ray along -z, y up from the back of the hand.
+// Positions in m, quaternions (w, x, y, z), stamps in s of the client's clock. `Frames` converts from Unity's.
+
+public enum Mode { Hold, Aim, Plan, Preview, Ready, Delay, Execute, Follow, Stopped }
+
+public enum Motion { Hold, Execute, Follow }
+
+/// <summary>Where a point is. Unknown: no map tells. Blocked: in a solid of the world.</summary>
+public enum Where { Inside, Outside, Unknown, Blocked }
+
+public enum Shape { Cylinder, Box, Sphere, Toy, Basket }
+
+public enum Support { Hanging, Standing, Held }
+
+public enum ExecutorMode { Idle, Running, Done, Fault }
+
+/// <summary>One tracked controller: its pose in the reference frame, its stick (x right, y forward, -1 to 1) and what
+/// is held.</summary>
+public sealed class Controller {
+  public readonly Vector Position;
+  public readonly Quaternion Quaternion;
+  public readonly bool Tracked, Trigger, Grip, StickPressed, Primary, Secondary;
+  public readonly double StickX, StickY;
+
+  public Controller(Vector position, Quaternion quaternion, bool tracked = true, bool trigger = false,
+                    bool grip = false, double stickX = 0, double stickY = 0, bool stickPressed = false,
+                    bool primary = false, bool secondary = false) {
+    Position = position;
+    Quaternion = quaternion;
+    Tracked = tracked;
+    Trigger = trigger;
+    Grip = grip;
+    StickX = stickX;
+    StickY = stickY;
+    StickPressed = stickPressed;
+    Primary = primary;
+    Secondary = secondary;
+  }
+}
+
+/// <summary>Of the reference frame in the base frame: p_base = position + rotate(quaternion, p_reference); m.</summary>
+public sealed class Pose {
+  public readonly Vector Position;
+  public readonly Quaternion Quaternion;
+
+  public Pose(Vector position, Quaternion quaternion) {
+    Position = position;
+    Quaternion = quaternion;
+  }
+
+  internal static bool Same(Pose a, Pose b) =>
+      ReferenceEquals(a, b) || (a != null && b != null && a.Position == b.Position && a.Quaternion == b.Quaternion);
+}
+
+/// <summary>A solid, axes along the base frame: corners, m. A table, a chair's seat, the floor.</summary>
+public sealed class Box {
+  public readonly string Name;
+  public readonly Vector Low, High;
+
+  public Box(string name, Vector low, Vector high) {
+    Name = name;
+    Low = low;
+    High = high;
+  }
+
+  internal bool Has(Vector place) =>
+      Low.X <= place.X && place.X <= High.X && Low.Y <= place.Y && place.Y <= High.Y && Low.Z <= place.Z
+      && place.Z <= High.Z;
+
+  internal bool IsAs(Box other) => Name == other.Name && Low == other.Low && High == other.High;
+}
+
+/// <summary>Sizes of a basket, m: its box's width along x and length along y, and the rise of the bar above
+/// it.</summary>
+public readonly struct Basket {
+  public readonly double Width, Length, Rise;
+
+  public Basket(double width, double length, double rise) {
+    Width = width;
+    Length = length;
+    Rise = rise;
+  }
+
+  public static Basket Usual => new Basket(0.12, 0.16, 0.22);
+
+  internal bool IsAs(Basket other) => Width == other.Width && Length == other.Length && Rise == other.Rise;
+}
+
+/// <summary>Something to grasp, as the client believes it: position of its centre, m, and quaternion, in the base
+/// frame.</summary>
+public sealed class Thing {
+  public readonly string Name;
+  public readonly Shape Shape;
+  /// <summary>m, of a box its width along x and y, of a basket its bar's.</summary>
+  public readonly double Diameter;
+  /// <summary>m, along z, of a basket its box's.</summary>
+  public readonly double Height;
+  /// <summary>kg.</summary>
+  public readonly double Mass;
+  public readonly Vector Position;
+  public readonly Quaternion Quaternion;
+  public readonly Support Support;
+  public readonly Basket Basket;
+
+  public Thing(string name, Shape shape, double diameter, double height, double mass, Vector position,
+               Quaternion quaternion, Support support, Basket basket) {
+    Name = name;
+    Shape = shape;
+    Diameter = diameter;
+    Height = height;
+    Mass = mass;
+    Position = position;
+    Quaternion = quaternion;
+    Support = support;
+    Basket = basket;
+  }
+
+  internal bool IsAs(Thing other) =>
+      Name == other.Name && Shape == other.Shape && Diameter == other.Diameter && Height == other.Height
+      && Mass == other.Mass && Position == other.Position && Quaternion == other.Quaternion && Support == other.Support
+      && Basket.IsAs(other.Basket);
+}
+
+/// <summary>What stands around the robot: a digest, which changes with it, the solids that no target may be in, and the
+/// things that can be grasped.</summary>
+public sealed class World {
+  public readonly string Digest;
+  public readonly IReadOnlyList<Box> Boxes;
+  public readonly IReadOnlyList<Thing> Things;
+
+  public World(string digest, IReadOnlyList<Box> boxes = null, IReadOnlyList<Thing> things = null) {
+    Digest = digest;
+    Boxes = boxes ?? new Box[0];
+    Things = things ?? new Thing[0];
+  }
+
+  /// <summary>What the arm holds; null where it holds nothing.</summary>
+  public Thing Held {
+    get {
+      foreach (var thing in Things) {
+        if (thing.Support == Support.Held) {
+          return thing;
+        }
+      }
+      return null;
+    }
+  }
+
+  internal bool IsAs(World other) {
+    if (ReferenceEquals(this, other)) {
+      return true;
+    }
+    if (Digest != other.Digest || Boxes.Count != other.Boxes.Count || Things.Count != other.Things.Count) {
+      return false;
+    }
+    for (int i = 0; i < Boxes.Count; i++) {
+      if (!Boxes[i].IsAs(other.Boxes[i])) {
+        return false;
+      }
+    }
+    for (int i = 0; i < Things.Count; i++) {
+      if (!Things[i].IsAs(other.Things[i])) {
+        return false;
+      }
+    }
+    return true;
+  }
+}
+
+/// <summary>The assistant's: with the mount at <see cref="Rigid"/>, m, the end effector pointing along
+/// <see cref="Pointing"/>, the thing is held with a probability, more surely than where the user has it.</summary>
+public sealed class Offer {
+  public readonly string Thing;
+  public readonly Vector Rigid, Pointing;
+  public readonly double Probability;
+
+  public Offer(string thing, Vector rigid, Vector pointing, double probability) {
+    Thing = thing;
+    Rigid = rigid;
+    Pointing = pointing;
+    Probability = probability;
+  }
+}
+
+/// <summary>What became of plan request <see cref="Serial"/>: its digest, or why it was refused; the package and world
+/// it was made for.</summary>
+public sealed class PlanReport {
+  public readonly int Serial;
+  public readonly string Digest, Refused, Package, World;
+
+  public PlanReport(int serial, string digest = "", string refused = "", string package = "", string world = "") {
+    Serial = serial;
+    Digest = digest;
+    Refused = refused;
+    Package = package;
+    World = world;
+  }
+}
+
+/// <summary>What the robot does: <see cref="Fault"/> in words where it has one, digest of the plan that it runs or has
+/// run.</summary>
+public sealed class ExecutorReport {
+  public readonly ExecutorMode Mode;
+  public readonly string Digest, Fault;
+
+  public ExecutorReport(ExecutorMode mode = ExecutorMode.Idle, string digest = "", string fault = "") {
+    Mode = mode;
+    Digest = digest;
+    Fault = fault;
+  }
+}
+
+/// <summary>All that the core hears at one step.</summary>
+public sealed class Input {
+  /// <summary>s, of the client's clock.</summary>
+  public readonly double Stamp;
+  public readonly Controller Left, Right;
+  /// <summary>Null until the base is aligned.</summary>
+  public readonly Pose Alignment;
+  /// <summary>Of the rigid robot, rad, seven.</summary>
+  public readonly IReadOnlyList<double> Joints;
+  public readonly World World;
+  /// <summary>Digest of the package in use.</summary>
+  public readonly string Package;
+  /// <summary>The newest report; null where there is none.</summary>
+  public readonly PlanReport Plan;
+  /// <summary>Digest of the plan whose preview has been shown to its end.</summary>
+  public readonly string Shown;
+  public readonly ExecutorReport Executor;
+  /// <summary>A place of the mount that the assistant has found better than that of the newest plan, or null.</summary>
+  public readonly Offer Offer;
+
+  public Input(double stamp, Controller left, Controller right, Pose alignment, IReadOnlyList<double> joints,
+               World world, string package, PlanReport plan = null, string shown = "",
+               ExecutorReport executor = null, Offer offer = null) {
+    Stamp = stamp;
+    Left = left;
+    Right = right;
+    Alignment = alignment;
+    Joints = joints;
+    World = world;
+    Package = package;
+    Plan = plan;
+    Shown = shown;
+    Executor = executor ?? new ExecutorReport();
+    Offer = offer;
+  }
+}
+
+/// <summary>A target in the base frame, and whether it can be reached.</summary>
+public sealed class Target {
+  /// <summary>m.</summary>
+  public readonly Vector Position;
+  public readonly Where Reach;
+  /// <summary>m.</summary>
+  public readonly double OutsideBy;
+  /// <summary>Where outside, the nearest point that is inside, m, or null; the target stays where the user put
+  /// it.</summary>
+  public readonly Vector? Offer;
+  /// <summary>Name of the solid that it is in, "" for none.</summary>
+  public readonly string Solid;
+
+  public Target(Vector position, Where reach = Where.Unknown, double outsideBy = 0, Vector? offer = null,
+                string solid = "") {
+    Position = position;
+    Reach = reach;
+    OutsideBy = outsideBy;
+    Offer = offer;
+    Solid = solid;
+  }
+}
+
+/// <summary>Rigid target (the mount) and soft tip target, and how the mount shall be turned.</summary>
+public sealed class Targets {
+  public readonly Target Rigid, Tip;
+  /// <summary>Direction in which the end effector points, unit length.</summary>
+  public readonly Vector Pointing;
+  /// <summary>Angle of the soft arm's tendon 1 about the arm's axis, rad (<see cref="Alignment"/>).</summary>
+  public readonly double Heading;
+  /// <summary>Which bends, 0 dorsal, 1 ventral.</summary>
+  public readonly int HalfPlane;
+  /// <summary>By which the wrist turns from where it is, rad; null where no half-plane is within its limits.</summary>
+  public readonly double? Turned;
+  /// <summary>The controller was tilted further than the end effector may be.</summary>
+  public readonly bool TiltLimited;
+  /// <summary>Name of what the tip target marks, or of what the arm holds; "" for nothing.</summary>
+  public readonly string Thing;
+  /// <summary>The assistant's offer, or null.</summary>
+  public readonly Offer Better;
+
+  public Targets(Target rigid, Target tip, Vector pointing, double heading, int halfPlane, double? turned,
+                 bool tiltLimited = false, string thing = "", Offer better = null) {
+    Rigid = rigid;
+    Tip = tip;
+    Pointing = pointing;
+    Heading = heading;
+    HalfPlane = halfPlane;
+    Turned = turned;
+    TiltLimited = tiltLimited;
+    Thing = thing;
+    Better = better;
+  }
+
+  internal Targets WithBetter(Offer better) =>
+      new Targets(Rigid, Tip, Pointing, Heading, HalfPlane, Turned, TiltLimited, Thing, better);
+}
+
+/// <summary>A plan that the core asks for: answered by a <see cref="PlanReport"/> of the same serial.</summary>
+public sealed class Request {
+  public readonly int Serial;
+  public readonly Targets Targets;
+  public readonly string World, Package;
+
+  public Request(int serial, Targets targets, string world, string package) {
+    Serial = serial;
+    Targets = targets;
+    World = world;
+    Package = package;
+  }
+}
+
+/// <summary>What the core wants at one step.</summary>
+public sealed class Intent {
+  public readonly Mode Mode;
+  /// <summary>The only thing that lets the robot move: <see cref="Motion.Hold"/> stops it.</summary>
+  public readonly Motion Motion;
+  /// <summary>One line for the user, "" for none.</summary>
+  public readonly string Notice;
+  /// <summary>Null where one of both is not set.</summary>
+  public readonly Targets Targets;
+  /// <summary>Ends of the rays, base frame, m, or null.</summary>
+  public readonly Vector? LeftRay, RightRay;
+  /// <summary>Null but in the mode plan.</summary>
+  public readonly Request Request;
+  /// <summary>Digest to show, "" for none.</summary>
+  public readonly string Preview;
+  /// <summary>Digest to run, with motion <see cref="Motion.Execute"/>.</summary>
+  public readonly string Execute;
+  /// <summary>s until execution begins.</summary>
+  public readonly double Countdown;
+  /// <summary>Where the robot shall be now, with motion <see cref="Motion.Follow"/>, else null.</summary>
+  public readonly Targets Follow;
+
+  public Intent(Mode mode, Motion motion, string notice, Targets targets, Vector? leftRay, Vector? rightRay,
+                Request request, string preview, string execute, double countdown, Targets follow) {
+    Mode = mode;
+    Motion = motion;
+    Notice = notice;
+    Targets = targets;
+    LeftRay = leftRay;
+    RightRay = rightRay;
+    Request = request;
+    Preview = preview;
+    Execute = execute;
+    Countdown = countdown;
+    Follow = follow;
+  }
+}
+}

@@ -1,0 +1,54 @@
+using System;
+using static Trunkline.Vectors;
+
+namespace Trunkline {
+
+/// <summary>The One-Euro filter, a low-pass whose cutoff grows with speed: trunkline/teleop/one_euro.py, which has the
+/// equations and their source.</summary>
+public sealed class OneEuro {
+  /// <summary>f_min and f_d, Hz; β, Hz per m/s, or per rad/s.</summary>
+  public readonly double MinCutoff, Beta, DerivativeCutoff;
+
+  public OneEuro(double minCutoff, double beta, double derivativeCutoff) {
+    MinCutoff = minCutoff;
+    Beta = beta;
+    DerivativeCutoff = derivativeCutoff;
+  }
+
+  /// <summary>The filtered pose after a measured one, <paramref name="dt"/> s after the <paramref name="last"/>; as
+  /// measured where there is no last one.</summary>
+  public static Smoothed Smooth(Smoothed last, Vector position, Quaternion quaternion, double dt, OneEuro place,
+                                OneEuro turn) {
+    quaternion = Unit(quaternion);
+    if (last == null) {
+      return new Smoothed(position, quaternion, new Vector(), 0);
+    }
+    var moved = Scale(Subtract(position, last.Position), 1 / dt);
+    double share = Share(place.DerivativeCutoff, dt);
+    var velocity = Add(last.Velocity, Scale(Subtract(moved, last.Velocity), share));
+    share = Share(place.MinCutoff + place.Beta * Norm(velocity), dt);
+    var placed = Add(last.Position, Scale(Subtract(position, last.Position), share));
+    double turned = AngleBetween(last.Quaternion, quaternion) / dt;
+    double spin = last.Spin + Share(turn.DerivativeCutoff, dt) * (turned - last.Spin);
+    share = Share(turn.MinCutoff + turn.Beta * Math.Abs(spin), dt);
+    return new Smoothed(placed, Toward(last.Quaternion, quaternion, share), velocity, spin);
+  }
+
+  private static double Share(double cutoff, double dt) => 1 / (1 + 1 / (2 * Math.PI * cutoff * dt));
+}
+
+/// <summary>A pose as filtered: position (m) and quaternion, their low-passed velocity (m/s) and spin
+/// (rad/s).</summary>
+public sealed class Smoothed {
+  public readonly Vector Position, Velocity;
+  public readonly Quaternion Quaternion;
+  public readonly double Spin;
+
+  public Smoothed(Vector position, Quaternion quaternion, Vector velocity, double spin) {
+    Position = position;
+    Quaternion = quaternion;
+    Velocity = velocity;
+    Spin = spin;
+  }
+}
+}

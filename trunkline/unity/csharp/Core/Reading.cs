@@ -1,0 +1,18 @@
+namespace Trunkline {
+
+/// <summary>What is told of a target's reach: where a point is, how far outside, m, and the nearest reachable point, m,
+/// where it is outside. Port of trunkline/teleop/reading.py.</summary>
+public readonly struct Reading {
+  public readonly Where Where;
+  public readonly double OutsideBy;
+  public readonly Vector? Offer;
+
+  public Reading(Where where, double outsideBy = 0, Vector? offer = null) {
+    Where = where;
+    OutsideBy = outsideBy;
+    Offer = offer;
+  }
+
+  internal Reading WithOffer(Vector? offer) => new Reading(Where, OutsideBy, offer);
+}
+}

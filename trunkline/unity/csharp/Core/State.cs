@@ -1,0 +1,116 @@
+using System;
+using System.Collections.Generic;
+
+namespace Trunkline {
+
+/// <summary>What a plan was asked for: any change of it voids the plan.</summary>
+public sealed class Pinned {
+  public readonly Request Request;
+  public readonly Pose Alignment;
+  public readonly World World;
+
+  public Pinned(Request request, Pose alignment, World world) {
+    Request = request;
+    Alignment = alignment;
+    World = world;
+  }
+}
+
+/// <summary>The targets at a stamp, s.</summary>
+public readonly struct Remembered {
+  public readonly double Stamp;
+  public readonly Targets Targets;
+
+  public Remembered(double stamp, Targets targets) {
+    Stamp = stamp;
+    Targets = targets;
+  }
+}
+
+/// <summary>All that the core remembers from step to step: trunkline/teleop/state.py. It never changes; a step makes
+/// another.</summary>
+public sealed class State {
+  internal static readonly IReadOnlyList<Remembered> Nothing = new Remembered[0];
+
+  public Hand Left { get; internal set; }
+  public Hand Right { get; internal set; }
+  public Mode Mode { get; internal set; } = Mode.Hold;
+  /// <summary>The last, s; null before the first.</summary>
+  public double? Stamp { get; internal set; }
+  /// <summary>s without a new stamp.</summary>
+  public double Silent { get; internal set; }
+  /// <summary>s for which all was sound and nothing pressed.</summary>
+  public double SoundFor { get; internal set; }
+  /// <summary>s in this mode.</summary>
+  public double Waited { get; internal set; }
+  public Vector Pointing { get; internal set; } = Vectors.Down;
+  public bool Limited { get; internal set; }
+  public Aligned Aligned { get; internal set; } = new Aligned(0, 0, 0);
+  public Pose Alignment { get; internal set; }
+  /// <summary>Its digest.</summary>
+  public string World { get; internal set; } = "";
+  /// <summary>Of the last while in this mode, to look back from a press and to follow with a delay.</summary>
+  public IReadOnlyList<Remembered> History { get; internal set; } = Nothing;
+  public int Serial { get; internal set; }
+  public Pinned Pinned { get; internal set; }
+  /// <summary>Of the plan that is there, "" for none.</summary>
+  public string Digest { get; internal set; } = "";
+  /// <summary>The robot was seen to run it.</summary>
+  public bool Running { get; internal set; }
+  public Targets Following { get; internal set; }
+  public string Notice { get; internal set; } = "";
+
+  public State(Hand left, Hand right) {
+    Left = left;
+    Right = right;
+  }
+
+  internal State Copy() => (State)MemberwiseClone();
+
+  /// <summary>0 the left one, 1 the right.</summary>
+  internal Hand HandOf(int index) => index == 0 ? Left : Right;
+
+  internal void SetHand(int index, Hand hand) {
+    if (index == 0) {
+      Left = hand;
+    } else {
+      Right = hand;
+    }
+  }
+
+  /// <summary>Whether a button went down at this step, on either hand.</summary>
+  internal bool Presses(Buttons one) => Left.Presses(one) || Right.Presses(one);
+
+  /// <summary>Whether a grip is held, without which the robot never moves.</summary>
+  public bool Gripped => Left.Grips || Right.Grips;
+
+  /// <summary>Whether all grips and triggers are let go.</summary>
+  public bool Idle => ((Left.Held | Right.Held) & (Buttons.Grip | Buttons.Trigger)) == 0;
+
+  /// <summary>The targets of so many <paramref name="seconds"/> ago; null where there are none as old.</summary>
+  public Targets Before(double seconds) {
+    if (Stamp == null) {
+      return null;
+    }
+    for (int i = History.Count - 1; i >= 0; i--) {
+      if (History[i].Stamp <= Stamp.Value - seconds) {
+        return History[i].Targets;
+      }
+    }
+    return null;
+  }
+
+  // The history from `first` on, and `also` where it is one.
+  internal IReadOnlyList<Remembered> HistoryFrom(int first, Remembered? also = null) {
+    int kept = Math.Max(History.Count - first, 0);
+    var found = new Remembered[kept + (also == null ? 0 : 1)];
+    for (int i = 0; i < kept; i++) {
+      found[i] = History[first + i];
+    }
+    if (also != null) {
+      found[kept] = also.Value;
+    }
+    return found;
+  }
+}
+}

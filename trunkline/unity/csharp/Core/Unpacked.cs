@@ -1,0 +1,150 @@
+using System;
+using System.Collections.Generic;
+using System.Security.Cryptography;
+using System.Text;
+
+namespace Trunkline {
+
+/// <summary>A finished package, read back: its digest, its maps in the base frames, what its network takes. Port of
+/// trunkline/unity/unpacked.py. Files are contents by path in the package.</summary>
+public static class Unpacked {
+  private const string _manifest = "Runtime/manifest.json";
+
+  /// <summary>SHA-256 of the manifest, which has that of every other file: of another package, another
+  /// digest.</summary>
+  /// <exception cref="InputError">Naming the file that is not the one that the manifest means.</exception>
+  public static string PackageDigest(IReadOnlyDictionary<string, byte[]> files) {
+    var digests = Manifest(files).Block("sha256");
+    using (var hash = SHA256.Create()) {
+      foreach (string path in digests.Names) {
+        string found = files.TryGetValue(path, out var data) ? Digits(hash.ComputeHash(data)) : "none";
+        string expected = digests.Text(path);
+        if (found != expected) {
+          throw new InputError($"{path}: found sha256 {Formats.First(found, 12)}, expected "
+              + $"{Formats.First(expected, 12)} as the manifest says");
+        }
+      }
+      return Digits(hash.ComputeHash(files[_manifest]));
+    }
+  }
+
+  /// <summary>The maps of the package's reach.</summary>
+  /// <exception cref="InputError">A file is missing, or not of the lattice that the manifest says.</exception>
+  public static MapReach MapsOf(IReadOnlyDictionary<string, byte[]> files) {
+    JsonBlock manifest = Manifest(files), reach = manifest.Block("reach"), grids = manifest.Block("grids");
+    double tolerance = reach.Number("tolerance");
+    var maps = new List<SignedMap>();
+    string first = null;
+    foreach (string name in reach.Texts("grids")) {
+      first = first ?? name;
+      foreach (string key in new[] { "shape", "origin", "spacing" }) {
+        if (!Same(grids.Block(name).Numbers(key), grids.Block(first).Numbers(key))) {
+          throw new InputError($"{name}: found another {key} than that of {first}, expected one lattice for all soft "
+              + "maps");
+        }
+      }
+      maps.Add(Grid(files, grids, name));
+    }
+    var rigid = Grid(files, grids, "rigid");
+    return reach.Has("sheets")
+        ? new MapReach(rigid, Sheets(files, reach.Block("sheets"), tolerance))
+        : new MapReach(rigid, new TiltReach(maps, reach.Numbers("angles")));
+  }
+
+  /// <summary>The package's inverse kinematics by a <paramref name="network"/> that runs its file.</summary>
+  /// <exception cref="InputError">The network is of other inputs or outputs.</exception>
+  public static ArmKinematics KinematicsOf(IReadOnlyDictionary<string, byte[]> files, INetwork network) {
+    var block = Manifest(files).Block("network");
+    return new ArmKinematics(network, block.Texts("input_order"), block.Texts("output_order"),
+                             block.Number("doubt_beyond"));
+  }
+
+  private static bool Same(double[] one, double[] other) {
+    bool same = one.Length == other.Length;
+    for (int i = 0; same && i < one.Length; i++) {
+      same = one[i] == other[i];
+    }
+    return same;
+  }
+
+  private static SignedMap Grid(IReadOnlyDictionary<string, byte[]> files, JsonBlock grids, string name) {
+    var block = grids.Block(name);
+    double[] shape = block.Numbers("shape"), origin = block.Numbers("origin");  // along Unity's axes, x fastest
+    int nx = (int)shape[0], ny = (int)shape[1], nz = (int)shape[2];
+    var values = Halves(files, block.Text("file"), nx * ny * nz);
+    return new SignedMap(values, nx, nz, ny, new Vector(origin[0], origin[2], origin[1]), block.Numbers("spacing")[0]);
+  }
+
+  private static SheetReach Sheets(IReadOnlyDictionary<string, byte[]> files, JsonBlock block, double tolerance) {
+    var directions = block.Numbers("directions");
+    int count = directions.Length / 3, around = block.Integer("around"), along = block.Integer("along");
+    var downs = new Vector[count];
+    for (int j = 0; j < count; j++) {
+      downs[j] = new Vector(directions[3 * j], directions[3 * j + 2], directions[3 * j + 1]);
+    }
+    var points = Halves(files, block.Text("file"), count * around * along * 3);
+    for (int i = 0; i < points.Length; i += 3) {
+      Exchange(ref points[i + 1], ref points[i + 2]);
+    }
+    var matrix = Doubles(files, block.Text("weights"), count * (count + 4));
+    for (int end = count + 4; end <= matrix.Length; end += count + 4) {
+      Exchange(ref matrix[end - 2], ref matrix[end - 1]);  // the last columns are of g itself
+    }
+    return new SheetReach(points, downs, matrix, around, along, tolerance);
+  }
+
+  private static void Exchange<T>(ref T a, ref T b) {
+    T kept = a;
+    a = b;
+    b = kept;
+  }
+
+  private static float[] Halves(IReadOnlyDictionary<string, byte[]> files, string path, int count) {
+    var data = Contents(files, path, 2 * count);
+    var found = new float[count];
+    for (int i = 0; i < count; i++) {
+      found[i] = Half(data[2 * i] | data[2 * i + 1] << 8);
+    }
+    return found;
+  }
+
+  // IEEE 754 binary16: sign, 5 bits of exponent, 10 of fraction.
+  private static float Half(int bits) {
+    int exponent = bits >> 10 & 31, fraction = bits & 1023;
+    double value = exponent == 0 ? fraction * Math.Pow(2, -24)
+        : exponent == 31 ? (fraction == 0 ? double.PositiveInfinity : double.NaN)
+        : (1024 + fraction) * Math.Pow(2, exponent - 25);
+    return (float)((bits & 0x8000) != 0 ? -value : value);
+  }
+
+  private static double[] Doubles(IReadOnlyDictionary<string, byte[]> files, string path, int count) {
+    var data = Contents(files, path, 8 * count);
+    var found = new double[count];
+    Buffer.BlockCopy(data, 0, found, 0, data.Length);  // little-endian, as are the machines that Unity runs on
+    return found;
+  }
+
+  private static byte[] Contents(IReadOnlyDictionary<string, byte[]> files, string path, int size) {
+    if (!files.TryGetValue(path, out var data) || data.Length != size) {
+      string found = data == null ? "no such file" : $"found {data.Length} bytes";
+      throw new InputError($"{path}: {found}, expected {size} as the manifest's lattice says");
+    }
+    return data;
+  }
+
+  private static JsonBlock Manifest(IReadOnlyDictionary<string, byte[]> files) {
+    if (!files.TryGetValue(_manifest, out var text)) {
+      throw new InputError($"package: found no {_manifest}, expected one of the stage package_unity");
+    }
+    return new JsonBlock(Json.Read(text, _manifest), _manifest);
+  }
+
+  private static string Digits(byte[] hash) {
+    var found = new StringBuilder();
+    foreach (byte one in hash) {
+      found.Append(one.ToString("x2"));
+    }
+    return found.ToString();
+  }
+}
+}
