@@ -117,10 +117,9 @@ def main() -> int:
     parser.add_argument("--only", choices=ARMS)
     only = parser.parse_args().only
     with recorded("by_sysid", keep=not only):
-        print(
-            "| arm | model | position / tip on `validate`, mm | % of length | tip, RMS without mean offset, mm | left |"
-        )
-        print("|---|---|---:|---:|---:|---|")
+        errors = "position / tip, mm | % of length | tip, RMS without mean offset, mm"
+        print(f"| arm | model | on | {errors} | left, or source |")
+        print("|---|---|---|---:|---:|---:|---|")
         for arm in [only] if only else ARMS:
             for line in rows(arm):
                 print(line, flush=True)

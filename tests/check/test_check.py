@@ -10,7 +10,7 @@ from tests.support.matched_plant import curl, motion, release, small_model, stat
 from tests.support.workbench import workbench
 from trunkline.check.__main__ import main
 from trunkline.check.recorded import missing_lines, recorded_lines
-from trunkline.check.told import described_lines, told_by, untold
+from trunkline.check.told import described_lines, to_identify_from, told_by, untold
 from trunkline.identification.search import search
 from trunkline.identification.setup import set_up
 from trunkline.trials.trial import Trial
@@ -62,27 +62,28 @@ def test_tendons_that_never_pull_are_named(model):
 def test_what_shows_in_no_trial_and_what_shows_as_one_is_told(model):
     ranges = {"stiffness": (0.1, 10.0), "kp": (10.0, 1e4), "force_range": (5.0, 1e4)}
     pulls = [static_pull(model, (level, 0, 0)) for level in (10, 20)]
-    told, pairs = told_by(settings(["static_pull"], ["static_pull"], ranges), model, pulls, 0.005)
+    prepared = to_identify_from(settings(["static_pull"], ["static_pull"], ranges), model, pulls)
+    told, pairs = told_by(*prepared, 0.005)
     by_name = {one.name: one for one in told}
     assert by_name["force_range"].words() == "force_range shows in no trial"
     assert np.isfinite(by_name["kp"].half_width)
-    sure, _ = told_by(settings(["static_pull"], ["static_pull"], ranges), model, pulls, 0.0025)
+    sure, _ = told_by(*prepared, 0.0025)
     np.testing.assert_allclose(2 * sure[0].half_width, told[0].half_width)
     moving = settings(["motion"], ["motion"], {"dead_time": (1e-3, 0.1), "time_constant": (1e-3, 0.1)})
     slow = small_model(4, dead_time=0.02)
-    _, pairs = told_by(moving, slow, [motion(slow, reach_mm=10)], 0.005)
+    _, pairs = told_by(*to_identify_from(moving, slow, [motion(slow, reach_mm=10)]), 0.005)
     assert pairs == ["dead_time and time_constant trade off"]
 
 
 def test_a_session_that_says_down_for_up_is_seen(model):
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.1, 10.0)})
     trials = [tilt(model, angle) for angle in (20, 60)]
-    (line,) = described_lines(config, model, trials)
+    (line,) = described_lines(*to_identify_from(config, model, trials))
     assert line.startswith("as described, it is ")
     off, still = (float(part.split(" mm")[0].split(" ")[-1]) for part in line.split(", a straight arm"))
     assert off < 0.01 * still, "the arm that made them"
     wrong = [replace(trial, gravity=-trial.gravity) for trial in trials]
-    line, doubt = described_lines(config, model, wrong)
+    line, doubt = described_lines(*to_identify_from(config, model, wrong))
     assert doubt.startswith("no nearer than a straight arm: look at `up`")
 
 
@@ -91,7 +92,7 @@ def test_the_expected_width_is_that_of_fits_to_trials_that_are_off_so(model):
     share, rng = 0.01, np.random.default_rng(0)
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3 * model.jnt_stiffness[0], 30.0)})
     clean = [tilt(model, angle) for angle in (20, 40, 60, 80)]
-    (told,), _ = told_by(config, model, clean, share)
+    (told,), _ = told_by(*to_identify_from(config, model, clean), share)
     found = []
     for _ in range(40):
         off = [rng.normal(size=3) * share / np.sqrt(3) for _ in clean]

@@ -1,10 +1,17 @@
-"""Small packages of balls, without shared vectors."""
+"""Small packages of balls, with shared vectors and without, and the one that the stage made last."""
+
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.support.operator import config
 from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, grids, sheets_of_a_ball, sources_in
+from trunkline.unity.package import read_tarball
+from trunkline.unity.shared_vectors import with_shared_vectors
 from trunkline.unity.twin import assemble
+
+BUILT = sorted((Path(__file__).parents[2] / "artifacts/package_unity").glob("*.tgz"))
 
 
 @pytest.fixture(scope="session")
@@ -25,3 +32,13 @@ def of_one_tilt(tmp_path_factory):
     arrays = {"soft_030": soft, "soft_035": soft - 0.02, "rigid": np.linalg.norm(points - 0.4, axis=-1) - 0.3}
     np.savez(sources.grids, **grids() | arrays | {"origin": np.full(3, -0.8), "spacing": np.full(3, 0.1)})
     return assemble(LABEL, sources, TRAJECTORY, ROBOT)[0]
+
+
+@pytest.fixture(scope="session", params=["plain", "of_one_tilt", "built"])
+def files(request):
+    """Packages with shared vectors."""
+    if request.param != "built":
+        return with_shared_vectors(request.getfixturevalue(request.param), config().core)
+    if not BUILT:
+        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
+    return read_tarball(BUILT[0])

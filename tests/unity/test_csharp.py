@@ -14,7 +14,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.operator import config
-from tests.unity.test_shared_vectors import BUILT, CASES
+from tests.unity.test_shared_vectors import CASES
 from tests.unity.test_twin import network
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
@@ -30,7 +30,6 @@ from trunkline.teleop.vectors import add
 from trunkline.unity.answers import TARGETS, answers_of
 from trunkline.unity.frame import unity_position, unity_quaternion
 from trunkline.unity.network import describe_network
-from trunkline.unity.package import read_tarball
 from trunkline.unity.shared_vectors import with_shared_vectors
 from trunkline.unity.twin import CSHARP, MANIFEST, NETWORK
 from trunkline.unity.unpacked import maps_of, package_digest, robot_of
@@ -64,16 +63,6 @@ def run(program: Path, files: dict[str, bytes], folder: Path, *options: str) -> 
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_bytes(data)
     return subprocess.run(["mono", str(program), str(folder), *options], capture_output=True, text=True)
-
-
-@pytest.fixture(scope="module", params=["plain", "of_one_tilt", "built"])
-def files(request):
-    """Small packages with shared vectors, and the one that the stage made last."""
-    if request.param != "built":
-        return with_shared_vectors(request.getfixturevalue(request.param), config().core)
-    if not BUILT:
-        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
-    return read_tarball(BUILT[0])
 
 
 def test_the_core_answers_the_shared_vectors_and_what_they_leave_out(program, files, tmp_path):

@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,25 +16,13 @@ from trunkline.teleop.messages import Input, from_json
 from trunkline.teleop.settings import Teleop
 from trunkline.teleop.transitions import MODES, TRANSITIONS
 from trunkline.unity.answers import answers_of
-from trunkline.unity.package import read_tarball
 from trunkline.unity.readers import ENGINES, ENGINES_APART, refusals
 from trunkline.unity.shared_vectors import FOLDER, STEPS, cases_file, steps_file, with_shared_vectors
 from trunkline.unity.twin import NETWORK, assemble
 from trunkline.unity.unpacked import package_digest, robot_of
 
-BUILT = sorted((Path(__file__).parents[2] / "artifacts/package_unity").glob("*.tgz"))
 CASES = ("alignment", "rigid_reach", "soft_reach", "targets", "network")
 MOST = 1_500_000  # bytes of all, unpacked
-
-
-@pytest.fixture(scope="module", params=["plain", "of_one_tilt", "built"])
-def files(request):
-    """Small packages, and the one that the stage made last."""
-    if request.param != "built":
-        return with_shared_vectors(request.getfixturevalue(request.param), config().core)
-    if not BUILT:
-        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
-    return read_tarball(BUILT[0])
 
 
 @pytest.fixture(scope="module")

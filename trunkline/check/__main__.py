@@ -14,7 +14,7 @@ import mujoco
 from trunkline.arm.holes import add_holes
 from trunkline.arm.joints import add_elements
 from trunkline.check.recorded import missing_lines, recorded_lines
-from trunkline.check.told import described_lines, told_by, untold
+from trunkline.check.told import described_lines, to_identify_from, told_by, untold
 from trunkline.errors import in_one_line
 from trunkline.evaluate.session import trials_of
 from trunkline.identification.checks import check_trials
@@ -56,8 +56,9 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"  {line}")
         if lacking:
             continue
-        print("\n".join(f"  {line}" for line in described_lines(config, model, trials)), flush=True)
-        found, pairs = told_by(config, model, trials, told.error / 100)
+        prepared = to_identify_from(config, model, trials)
+        print("\n".join(f"  {line}" for line in described_lines(*prepared)), flush=True)
+        found, pairs = told_by(*prepared, told.error / 100)
         for one in sorted(found, key=lambda one: -one.share):
             print(f"  {one.words()}")
         for pair in pairs:

@@ -53,15 +53,14 @@ class Told:
 
 
 def told_by(
-    config: IdentificationSettings, model: mujoco.MjModel, trials: list[Trial], share: float
+    model: mujoco.MjModel, experiments: list[Experiment], fit: Fit, share: float
 ) -> tuple[list[Told], list[str]]:
     """What a stage's trials tell of its parameters, and which two they hardly tell apart, a few words a pair.
 
     Args:
-        model: to begin with. trials: of the session, in any split; those to identify from must be there.
+        model, experiments, fit: as `to_identify_from` gives them.
         share: by which the fitted model will be off, of a point's distance from the base.
     """
-    model, experiments, fit = _to_identify_from(config, model, trials)
     problem = fit.problem(model, experiments)
     normal = linearise(problem, problem.start()).normals().sum(axis=0)
     scale = 1 / np.sqrt(np.where(np.diag(normal) > 0, np.diag(normal), np.inf))
@@ -80,10 +79,9 @@ def told_by(
     return told, pairs
 
 
-def described_lines(config: IdentificationSettings, model: mujoco.MjModel, trials: list[Trial]) -> list[str]:
+def described_lines(model: mujoco.MjModel, experiments: list[Experiment], fit: Fit) -> list[str]:
     """How far the model to begin with is from a stage's trials, beside a straight arm; and what to look at where it is
     no nearer."""
-    model, experiments, fit = _to_identify_from(config, model, trials)
     found = replay(model, experiments, fit.segments)
     off, still = (Prediction(one, experiments).overall() for one in (found, straight(experiments, found)))
     told = f"as described, it is {off['e_position_mm']:.3g} mm off ({off['e_position_pct']:.2g} % of length)"
@@ -93,10 +91,10 @@ def described_lines(config: IdentificationSettings, model: mujoco.MjModel, trial
     return lines
 
 
-def _to_identify_from(
+def to_identify_from(
     config: IdentificationSettings, model: mujoco.MjModel, trials: list[Trial]
 ) -> tuple[mujoco.MjModel, list[Experiment], Fit]:
-    """As `set_up`, moving trials by their beginning alone."""
+    """As `set_up`, of the trials to identify from alone, which must be there; moving ones by their beginning."""
     config = with_every(config, model)
     own = [trial for trial in trials if trial.experiment in config.experiments and trial.split == IDENTIFY]
     model, experiments, fit = set_up(config, own, model)
