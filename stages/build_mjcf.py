@@ -3,35 +3,20 @@
 from pathlib import Path
 
 from trunkline.arm.cad import CadArm
-from trunkline.arm.holes import Holes, add_holes
-from trunkline.arm.joints import Joints, add_elements
-from trunkline.arm.kinds import Arm
-from trunkline.arm.mjcf import Actuation, Solver
+from trunkline.arm.kinds import Description, described_arm
 from trunkline.figures.arm import arm_figure
 from trunkline.figures.style import save_figure
 from trunkline.pipeline.config import own_or_project
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.settings import settings
 from trunkline.statics.chain import read_chain
 
 ARTIFACTS = Path("artifacts/build_mjcf")
-MODELS = "build_mjcf/mjcf"  # folder below conf/ of arms that come as MJCF
 
-
-@settings
-class Config:
-    arm: Arm
-    joints: Joints
-    holes: Holes
-    actuation: Actuation
-    solver: Solver
+Config = Description
 
 
 def cad_arm(config: Config) -> CadArm:
-    arm = config.arm.build(config.actuation, config.solver, own_or_project(Path("."), "conf") / MODELS)
-    add_elements(arm.spec, config.joints, config.solver.armature)
-    add_holes(arm.spec, config.holes)
-    return arm
+    return described_arm(config, own_or_project(Path("."), "conf"))
 
 
 def main(config: Config) -> None:

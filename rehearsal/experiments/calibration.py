@@ -55,20 +55,6 @@ def reliability(probability: np.ndarray, outcome: np.ndarray, bins: int = BINS) 
     return found
 
 
-def line(results: list[Result]) -> str:
-    """Agreement, path difference and Brier scores, in one line; "" where no run was previewed."""
-    probability, outcome = stated(results)
-    if not len(outcome):
-        return ""
-    agreed = np.mean([result.agreed for result in results if np.isfinite(result.agreed)])
-    paths = [result.path_pct for result in results if np.isfinite(result.path_pct)]
-    told = f"; tip path off by {np.median(paths):.1f} % of the length, median" if paths else ""
-    return (
-        f"{len(outcome)} previews: {100 * agreed:.0f} % agree with what happened; Brier score "
-        f"{brier(probability, outcome):.3f}, of the base rate {base_brier(outcome):.3f}{told}"
-    )
-
-
 def draw_reliability(results: list[Result], file: Path) -> None:
     """Share of successes over the stated probability, with Wilson intervals."""
     from matplotlib.figure import Figure

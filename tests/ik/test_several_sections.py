@@ -17,10 +17,10 @@ from trunkline.dataset.samples import from_any_side, read_samples
 from trunkline.dataset.sampling import in_sections, sections
 from trunkline.dataset.table import command_by_tension, tip_by_tension
 from trunkline.errors import InputError
-from trunkline.ik.as_controls import draw_targets, settled
+from trunkline.ik.as_controls import DOUBT, draw_targets, settled
 from trunkline.ik.ask import ask
 from trunkline.ik.inputs import draw_gravity, gravity_of, inputs_of
-from trunkline.ik.learn import Unseen, known_gravities, unseen_targets
+from trunkline.ik.learn import Unseen, doubt_beyond, known_gravities, unseen_targets
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.polish import polish
 from trunkline.ik.tip_loss import tip_loss
@@ -112,8 +112,9 @@ def test_a_stroke_is_of_arms_of_several_sections(model, chain):
 def test_gauss_newton_steps_bring_the_tip_to_its_target(chain, table):
     rows = table.sample(80, random_state=0)
     targets, lengths = rows[POSE].to_numpy(), rows[length_columns(6)].to_numpy()
-    wrong = lengths + np.random.default_rng(1).uniform(-5e-4, 5e-4, lengths.shape)
-    before, after = (polish(chain, targets, wrong, steps) for steps in (0, 4))
+    commands = rows[command_columns(6)].to_numpy()
+    wrong = commands + np.random.default_rng(1).uniform(-5e-4, 5e-4, commands.shape)
+    before, after = (polish(chain, targets, lengths, steps, commands=wrong) for steps in (0, 4))
     assert before.converged.all()
     assert np.median(before.position_error) > 0.01 * chain.length
     assert np.median(after.position_error) < 1e-4 * chain.length
@@ -160,4 +161,7 @@ def test_a_network_of_poses_alone_is_exported_as_it_is_and_beats_the_straight_ar
     straight = np.linalg.norm(drawn.targets[:, :3] - [0, 0, -chain.length], axis=1)
     assert np.median(missed) < 0.25 * np.median(straight)
 
-
+    loose, tight = (doubt_beyond(network, table[POSE].to_numpy(), length) for length in (1e-6, 10.0))
+    foreseen = np.linalg.norm(told.tip.numpy() - asked[:, :3], axis=1)
+    assert 0.8 < (foreseen <= loose).mean() <= 1, "nineteen in twenty are beyond doubt"
+    assert tight == DOUBT * 10.0, "however well it foresees"

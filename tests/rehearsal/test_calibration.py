@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rehearsal.experiments.calibration import base_brier, brier, draw_reliability, line, reliability, stated
+from rehearsal.experiments.calibration import base_brier, brier, draw_reliability, reliability, stated
 from rehearsal.experiments.result import Result
 
 
@@ -38,8 +38,6 @@ def test_runs_without_a_preview_do_not_count():
     probability, outcome = stated(found)
     assert len(outcome) == 10
     assert [one.runs for one in reliability(probability, outcome)] == [10]
-    assert line(found).startswith("10 previews: 90 % agree")
-    assert line([Result("reach", 1, True)]) == ""
 
 
 def test_the_picture_is_drawn(tmp_path):

@@ -13,7 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Protocol, Union, get_args
 from pydantic import Field
 
 from trunkline.arm.cad import CadArm
+from trunkline.arm.holes import Holes, add_holes
+from trunkline.arm.joints import Joints, add_elements
 from trunkline.arm.mjcf import Actuation, Solver
+from trunkline.settings import settings
 
 PACKAGE = __name__.rpartition(".")[0]
 
@@ -38,3 +41,25 @@ if TYPE_CHECKING:
     Arm = Kind  # which classes there are is found out when the program runs
 else:
     Arm = Annotated[Union[tuple(ARMS.values())], Field(discriminator="kind")]  # noqa: UP007 (of found classes)
+
+
+MODELS = "build_mjcf/mjcf"  # folder below conf/ of arms that come as MJCF
+
+
+@settings
+class Description:
+    """An arm from its description alone: geometry, material, motors and solver, as the stage `build_mjcf` is told."""
+
+    arm: Arm
+    joints: Joints
+    holes: Holes
+    actuation: Actuation
+    solver: Solver
+
+
+def described_arm(description: Description, conf: Path) -> CadArm:
+    """The CAD model; `conf` is the folder of settings, which holds arms that come as MJCF."""
+    arm = description.arm.build(description.actuation, description.solver, conf / MODELS)
+    add_elements(arm.spec, description.joints, description.solver.armature)
+    add_holes(arm.spec, description.holes)
+    return arm

@@ -9,10 +9,7 @@ import argparse
 import sys
 from pathlib import Path
 
-import mujoco
-
-from trunkline.arm.holes import add_holes
-from trunkline.arm.joints import add_elements
+from trunkline.arm.kinds import described_arm
 from trunkline.check.recorded import missing_lines, recorded_lines
 from trunkline.check.told import described_lines, to_identify_from, told_by, untold
 from trunkline.errors import in_one_line
@@ -23,7 +20,6 @@ from trunkline.pipeline.config import own_or_project, settings_of
 from trunkline.settings import read_yaml
 from trunkline.trials.splits import DECIDING, IDENTIFY
 
-MODELS = "build_mjcf/mjcf"  # folder below conf/ of arms that come as MJCF
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 
 
@@ -40,7 +36,8 @@ def main(arguments: list[str] | None = None) -> int:
                         help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
     told = parser.parse_args(arguments)
     trials = trials_of(told.session, told.settings)
-    model = cad_model(told.settings)
+    description = settings_of("build_mjcf", told.settings)
+    model = described_arm(description, own_or_project(told.settings, "conf")).spec.compile()
     check_trials([trial for trial in trials if trial.split in DECIDING], model)
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_lines(trials))]))
     if missing := missing_lines(trials):
@@ -64,15 +61,6 @@ def main(arguments: list[str] | None = None) -> int:
         for pair in pairs:
             print(f"  hardly told apart: {pair}")
     return 0
-
-
-def cad_model(root: Path) -> mujoco.MjModel:
-    """The arm in params.yaml, from its description alone, as the stage `build_mjcf` makes it."""
-    config = settings_of("build_mjcf", root)
-    spec = config.arm.build(config.actuation, config.solver, own_or_project(root, "conf") / MODELS).spec
-    add_elements(spec, config.joints, config.solver.armature)
-    add_holes(spec, config.holes)
-    return spec.compile()
 
 
 if __name__ == "__main__":

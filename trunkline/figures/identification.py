@@ -104,7 +104,7 @@ def shape_figure(table: pd.DataFrame) -> Figure:
     for source in table.source.unique():
         axis.plot([], [], "o" if source == "measured" else "-", color=COLORS.get(source, MEASURED), label=source)
     axis.legend(loc="upper right")
-    axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Shapes at rest, validate split")
+    axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Shapes, validate split")
     return figure
 
 

@@ -83,12 +83,15 @@ def distance_table(predictions: dict[str, Prediction], segments: tuple[str, ...]
 
 
 def shape_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -> pd.DataFrame:
-    """Last shapes in the plane of the tilt: columns trial, tilt_deg, source, segment, x_mm, z_mm."""
+    """Of each trial the shape furthest from the one that it begins with, in the plane of the tilt: columns trial,
+    tilt_deg, source, segment, x_mm, z_mm. Of a release that is its first swing to the other side."""
     rows = []
     for index, experiment in enumerate(next(iter(predictions.values())).experiments):
         found = {LABELS[model]: p.replay.positions[index] for model, p in predictions.items()}
         sources = {"measured": experiment.positions} | found
+        from_first = np.linalg.norm(experiment.positions - experiment.positions[0], axis=2)  # (T, segments)
+        shown = int(np.nan_to_num(from_first).max(axis=1).argmax())
         for source, positions in sources.items():
-            for segment, (x, _, z) in zip(segments, positions[-1] * 1e3, strict=True):
+            for segment, (x, _, z) in zip(segments, positions[shown] * 1e3, strict=True):
                 rows.append((experiment.name, np.degrees(tilt_of_gravity(experiment.gravity)), source, segment, x, z))
     return pd.DataFrame(rows, columns=["trial", "tilt_deg", "source", "segment", "x_mm", "z_mm"])

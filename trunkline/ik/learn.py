@@ -13,11 +13,12 @@ import torch
 from pydantic import Field
 
 from trunkline.dataset.columns import command_columns, length_columns, tension_columns
+from trunkline.dataset.sampling import sections
 from trunkline.dataset.table import command_by_tension, sample_table, tip_by_tension, turn_by_tension
 from trunkline.frames import downwards
 from trunkline.ik.as_controls import DOUBT, AsControls, Rig, score
 from trunkline.ik.ask import ask
-from trunkline.ik.inputs import draw_gravity, inputs_of, told_of_gravity
+from trunkline.ik.inputs import draw_gravity, inputs_of, position_of, told_of_gravity
 from trunkline.ik.network import OUTPUTS, InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.ik.polish import polish
@@ -33,6 +34,8 @@ from trunkline.ik.tip_loss import tip_loss
 from trunkline.ik.training import Training, train
 from trunkline.progress import progress
 from trunkline.statics.chain import Chain
+
+FALSE_ALARMS = 0.05  # of reachable targets, that may be doubted
 
 
 @dataclass
@@ -111,7 +114,8 @@ def learn(
     sent_before = table.loc[table["split"] == "train", command_columns(chain.tendons)].to_numpy()
     deepest = chain.straight_lengths - sent_before.min(axis=0)
     unseen = unseen_targets(chain, known, learning.unseen, learning.seed, deepest)
-    exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], DOUBT * chain.length)
+    doubtful = doubt_beyond(network, held_out[columns].to_numpy(), chain.length)
+    exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], doubtful)
     runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
     errors, difference, found = {}, 0.0, {}
     for name, targets in (("held out", held_out), ("unseen angles", unseen)):
@@ -172,12 +176,23 @@ def fit(table: pd.DataFrame, chain: Chain, learning: Learning) -> tuple[InverseK
     return network, pd.DataFrame(curve)
 
 
+def doubt_beyond(network: InverseKinematics, reachable: np.ndarray, length: float) -> float:
+    """How far from its target a foreseen tip is a reason to doubt, m: DOUBT of the arm's `length`, and no less than
+    leaves all but FALSE_ALARMS of `reachable` targets (N, 7, 8 or 10) without doubt."""
+    with torch.no_grad():
+        tips = network(torch.tensor(reachable, dtype=torch.float32)).tip.numpy()
+    missed = np.linalg.norm(tips - position_of(reachable), axis=1)
+    return max(DOUBT * length, float(np.quantile(missed, 1 - FALSE_ALARMS)))
+
+
 def polished_errors(chain: Chain, held_out: pd.DataFrame, runtime, polishing: Polish, seed: int) -> TipErrors:
     """Errors of some held-out targets after Gauss-Newton steps from the network's answers."""
     count = min(polishing.targets, len(held_out))
     inputs = held_out.sample(count, random_state=seed).to_numpy()
     print(f"train_ik: up to {polishing.steps} Gauss-Newton steps for {count} answers", flush=True)
-    found = polish(chain, inputs, ask(runtime, inputs)["lengths"].astype(float), polishing.steps)
+    answer = {name: values.astype(float) for name, values in ask(runtime, inputs).items()}
+    commands = answer["commands"] if len(sections(chain)) > 1 else None
+    found = polish(chain, inputs, answer["lengths"], polishing.steps, commands=commands)
     return TipErrors(found.position_error, found.orientation_error)
 
 

@@ -19,7 +19,7 @@ from trunkline.frames import rotation_from_wxyz
 from trunkline.ik.bounded_least_squares import bounded_least_squares
 from trunkline.ik.inputs import gravity_of, position_of, quaternion_of
 from trunkline.statics.chain import Chain
-from trunkline.statics.equilibria import Equilibrium, forward
+from trunkline.statics.equilibria import Equilibrium, actuated, forward
 from trunkline.statics.restart import restart
 from trunkline.statics.sensitivity import sensitivity
 
@@ -49,7 +49,14 @@ class Polished:
     converged: np.ndarray
 
 
-def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 3, lever: float = 0.02) -> Polished:
+def polish(
+    chain: Chain,
+    targets: np.ndarray,
+    lengths: np.ndarray,
+    steps: int = 3,
+    lever: float = 0.02,
+    commands: np.ndarray | None = None,
+) -> Polished:
     """Lengths that bring the tip nearer to its targets, never further from them.
 
     Args:
@@ -57,11 +64,12 @@ def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 
         lengths: first answers, m, for instance the network's. Shape (N, K).
         steps: most Gauss-Newton steps for each target.
         lever: m; a turn of the tip by 1 rad counts as this much distance.
+        commands: of the actuators, m, to begin with in place of the lengths. Of an arm of several sections these
+            tell the pose better: cables at one distance from the axis, all a little too short, hold none at all.
+            Shape (N, K).
     """
     gravity = gravity_of(targets)
-    if len(sections(chain)) > 1:
-        lengths = _slackened(chain, lengths)
-    best = forward(chain, lengths, gravity)
+    best = forward(chain, lengths, gravity) if commands is None else actuated(chain, commands, gravity)
     error = _missing_pose(best, targets, lever)
     size = np.where(best.converged, np.linalg.norm(error, axis=1), np.inf)
     taken = np.zeros(len(targets), int)
@@ -88,16 +96,6 @@ def polish(chain: Chain, targets: np.ndarray, lengths: np.ndarray, steps: int = 
         steps=taken,
         converged=best.converged,
     )
-
-
-def _slackened(chain: Chain, lengths: np.ndarray) -> np.ndarray:
-    """Lengths (N, K), of each section that of the tendon drawn in least paid out: three a little too short have no
-    equilibrium at all where they run at one distance from the axis."""
-    lengths, pulls = lengths.copy(), chain.straight_lengths - lengths
-    for section in sections(chain):
-        least = section[pulls[:, section].argmin(axis=1)]
-        lengths[np.arange(len(lengths)), least] = chain.straight_lengths[least] + chain.length
-    return lengths
 
 
 def _missing_pose(found: Equilibrium, targets: np.ndarray, lever: float) -> np.ndarray:

@@ -55,7 +55,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)
     if model_path == CAD_MODEL and not any(map(is_static, config.experiments)):
-        print(f"{stage}: without static tilts, stiffness comes from the shape at rest and the ring-down of releases")
+        seen = " and ".join(EXPERIMENTS[kind].plural for kind in config.experiments)
+        print(f"{stage}: without trials at rest, stiffness comes from {seen}, as a ratio to the masses")
     result = identify(stage, model, fitted, fit)
     identified = save_model(spec, result.models["identified"])
     # score what is written, not what was in memory: MJCF keeps six digits
@@ -173,7 +174,7 @@ def write_tables(folder: Path, predictions: dict[str, Prediction], segments: tup
 def write_plots(
     folder: Path, result: Identification, bounds, segments, predictions: dict[str, Prediction], shapes: bool
 ) -> None:
-    """PNGs for people and CSV for `dvc plots`: of shapes at rest (static ones, or how releases end), or of motions."""
+    """PNGs for people and CSV for `dvc plots`: of one shape a trial (`shapes`), or of motions."""
     # pyplot and scipy.signal take long to import, so not before the first line
     from trunkline.figures import identification as plots
     from trunkline.figures.scoring import segment_figure
