@@ -1,6 +1,10 @@
 """Pack the twin for Unity: calibrated MJCF, IK network, reachability maps and a manifest, in one tarball."""
 
 from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
 
 from trunkline.figures.package import roundtrip_figure
 from trunkline.figures.style import save_figure
@@ -10,8 +14,9 @@ from trunkline.settings import settings
 from trunkline.teleop.settings import Teleop
 from trunkline.unity.comparison import curled, read_models
 from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.proof import started
 from trunkline.unity.readers import refusals
-from trunkline.unity.shared_vectors import with_shared_vectors
+from trunkline.unity.shared_vectors import vectors, with_shared_vectors
 from trunkline.unity.sources import read_sources
 from trunkline.unity.twin import MANIFEST, Label, Trajectory, assemble, compare
 
@@ -23,6 +28,7 @@ class Config(Label):
     roundtrip: Trajectory
     robot: Robot
     core: Teleop
+    start_tilts_deg: Annotated[list[Annotated[float, Field(ge=0, le=180)]], Field(min_length=1)]
 
 
 def main(config: Config) -> None:
@@ -50,7 +56,9 @@ def main(config: Config) -> None:
             "foreign_readers_failed": len(refused),
             "files": len(packed),
             "bytes": tarball.stat().st_size,
+            "shared_vectors": vectors(packed),
         }
+        metrics |= started(models["calibrated"], packed, np.radians(config.start_tilts_deg).tolist())
         write_json(out / "metrics.json", metrics)
 
 

@@ -20,6 +20,7 @@ from trunkline.ik.network import InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.statics.chain import read_chain
 from trunkline.statics.equilibria import equilibrium
+from trunkline.unity.twin import CSHARP
 
 ROOT = Path(__file__).parents[2]
 # Kernels as plain Python: two equilibria take less time than to compile what the checkout has compiled already.
@@ -59,8 +60,8 @@ def python(wheel, tmp_path_factory) -> Path:
 def test_the_wheel_is_the_library_with_the_unity_sources(wheel):
     names = zipfile.ZipFile(wheel).namelist()
     assert {name.split("/")[0].partition("-")[0] for name in names} == {"trunkline"}
-    for file in ("SoftReach.cs", "Core/Teleoperation.cs", "Core/Trunkline.Core.asmdef"):
-        assert f"trunkline/unity/csharp/{file}" in names
+    for path in CSHARP.rglob("*.*"):
+        assert f"trunkline/unity/csharp/{path.relative_to(CSHARP).as_posix()}" in names
 
 
 def test_the_example_runs_outside_of_a_checkout(python, tmp_path):

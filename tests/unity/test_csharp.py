@@ -3,7 +3,6 @@
 import hashlib
 import json
 import math
-import shutil
 import subprocess
 from dataclasses import asdict
 from functools import partial
@@ -14,6 +13,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.operator import config
+from tests.unity.mono import compiled
 from tests.unity.test_shared_vectors import CASES
 from tests.unity.test_twin import network
 from trunkline.errors import InputError
@@ -36,25 +36,20 @@ from trunkline.unity.unpacked import maps_of, package_digest, robot_of
 
 TESTS = Path(__file__).parent / "csharp"
 CORE = sorted((CSHARP / "Core").glob("*.cs"))
+SHARED = [CSHARP / "Tests" / name for name in ("Comparison.cs", "Messages.cs", "SharedVectors.cs")]
 NAN = float("nan")
+SILENT: dict[str, list] = {"commands": [], "lengths": [], "tip": []}  # of a network that is not asked
 STEP = 0.01  # s, over which a turning frame is looked at
 BENDS = 6  # targets that the network is asked to bend to
+REACHES = 400  # questions about the tip's reach, gravity another at each: few points of the surface answer each
 
 
 @pytest.fixture(scope="module")
 def program(tmp_path_factory):
     """The test program, of the core as a library of its own."""
-    for name in ("mcs", "mono"):
-        if shutil.which(name) is None:
-            pytest.fail(f"{name}: no such program; `make mono` installs Debian's Mono", pytrace=False)
     folder = tmp_path_factory.mktemp("csharp")
-    compiled = ["mcs", "-langversion:7.2", "-warnaserror+", "-nologo"]
-    library = [*compiled, "-noconfig", "-target:library", f"-out:{folder / 'core.dll'}", *map(str, CORE)]
-    tests = [*compiled, f"-r:{folder / 'core.dll'}", f"-out:{folder / 'vectors.exe'}"]
-    for command in (library, [*tests, *map(str, sorted(TESTS.glob("*.cs")))]):
-        done = subprocess.run(command, capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-    return folder / "vectors.exe"
+    core = compiled(folder / "core.dll", CORE, [], "-noconfig")
+    return compiled(folder / "vectors.exe", [*SHARED, *sorted(TESTS.glob("*.cs"))], [core])
 
 
 def run(program: Path, files: dict[str, bytes], folder: Path, *options: str) -> subprocess.CompletedProcess:
@@ -70,7 +65,7 @@ def test_the_core_answers_the_shared_vectors_and_what_they_leave_out(program, fi
     done = run(program, files, tmp_path / "package", "--more", str(tmp_path / "more.json"))
     assert done.returncode == 0, done.stdout + done.stderr
     told = {line.split()[0]: int(line.split()[1]) for line in done.stdout.splitlines()}
-    assert set(told) == {*CASES, "steps", "frames", "fit", "bend", "things", "refusals"}
+    assert set(told) == {*CASES, "steps", "frames", "fit", "bend", "things", "reach", "refusals"}
     for name in CASES:
         assert told[name] == len(json.loads(files[f"Tests/Vectors/{name}.json"])["cases"])
     recorded = json.loads(files["Tests/Vectors/steps.json"])["sequences"]
@@ -143,6 +138,22 @@ def test_a_package_that_is_not_sound_is_refused_in_the_same_words(program, of_on
     assert (done.returncode, done.stdout) == (1, f"error: {refused}\n")
 
 
+SHEETS = "Runtime/Reachability/sheets.bytes"
+BAD_SHEETS = {"no sheets": None, "short sheets": -2, "long sheets": 6}  # bytes that are cut off or put on
+
+
+@pytest.mark.parametrize("name", BAD_SHEETS)
+def test_sheets_that_are_not_sound_are_refused_in_the_same_words(program, plain, tmp_path, name):
+    cut = BAD_SHEETS[name]
+    files = {path: data for path, data in plain.items() if path != SHEETS}
+    if cut is not None:
+        files[SHEETS] = (plain[SHEETS] + bytes(6))[: len(plain[SHEETS]) + cut]
+    refused = said_by(lambda: maps_of(files))
+    steps = with_shared_vectors(plain, config().core)["Tests/Vectors/steps.json"]
+    done = run(program, rehashed(files | {"Tests/Vectors/steps.json": steps}), tmp_path)
+    assert (done.returncode, done.stdout) == (1, f"error: {refused}\n")
+
+
 # --- what the shared vectors leave out
 
 
@@ -156,6 +167,7 @@ def more(files: dict[str, bytes]) -> dict[str, list]:
         "fit": [a_fit(rng, count) for count in (3, 3, 4, 6, 12) for _ in range(4)],
         "bend": bends(files, rng),
         "things": [of_things(core, files, rng, held) for held in (False, True) for _ in range(8)],
+        "reach": reaches(files, rng),
         "refusals": refusals(files),
     }
 
@@ -197,6 +209,8 @@ def a_fit(rng: np.random.Generator, count: int) -> dict:
 def bends(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
     """Calls of `bend`, with what the network was asked and answered."""
     known, found, asked = network_of(files[NETWORK]), [], []
+    described = json.loads(files[MANIFEST])
+    lengths = [described["model"]["rest_lengths"][tendon] for tendon in described["network"]["output_order"]]
 
     def recording(poses: np.ndarray) -> dict[str, np.ndarray]:
         asked[:] = [poses, known.ask(poses)]
@@ -210,7 +224,19 @@ def bends(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
         poses, answers = asked
         told = {name: answers[name].astype(float).ravel().tolist() for name in ("commands", "lengths", "tip")}
         question = {"tip": tip, "gravity": gravity, "tolerance": 100.0, "poses": poses.tolist(), "network": told}
-        found.append(case(question, {name: values.tolist() for name, values in bent._asdict().items()}))
+        pulls = [rest - command for rest, command in zip(lengths, bent.commands, strict=True)]
+        answer = {name: values.tolist() for name, values in bent._asdict().items()}
+        found.append(case(question, answer | {"pulls": pulls}))
+    return found
+
+
+def reaches(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
+    """Tips around the arm under gravity from any side; Python looks at all triangles of the surface."""
+    reach, found = MapReach.from_arrays(maps_of(files)), []
+    for down in rng.normal(size=(REACHES, 3)):
+        tip = tuple(rng.uniform([-0.4, -0.4, -0.6], [0.4, 0.4, 0.2]).tolist())
+        gravity = tuple((down / np.linalg.norm(down)).tolist())
+        found.append(case({"tip": tip, "gravity": gravity}, reach.soft(tip, gravity)._asdict()))
     return found
 
 
@@ -266,6 +292,9 @@ def refusals(files: dict[str, bytes]) -> list[dict]:
         tendons = ["tendon_1", "tendon_2", "tendon_3"]
         describe = partial(describe_network, network(inputs=7), NETWORK, tendons, "network")
         found.append(case({"of": "other network"}, {"says": said_by(describe)}))
+    tip, gravity = (NAN, 0.0, -0.3), (0.0, 0.0, -1.0)
+    found.append(case({"of": "bend", "tip": tip, "gravity": gravity, "tolerance": 1.0, "poses": [], "network": SILENT},
+                      {"says": said_by(lambda: bend(known, tip, gravity, 1.0))}))  # fmt: skip
     for one in bends(files, np.random.default_rng(1))[:1]:
         question = one["question"] | {"tolerance": 1e-6}
         tip, gravity = question["tip"], question["gravity"]

@@ -141,7 +141,7 @@ def with_two_vertices_in_one_place(obj: bytes) -> bytes:
         (NETWORK, lambda data: data.replace(b"MatMul", b"MatMal")),
         (MANIFEST + ".meta", lambda data: b"guid: x\n"),
         ("package.json", lambda data: data[:-4]),
-        ("Runtime/CalibratedSprings.cs", lambda data: data + b"}"),
+        ("Runtime/Twin.cs", lambda data: data + b"}"),
         ("README.md", lambda data: b"\xff"),
     ],
 )

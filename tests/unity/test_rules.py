@@ -6,9 +6,18 @@ import pytest
 
 from tests.support.small_arm import small_mjcf, small_spec
 from trunkline.errors import InputError
+from trunkline.unity.pulls import as_pulls
 from trunkline.unity.rules import Violation, lint_mjcf, lint_network
 
-MJCF = small_mjcf()
+
+def pulls(spec: mujoco.MjSpec) -> str:
+    """The arm as the package has it."""
+    as_pulls(spec)
+    spec.compile()
+    return spec.to_xml()
+
+
+MJCF = pulls(small_spec())
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype="<f4")
 FACES = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (0, 3, 2)]
@@ -28,6 +37,7 @@ def insert(anchor: str, text: str) -> str:
 
 def spec_with(change) -> str:
     spec = small_spec()
+    as_pulls(spec)
     change(spec)
     spec.compile()
     return spec.to_xml()
@@ -145,6 +155,7 @@ TEXT_CASES = {
         insert("<worldbody>", '<asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"/></asset>'),
         ("mesh m", "mesh"),
     ),
+    "a control that older libraries do not know": (small_mjcf(), ("general tendon_1_position", "attribute")),
     "compile warning": (
         MJCF.replace("<compiler ", '<compiler settotalmass="3" ', 1),
         ("compiler", "warning"),

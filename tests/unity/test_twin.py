@@ -25,9 +25,10 @@ from trunkline.frames import downwards
 from trunkline.hybrid.robots import PandaRobot
 from trunkline.ik.inputs import TILT
 from trunkline.reachability.sheets import Sheets
+from trunkline.unity import manifest as schema
 from trunkline.unity.importer import as_imported
-from trunkline.unity.linearize import JointLaw, Laws, compile_with
-from trunkline.unity.manifest import Manifest, Model
+from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
+from trunkline.unity.manifest import Manifest, Model, Names
 from trunkline.unity.package import read_tarball, write_tarball
 from trunkline.unity.readers import refusals
 from trunkline.unity.roundtrip import curl, simulate
@@ -137,7 +138,8 @@ def test_the_same_inputs_give_the_same_bytes(sources, tmp_path):
 
 
 def test_every_file_and_folder_has_a_meta_with_its_own_lasting_guid(files, sources):
-    contents = {path for path in files if not path.endswith(".meta")}
+    seen = {path for path in files if "~/" not in path}  # Unity ignores folders that end in ~
+    contents = {path for path in seen if not path.endswith(".meta")}
     folders = {str(folder) for path in contents for folder in Path(path).parents} - {"."}
     assert {path.removesuffix(".meta") for path in files if path.endswith(".meta")} == contents | folders
     guids = {
@@ -176,6 +178,22 @@ def test_meshes_stay_closed_and_outwards(files):
         loaded = trimesh.load_mesh(io.BytesIO(files[mesh.file]), file_type="obj")
         assert loaded.is_watertight
         assert (len(loaded.faces), loaded.volume > 0) == (mesh.triangles, True)
+
+
+def test_meshes_and_grids_say_how_true_they_are(files, sources):
+    """A ball's mesh of 80 triangles lies inside of it; a grid of one spacing tells by how much."""
+    axis = np.linspace(-0.5, 0.5, 21)
+    ball = np.linalg.norm(np.meshgrid(axis, axis, axis, indexing="ij"), axis=0) - 0.3
+    maps = {name: values for name, values in grids().items() if not name.startswith("soft_0")} | {"soft_030": ball}
+    lattice = {"soft_angles": np.array([0.5]), "origin": np.full(3, -0.5), "spacing": axis[1] - axis[0]}
+    np.savez(sources.grids, **maps | lattice)
+    described = Manifest.model_validate_json(assemble(LABEL, sources, TRAJECTORY, ROBOT)[0][MANIFEST])
+    mesh = trimesh.load_mesh(io.BytesIO(files[described.meshes["soft_030"].file]), file_type="obj")
+    sag = 0.3 - np.linalg.norm(mesh.triangles_center, axis=1).min()
+    assert described.meshes["soft_030"].deviation == pytest.approx(sag, rel=0.3)
+    assert 0.98 < described.grids["soft_030"].overlap < 1
+    uneven = Manifest.model_validate_json(files[MANIFEST])
+    assert uneven.meshes["soft_030"].deviation is None  # of a lattice that is not the same along all axes
 
 
 def test_a_grid_is_found_again_at_its_place(files):
@@ -254,10 +272,12 @@ def test_springs_that_stiffen_are_restored_from_the_manifest(sources):
         assert [law.coefficients for law in laws] == [(a, *rest) for a, rest in zip(first, higher, strict=True)]
 
 
-def test_a_linear_model_is_packed_as_it_is(files, sources):
+def test_a_linear_model_is_packed_as_it_is_but_for_its_controls(files, sources):
     model = Manifest.model_validate_json(files[MANIFEST]).model
     assert (model.springs, model.dampers, model.changes_max_deviation_mm) == ([], [], 0)
-    assert files[MODEL].decode() == sources.mjcf
+    before, after = (text.partition("<actuator>") for text in (sources.mjcf, files[MODEL].decode()))
+    assert before[0] == after[0]
+    assert "input=" not in after[2]
 
 
 def test_what_a_file_cannot_say_of_winches_is_stated_and_left_out(sources):
@@ -286,21 +306,21 @@ def test_branches_of_joints_are_packed_under_names_that_unity_can_hold(sources):
 
 
 def test_the_component_for_unity_reads_what_the_manifest_holds(files):
-    script = files["Runtime/CalibratedSprings.cs"].decode()
+    script = files["Runtime/Twin.cs"].decode()
     classes = re.findall(r"\[Serializable\]\s+public class (\w+) \{(.*?)\}", script, re.DOTALL)
     read = {name: set(re.findall(r"public [\w[\]]+ (\w+);", body)) for name, body in classes}
-    assert read == {
-        "Manifest": {"model"},
-        "Model": {"springs", "dampers", "diagonals"},
-        "JointLaw": {"joint", "coefficients"},
-        "TendonLaw": {"tendon", "coefficients"},
-    }
-    for block in (Manifest, Model):
-        assert read[block.__name__] <= set(block.model_fields)
-    assert read["JointLaw"] <= set(JointLaw.__dataclass_fields__)
-    assert "public class CalibratedSprings : MonoBehaviour" in script  # Unity goes by the file's name
+    blocks = {
+        "Manifest": Manifest.model_fields, "Model": Model.model_fields, "Names": Names.model_fields,
+        "Actuator": schema.Actuator.model_fields, "Branch": schema.Branch.model_fields,
+        "JointLaw": JointLaw.__dataclass_fields__, "TendonLaw": TendonLaw.__dataclass_fields__,
+    }  # fmt: skip
+    assert read.keys() == blocks.keys()
+    for name, fields in blocks.items():
+        assert read[name]
+        assert read[name] <= set(fields)
+    assert "public class Twin : MonoBehaviour" in script  # Unity goes by the file's name
     assembly = json.loads(files["Runtime/Trunkline.asmdef"])
-    assert assembly["references"] == ["Mujoco.Runtime"]
+    assert "Mujoco.Runtime" in assembly["references"]
     assert assembly["allowUnsafeCode"]
     assert [version["define"] for version in assembly["versionDefines"]] == assembly["defineConstraints"]
 
@@ -408,13 +428,21 @@ def test_the_stage_writes_package_manifest_and_metrics(project, change):
     out = project / "artifacts/package_unity"
     (tarball,) = out.glob("*.tgz")
     files, metrics = read_tarball(tarball), json.loads((out / "metrics.json").read_text())
+    steps = json.loads(files["Tests/Vectors/steps.json"])["sequences"]
+    cases = [data for path, data in files.items() if path.startswith("Tests/Vectors/") and path.endswith(".json")]
+    start, recreated = metrics.pop("start_error_mm"), metrics.pop("recreated_error_mm")
     assert metrics == {
         "rule_violations": 0,
         "foreign_readers_failed": 0,
         "roundtrip_max_deviation_mm": 0.0,
         "files": len(files),
         "bytes": tarball.stat().st_size,
+        "shared_vectors": sum(len(json.loads(data).get("cases", [])) for data in cases)
+        + sum(len(sequence["steps"]) for sequence in steps),
     }
+    assert start["turns"] >= 2
+    assert max(start["max"], recreated["max"]) < 0.1  # mm
+    assert min(start["without"], recreated["without"]) > 10
     assert (out / "manifest.json").read_bytes() == files[MANIFEST]
     assert onnx.load_model_from_string(files[NETWORK]).graph.name == "ik"
     assert json.loads(files["package.json"])["version"] in tarball.name

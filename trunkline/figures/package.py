@@ -26,7 +26,7 @@ def roundtrip_figure(time: np.ndarray, tips: dict[str, np.ndarray], gaps_mm: dic
             above.plot(time, 1e3 * tip[:, axis], label=label if axis == 0 else None, **look)
         start = next(iter(tips.values()))[0, axis]
         above.annotate(name, (0, 1e3 * start), xytext=(-12, -4), textcoords="offset points")
-    above.set(title="The packed model moves as the calibrated one does", ylabel="last unit (mm)")
+    above.set(title="The packed model moves as the calibrated one does", ylabel="tip (mm)")
     above.legend(ncols=3, loc="lower center", bbox_to_anchor=(0.5, -0.2))
     for (label, gap), look in zip(gaps_mm.items(), looks[1:], strict=True):
         below.plot(time, 1e3 * gap, label=label, **look)

@@ -11,7 +11,7 @@ from trunkline.unity.linearize import Laws, compile_with
 from trunkline.unity.manifest import Manifest
 from trunkline.unity.roundtrip import curl, deviation, simulate
 from trunkline.unity.twin import MANIFEST, MODEL, Trajectory
-from trunkline.unity.unsupported import without_dead_time, without_rubbing, without_winches
+from trunkline.unity.unsupported import without_unsupported
 
 
 @dataclass
@@ -41,9 +41,7 @@ def read_models(calibrated: str, packed: dict[str, bytes]) -> dict[str, mujoco.M
         calibrated: MJCF. packed: the package's files by path.
     """
     mjcf, spec = packed[MODEL].decode(), mujoco.MjSpec.from_string(calibrated)
-    without_dead_time(spec)
-    without_rubbing(spec)
-    without_winches(spec)
+    without_unsupported(spec)
     described = Manifest.model_validate_json(packed[MANIFEST]).model
     laws = Laws(described.springs, described.dampers, described.diagonals)
     return {
@@ -56,10 +54,10 @@ def read_models(calibrated: str, packed: dict[str, bytes]) -> dict[str, mujoco.M
 def curled(models: dict[str, mujoco.MjModel], trajectory: Trajectory) -> Curled:
     """The curl at the last gravity angle; the calibrated model is the first."""
     calibrated = models["calibrated"]
-    controls = curl(calibrated, trajectory.duration, trajectory.pull)
-    motions = {name: simulate(model, controls, trajectory.tilts[-1]) for name, model in models.items()}
+    commands = curl(calibrated, trajectory.duration, trajectory.pull)
+    motions = {name: simulate(model, commands, trajectory.tilts[-1]) for name, model in models.items()}
     return Curled(
-        time=calibrated.opt.timestep * np.arange(1, len(controls) + 1),
-        tips={name: motion.positions[:, -1] for name, motion in motions.items()},
+        time=calibrated.opt.timestep * np.arange(1, len(commands) + 1),
+        tips={name: motion.tip for name, motion in motions.items()},
         gaps={name: deviation(motions["calibrated"], motions[name]) for name in ("packed", "imported")},
     )

@@ -70,10 +70,10 @@ ATTRIBUTES: dict[str, frozenset[str]] = {
     "spatial": _TENDON,
     "fixed": _TENDON,
     "tendon": _TENDON,
-    # MjActuator; `input` only says what the control means
+    # MjActuator; `input`, which MuJoCo saves from 4.0 on, is refused by the libraries of earlier versions
     "general": _set(
         "name class group joint tendon ctrllimited forcelimited ctrlrange forcerange lengthrange gear dyntype"
-        " gaintype biastype dynprm gainprm biasprm input"
+        " gaintype biastype dynprm gainprm biasprm"
     ),
     "mesh": _set("name class file scale content_type"),
 }

@@ -3,7 +3,7 @@
 MuJoCo's joint torque is -(a q + b q² + c q³) for a spring and -(a v + b v|v| + c v³) for a damper. The line
 that stands in for it is nearest in the mean square over the angles and speeds of a given movement, Σ τ q / Σ q².
 So it is for a round joint's diagonals, whose lengths are sums and differences of angles. In Unity,
-`csharp/CalibratedSprings.cs` writes the polynomials back; `compile_with` does the same here.
+`csharp/Twin.cs` writes the polynomials back; `write_laws` does the same here.
 """
 
 from dataclasses import dataclass
@@ -94,16 +94,21 @@ def _slope(coefficients: tuple[float, float, float], x: np.ndarray, even: np.nda
 def compile_with(mjcf: str, laws: Laws) -> mujoco.MjModel:
     """The model of an MJCF with these laws, its own being lines."""
     model = mujoco.MjModel.from_xml_string(mjcf)
+    write_laws(model, laws)
+    return model
+
+
+def write_laws(model: mujoco.MjModel, laws: Laws, prefix: str = "") -> None:
+    """Give a compiled model these laws, in place. `prefix`: before the names of an arm that is not alone in it."""
     for spring in laws.springs:
-        index = model.joint(spring.joint).id
+        index = model.joint(prefix + spring.joint).id
         a, *higher = spring.coefficients
         model.jnt_stiffness[index], model.jnt_stiffnesspoly[index] = a, higher
     for damper in laws.dampers:
-        index = model.jnt_dofadr[model.joint(damper.joint).id]
+        index = model.jnt_dofadr[model.joint(prefix + damper.joint).id]
         a, *higher = damper.coefficients
         model.dof_damping[index], model.dof_dampingpoly[index] = a, higher
     for diagonal in laws.diagonals:
-        index = model.tendon(diagonal.tendon).id
+        index = model.tendon(prefix + diagonal.tendon).id
         a, *higher = diagonal.coefficients
         model.tendon_stiffness[index], model.tendon_stiffnesspoly[index] = a, higher
-    return model

@@ -6,10 +6,12 @@ from typing import Literal
 import mujoco
 from pydantic import BaseModel, ConfigDict, Field
 
-from trunkline.elements import cables
+from trunkline.elements import BRANCH, all_elements, cables
 from trunkline.hybrid.robots import Robot
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw, TendonLaw
+from trunkline.unity.pulls import rest_lengths
+from trunkline.unity.rounding import ROUNDED
 
 
 class _Block(BaseModel):
@@ -51,20 +53,50 @@ class Names(_Block):
     sites: list[str]
 
 
+class Actuator(_Block):
+    name: str
+    tendon: str
+    rest_length: float = Field(gt=0, description="m; the command that the control 0 stands for")
+
+
+class Branch(_Block):
+    joint: str
+    branch: str = Field(description="the hinge that lags behind the joint, on the world")
+    tie: str = Field(description="the tendon that ties one to the other, whose spring bears nothing at rest")
+
+
+class StepError(_Block):
+    display_rate: float = Field(gt=0, description="Hz")
+    steps_per_frame: int = Field(gt=0)
+    step: float = Field(gt=0, description="s")
+    tip_error_mm: float | None = Field(
+        description="largest on a curl, against `time_step`, at the display's frames; null where the arm diverges"
+    )
+
+
 class Model(_Block):
     file: str
-    time_step: float = Field(gt=0, description="s; set it as Unity's Fixed Timestep")
+    time_step: float = Field(gt=0, description="s; with which the arm was calibrated")
+    longest_step: float = Field(gt=0, description="s; the component takes no longer one")
+    steps: list[StepError] = Field(description="by display rate, up to the steps a frame that the component takes")
     gravity: list[float] = Field(min_length=3, max_length=3, description="m/s², base frame, mount upright")
     gravity_unity: list[float] = Field(min_length=3, max_length=3, description="m/s², for Physics.gravity")
     integrator: str
     names: Names
-    rest_lengths: dict[str, float] = Field(description="path length of each tendon, arm straight, m")
+    rest_lengths: dict[str, float] = Field(
+        description="by tendon, m: the command at which it just hangs straight; a command is this less the pull"
+    )
+    actuators: list[Actuator] = Field(description="in the order of the network's outputs")
     control: str = (
-        "each actuator's control is a command in m: it pulls with kp (path length - command) N and never pushes, so "
-        "under tension the path stays longer than the command by tension / kp"
+        "each actuator's control is a pull in m from the straight arm, 0 for none: rest length - command. It pulls"
+        " with kp (path length - rest length + pull) N and never pushes, so under tension the path stays longer than"
+        " the command by tension / kp"
+    )
+    branches: list[Branch] = Field(
+        description="of joints that creep: springs and dampers in series, at rest where their joints are"
     )
     springs: list[JointLaw] = Field(
-        description="of hinges, polynomials that the importer cannot read: CalibratedSprings.cs restores them"
+        description="of hinges, polynomials that the importer cannot read: Twin.cs restores them"
     )
     dampers: list[JointLaw] = Field(description="likewise")
     diagonals: list[TendonLaw] = Field(
@@ -123,6 +155,8 @@ class Grid(_Block):
     spacing: list[float] = Field(min_length=3, max_length=3, description="between points, Unity's axes, m")
     format: str = "raw little-endian float16, x fastest, then y, then z (Unity Texture3D, RHalf)"
     meaning: str = "signed distance to the surface of the reachable set, m, negative inside"
+    rounded: str = ROUNDED
+    overlap: float = Field(description="with the set before it was rounded: what both share over what either has")
 
 
 class Sheets(_Block):
@@ -156,6 +190,9 @@ class Mesh(_Block):
     file: str
     frame: str
     triangles: int = Field(gt=0)
+    deviation: float | None = Field(
+        description="m; the farthest that it is from the surface of the grid of its name, or that from it"
+    )
 
 
 class Manifest(_Block):
@@ -184,8 +221,25 @@ def names_of(model: mujoco.MjModel) -> Names:
     )
 
 
+def actuators_of(model: mujoco.MjModel) -> list[Actuator]:
+    """Those of a model that takes pulls."""
+    tendons = [model.tendon(i).name for i in model.actuator_trnid[:, 0]]
+    rest = rest_lengths(model).tolist()
+    return [Actuator(name=model.actuator(i).name, tendon=tendons[i], rest_length=rest[i]) for i in range(model.nu)]
+
+
+def branches_of(model: mujoco.MjModel) -> list[Branch]:
+    """Of all joints, the first of each, then the second."""
+    return [
+        Branch(joint=model.joint(hinge).name, branch=model.joint(own).name, tie=model.tendon(tendon).name)
+        for one in all_elements(model, BRANCH)
+        for hinge, own, tendon in zip(one.hinge, one.own, one.tendon, strict=True)
+    ]
+
+
 def describe_model(model: mujoco.MjModel, file: str, **measured) -> Model:
-    """The model's block; `measured` are its springs, dampers and deviations."""
+    """The model's block; `measured` are its springs, dampers, steps and deviations."""
+    drawn = actuators_of(model)
     return Model(
         file=file,
         time_step=model.opt.timestep,
@@ -193,7 +247,9 @@ def describe_model(model: mujoco.MjModel, file: str, **measured) -> Model:
         gravity_unity=unity_position(model.opt.gravity).tolist(),
         integrator=mujoco.mjtIntegrator(model.opt.integrator).name.removeprefix("mjINT_").lower(),
         names=names_of(model),
-        rest_lengths={model.tendon(i).name: float(model.tendon_length0[i]) for i in cables(model)},
+        rest_lengths={one.tendon: one.rest_length for one in drawn},
+        actuators=drawn,
+        branches=branches_of(model),
         **measured,
     )
 

@@ -14,6 +14,11 @@ from pathlib import Path
 from trunkline.errors import InputError
 
 ROOT = "package/"  # folder that npm's and Unity's tarballs hold everything in
+SAMPLES = [{
+    "displayName": "Pointing",
+    "description": "Two rays set the targets of a robot that carries the arm; the twin bends as the network says.",
+    "path": "Samples~/Pointing",
+}]  # fmt: skip
 
 
 def package_json(name: str, version: str, display_name: str, unity: str, description: str) -> bytes:
@@ -25,20 +30,24 @@ def package_json(name: str, version: str, display_name: str, unity: str, descrip
         "unity": unity,
         "description": description,
         "dependencies": {"com.unity.modules.jsonserialize": "1.0.0"},  # JsonUtility; org.mujoco is in no registry
-        "keywords": ["mujoco", "soft robot", "digital twin"],
+        "keywords": ["mujoco", "soft robot", "tendon-driven", "digital twin", "teleoperation", "xr"],
+        "license": "MIT",
+        "samples": SAMPLES,
         "hideInEditor": False,
     }
     return (json.dumps(fields, indent=2) + "\n").encode()
 
 
 def with_metas(name: str, files: dict[str, bytes]) -> dict[str, bytes]:
-    """The files of a package and a `.meta` beside each of them and of their folders.
+    """The files of a package and a `.meta` beside each of them and of their folders. Unity does not look into folders
+    whose names end in `~`: what is in them has none.
 
     Args:
         name: the package's name, part of the identifiers. files: contents by path in the package.
     """
-    folders = {str(folder) for path in files for folder in Path(path).parents if str(folder) != "."}
-    metas = {f"{path}.meta": _meta(name, path, is_folder=False) for path in files}
+    seen = [path for path in files if not any(part.endswith("~") for part in Path(path).parts)]
+    folders = {str(folder) for path in seen for folder in Path(path).parents if str(folder) != "."}
+    metas = {f"{path}.meta": _meta(name, path, is_folder=False) for path in seen}
     metas |= {f"{folder}.meta": _meta(name, folder, is_folder=True) for folder in folders}
     return dict(sorted((files | metas).items()))
 

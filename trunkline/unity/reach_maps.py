@@ -4,16 +4,23 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scipy.ndimage import map_coordinates
 
 from trunkline.errors import InputError
+from trunkline.fields.grid import Lattice
+from trunkline.fields.mesh import unsimplified
+from trunkline.fields.mesh_distance import mesh_distance
 from trunkline.unity.frame import unity_obj, unity_position, unity_volume
 from trunkline.unity.manifest import Grid, Mesh, Reach, Sheets
+from trunkline.unity.rounding import rounded
 
 FOLDER = "Runtime/Reachability"
 BETWEEN_GRIDS = (
     "trilinear between the points of the two grids beside the gravity angle, linear between their angles; also out of"
     " reach: points off the grid and gravity angles beyond the first and last"
 )
+PROBES = 200_000  # points by which grids are compared
+LOOKS = 0.5  # lattice steps, between the points of a mesh that are looked at
 TO_SHEET = "distance from the sheet's triangles under the gravity that pulls, less the tolerance"
 
 
@@ -22,8 +29,13 @@ def frame_of(name: str) -> str:
     return "base of the soft arm" if name.startswith("soft") else "base of the rigid arm"
 
 
-def convert_meshes(paths: list[Path]) -> tuple[dict[str, bytes], dict[str, Mesh]]:
+def convert_meshes(
+    paths: list[Path], arrays: dict[str, np.ndarray], source: str
+) -> tuple[dict[str, bytes], dict[str, Mesh]]:
     """Meshes (OBJ or STL) as OBJ files for Unity.
+
+    Args:
+        arrays, source: as of `convert_grids`; how far a mesh is from the surface of the grid of its name is measured.
 
     Returns:
         Contents by path in the package, and the manifest's blocks by name of the map.
@@ -35,8 +47,25 @@ def convert_meshes(paths: list[Path]) -> tuple[dict[str, bytes], dict[str, Mesh]
             raise InputError(f"{path}: found no triangles, expected a closed mesh")
         file = f"{FOLDER}/{path.stem}.obj"
         files[file] = unity_obj(mesh.vertices, mesh.faces)
-        blocks[path.stem] = Mesh(file=file, frame=frame_of(path.stem), triangles=len(mesh.faces))
+        blocks[path.stem] = Mesh(
+            file=file,
+            frame=frame_of(path.stem),
+            triangles=len(mesh.faces),
+            deviation=_deviation(mesh, arrays, path.stem, source),
+        )
     return files, blocks
+
+
+def _deviation(mesh: trimesh.Trimesh, arrays: dict[str, np.ndarray], name: str, source: str) -> float | None:
+    """How far a mesh and the surface of the grid of its name, as it is packed, are from each other at most, m."""
+    if name not in arrays:
+        return None
+    origin, spacing = (_lattice(arrays, name, key, source) for key in ("origin", "spacing"))
+    if np.ptp(spacing):
+        return None
+    lattice = Lattice(origin, float(spacing[0]), arrays[name].shape)
+    whole = unsimplified(rounded(arrays[name]), lattice)
+    return mesh_distance((mesh.vertices, mesh.faces), whole, LOOKS * lattice.spacing)
 
 
 def convert_grids(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str, bytes], dict[str, Grid]]:
@@ -53,17 +82,26 @@ def convert_grids(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str,
             continue
         origin, spacing = (_lattice(arrays, name, key, source) for key in ("origin", "spacing"))
         file = f"{FOLDER}/{name}.bytes"
-        files[file] = unity_volume(values)
+        packed = rounded(values)
+        files[file] = unity_volume(packed)
         blocks[name] = Grid(
             file=file,
             frame=frame_of(name),
             shape=unity_position(values.shape).tolist(),
             origin=unity_position(origin).tolist(),
             spacing=unity_position(spacing).tolist(),
+            overlap=_overlap(values, packed),
         )
     if not blocks:
         raise InputError(f"{source}: found no grid of three dimensions, expected one for each map")
     return files, blocks
+
+
+def _overlap(values: np.ndarray, packed: np.ndarray) -> float:
+    """Of the insides of two grids, by points anywhere between theirs: those in both over those in either."""
+    points = np.random.default_rng(0).uniform(0, np.array(values.shape) - 1, (PROBES, 3)).T
+    one, other = (map_coordinates(np.asarray(grid, float), points, order=1) <= 0 for grid in (values, packed))
+    return round(float((one & other).sum() / max((one | other).sum(), 1)), 5)
 
 
 def convert_sheets(arrays: dict[str, np.ndarray], source: str) -> tuple[dict[str, bytes], Sheets | None]:

@@ -26,13 +26,14 @@ from trunkline.unity.unpacked import robot_of
 
 FOLDER = "Tests/Vectors"
 STEPS = f"{FOLDER}/steps.json"
+TELEOPERATION = "Runtime/teleoperation.json"
 SEED = 0
 SETTINGS = TypeAdapter(Teleop)
 
 
 def with_shared_vectors(files: dict[str, bytes], core: Teleop) -> dict[str, bytes]:
-    """A package with its shared vectors, made with these settings of the core; without them where a mount stands still,
-    as nothing is teleoperated then.
+    """A package with the settings of the core, and its shared vectors made with them; without both where a mount stands
+    still, as nothing is teleoperated then.
 
     Raises:
         InputError: its maps leave nothing within reach.
@@ -43,10 +44,18 @@ def with_shared_vectors(files: dict[str, bytes], core: Teleop) -> dict[str, byte
     answers, rng = answers_of(files, core, robot.mount_offset), np.random.default_rng(SEED)
     joints: Joints = tuple(float(angle) for angle in robot.ready)  # type: ignore[assignment]
     rigid, tip = within_reach(answers, joints, rng)
-    vectors = {STEPS: steps_file(answers.core, sequences(answers.core, joints, rigid, tip))}
+    vectors = {TELEOPERATION: SETTINGS.dump_json(core, indent=2) + b"\n"}
+    vectors[STEPS] = steps_file(answers.core, sequences(answers.core, joints, rigid, tip))
     for name, questions in cases(answers, joints, rigid, tip, rng).items():
         vectors[f"{FOLDER}/{name}.json"] = cases_file(answers, name, questions)
     return sealed(Manifest.model_validate_json(files[MANIFEST]), without_metas(files) | vectors)
+
+
+def vectors(files: dict[str, bytes]) -> int:
+    """How many shared vectors a package has: answers that a client is held to."""
+    told = [json.loads(data) for path, data in files.items() if path.startswith(FOLDER) and path.endswith(".json")]
+    steps = sum(len(sequence["steps"]) for one in told for sequence in one.get("sequences", []))
+    return steps + sum(len(one.get("cases", [])) for one in told)
 
 
 def steps_file(core: Teleoperation, recorded: dict[str, list[tuple[float, Input]]]) -> bytes:

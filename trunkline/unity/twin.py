@@ -15,18 +15,20 @@ from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize
 from trunkline.unity.manifest import Hybrid, Manifest, Versions, describe_model, hashes
 from trunkline.unity.network import describe_network
+from trunkline.unity.pace import LONGEST_STEP, step_errors, with_steps
 from trunkline.unity.package import package_json, with_metas
+from trunkline.unity.pulls import as_pulls
 from trunkline.unity.reach_maps import convert_grids, convert_meshes, convert_sheets, describe_reach
 from trunkline.unity.roundtrip import curl, deviation, simulate
 from trunkline.unity.rules import Violation, lint_mjcf
-from trunkline.unity.unsupported import without_dead_time, without_rubbing, without_winches
+from trunkline.unity.unsupported import without_unsupported
 
 MODEL = "Runtime/Model/arm.xml"
 CALIBRATED, PARAMETERS = "Runtime/Model/calibrated.xml", "Runtime/Model/parameters.json"
 NETWORK = "Runtime/Network/ik.onnx"
-MANIFEST = "Runtime/manifest.json"
+MANIFEST, README = "Runtime/manifest.json", "README.md"
 CSHARP = Path(__file__).parent / "csharp"
-SCRIPTS = sorted(path for path in CSHARP.rglob("*") if path.suffix in (".cs", ".asmdef"))
+OWN_FOLDERS = ("Editor", "Samples~", "Tests")  # of CSHARP, which lie beside Runtime in the package, as Unity expects
 
 
 @dataclass
@@ -80,9 +82,10 @@ def assemble(
 ) -> tuple[dict[str, bytes], list[Violation]]:
     """All files of the package by path, and the rules that it breaks."""
     spec = mujoco.MjSpec.from_string(sources.mjcf)
-    dead_time, friction, winches = without_dead_time(spec), without_rubbing(spec), without_winches(spec)
+    left_out = without_unsupported(spec)
     calibrated = spec.compile()
     laws = linearize(spec, *movement(calibrated, trajectory))
+    as_pulls(spec)
     spec.compile()
     mjcf = spec.to_xml()
     violations = lint_mjcf(mjcf)
@@ -94,16 +97,20 @@ def assemble(
         violations.append(
             Violation("simulation", "warning", f"{complaints} while it curls; Unity stops at one")
         )
+    restored = compile_with(mjcf, laws)
+    steps = step_errors(calibrated, restored, trajectory.duration, trajectory.pull, trajectory.tilts)
     tendons = [bundled.tendon(i).name for i in bundled.actuator_trnid[:, 0]]
     network = sources.network.read_bytes()
     network_block, found = describe_network(network, NETWORK, tendons, str(sources.network))
-    meshes, mesh_blocks = convert_meshes(sources.meshes)
-    with np.load(sources.grids) as arrays:
-        grids, grid_blocks = convert_grids(dict(arrays), str(sources.grids))
-        sheets, sheet_block = convert_sheets(dict(arrays), str(sources.grids))
-        reach = describe_reach(dict(arrays), sheet_block, str(sources.grids))
+    with np.load(sources.grids) as archive:
+        arrays, source = dict(archive), str(sources.grids)
+    meshes, mesh_blocks = convert_meshes(sources.meshes, arrays, source)
+    grids, grid_blocks = convert_grids(arrays, source)
+    sheets, sheet_block = convert_sheets(arrays, source)
+    reach = describe_reach(arrays, sheet_block, source)
 
     files = sources.texts | {
+        README: with_steps(sources.texts[README].decode(), steps).encode(),
         "package.json": package_json(
             label.name, label.version, label.display_name, label.unity, label.description
         ),
@@ -112,7 +119,9 @@ def assemble(
         PARAMETERS: identified(sources.parameters),
         NETWORK: network,
     }
-    files |= {f"Runtime/{path.relative_to(CSHARP).as_posix()}": path.read_bytes() for path in SCRIPTS}
+    files |= scripts()
+    if "README.md" in files:  # what the package manager's link opens, as there is no address on the web
+        files[f"Documentation~/{label.name}.md"] = files["README.md"]
     manifest = Manifest(
         name=label.name,
         versions=Versions(
@@ -121,14 +130,14 @@ def assemble(
         model=describe_model(
             bundled,
             MODEL,
+            longest_step=LONGEST_STEP,
+            steps=steps,
             springs=laws.springs,
             dampers=laws.dampers,
             diagonals=laws.diagonals,
             changes_max_deviation_mm=compare(calibrated, bundled, trajectory)[0] if laws else 0.0,
             import_max_deviation_mm=import_deviation_mm,
-            dead_time=dead_time,
-            capstan_friction=friction,
-            **winches,
+            **left_out,
         ),
         hybrid=Hybrid(arm=CALIBRATED, parameters=PARAMETERS, robot=robot),
         network=network_block,
@@ -139,6 +148,16 @@ def assemble(
         sha256={},
     )
     return sealed(manifest, files | meshes | grids | sheets), violations + found
+
+
+def scripts() -> dict[str, bytes]:
+    """The C# and what describes it, by path in the package."""
+    found = {}
+    for path in sorted(CSHARP.rglob("*")):
+        if path.suffix in (".cs", ".asmdef", ".md"):
+            place = path.relative_to(CSHARP)
+            found[("" if place.parts[0] in OWN_FOLDERS else "Runtime/") + place.as_posix()] = path.read_bytes()
+    return found
 
 
 def sealed(manifest: Manifest, files: dict[str, bytes]) -> dict[str, bytes]:
@@ -165,8 +184,8 @@ def identified(parameters: dict[str, dict]) -> bytes:
 
 def movement(model: mujoco.MjModel, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles and speeds of a model on the trajectory, all gravity angles one after the other."""
-    controls = curl(model, trajectory.duration, trajectory.pull)
-    motions = [simulate(model, controls, tilt) for tilt in trajectory.tilts]
+    commands = curl(model, trajectory.duration, trajectory.pull)
+    motions = [simulate(model, commands, tilt) for tilt in trajectory.tilts]
     return np.concatenate([m.angles for m in motions]), np.concatenate([m.speeds for m in motions])
 
 
@@ -177,10 +196,10 @@ def compare(first: mujoco.MjModel, second: mujoco.MjModel, trajectory: Trajector
     Raises:
         InputError: one of them diverges, so that no distance says anything.
     """
-    controls = curl(first, trajectory.duration, trajectory.pull)
+    commands = curl(first, trajectory.duration, trajectory.pull)
     largest, warnings = 0.0, 0
     for tilt in trajectory.tilts:
-        expected, found = (simulate(model, controls, tilt) for model in (first, second))
+        expected, found = (simulate(model, commands, tilt) for model in (first, second))
         furthest = float(deviation(expected, found).max())
         if not np.isfinite(furthest):
             raise InputError(f"a curl at a gravity angle of {tilt:g} rad: found positions that are not finite")

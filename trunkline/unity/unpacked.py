@@ -1,5 +1,5 @@
 """A finished package, read back: its digest, its maps in the base frames, as the stage `reachability` wrote them, the
-model that Unity shows, and what a preview needs: the calibrated arm, what holds it, and how sure its parameters are."""
+calibrated model, and what a preview needs: the arm whole, what holds it, and how sure its parameters are."""
 
 import hashlib
 import json
@@ -14,9 +14,9 @@ from trunkline.errors import InputError
 from trunkline.hybrid import doubts
 from trunkline.hybrid.robots import Robot
 from trunkline.unity.frame import unity_position
-from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
 from trunkline.unity.package import read_tarball
-from trunkline.unity.twin import MANIFEST, MODEL
+from trunkline.unity.twin import MANIFEST
+from trunkline.unity.unsupported import without_unsupported
 
 
 def read_package(path: Path) -> dict[str, bytes]:
@@ -84,11 +84,11 @@ def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
 
 
 def model_of(files: dict[str, bytes]) -> mujoco.MjModel:
-    """The model with the springs and dampers that the manifest lists, as *Calibrated Springs* restores them."""
-    block = _manifest(files)["model"]
-    springs, dampers = ([JointLaw(**law) for law in block[name]] for name in ("springs", "dampers"))
-    laws = Laws(springs, dampers, [TendonLaw(**law) for law in block["diagonals"]])
-    return compile_with(files[MODEL].decode(), laws)
+    """The calibrated model as plain MuJoCo steps it: without the motors' dead time and winches, and cables that rub.
+    Its controls are commands, those of the file that Unity imports are pulls."""
+    spec = arm_of(files)
+    without_unsupported(spec)
+    return spec.compile()
 
 
 def arm_of(files: dict[str, bytes]) -> mujoco.MjSpec:

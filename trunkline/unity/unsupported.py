@@ -6,6 +6,13 @@ import mujoco
 from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, capstan_friction, is_hole, numeric
 
 
+def without_unsupported(spec: mujoco.MjSpec) -> dict[str, float]:
+    """All of it, as the manifest's block `model` names it: `dead_time`, s, `capstan_friction`, `rate_limit`, m/s, and
+    `backlash`, m; 0 for none."""
+    dead_time, friction = without_dead_time(spec), without_rubbing(spec)
+    return {"dead_time": dead_time, "capstan_friction": friction} | without_winches(spec)
+
+
 def without_dead_time(spec: mujoco.MjSpec) -> float:
     """Take the motors' dead time from a model in place, as no component of the importer has it; s, as it was."""
     dead_time = max((float(actuator.delay) for actuator in spec.actuators), default=0.0)

@@ -42,16 +42,18 @@ public sealed class ArmKinematics {
 
   private readonly INetwork _network;
   private readonly IReadOnlyList<string> _inputs;
+  private readonly IReadOnlyList<double> _restLengths;
   private readonly int _tendons;
   private readonly double _doubtBeyond;
 
   /// <param name="network">Runs the package's file.</param>
   /// <param name="inputs">Names of its inputs: the manifest's network.input_order.</param>
   /// <param name="tendons">Names of the columns of commands and lengths: network.output_order.</param>
+  /// <param name="restLengths">m, of each of them, the arm straight: model.rest_lengths.</param>
   /// <param name="doubtBeyond">m: network.doubt_beyond.</param>
   /// <exception cref="InputError">The network is of other inputs or outputs.</exception>
   public ArmKinematics(INetwork network, IReadOnlyList<string> inputs, IReadOnlyList<string> tendons,
-                       double doubtBeyond) {
+                       IReadOnlyList<double> restLengths, double doubtBeyond) {
     var outputs = network.Outputs;
     int count = tendons.Count;
     bool known = outputs.Count == 3 && outputs[0] == count && outputs[1] == count && outputs[2] == 3;
@@ -62,6 +64,7 @@ public sealed class ArmKinematics {
     }
     _network = network;
     _inputs = inputs;
+    _restLengths = restLengths;
     _tendons = count;
     _doubtBeyond = doubtBeyond;
   }
@@ -101,6 +104,16 @@ public sealed class ArmKinematics {
     if (missed > tolerance) {
       throw new InputError("out of reach: the soft arm's tip comes no nearer to its target than "
           + $"{Formats.Fixed(1e3 * missed, 0)} mm");
+    }
+    return found;
+  }
+
+  /// <summary>Commands as pulls, m: by how much each is shorter than the tendon when the arm is straight. These are the
+  /// controls of the imported model's actuators.</summary>
+  public double[] PullsOf(Answer answer) {
+    var found = new double[_tendons];
+    for (int i = 0; i < found.Length; i++) {
+      found[i] = _restLengths[i] - answer.Commands[i];
     }
     return found;
   }

@@ -53,7 +53,7 @@ public sealed class MapReach : IReach {
     return _soft.Read(tip, gravity);
   }
 
-  private static void Require(string name, Vector given) {
+  internal static void Require(string name, Vector given) {
     if (!IsFinite(given)) {
       throw new InputError($"{name}: found ({Formats.General(given.X)}, {Formats.General(given.Y)}, "
           + $"{Formats.General(given.Z)}), expected finite numbers");

@@ -9,54 +9,84 @@ namespace Trunkline {
 /// trunkline/unity/unpacked.py. Files are contents by path in the package.</summary>
 public static class Unpacked {
   private const string _manifest = "Runtime/manifest.json";
+  private static readonly double[] _powers = PowersOfTwo();  // of the last bit of a number of 16 bits, by its exponent
 
   /// <summary>SHA-256 of the manifest, which has that of every other file: of another package, another
   /// digest.</summary>
   /// <exception cref="InputError">Naming the file that is not the one that the manifest means.</exception>
   public static string PackageDigest(IReadOnlyDictionary<string, byte[]> files) {
     var digests = Manifest(files).Block("sha256");
-    using (var hash = SHA256.Create()) {
-      foreach (string path in digests.Names) {
-        string found = files.TryGetValue(path, out var data) ? Digits(hash.ComputeHash(data)) : "none";
-        string expected = digests.Text(path);
-        if (found != expected) {
-          throw new InputError($"{path}: found sha256 {Formats.First(found, 12)}, expected "
-              + $"{Formats.First(expected, 12)} as the manifest says");
-        }
+    foreach (string path in digests.Names) {
+      Require(path, files.TryGetValue(path, out var data) ? Digest(data) : "none", digests.Text(path));
+    }
+    return Digest(files[_manifest]);
+  }
+
+  /// <summary>The same of an app that brings some of the package's files: those that it brings are tested.</summary>
+  /// <exception cref="InputError">Naming the file that is not the one that the manifest means.</exception>
+  public static string PartDigest(IReadOnlyDictionary<string, byte[]> files) {
+    var digests = Manifest(files).Block("sha256");
+    foreach (var file in files) {
+      if (file.Key != _manifest) {
+        Require(file.Key, Digest(file.Value), digests.Has(file.Key) ? digests.Text(file.Key) : "none");
       }
-      return Digits(hash.ComputeHash(files[_manifest]));
+    }
+    return Digest(files[_manifest]);
+  }
+
+  private static void Require(string path, string found, string expected) {
+    if (found != expected) {
+      throw new InputError($"{path}: found sha256 {Formats.First(found, 12)}, expected "
+          + $"{Formats.First(expected, 12)} as the manifest says");
     }
   }
 
-  /// <summary>The maps of the package's reach.</summary>
+  /// <summary>The maps of the package's reach. Where it has sheets, the soft grids may be left out.</summary>
   /// <exception cref="InputError">A file is missing, or not of the lattice that the manifest says.</exception>
   public static MapReach MapsOf(IReadOnlyDictionary<string, byte[]> files) {
+    var manifest = Manifest(files);
+    RequireOneLattice(manifest);
+    var grids = manifest.Block("reach").Has("sheets") ? null : GridsOf(files);
+    var rigid = Grid(files, manifest.Block("grids"), "rigid");
+    return new MapReach(rigid, (ISoftReach)grids ?? SheetsOf(files));
+  }
+
+  /// <summary>The tip's reach by the soft grids, for gravity of one tilt.</summary>
+  /// <exception cref="InputError">As for <see cref="MapsOf"/>.</exception>
+  public static TiltReach GridsOf(IReadOnlyDictionary<string, byte[]> files) {
     JsonBlock manifest = Manifest(files), reach = manifest.Block("reach"), grids = manifest.Block("grids");
-    double tolerance = reach.Number("tolerance");
-    var maps = new List<SignedMap>();
-    string first = null;
-    foreach (string name in reach.Texts("grids")) {
-      first = first ?? name;
+    RequireOneLattice(manifest);
+    var maps = Array.ConvertAll(reach.Texts("grids"), name => Grid(files, grids, name));
+    return new TiltReach(maps, reach.Numbers("angles"));
+  }
+
+  private static void RequireOneLattice(JsonBlock manifest) {
+    var names = manifest.Block("reach").Texts("grids");
+    var grids = manifest.Block("grids");
+    foreach (string name in names) {
       foreach (string key in new[] { "shape", "origin", "spacing" }) {
-        if (!Same(grids.Block(name).Numbers(key), grids.Block(first).Numbers(key))) {
-          throw new InputError($"{name}: found another {key} than that of {first}, expected one lattice for all soft "
-              + "maps");
+        if (!Same(grids.Block(name).Numbers(key), grids.Block(names[0]).Numbers(key))) {
+          throw new InputError($"{name}: found another {key} than that of {names[0]}, expected one lattice for all "
+              + "soft maps");
         }
       }
-      maps.Add(Grid(files, grids, name));
     }
-    var rigid = Grid(files, grids, "rigid");
-    return reach.Has("sheets")
-        ? new MapReach(rigid, Sheets(files, reach.Block("sheets"), tolerance))
-        : new MapReach(rigid, new TiltReach(maps, reach.Numbers("angles")));
+  }
+
+  /// <summary>The surface of the soft arm's tips; null in a package for gravity of one tilt.</summary>
+  /// <exception cref="InputError">A file is missing, or of another size.</exception>
+  public static SheetReach SheetsOf(IReadOnlyDictionary<string, byte[]> files) {
+    var reach = Manifest(files).Block("reach");
+    return reach.Has("sheets") ? Sheets(files, reach.Block("sheets"), reach.Number("tolerance")) : null;
   }
 
   /// <summary>The package's inverse kinematics by a <paramref name="network"/> that runs its file.</summary>
   /// <exception cref="InputError">The network is of other inputs or outputs.</exception>
   public static ArmKinematics KinematicsOf(IReadOnlyDictionary<string, byte[]> files, INetwork network) {
-    var block = Manifest(files).Block("network");
-    return new ArmKinematics(network, block.Texts("input_order"), block.Texts("output_order"),
-                             block.Number("doubt_beyond"));
+    JsonBlock block = Manifest(files).Block("network"), lengths = Manifest(files).Block("model").Block("rest_lengths");
+    var tendons = block.Texts("output_order");
+    var rest = Array.ConvertAll(tendons, lengths.Number);
+    return new ArmKinematics(network, block.Texts("input_order"), tendons, rest, block.Number("doubt_beyond"));
   }
 
   private static bool Same(double[] one, double[] other) {
@@ -111,10 +141,17 @@ public static class Unpacked {
   // IEEE 754 binary16: sign, 5 bits of exponent, 10 of fraction.
   private static float Half(int bits) {
     int exponent = bits >> 10 & 31, fraction = bits & 1023;
-    double value = exponent == 0 ? fraction * Math.Pow(2, -24)
-        : exponent == 31 ? (fraction == 0 ? double.PositiveInfinity : double.NaN)
-        : (1024 + fraction) * Math.Pow(2, exponent - 25);
+    double value = exponent == 31 ? (fraction == 0 ? double.PositiveInfinity : double.NaN)
+        : (exponent == 0 ? fraction : 1024 + fraction) * _powers[Math.Max(exponent, 1)];
     return (float)((bits & 0x8000) != 0 ? -value : value);
+  }
+
+  private static double[] PowersOfTwo() {
+    var found = new double[31];
+    for (int exponent = 0; exponent < found.Length; exponent++) {
+      found[exponent] = Math.Pow(2, exponent - 25);
+    }
+    return found;
   }
 
   private static double[] Doubles(IReadOnlyDictionary<string, byte[]> files, string path, int count) {
@@ -139,10 +176,13 @@ public static class Unpacked {
     return new JsonBlock(Json.Read(text, _manifest), _manifest);
   }
 
-  private static string Digits(byte[] hash) {
+  // SHA-256 in hexadecimal digits.
+  private static string Digest(byte[] data) {
     var found = new StringBuilder();
-    foreach (byte one in hash) {
-      found.Append(one.ToString("x2"));
+    using (var hash = SHA256.Create()) {
+      foreach (byte one in hash.ComputeHash(data)) {
+        found.Append(one.ToString("x2"));
+      }
     }
     return found.ToString();
   }

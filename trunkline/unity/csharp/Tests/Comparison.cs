@@ -1,12 +1,18 @@
 using System;
 using System.Collections.Generic;
 using System.Globalization;
-using Trunkline;
 
-/// <summary>What was answered beside what Python answered, both as JSON: words alike, numbers within 1e-5 of
-/// themselves, and within 1e-9 where they are nearly 0.</summary>
+namespace Trunkline.Tests {
+
+/// <summary>What was answered beside what Python answered, both as JSON: words alike, numbers within a share of
+/// themselves, and within an absolute bound where they are nearly 0.</summary>
 internal sealed class Comparison {
-  private const double _relative = 1e-5, _absolute = 1e-9;
+  private readonly double _relative, _absolute;
+
+  public Comparison(double relative = 1e-5, double absolute = 1e-9) {
+    _relative = relative;
+    _absolute = absolute;
+  }
 
   /// <summary>The greatest of |found - expected| / max(|expected|, 1e-4).</summary>
   public double Greatest { get; private set; }
@@ -46,4 +52,5 @@ internal sealed class Comparison {
       throw new InputError($"{where}: found {found ?? "null"}, expected {expected ?? "null"}");
     }
   }
+}
 }

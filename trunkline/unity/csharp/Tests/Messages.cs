@@ -1,6 +1,7 @@
 using System;
 using System.Collections.Generic;
-using Trunkline;
+
+namespace Trunkline.Tests {
 
 /// <summary>The core's messages from JSON and as JSON, by the names that Python has.</summary>
 internal static class Messages {
@@ -167,4 +168,5 @@ internal static class Messages {
     ["request"] = Json(intent.Request), ["preview"] = intent.Preview, ["execute"] = intent.Execute,
     ["countdown"] = Json(intent.Countdown), ["follow"] = Json(intent.Follow),
   };
+}
 }
