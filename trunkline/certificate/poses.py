@@ -14,6 +14,7 @@ from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial
 
 PULLED = 1e-3  # m, from which on a tendon counts as pulled
+LOOSE_EVERY = 5  # poses of which one is without a pull
 
 
 @dataclass
@@ -68,24 +69,29 @@ def posed(trials: list[Trial], model: mujoco.MjModel) -> Poses:
     """The poses of trials at rest, the last one of each."""
     order = actuators(model)
     commands = [commanded_lengths(trial, model)[-1][order] for trial in trials]
-    return Poses(np.array([trial.gravity for trial in trials]).reshape(-1, 3), np.array(commands))
+    gravity = np.array([trial.gravity for trial in trials]).reshape(-1, 3)
+    return Poses(gravity, np.array(commands).reshape(-1, model.nu))
 
 
 def draw_poses(chain: Chain, conditions: Conditions, count: int, rng: np.random.Generator) -> Poses:
-    """Poses within `conditions`: one or two neighbouring motors pull, the others are slack, the mount is tilted to any
-    side; everything evenly."""
-    tilt, side = np.radians(rng.uniform(0, conditions.tilt_deg, count)), rng.uniform(0, 2 * np.pi, count)
+    """Poses within `conditions`, everything drawn evenly.
+
+    In most of them one or two neighbouring motors pull, the others are slack, and the mount is tilted as far as it was
+    in trials with a pull; in the others, one in `LOOSE_EVERY`, all are slack and the mount is tilted as far as it ever
+    was. To any side.
+    """
+    pulled = (rng.random(count) >= 1 / LOOSE_EVERY) & (conditions.pull > PULLED)
+    largest = np.where(pulled, conditions.pulled_tilt_deg, conditions.tilt_deg)
+    tilt, side = np.radians(largest * rng.uniform(0, 1, count)), rng.uniform(0, 2 * np.pi, count)
     across = np.sin(tilt)
     gravity = STANDARD_GRAVITY * np.stack([across * np.cos(side), across * np.sin(side), -np.cos(tilt)], axis=1)
-    pulls = np.full((count, chain.tendons), -SLACK)
-    if conditions.pull > PULLED:
-        order = around_the_arm(chain)
-        for row in pulls:
-            first = int(rng.integers(chain.tendons))
+    pulls, order = np.full((count, chain.tendons), -SLACK), around_the_arm(chain)
+    for row in (pulls[index] for index in np.flatnonzero(pulled)):
+        levels = rng.uniform(0, conditions.pull, 2)
+        while levels.sum() > conditions.pulls:
             levels = rng.uniform(0, conditions.pull, 2)
-            while levels.sum() > conditions.pulls:
-                levels = rng.uniform(0, conditions.pull, 2)
-            row[order[first]] = levels[0]
-            if chain.tendons > 1 and rng.random() < 0.5:
-                row[order[(first + 1) % chain.tendons]] = levels[1]
+        first, several = int(rng.integers(chain.tendons)), chain.tendons > 1 and rng.random() < 0.5
+        row[order[first]] = levels[0]
+        if several:
+            row[order[(first + 1) % chain.tendons]] = levels[1]
     return Poses(gravity, chain.straight_lengths - pulls)
