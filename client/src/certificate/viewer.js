@@ -27,7 +27,7 @@ class Viewer {
     sun.position.set(1, 1.5, 2);
     this.simulated = new Tube(new MeshLambertMaterial({ vertexColors: true }));
     this.measured = new Tube(new MeshLambertMaterial({ vertexColors: true }));
-    this.net = new Tube(new MeshBasicMaterial({ color: 0xa34700, wireframe: true }));
+    this.net = new Tube(new MeshBasicMaterial({ color: 0xa34700, wireframe: true }), 24, 6);
     const axes = new AxesHelper(0.08);
     this.floor = new GridHelper(1, 10, 0xb9bfc6, 0xd6dade);
     this.floor.rotation.x = Math.PI / 2; // three's lies across y; z is along the arm
