@@ -216,7 +216,7 @@ def _table(caption: str, head: list[str], rows: list[tuple[bool, list[str]]], la
     Args:
         rows: whether one stands out, and its cells. last: the element that the last cell is put in.
     """
-    heads = "".join(f'<th scope="col">{escape(name)}</th>' if name else "<td></td>" for name in head)
+    heads = "".join(f'<th scope="col"{_wrapped(name)}>{escape(name)}</th>' if name else "<td></td>" for name in head)
     lines = []
     for whole, (first, *cells) in rows:
         marked = ' class="whole"' if whole else ""
@@ -231,9 +231,12 @@ def _table(caption: str, head: list[str], rows: list[tuple[bool, list[str]]], la
 
 
 def _cell(text: str, head: str, inside: str) -> str:
-    named = ' class="wrap"' if head in ("in words", "distribution", "is") else ""
     shown = f"<{inside}>{escape(text)}</{inside}>" if inside else escape(text)
-    return f"<td{named}>{shown}</td>"
+    return f"<td{_wrapped(head)}>{shown}</td>"
+
+
+def _wrapped(head: str) -> str:
+    return ' class="wrap"' if head in ("in words", "distribution", "is") else ""
 
 
 def _png(picture: bytes) -> str:

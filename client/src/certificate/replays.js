@@ -1,6 +1,7 @@
 // The trials that the page carries: both arms' points, as numbers of `unit_m`, little-endian, 16 bits.
 
 const LOST = -32768; // of a point that the cameras did not see
+const USUAL = 0.95; // share of a trial's errors that the colours tell apart
 
 /** What Python packed (trunkline/certificate/replays.py): trials by number, and each frame's points. */
 export class Replays {
@@ -23,12 +24,11 @@ export class Replays {
     return { measured, simulated, errors };
   }
 
-  /** The largest error of a trial, mm, rounded up to a number that reads well. */
-  largest(trial) {
-    let most = 0.1;
-    for (let frame = 0; frame < this.trials[trial].frames; frame++) {
-      for (const error of this.frame(trial, frame).errors) if (error > most) most = error;
-    }
+  /** An error that few of a trial exceed, mm, rounded up to a number that reads well. */
+  scale(trial) {
+    const errors = Array.from({ length: this.trials[trial].frames }, (_, frame) => this.frame(trial, frame).errors).flat();
+    const sorted = errors.filter(Number.isFinite).sort((a, b) => a - b);
+    const most = Math.max(sorted[Math.floor(USUAL * (sorted.length - 1))] ?? 0, 0.1);
     const ten = 10 ** Math.floor(Math.log10(most));
     return ten * [1, 2, 5, 10].find((step) => step * ten >= most);
   }

@@ -10,7 +10,7 @@ import { Tube } from "./tube.js";
 
 const MEASURED = [0.93, 0.55, 0.1]; // orange, where the colours of errors are blue to yellow
 const TURN = 0.12, ZOOM = 1.15; // rad and times, of a key
-const WIDER = 1.04; // times the arm, of the net that stands for the measured one around the simulated
+const WIDER = 1.06; // times the arm, of the net that stands for the measured one around the simulated
 const NEAREST = 0.15, FARTHEST = 5; // m
 
 const the = (id) => document.getElementById(id);
@@ -27,7 +27,7 @@ class Viewer {
     sun.position.set(1, 1.5, 2);
     this.simulated = new Tube(new MeshLambertMaterial({ vertexColors: true }));
     this.measured = new Tube(new MeshLambertMaterial({ vertexColors: true }));
-    this.net = new Tube(new MeshBasicMaterial({ color: 0xa34700, wireframe: true }), 24, 6);
+    this.net = new Tube(new MeshBasicMaterial({ color: 0xa34700, wireframe: true }), 36, 12);
     const axes = new AxesHelper(0.08);
     this.floor = new GridHelper(1, 10, 0xb9bfc6, 0xd6dade);
     this.floor.rotation.x = Math.PI / 2; // three's lies across y; z is along the arm
@@ -78,8 +78,8 @@ class Viewer {
 
   choose(number) {
     this.number = number;
-    this.scale = this.replays.largest(number);
-    the("largest").textContent = `${this.scale} mm`;
+    this.scale = this.replays.scale(number);
+    the("largest").textContent = `${this.scale} mm and more`;
     the("scrubber").max = String(this.trial.frames - 1);
     for (const id of ["scrubber", "play"]) the(id).disabled = this.trial.frames < 2;
     const box = new Box3();
