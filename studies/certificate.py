@@ -125,7 +125,7 @@ def main() -> int:
         inputs = inputs_of(model, trials, tables, ingested, asked.arms, draws)
         found = budget(inputs, poses[: len(kept)], asked.arms, asked.each, draws)
         tips = np.array([[float(row[axis]) for axis in "xyz"] for row in kept])
-        loose = (pulls[: len(kept)] <= PULLED).all(axis=1)
+        loose = np.max(pulls[: len(kept)], axis=1) <= PULLED
         print("\n".join(told_lines(tips, found, loose, back[: len(kept)])))
     return 0
 
