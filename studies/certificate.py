@@ -109,7 +109,8 @@ def main() -> int:
     rng = np.random.default_rng(SEED)
     poses = draw_poses(chain, conditions, COUNT, rng)
     pulls, back = chain.straight_lengths - poses.commands, rng.random(COUNT) < 0.5
-    rows = Rows("certificate", digest((SEED, conditions), Path("demo/plants"), ROOT / "conf"), "pose")
+    lab = [*sorted(Path("demo/plants").glob("*.py")), ROOT / "conf"]
+    rows = Rows("certificate", digest((SEED, conditions), *lab), "pose")
     with redirect_stdout(sys.stderr):
         for first in range(len(rows.read()), arguments.poses, BATCH):
             chosen = slice(first, min(first + BATCH, arguments.poses))
