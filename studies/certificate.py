@@ -24,7 +24,7 @@ from studies.rows import Rows, digest
 from trunkline.arm.spiral import spiral_chain
 from trunkline.certificate.budget import Budget, budget
 from trunkline.certificate.certificate import inputs_of
-from trunkline.certificate.poses import PULLED, Poses, conditions_of, draw_poses
+from trunkline.certificate.poses import Poses, conditions_of, draw_poses
 from trunkline.errors import in_one_line
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.inputs import read_model
@@ -57,11 +57,11 @@ def true_tips(
 
     Args:
         units: that the arm has. tip: from the centre of the last one, in its frame, m. Shape (3,).
-        pulls: of the motors, m. Shape (N, K). back: whether they come from beyond. Shape (N,).
+        pulls: of the motors, m, less than 0 where one is loose. Shape (N, K). back: whether they come from beyond. Shape (N,).
     """
     tips = np.empty((len(poses), 3))
     for pulled in (True, False):  # an arm that only hangs is steadied by a hand, as the lab does it
-        chosen = np.flatnonzero((pulls > PULLED).any(axis=1) == pulled)
+        chosen = np.flatnonzero((pulls > 0).any(axis=1) == pulled)
         if not len(chosen):
             continue
         moved = np.cumsum([0, slow.pull_ramp, slow.pull_turn, slow.pull_back]) * pulled
@@ -70,7 +70,7 @@ def true_tips(
         beyond = np.where(back[chosen], slow.pull_beyond, 1.0)
         profiles = np.array([np.interp(time, moved, [0, far, far, 1]) for far in beyond])
         sent = pulls[chosen, None]
-        commands = np.where(sent > PULLED, profiles[..., None] * sent, -LOOSE)
+        commands = np.where(sent > 0, profiles[..., None] * sent, -LOOSE)
         bench = Bench(
             poses.gravity[chosen], commands, np.zeros_like(commands), np.zeros(len(chosen)),
             steady=0.0 if pulled else slow.settle, steady_factor=slow.steady_factor, since=rest,
@@ -126,7 +126,7 @@ def main() -> int:
         inputs = inputs_of(model, trials, tables, ingested, asked.arms, draws)
         found = budget(inputs, poses[: len(kept)], asked.arms, asked.each, draws)
         tips = np.array([[float(row[axis]) for axis in "xyz"] for row in kept])
-        loose = np.max(pulls[: len(kept)], axis=1) <= PULLED
+        loose = np.max(pulls[: len(kept)], axis=1) <= 0
         print("\n".join(told_lines(tips, found, loose, back[: len(kept)])))
     return 0
 
