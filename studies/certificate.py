@@ -57,7 +57,8 @@ def true_tips(
 
     Args:
         units: that the arm has. tip: from the centre of the last one, in its frame, m. Shape (3,).
-        pulls: of the motors, m, less than 0 where one is loose. Shape (N, K). back: whether they come from beyond. Shape (N,).
+        pulls: of the motors, m, less than 0 where one is loose. Shape (N, K).
+        back: whether they come from beyond. Shape (N,).
     """
     tips = np.empty((len(poses), 3))
     for pulled in (True, False):  # an arm that only hangs is steadied by a hand, as the lab does it

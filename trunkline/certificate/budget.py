@@ -133,8 +133,8 @@ def budget(inputs: Inputs, poses: Poses, arms: int, each: int, rng: np.random.Ge
     if inputs.lacking:
         offsets = offsets + lacking_draws(inputs.lacking, ways, tips - arm.origin, draws, rng)
     told = [
-        Source(name, f"t, {degrees:.0f} degrees of freedom", deviation, _axis_unit(name), degrees,
-               np.linalg.norm(move, axis=1))
+        Source(name, f"t, {degrees:.0f} degrees of freedom", deviation * PARAMETERS[name].scale, _axis_unit(name),
+               degrees, np.linalg.norm(move, axis=1))
         for name, deviation, degrees, move in zip(known.names, known.deviation, known.degrees, moves, strict=True)
     ]  # fmt: skip
     told.append(Source(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3), "half bands", np.inf,
