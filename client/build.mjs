@@ -1,23 +1,24 @@
-// Builds the page: one script, one HTML file and an icon, which are committed, so that users need no Node.
+// Builds the page of live sessions, one script, one HTML file and an icon, and what a certificate's page has inside, a
+// script and a style sheet. They are committed, so that users need no Node.
 //
-//   node build.mjs            writes trunkline/live/page/
+//   node build.mjs            writes trunkline/live/page/ and trunkline/certificate/page/
 //   node build.mjs --check    compares it with what is there; ends with 1 where a byte differs
 //
 // The same sources give the same bytes: versions are those of package-lock.json, and nothing of the machine goes in.
 
 import { existsSync, mkdirSync, readFileSync, writeFileSync } from "node:fs";
-import { dirname, join } from "node:path";
+import { dirname, join, relative } from "node:path";
 import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
 
 const here = dirname(fileURLToPath(import.meta.url));
-const page = join(here, "..", "trunkline", "live", "page");
+const room = (name, file) => join(here, "..", "trunkline", name, "page", file);
 
-/** Files of the page by name, as bytes. */
-async function pageFiles() {
+/** The bytes of a script with all that it imports. */
+async function bundled(entry) {
   const { outputFiles } = await build({
     absWorkingDir: here,
-    entryPoints: ["src/main.js"],
+    entryPoints: [entry],
     bundle: true,
     minify: true,
     format: "esm",
@@ -28,24 +29,31 @@ async function pageFiles() {
     write: false,
     logLevel: "warning",
   });
+  return Buffer.from(outputFiles[0].contents);
+}
+
+/** What is built, bytes by path. */
+async function built() {
   return {
-    "app.js": Buffer.from(outputFiles[0].contents),
-    "index.html": readFileSync(join(here, "src", "index.html")),
-    "icon.svg": readFileSync(join(here, "src", "icon.svg")),
+    [room("live", "app.js")]: await bundled("src/main.js"),
+    [room("live", "index.html")]: readFileSync(join(here, "src", "index.html")),
+    [room("live", "icon.svg")]: readFileSync(join(here, "src", "icon.svg")),
+    [room("certificate", "viewer.js")]: await bundled("src/certificate/viewer.js"),
+    [room("certificate", "page.css")]: readFileSync(join(here, "src", "certificate", "page.css")),
   };
 }
 
-const files = await pageFiles();
+const files = await built();
 if (process.argv.includes("--check")) {
-  const stale = Object.keys(files).filter((name) => {
-    const path = join(page, name);
-    return !existsSync(path) || !readFileSync(path).equals(files[name]);
-  });
+  const stale = Object.keys(files).filter((path) => !existsSync(path) || !readFileSync(path).equals(files[path]));
   if (stale.length) {
-    console.error(`trunkline/live/page: found other bytes in ${stale.join(", ")}, expected those of \`make client\``);
+    const names = stale.map((path) => relative(join(here, ".."), path)).join(", ");
+    console.error(`found other bytes in ${names}, expected those of \`make client\``);
     process.exit(1);
   }
 } else {
-  mkdirSync(page, { recursive: true });
-  for (const [name, bytes] of Object.entries(files)) writeFileSync(join(page, name), bytes);
+  for (const [path, bytes] of Object.entries(files)) {
+    mkdirSync(dirname(path), { recursive: true });
+    writeFileSync(path, bytes);
+  }
 }

@@ -13,7 +13,7 @@ import { chromium } from "playwright-core";
 
 const here = dirname(fileURLToPath(import.meta.url));
 export const root = join(here, "..", "..");
-const PYTHON = process.env.TRUNKLINE_PYTHON ?? join(root, ".venv", "bin", "python");
+export const PYTHON = process.env.TRUNKLINE_PYTHON ?? join(root, ".venv", "bin", "python");
 const BROWSER = process.env.TRUNKLINE_BROWSER ?? "/usr/bin/chromium";
 const PICTURES = process.env.TRUNKLINE_PICTURES ?? "";
 const LONGEST = 120_000; // ms that anything may take; drawing by software on a shared core is slow

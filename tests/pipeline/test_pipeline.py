@@ -282,9 +282,10 @@ def test_an_edit_reruns_exactly_what_depends_on_it(pipeline, stages, name):
         ("trunkline/takes/swaps.py", ["ingest"]),
         ("trunkline/filtering/filter.py", ["filter"]),
         ("trunkline/identification/search.py", ["identify_stiffness", "identify_damping", "identify_control"]),
-        ("trunkline/dataset/sampling.py", ["fk_dataset", "train_ik", "reachability"]),
+        ("trunkline/dataset/sampling.py", ["report", "fk_dataset", "train_ik", "reachability"]),
         ("trunkline/ik/network.py", ["train_ik"]),
         ("trunkline/panda/inverse.py", ["reachability"]),
+        ("trunkline/certificate/budget.py", ["report"]),
         ("trunkline/unity/rules.py", ["package_unity"]),
     ],
 )

@@ -14,13 +14,13 @@ WIDEST = 180.0  # deg without a direction, from which on one side of the arm is 
 ONE_LINE = 20.0  # deg, within which directions lie in one plane
 
 
-def recorded_lines(trials: list[Trial]) -> list[str]:
-    """A line a kind of experiment: trials by split, and over which range, but for those of `test`."""
+def recorded_lines(trials: list[Trial], splits: tuple[str, ...] = SPLITS) -> list[str]:
+    """A line a kind of experiment: trials of `splits` by split, and over which range, but for those of `test`."""
     lines = []
     for kind, told in EXPERIMENTS.items():
         own = [trial for trial in trials if trial.experiment == kind]
         if own:
-            counts = [f"{sum(t.split == split for t in own)} {split}" for split in SPLITS]
+            counts = [f"{sum(t.split == split for t in own)} {split}" for split in splits]
             lines.append(f"{told.plural}: {', '.join(counts)}{_range([t for t in own if t.split in DECIDING])}")
     return lines
 

@@ -1,0 +1,45 @@
+"""Certify what the twin is good for: one page and the same facts as JSON."""
+
+import json
+from pathlib import Path
+
+from trunkline.certificate.certificate import Asked, certify, digests
+from trunkline.certificate.page import page
+from trunkline.errors import existing
+from trunkline.figures.certificate import pose_figure, uncertainty_figure
+from trunkline.figures.style import save_figure
+from trunkline.pipeline.inputs import read_model
+from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.settings import settings
+from trunkline.trials.splits import DECIDING
+from trunkline.trials.trial import read_trials
+
+ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
+MODEL = ARTIFACTS / "identify_control/arm.xml"
+STAGES = ("identify_stiffness", "identify_damping", "identify_control")
+
+
+@settings
+class Config(Asked):
+    """See conf/report/config.yaml."""
+
+
+def main(config: Config) -> None:
+    def told(stage: str, name: str = "metrics") -> dict:
+        return json.loads(existing(ARTIFACTS / stage / f"{name}.json").read_text())
+
+    tables = {stage: told(stage, "parameters") for stage in STAGES}
+    metrics = {stage: told(stage) for stage in (*STAGES, "score", "ingest", "filter")}
+    found = certify(config, read_model(MODEL), read_trials(TRIALS, DECIDING), tables, metrics)
+    facts = found.facts | {"files": digests([MODEL, *(ARTIFACTS / s / "parameters.json" for s in STAGES)])}
+    with output_folder(ARTIFACTS / "report") as folder:
+        save_figure(uncertainty_figure(found.budget.tips, found.budget.radius), folder / "uncertainty.png", 110)
+        save_figure(pose_figure(found.shapes), folder / "poses.png", 110)
+        pictures = {name: (folder / f"{name}.png").read_bytes() for name in ("uncertainty", "poses")}
+        (folder / "certificate.html").write_text(page(facts, found.replays, pictures), encoding="utf-8")
+        write_json(folder / "facts.json", facts)
+        write_json(folder / "metrics.json", found.metrics)
+
+
+if __name__ == "__main__":
+    run_stage("report", Config, main)
