@@ -24,8 +24,7 @@ import numpy as np
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT
 from trunkline.pipeline.results import recorded
-from trunkline.unity.package import read_tarball
-from trunkline.unity.twin import CALIBRATED
+from trunkline.unity.package import CALIBRATED, read_tarball
 
 SOURCE = PROJECT / "benchmarks/arm64.c"
 VECTORS = "Tests/Vectors/network.json"

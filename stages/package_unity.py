@@ -13,12 +13,12 @@ from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.settings import settings
 from trunkline.teleop.settings import Teleop
 from trunkline.unity.comparison import curled, read_models
-from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.package import MANIFEST, read_tarball, write_tarball
 from trunkline.unity.proof import started
 from trunkline.unity.readers import refusals
 from trunkline.unity.shared_vectors import vectors, with_shared_vectors
 from trunkline.unity.sources import read_sources
-from trunkline.unity.twin import MANIFEST, Label, Trajectory, assemble, compare
+from trunkline.unity.twin import Label, Trajectory, assemble, compare
 
 ARTIFACTS = Path("artifacts/package_unity")
 

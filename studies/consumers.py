@@ -26,8 +26,7 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.pipeline.config import PROJECT
 from trunkline.pipeline.results import recorded
-from trunkline.unity.package import read_tarball
-from trunkline.unity.twin import CALIBRATED, MANIFEST, MODEL
+from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, read_tarball
 
 PLACES = PROJECT / "build/consumers"
 PACKAGES = PROJECT / "artifacts/package_unity"

@@ -25,7 +25,7 @@ from trunkline.teleop.reach import MapReach
 from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.tendons import Network, bend, network_of
 from trunkline.teleop.vectors import DOWN
-from trunkline.unity.twin import NETWORK
+from trunkline.unity.package import NETWORK
 from trunkline.unity.unpacked import maps_of, model_of, read_package
 
 ARTIFACTS = Path("artifacts")

@@ -19,8 +19,8 @@ from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.ik.inputs import DIRECTION
 from trunkline.simulation.rest import settle
-from trunkline.unity.package import read_tarball, write_tarball
-from trunkline.unity.twin import MANIFEST, assemble
+from trunkline.unity.package import MANIFEST, read_tarball, write_tarball
+from trunkline.unity.twin import assemble
 
 PAGE = Path(__file__).parents[2] / "docs/consumers.md"
 VECTORS = "Tests/Vectors/network.json"

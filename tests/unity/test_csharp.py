@@ -30,8 +30,9 @@ from trunkline.teleop.vectors import add
 from trunkline.unity.answers import TARGETS, answers_of
 from trunkline.unity.frame import unity_position, unity_quaternion
 from trunkline.unity.network import describe_network
+from trunkline.unity.package import MANIFEST, NETWORK
 from trunkline.unity.shared_vectors import with_shared_vectors
-from trunkline.unity.twin import CSHARP, MANIFEST, NETWORK
+from trunkline.unity.twin import CSHARP
 from trunkline.unity.unpacked import maps_of, package_digest, robot_of
 
 TESTS = Path(__file__).parent / "csharp"

@@ -22,9 +22,9 @@ from trunkline.hybrid.preview import Holding, joined, preview
 from trunkline.hybrid.robots import FixedMount
 from trunkline.hybrid.touch import read_geometry
 from trunkline.hybrid.worlds import World
-from trunkline.unity.package import write_tarball
+from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, write_tarball
 from trunkline.unity.sources import IDENTIFIED
-from trunkline.unity.twin import CALIBRATED, MANIFEST, MODEL, Trajectory, assemble
+from trunkline.unity.twin import Trajectory, assemble
 from trunkline.unity.unpacked import arm_of, doubts_of, package_digest, read_package, robot_of
 
 ARTIFACTS = Path(__file__).parents[2] / "artifacts"

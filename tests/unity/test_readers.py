@@ -14,9 +14,8 @@ from tests.unity.test_twin import files, sources  # noqa: F401
 from trunkline.ik.network import InverseKinematics
 from trunkline.ik.onnx import to_onnx
 from trunkline.unity import readers
-from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.package import MANIFEST, MODEL, NETWORK, read_tarball, write_tarball
 from trunkline.unity.readers import ENGINES, refusals
-from trunkline.unity.twin import MANIFEST, MODEL, NETWORK
 
 BUILT = sorted((Path(__file__).parents[2] / "artifacts/package_unity").glob("*.tgz"))
 OBJ = "Runtime/Reachability/soft_030.obj"

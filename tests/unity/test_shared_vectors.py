@@ -16,9 +16,10 @@ from trunkline.teleop.messages import Input, from_json
 from trunkline.teleop.settings import Teleop
 from trunkline.teleop.transitions import MODES, TRANSITIONS
 from trunkline.unity.answers import answers_of
+from trunkline.unity.package import NETWORK
 from trunkline.unity.readers import ENGINES, ENGINES_APART, refusals
 from trunkline.unity.shared_vectors import FOLDER, STEPS, cases_file, steps_file, with_shared_vectors
-from trunkline.unity.twin import NETWORK, assemble
+from trunkline.unity.twin import assemble
 from trunkline.unity.unpacked import package_digest, robot_of
 
 CASES = ("alignment", "rigid_reach", "soft_reach", "targets", "network")

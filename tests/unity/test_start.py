@@ -17,10 +17,11 @@ from trunkline.unity import start
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import Laws, write_laws
 from trunkline.unity.pace import steps_taken
+from trunkline.unity.package import MODEL
 from trunkline.unity.plugin import Imported, Scene
 from trunkline.unity.proof import DOWN, PREFIX, TIP, at_rest, manifest_of, pull, scene_of, turns
 from trunkline.unity.start import Twin
-from trunkline.unity.twin import CSHARP, MODEL, assemble
+from trunkline.unity.twin import CSHARP, assemble
 from trunkline.unity.unpacked import model_of
 
 MM = 1e-3

@@ -29,10 +29,10 @@ from trunkline.unity import manifest as schema
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
 from trunkline.unity.manifest import Manifest, Model, Names
-from trunkline.unity.package import read_tarball, write_tarball
+from trunkline.unity.package import MANIFEST, MODEL, NETWORK, read_tarball, write_tarball
 from trunkline.unity.readers import refusals
 from trunkline.unity.roundtrip import curl, simulate
-from trunkline.unity.twin import MANIFEST, MODEL, NETWORK, Label, Sources, Trajectory, assemble, compare
+from trunkline.unity.twin import Label, Sources, Trajectory, assemble, compare
 
 ROOT = Path(__file__).parents[2]
 LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0")

@@ -31,9 +31,9 @@ from trunkline.teleop.messages import Controller, Input, Pose, to_json
 from trunkline.teleop.reach import MapReach
 from trunkline.teleop.vectors import about, conjugate, multiply
 from trunkline.unity.answers import PACKAGE
-from trunkline.unity.package import SAMPLES, package_json
+from trunkline.unity.package import MANIFEST, SAMPLES, package_json
 from trunkline.unity.shared_vectors import with_shared_vectors
-from trunkline.unity.twin import CSHARP, MANIFEST
+from trunkline.unity.twin import CSHARP
 from trunkline.unity.unpacked import maps_of, package_digest
 
 STUBS = Path(__file__).parent / "stubs"

@@ -10,10 +10,9 @@ from trunkline.dataset.gravities import spread
 from trunkline.errors import InputError
 from trunkline.reachability.sheets import Sheets
 from trunkline.teleop.reach import MapReach
-from trunkline.unity.package import write_tarball
+from trunkline.unity.package import MANIFEST, write_tarball
 from trunkline.unity.reach_maps import convert_grids, convert_sheets, describe_reach
 from trunkline.unity.rounding import rounded
-from trunkline.unity.twin import MANIFEST
 from trunkline.unity.unpacked import maps_of, package_digest, read_package
 
 RNG = np.random.default_rng(0)

@@ -27,7 +27,7 @@ from trunkline.teleop.tendons import Network, network_of
 from trunkline.teleop.trajectory import limits_of
 from trunkline.teleop.vectors import DOWN, Vector, conjugate, rotate
 from trunkline.unity import unpacked
-from trunkline.unity.twin import MANIFEST, MODEL
+from trunkline.unity.package import MANIFEST, MODEL
 
 PACKAGES = Path("artifacts/package_unity")
 

@@ -15,7 +15,7 @@ from trunkline.teleop.messages import Box, Targets, World
 from trunkline.teleop.reach import MapReach
 from trunkline.teleop.settings import Teleop
 from trunkline.teleop.targets import place
-from trunkline.unity.twin import NETWORK
+from trunkline.unity.package import NETWORK
 from trunkline.unity.unpacked import maps_of
 
 PACKAGE = "a" * 64  # stands for the package's digest, which depends on the shared vectors

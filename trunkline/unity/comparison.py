@@ -9,8 +9,9 @@ import pandas as pd
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import Laws, compile_with
 from trunkline.unity.manifest import Manifest
+from trunkline.unity.package import MANIFEST, MODEL
 from trunkline.unity.roundtrip import curl, deviation, simulate
-from trunkline.unity.twin import MANIFEST, MODEL, Trajectory
+from trunkline.unity.twin import Trajectory
 from trunkline.unity.unsupported import without_unsupported
 
 

@@ -14,6 +14,12 @@ from pathlib import Path
 from trunkline.errors import InputError
 
 ROOT = "package/"  # folder that npm's and Unity's tarballs hold everything in
+
+# where the twin's own files are in it
+MODEL = "Runtime/Model/arm.xml"
+CALIBRATED, PARAMETERS = "Runtime/Model/calibrated.xml", "Runtime/Model/parameters.json"
+NETWORK = "Runtime/Network/ik.onnx"
+MANIFEST, README = "Runtime/manifest.json", "README.md"
 SAMPLES = [{
     "displayName": "Pointing",
     "description": "Two rays set the targets of a robot that carries the arm; the twin bends as the network says.",

@@ -14,9 +14,9 @@ from trunkline.statics.equilibria import actuated
 from trunkline.unity.importer import as_imported
 from trunkline.unity.manifest import Manifest, Model
 from trunkline.unity.pace import steps_taken
+from trunkline.unity.package import MANIFEST, MODEL
 from trunkline.unity.plugin import Imported, Scene
 from trunkline.unity.start import Twin
-from trunkline.unity.twin import MANIFEST, MODEL
 
 DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 PREFIX = "arm_"  # before an arm's names in the scene

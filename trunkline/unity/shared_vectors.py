@@ -18,10 +18,10 @@ from trunkline.teleop.messages import Input, Joints, to_json
 from trunkline.teleop.settings import Teleop
 from trunkline.unity.answers import Answers, Case, answers_of
 from trunkline.unity.manifest import Manifest
-from trunkline.unity.package import without_metas
+from trunkline.unity.package import MANIFEST, without_metas
 from trunkline.unity.questions import cases, within_reach
 from trunkline.unity.sequences import sequences
-from trunkline.unity.twin import MANIFEST, sealed
+from trunkline.unity.twin import sealed
 from trunkline.unity.unpacked import robot_of
 
 FOLDER = "Tests/Vectors"

@@ -16,17 +16,22 @@ from trunkline.unity.linearize import compile_with, linearize
 from trunkline.unity.manifest import Hybrid, Manifest, Versions, describe_model, hashes
 from trunkline.unity.network import describe_network
 from trunkline.unity.pace import LONGEST_STEP, step_errors, with_steps
-from trunkline.unity.package import package_json, with_metas
+from trunkline.unity.package import (
+    CALIBRATED,
+    MANIFEST,
+    MODEL,
+    NETWORK,
+    PARAMETERS,
+    README,
+    package_json,
+    with_metas,
+)
 from trunkline.unity.pulls import as_pulls
 from trunkline.unity.reach_maps import convert_grids, convert_meshes, convert_sheets, describe_reach
 from trunkline.unity.roundtrip import curl, deviation, simulate
 from trunkline.unity.rules import Violation, lint_mjcf
 from trunkline.unity.unsupported import without_unsupported
 
-MODEL = "Runtime/Model/arm.xml"
-CALIBRATED, PARAMETERS = "Runtime/Model/calibrated.xml", "Runtime/Model/parameters.json"
-NETWORK = "Runtime/Network/ik.onnx"
-MANIFEST, README = "Runtime/manifest.json", "README.md"
 CSHARP = Path(__file__).parent / "csharp"
 OWN_FOLDERS = ("Editor", "Samples~", "Tests")  # of CSHARP, which lie beside Runtime in the package, as Unity expects
 

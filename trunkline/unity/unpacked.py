@@ -14,8 +14,7 @@ from trunkline.errors import InputError
 from trunkline.hybrid import doubts
 from trunkline.hybrid.robots import Robot
 from trunkline.unity.frame import unity_position
-from trunkline.unity.package import read_tarball
-from trunkline.unity.twin import MANIFEST
+from trunkline.unity.package import MANIFEST, read_tarball
 from trunkline.unity.unsupported import without_unsupported
 
 
