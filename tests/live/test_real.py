@@ -1,6 +1,7 @@
 """A real machine in a session: Panda and motors on one clock, and either's fault halts both. Nothing here is real."""
 
 import multiprocessing
+import queue
 import time
 from dataclasses import replace
 
@@ -80,6 +81,7 @@ class Rig:
         joints = machine.begin(np.zeros(7))
         robot = PacedRobot(joints, STRAIGHT, limits, PACKAGE, lambda q, c, _: machine.move(q, c), LIMITS["panda"])
         self.channel = Channel(multiprocessing.get_context("spawn"), 3, 0)
+        self.channel.plans = queue.Queue()  # at once: between processes it has a thread, on no clock that a test turns
         self.loop, self.permitted = Loop(self.channel, robot, machine), True
         here = np.append(READY, STRAIGHT)
         rows = gentle(here, here + TURN * np.eye(10)[0] - PULL * np.eye(10)[8], limits, 0.002, SECONDS)
@@ -88,7 +90,7 @@ class Rig:
         self.channel.plans.put((1, self.plan.digest(), self.plan, self.channel.asked[STOPS]))
         self.channel.asked[PERMITTED] = 1
         self.begun = self.now
-        until(lambda: self.loop.serial == 1, each=lambda: self.loop.turn(self.now))  # the queue has its own thread
+        until(lambda: self.loop.serial == 1, each=lambda: self.loop.turn(self.now))
 
     @property
     def mode(self):
