@@ -8,7 +8,8 @@ stand-in among true objects, from the session's log, and judged as the rehearsal
 own, where it has any for this package.
 
 ROBOT_PYTHON is of an environment with pylibfranka and franka-sim; franka-sim listens to every address, so the whole
-belongs in a network of its own (docs/execution.md). Runs are kept in build/experiments/runs.csv; stopped, they go on.
+belongs in a network of its own (docs/execution.md). A run is a row of docs/results/experiments.csv as soon as it is
+done; stopped, the command goes on from there.
 """
 
 import argparse
@@ -36,7 +37,7 @@ from trunkline.foresight.package import only_package
 from trunkline.live.session import Address, opened
 from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.results import recorded
+from trunkline.pipeline.results import FOLDER, recorded
 from trunkline.teleop.config import Config as Teleop
 
 ADDRESS, WINDOW, YIELDS = Address(8899), (320, 240), 3  # of the page: pixels, and how nice its browser is
@@ -112,14 +113,13 @@ def main() -> int:
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--runs", type=int, default=FEWEST, help="of each experiment, seeds 0, 1, ...")
     parser.add_argument("--only", choices=sorted(EXPERIMENTS))
-    parser.add_argument("--out", type=Path, default=Path("build/experiments"))
     given = parser.parse_args()
     with contextlib.suppress(OSError):
         os.nice(URGENT)
     python = Path(os.environ.get("ROBOT_PYTHON", ""))
     if not python.is_file():
         raise InputError(f"ROBOT_PYTHON: found {str(python)!r}, expected the Python of pylibfranka and franka-sim")
-    package, table = given.package or only_package(), given.out / "runs.csv"
+    package, table = given.package or only_package(), FOLDER / "experiments.csv"
     bench, source, names = bench_of(package), source_of(package), [given.only] if given.only else list(EXPERIMENTS)
     with recorded("experiments", keep=given.runs >= FEWEST and not given.only):
         print("| experiment | runs | success (95 %) | rehearsed | s a run | why it failed |")
