@@ -6,7 +6,8 @@ that is off by a share s of each point's distance from the base, a trial tells
     M_t = (NUMBERS / s²) J_tᵀ J_t,
 
 which is `trunkline.check.told` by the trial: over T trials Σ M_t is the inverse of its s² (JᵀJ)⁻¹ / (NUMBERS T). Trials
-are independent, so information adds. Here u = (z - middle) / half, z over half its range: what `told` calls a share.
+are independent, so information adds. Where motors hold the arm at rest, friction holds it anywhere in a band, in whose
+middle the twin has it: there s² is more by the variance of a rectangular distribution over that band. Here u = (z - middle) / half, z over half its range: what `told` calls a share.
 """
 
 from dataclasses import dataclass, replace
@@ -14,7 +15,10 @@ from dataclasses import dataclass, replace
 import mujoco
 import numpy as np
 
+from trunkline.certificate.arms import arm_of
+from trunkline.certificate.poses import Poses
 from trunkline.check.told import FRAMES, NUMBERS, TWO_SIDED, Told
+from trunkline.elements import actuators
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.fit import Fit
 from trunkline.identification.linearisation import linearise
@@ -74,7 +78,23 @@ def information(fit: Fit, model: mujoco.MjModel, experiments: list[Experiment], 
         return np.concatenate([information(fit, model, part, share) for part in parts])
     low, high = problem.bounds()
     half = 0.5 * (high - low)
-    return (not problem.diverged) * found * np.outer(half, half) * NUMBERS / share**2
+    off = shares_of(model, experiments, share)[:, None, None]
+    return (not problem.diverged) * found * np.outer(half, half) * NUMBERS / off**2
+
+
+def shares_of(model: mujoco.MjModel, experiments: list[Experiment], share: float) -> np.ndarray:
+    """By which the fitted model will be off in each trial, of a point's distance from the base: `share`, and with it
+    half the band in which friction holds the arm, where motors pull at rest. Of the tip's distance that is the more the
+    nearer a point is to the tip, so the tip's is taken over √3, the root mean square of 0 to 1. Shape (T,)."""
+    found = np.full(len(experiments), share)
+    pulled = [i for i, e in enumerate(experiments) if is_static(e.kind) and not e.slack(model)]
+    if pulled:
+        order = actuators(model)
+        commands = np.array([experiments[i].controls[-1][order] for i in pulled])
+        bands = arm_of(model).friction(Poses(np.array([experiments[i].gravity for i in pulled]), commands))
+        tips = np.array([np.linalg.norm(experiments[i].positions[-1], axis=1).max() for i in pulled])
+        found[pulled] = np.hypot(share, np.linalg.norm(bands, axis=1) / 3 / tips)
+    return found
 
 
 def stage_information(

@@ -3,16 +3,18 @@
 import numpy as np
 import yaml
 
-from trunkline.check.told import Told
+from trunkline.check.told import TWO_SIDED, Told
+from trunkline.identification.parameters import PARAMETERS
 from trunkline.suggest.candidates import Candidate
 from trunkline.suggest.goals import Goal
-from trunkline.suggest.information import TWO_SIDED, StageInformation
+from trunkline.suggest.information import StageInformation
 from trunkline.suggest.ranking import Suggestion
 from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.splits import IDENTIFY
 
 LEAST = 0.15  # of what a trial gains, from which on the parameter by which it does is named
 NAMED = 3  # parameters that are named, at most
+PERCENT = 0.2  # half-width of a logarithm, below which percent say it
 TITLES: dict[Goal, str] = {
     "intervals": "root mean square of the 95 % intervals over their ranges",
     "tip": "standard uncertainty of the tip at rest by the parameters, over the workspace",
@@ -76,8 +78,19 @@ def why_words(stages: list[StageInformation], weights: list[np.ndarray], one: Su
 
 
 def _change(before: Told, now: Told) -> str:
-    """Without the name twice."""
-    return f"{before.words()} now, then {now.words().removeprefix(before.name).strip().removeprefix('to ')}"
+    return f"{before.name} {_width(before)} now, then {_width(now)}"
+
+
+def _width(told: Told) -> str:
+    """Of an interval: a number in its unit, a factor, or percent where that is as good."""
+    parameter = PARAMETERS[told.name]
+    if told.share >= 1:
+        return "undetermined"
+    if parameter.signed:
+        return f"± {told.half_width * parameter.scale:.2g} {parameter.unit}".rstrip()
+    if told.half_width < PERCENT:
+        return f"± {100 * told.half_width:.2g} %"
+    return f"within a factor of {np.exp(told.half_width):.2f}"
 
 
 def entry_lines(found: list[Candidate], taken: set[str]) -> list[str]:
