@@ -168,9 +168,8 @@ def _say(seed: int, method: str, added: list[Candidate], states: list[State]) ->
 
 
 def table_lines(rows: list[dict], methods: list[str], added: int) -> list[str]:
-    """Medians over seeds after each trial, and how often a method has reached the list's last error by then."""
-    lines = ["| trials added | " + " | ".join(f"{method}: off, mm / width" for method in methods) + " |"]
-    lines.append("|---:|" + "---:|" * len(methods))
+    """After each trial, over seeds: the error's median and worst, and the median width of the intervals."""
+    lines = ["| trials added | " + " | ".join(methods) + " |", "|---:|" + "---:|" * len(methods)]
     for number in range(added + 1):
         cells = []
         for method in methods:
@@ -178,8 +177,8 @@ def table_lines(rows: list[dict], methods: list[str], added: int) -> list[str]:
             if f"{key} error" not in rows[0]:
                 cells.append("")
                 continue
-            off, width = (np.median([float(row[f"{key} {what}"]) for row in rows]) for what in ("error", "width"))
-            cells.append(f"{off:.1f} / {100 * width:.0f} %")
+            off, width = (np.array([float(row[f"{key} {what}"]) for row in rows]) for what in ("error", "width"))
+            cells.append(f"{np.median(off):.1f} ({off.max():.1f}) mm / {100 * np.median(width):.0f} %")
         lines.append(f"| {number} | {' | '.join(cells)} |")
     return lines
 
@@ -227,7 +226,8 @@ def main() -> int:
     methods = ["the paper's list", "random", *(f"suggested, for {goal}" for goal in SUGGESTED)]
     with recorded("suggest", keep=bool(kept)):
         found, listed = list(kept.values()), len(fixed_list())
-        print(f"{len(found)} arms, each with {len(started())} trials at first; medians\n")
+        first = f"{len(found)} arms, {len(started())} trials at first"
+        print(f"{first}; off: median (worst) / intervals over their ranges: median\n")
         print("\n".join(table_lines(found, methods, listed)))
         print("\n".join(reached_lines(found, methods, listed)))
         if line := other_commits(kept):

@@ -40,6 +40,11 @@ def grid() -> Recordable:
     return load_folder(Recordable, ROOT / "conf/suggest")
 
 
+@pytest.fixture(scope="module")
+def project(tmp_path_factory) -> Path:
+    return workbench(tmp_path_factory.mktemp("project"))
+
+
 def stage_of(model, grid, kinds, ranges, trials, share=SHARE, **changed) -> tuple[StageInformation, list]:
     every = candidates(grid, model, tuple(kinds), FRAMES)
     config = settings(kinds, kinds, ranges, **changed)
@@ -58,7 +63,7 @@ def paper_loss():
 
 def test_a_side_to_which_nothing_tilted_the_arm_comes_first(model, grid):
     """By distances, tilts about one axis do not tell by how much the mount leans about the other."""
-    ranges = {"stiffness": (0.1, 20.0), "mount_tilt_x": (-0.1, 0.1), "mount_tilt_y": (-0.1, 0.1)}
+    ranges = {"stiffness": (0.1, 20.0), "mount_tilt_x": (-0.3, 0.3), "mount_tilt_y": (-0.3, 0.3)}
     trials = [tilt(model, angle) for angle in (20, 50, 80)]  # about y: gravity towards +x
     stage, every = stage_of(model, grid, ["static_tilt"], ranges, trials, 2e-4, loss=paper_loss())
     told = {one.name: one.share for one in stage.told([])}
@@ -67,9 +72,9 @@ def test_a_side_to_which_nothing_tilted_the_arm_comes_first(model, grid):
     assert abs(first.gravity[1]) > abs(first.gravity[0]), first.name
     after = {one.name: one.share for one in stage.told([first.name])}
     assert after["mount_tilt_x"] < 0.5
-    assert why_words([stage], weights_for("intervals", [stage], model, grid), suggest(
-        [stage], weights_for("intervals", [stage], model, grid), every, 1
-    )[0]).startswith("mount_tilt_x undetermined now, then")  # fmt: skip
+    weights = weights_for("intervals", [stage], model, grid)
+    why = why_words([stage], weights, suggest([stage], weights, every, 1)[0])
+    assert why.startswith("mount_tilt_x undetermined now, then ± ")
 
 
 def test_a_tendon_that_was_never_pulled_comes_first(model, grid):
@@ -98,7 +103,8 @@ def test_information_adds_and_never_takes_away(model, grid):
     for matrix in together:
         np.testing.assert_allclose(matrix, matrix.T)
         assert np.linalg.eigvalsh(matrix).min() >= -1e-9 * np.abs(matrix).max()
-    np.testing.assert_allclose(information(fit, model, experiments, 2 * SHARE), together / 4)
+    loose = [i for i, e in enumerate(experiments) if e.kind != "static_pull"]
+    np.testing.assert_allclose(information(fit, model, experiments, 2 * SHARE)[loose], together[loose] / 4)
 
 
 @pytest.mark.parametrize(("kind", "name", "made"), [
@@ -108,16 +114,16 @@ def test_information_adds_and_never_takes_away(model, grid):
 def test_the_expected_interval_is_that_with_the_trial_really_added(grid, kind, name, made):
     """By `told_by`, the arithmetic of `check`, on a trial that plain steps of MuJoCo simulate; within 3 %. Of an arm
     whose tendons have no friction, which `check` leaves out."""
-    model = small_model(4)
+    model = small_model(4, kp=100)
     model.tendon_frictionloss[:] = 0
     kinds = ["static_tilt", "static_pull"]
-    ranges = ELASTIC | {"kp": (10.0, 1e4)}
+    ranges = ELASTIC | {"kp": (1.0, 1e4)}
     trials = [tilt(model, 40), tilt(model, 70), static_pull(model, (30, -300, -300)),
               static_pull(model, (-300, 45, -300))]  # fmt: skip
-    stage, every = stage_of(model, grid, kinds, ranges, trials)
+    stage, every = stage_of(model, grid, kinds, ranges, trials, 0.002)
     assert name in {one.name for one in every if one.kind == kind}
     now, expected = stage.told([]), stage.told([name])
-    really, _ = told_by(*to_identify_from(settings(kinds, kinds, ranges), model, [*trials, made(model)]), SHARE)
+    really, _ = told_by(*to_identify_from(settings(kinds, kinds, ranges), model, [*trials, made(model)]), 0.002)
     for before, one, other in zip(now, expected, really, strict=True):
         assert one.half_width == pytest.approx(other.half_width, rel=0.03), one.name
         assert one.half_width < before.half_width
@@ -151,7 +157,7 @@ def test_each_suggestion_knows_those_before_it(model, grid):
         assert one.after == pytest.approx(expected_loss([stage], weights, one.chosen))
         assert one.after == pytest.approx(after_each([stage], weights, left, one.chosen[:-1]).min())
     quick = suggest([stage], weights, every, 1, per_minute=True)[0]
-    gains = found[0].before - after_each([stage], weights, every, [])
+    gains = np.sqrt(found[0].before) - np.sqrt(after_each([stage], weights, every, []))
     assert quick.candidate == every[int(np.argmax(gains / [one.minutes for one in every]))]
 
 
@@ -202,10 +208,9 @@ def test_entries_are_read_back(model, grid, tmp_path):
     assert every[0].name not in {t.name for t in session.trials}, "a name that is taken"
 
 
-def test_the_command_says_all_and_writes_nothing(tmp_path, monkeypatch, capsys):
-    workbench(tmp_path)
-    monkeypatch.chdir(tmp_path)
-    files = sorted(path for path in tmp_path.rglob("*") if path.is_file())
+def test_the_command_says_all_and_writes_nothing(project, monkeypatch, capsys):
+    monkeypatch.chdir(project)
+    files = sorted(path for path in project.rglob("*") if path.is_file())
     assert main(["data/raw/demo", "--only", "static_tilt", "--count", "2"]) == 0
     told = capsys.readouterr().out
     assert "twin: as described in params.yaml, as no stage has identified one yet" in told
@@ -213,7 +218,7 @@ def test_the_command_says_all_and_writes_nothing(tmp_path, monkeypatch, capsys):
     assert "  - {file: tilt_0" in told
     assert "experiment: static_tilt, level: " in told
     assert "python -m trunkline.check data/raw/demo" in told
-    assert sorted(path for path in tmp_path.rglob("*") if path.is_file()) == files
+    assert sorted(path for path in project.rglob("*") if path.is_file()) == files
 
 
 @pytest.mark.parametrize(("arguments", "line"), [
@@ -225,9 +230,8 @@ def test_the_command_says_all_and_writes_nothing(tmp_path, monkeypatch, capsys):
     (["data/raw/demo", "--model", "arm.xml"], "arm.xml: no such file, expected the MJCF of an arm"),
     (["data/raw/demo", "--only", "static_path"], "--only: found static_path, expected one that a stage identifies"),
 ])  # fmt: skip
-def test_a_mistake_is_one_line(tmp_path, monkeypatch, capsys, arguments, line):
-    workbench(tmp_path)
-    monkeypatch.chdir(tmp_path)
+def test_a_mistake_is_one_line(project, monkeypatch, capsys, arguments, line):
+    monkeypatch.chdir(project)
     assert main(arguments) == 1
     told = capsys.readouterr()
     assert line in told.err.splitlines()[-1]

@@ -1,4 +1,4 @@
-"""What to record next, in seconds: `python -m trunkline.suggest SESSION`
+"""What to record next, without a fit: `python -m trunkline.suggest SESSION`
 
 Ranks trials that a lab could record (tilts, releases, pulls, curls, motions, loads at the tip) by how much each is
 expected to shrink what you care about, by the Fisher information that it has on the twin: --for intervals (of the
@@ -15,7 +15,6 @@ from pathlib import Path
 import mujoco
 
 from trunkline.arm.kinds import described_arm
-from trunkline.check.told import FRAMES
 from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.evaluate.model import read_arm
 from trunkline.evaluate.session import trials_of
@@ -24,7 +23,7 @@ from trunkline.pipeline.config import load_folder, own_or_project, settings_of
 from trunkline.settings import read_yaml
 from trunkline.suggest.candidates import Candidate, candidates
 from trunkline.suggest.goals import GOALS, Goal, weights_for
-from trunkline.suggest.information import StageInformation, stage_information
+from trunkline.suggest.information import FRAMES, StageInformation, stage_information
 from trunkline.suggest.ranking import Suggestion, after_each, expected_loss, suggest
 from trunkline.suggest.settings import Recordable
 from trunkline.suggest.words import (
@@ -80,7 +79,7 @@ def main(arguments: list[str] | None = None) -> int:
 def _check(told: argparse.Namespace) -> None:
     """Refuse options that mean nothing, before any work."""
     if told.goal not in GOALS:
-        raise InputError(f"--for: found {told.goal!r}, expected one of {', '.join(GOALS)}{nearest(told.goal, GOALS)}")
+        raise InputError(f"--for: found {told.goal!r}, expected one of {', '.join(GOALS)}{nearest(told.goal, list(GOALS))}")
     kinds = list(EXPERIMENTS)
     for kind in told.only:
         if kind not in kinds:
@@ -136,8 +135,10 @@ def _report(
     minutes = sum(one.candidate.minutes for one in found)
     lines = [
         f"goal: {TITLES[goal]}",
-        f"now, with {own} trials to identify from: {loss_words(goal, now)}; widest: {widest_words(stages, [])}",
-        "", f"suggested, of {len(usable)} that could be recorded, each knowing those before it:",
+        f"now, with {own} trials to identify from and a fitted model that is off by {told.error:g} %: "
+        f"{loss_words(goal, now)}; widest: {widest_words(stages, [])}",
+        "", f"suggested, of {len(usable)} that could be recorded, by gain a {'minute' if told.per_minute else 'trial'}, "
+        "each knowing those before it:",
         *(f"  {line}" for line in table_lines(goal, found)),
         f"after all, {minutes:g} minutes: {loss_words(goal, last.after)}; widest: {widest_words(stages, last.chosen)}",
         "", "why:", *(f"  {n}  {why_words(stages, weights, one)}" for n, one in enumerate(found, 1)),

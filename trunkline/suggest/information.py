@@ -7,7 +7,8 @@ that is off by a share s of each point's distance from the base, a trial tells
 
 which is `trunkline.check.told` by the trial: over T trials Σ M_t is the inverse of its s² (JᵀJ)⁻¹ / (NUMBERS T). Trials
 are independent, so information adds. Where motors hold the arm at rest, friction holds it anywhere in a band, in whose
-middle the twin has it: there s² is more by the variance of a rectangular distribution over that band. Here u = (z - middle) / half, z over half its range: what `told` calls a share.
+middle the twin has it: there s² is more by the variance of a rectangular distribution over that band. All of it is of
+u = (z - middle) / half, z over half of its range: what `told` calls a share.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +18,7 @@ import numpy as np
 
 from trunkline.certificate.arms import arm_of
 from trunkline.certificate.poses import Poses
-from trunkline.check.told import FRAMES, NUMBERS, TWO_SIDED, Told
+from trunkline.check.told import NUMBERS, TWO_SIDED, Told
 from trunkline.elements import actuators
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.fit import Fit
@@ -32,6 +33,7 @@ from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.trial import Trial
 
 PRIOR = 3.0  # information of "somewhere within its range": the variance of an even distribution over ±1 is 1/3
+FRAMES = 120  # of a moving trial that are looked at, recorded or not
 SAME = 0.02  # of a point's distance from the base, within which a candidate is a trial that there is
 
 

@@ -64,7 +64,7 @@ def suggest(
     while left and len(found) < count:
         after = after_each(stages, weights, left, chosen)
         minutes = np.array([one.minutes for one in left]) if per_minute else 1.0
-        best = int(np.argmax((before - after) / minutes))
+        best = int(np.argmax((np.sqrt(before) - np.sqrt(after)) / minutes))
         if after[best] >= before * (1 - 1e-9):
             break
         one = left.pop(best)

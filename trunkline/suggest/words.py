@@ -18,8 +18,7 @@ PERCENT = 0.2  # half-width of a logarithm, below which percent say it
 TITLES: dict[Goal, str] = {
     "intervals": "root mean square of the 95 % intervals over their ranges",
     "tip": "standard uncertainty of the tip at rest by the parameters, over the workspace",
-    "grasp": "standard uncertainty of the tip by the parameters where the arm is wound up, which stands in for the "
-    "probability to hold a thing: that one is not computed",
+    "grasp": "standard uncertainty of the tip by the parameters where the arm is wound up, in place of a grasp's odds",
 }
 
 
