@@ -79,7 +79,8 @@ def main(arguments: list[str] | None = None) -> int:
 def _check(told: argparse.Namespace) -> None:
     """Refuse options that mean nothing, before any work."""
     if told.goal not in GOALS:
-        raise InputError(f"--for: found {told.goal!r}, expected one of {', '.join(GOALS)}{nearest(told.goal, list(GOALS))}")
+        expected = f"{', '.join(GOALS)}{nearest(told.goal, list(GOALS))}"
+        raise InputError(f"--for: found {told.goal!r}, expected one of {expected}")
     kinds = list(EXPERIMENTS)
     for kind in told.only:
         if kind not in kinds:
@@ -132,13 +133,12 @@ def _report(
     usable = [one for one in offered if any(one.name in stage.added for stage in stages)]
     last, filtered = found[-1], not (told.session / "session.yaml").is_file()
     session = "data/raw/<session>" if filtered else told.session
-    minutes = sum(one.candidate.minutes for one in found)
+    minutes, unit = sum(one.candidate.minutes for one in found), "minute" if told.per_minute else "trial"
     lines = [
         f"goal: {TITLES[goal]}",
         f"now, with {own} trials to identify from and a fitted model that is off by {told.error:g} %: "
         f"{loss_words(goal, now)}; widest: {widest_words(stages, [])}",
-        "", f"suggested, of {len(usable)} that could be recorded, by gain a {'minute' if told.per_minute else 'trial'}, "
-        "each knowing those before it:",
+        "", f"suggested, of {len(usable)} that could be recorded, by gain a {unit}, each knowing those before it:",
         *(f"  {line}" for line in table_lines(goal, found)),
         f"after all, {minutes:g} minutes: {loss_words(goal, last.after)}; widest: {widest_words(stages, last.chosen)}",
         "", "why:", *(f"  {n}  {why_words(stages, weights, one)}" for n, one in enumerate(found, 1)),
