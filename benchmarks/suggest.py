@@ -209,7 +209,8 @@ def main() -> int:
     grid = replace(load_folder(Recordable, Path("conf/suggest")), loads=[])
     settings = {stage: settings_of(stage) for stage in STAGES}
     cad = described_arm(settings_of("build_mjcf"), Path("conf")).spec.compile()
-    made_of = digest((settings, grid, ADDED, FRAMES, SHARE), Path("demo/plants"), ROOT / "conf/record/plant")
+    lab = [*sorted(Path("demo/plants").glob("*.py")), ROOT / "conf"]
+    made_of = digest((settings, grid, ADDED, FRAMES, SHARE), *lab)
     rows = Rows("suggest", made_of, "seed")
     with threadpool_limits(1, user_api="blas"):
         for seed in islice(count(), len(rows.read()), arguments.seeds):
