@@ -17,7 +17,7 @@ from trunkline.demonstrations.recording import read_recording
 from trunkline.live.logbook import read_logbook
 
 FPS = 25
-READER = Path(__file__).with_name("lerobot_reads.py")
+READER = Path(__file__).parents[2] / "examples/demonstrations/load.py"
 OTHER = os.environ.get("LEROBOT_PYTHON", "")
 TASKS = ("bring the mount and the soft arm's tip to their targets", "grasp the cylinder",
          "follow the hands with mount and tip")  # fmt: skip
