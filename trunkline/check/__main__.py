@@ -10,7 +10,6 @@ import sys
 from pathlib import Path
 
 from trunkline.arm.kinds import described_arm
-from trunkline.called import called
 from trunkline.check.recorded import missing_lines, recorded_lines
 from trunkline.check.told import described_lines, to_identify_from, told_by, untold
 from trunkline.errors import in_one_line
@@ -27,7 +26,7 @@ STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.check"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="python -m trunkline.check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("session", type=Path, metavar="SESSION",
                         help="folder of logs and session.yaml, or of filtered trials")  # fmt: skip
