@@ -4,6 +4,7 @@
 PYTHON := $(or $(PYTHON),$(shell for python in python3.11 python3 python3.12 python3.13; do \
   $$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null && echo $$python && break; done))
 STAMP := .venv/requirements.lock
+INSTALLED := .venv/pyproject.toml
 TOOLS := client/node_modules/package-lock.json
 REQUIREMENTS := requirements.lock requirements-torch.txt
 PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
@@ -55,7 +56,7 @@ pull: setup          ## bring the session and all results from the DVC remote
 push: setup          ## send the session and all results to the DVC remote
 	dvc push $(SHARED)
 
-setup: $(STAMP)
+setup: $(STAMP) $(INSTALLED)
 
 # For work on the page and its tests; users of the page need neither. Node is a package of requirements.lock, which
 # pyright needs as well. TRUNKLINE_BROWSER names another Chromium; with `none` the tests in it are left out.
@@ -79,8 +80,7 @@ mono:
 
 # The stamp is made last: an interrupted set-up starts again. It is compared by content: to another branch and back
 # installs nothing. The lock is complete, so pip need not resolve anything; torch comes by itself (requirements-torch.txt
-# says why). The editable install puts this folder on the path of the virtual environment's Python, with the setuptools
-# of the lock, so that nothing unlocked is fetched to build.
+# says why).
 $(STAMP): $(shell cat $(REQUIREMENTS) | cmp -s - $(STAMP) || echo stale)
 	@test -n "$(PYTHON)" || { echo "error: found no Python 3.11 or newer" >&2; exit 1; }
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
@@ -90,8 +90,14 @@ $(STAMP): $(shell cat $(REQUIREMENTS) | cmp -s - $(STAMP) || echo stale)
 	@echo "installing the packages of requirements.lock into .venv (some minutes, once)"
 	@$(PIP) install --no-compile --no-deps --require-hashes -r requirements.lock
 	@$(PIP) install --no-compile -r requirements-torch.txt
-	@$(PIP) install --no-compile --no-deps --no-build-isolation -e .
 	@cat $(REQUIREMENTS) > $(STAMP)
+
+# The editable install puts this folder on the path of the virtual environment's Python, and its commands beside it, with
+# the setuptools of the lock, so that nothing unlocked is fetched to build. It takes seconds, and is done again where
+# pyproject.toml changed: a command that is new there is there after `make setup`.
+$(INSTALLED): $(STAMP) $(shell cmp -s pyproject.toml $(INSTALLED) || echo stale)
+	@$(PIP) install --no-compile --no-deps --no-build-isolation -e .
+	@cp pyproject.toml $(INSTALLED)
 
 requirements:        ## renew requirements.lock after an edit of pyproject.toml; needs uv, keeps what still fits
 	uv pip compile pyproject.toml --extra dev --universal --generate-hashes --no-emit-package torch \

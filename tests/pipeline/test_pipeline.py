@@ -17,6 +17,7 @@ from dvc.repo import Repo
 from omegaconf import OmegaConf
 
 from demo.plants.choice import Choice
+from tests.support.bucket import bucket
 from tests.support.stub_pipeline import StubPipeline
 from trunkline.pipeline import lock, versions
 from trunkline.pipeline.config import SHARED, check_settings, group_options
@@ -345,16 +346,33 @@ def test_a_queued_sweep_runs_every_value(pipeline):
     assert (pipeline.folder / "params.yaml").read_text() == before
 
 
-def test_what_was_pushed_is_pulled_elsewhere_and_not_run_again(pipeline, tmp_path):
-    """docs/remotes.md, with a folder as the remote: the results, and then a session of one's own."""
-    store = ("-q", "-d", "store", str(tmp_path / "store"))
+@pytest.fixture(params=["folder", "bucket"])
+def store(request, tmp_path):
+    """A DVC remote: its `url`, and what else `dvc remote modify` is to be told."""
+    if request.param == "folder":
+        yield {"url": str(tmp_path / "store")}
+    else:
+        with bucket() as there:
+            yield there
+
+
+def _add_remote(pipeline: StubPipeline, store: dict[str, str]) -> None:
+    """As in docs/remotes.md, all of it in `.dvc/config.local`."""
+    pipeline.run("dvc", "remote", "add", "--local", "-q", "-d", "store", store["url"])
+    for option, value in store.items():
+        if option != "url":
+            pipeline.run("dvc", "remote", "modify", "--local", "-q", "store", option, value)
+
+
+def test_what_was_pushed_is_pulled_elsewhere_and_not_run_again(pipeline, store, tmp_path):
+    """docs/remotes.md: the results, and then a session of one's own."""
     make = ("make", "--silent", "--assume-old=setup")  # the environment is there
-    pipeline.run("dvc", "remote", "add", "--local", *store)
+    _add_remote(pipeline, store)
     pipeline.run(*make, "push")
     there = pipeline.clone(tmp_path / "there")
     missing = {name for name in _outputs(pipeline) if not (there.folder / name).exists()}
     assert {"data/raw/demo", "artifacts/identify_control/arm.xml", "data/processed/fk_dataset"} <= missing
-    there.run("dvc", "remote", "add", *store)
+    _add_remote(there, store)
     there.run(*make, "pull")
     assert all(_content(there, name) == _content(pipeline, name) for name in _outputs(pipeline))
     assert there.ran("dvc", "repro", "-q") == []
@@ -367,6 +385,7 @@ def test_what_was_pushed_is_pulled_elsewhere_and_not_run_again(pipeline, tmp_pat
     there.commit()
     elsewhere = there.clone(tmp_path / "elsewhere")
     assert not (elsewhere.folder / own).exists()
+    _add_remote(elsewhere, store)
     elsewhere.run(*make, "pull")
     assert _content(elsewhere, own) == {f"{own}/release_1.mcap": b"poses"}
     assert _content(elsewhere, "data/processed") == _content(pipeline, "data/processed")

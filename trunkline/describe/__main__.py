@@ -8,6 +8,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from trunkline.called import called
 from trunkline.describe.drawing import read_drawing
 from trunkline.describe.words import doubt_lines, marker_lines, tendon_lines, unit_lines
 from trunkline.errors import in_one_line
@@ -20,7 +21,7 @@ from trunkline.statics.chain import read_chain
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m trunkline.describe", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=called("trunkline.describe"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("arm", type=Path, metavar="ARM", help="an arm's YAML, or a model in MJCF")
     parser.add_argument("--session", type=Path, metavar="FOLDER", help="of logs and session.yaml")

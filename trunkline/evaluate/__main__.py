@@ -12,6 +12,7 @@ from pathlib import Path
 
 from threadpoolctl import threadpool_limits
 
+from trunkline.called import called
 from trunkline.errors import InputError, in_one_line
 from trunkline.evaluate.model import read_arm, written_beside
 from trunkline.evaluate.report import change_lines, kind_lines, read_reference, trial_lines
@@ -25,7 +26,7 @@ from trunkline.pipeline.stage import output_folder, write_json
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m trunkline.evaluate", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=called("trunkline.evaluate"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="MJCF of the arm")
     parser.add_argument(

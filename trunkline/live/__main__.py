@@ -14,6 +14,7 @@ import ssl
 import sys
 from pathlib import Path
 
+from trunkline.called import called
 from trunkline.errors import InputError, in_one_line
 from trunkline.live.access import is_local, names_of
 from trunkline.live.certificate import fingerprint, make_certificate, tls_context
@@ -28,7 +29,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     Raises:
         InputError: an address that others reach, without TLS.
     """
-    parser = argparse.ArgumentParser(prog="python -m trunkline.live", description=(__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(prog=called("trunkline.live"), description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("package", type=Path)
     parser.add_argument("--host", default="127.0.0.1", help="an address of this machine")
     parser.add_argument("--port", type=int, default=PORT)

@@ -4,6 +4,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from trunkline.called import called
 from trunkline.errors import InputError, in_one_line
 from trunkline.preparation.proposal import propose
 from trunkline.preparation.survey import describe, survey
@@ -11,7 +12,7 @@ from trunkline.preparation.survey import describe, survey
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog="python -m trunkline.preparation.inspect", description=__doc__)
+    parser = argparse.ArgumentParser(prog=called("trunkline.preparation.inspect"), description=__doc__)
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="an MCAP log, or a folder of them")
     surveys, code = [], 0
     for path in _logs(parser.parse_args(arguments).logs):

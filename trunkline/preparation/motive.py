@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from mcap_ros2.writer import Writer
 
+from trunkline.called import called
 from trunkline.errors import in_one_line
 from trunkline.logs.definitions import MARKERS, RIGID_BODIES
 from trunkline.logs.pose_stream import PoseStream
@@ -53,7 +54,7 @@ def _body(poses: PoseStream, frame: int, body: int) -> dict:
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m trunkline.preparation.motive",
+        prog=called("trunkline.preparation.motive"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

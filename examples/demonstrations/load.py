@@ -1,0 +1,27 @@
+"""What lerobot's own loader reads of a dataset, as JSON: run by a Python in which lerobot is, which knows no Trunkline.
+
+LEROBOT_PYTHON lerobot_reads.py FOLDER
+"""
+# pyright: reportMissingImports=false
+
+import json
+import sys
+
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+CHUNK = 4  # frames of actions that a policy would ask for
+
+dataset = LeRobotDataset("any/name", root=sys.argv[1])
+ahead = {"action": [step / dataset.fps for step in range(CHUNK)]}
+chunks = LeRobotDataset("any/name", root=sys.argv[1], delta_timestamps=ahead)
+frames = [{k: v.tolist() if hasattr(v, "tolist") else v for k, v in dataset[n].items()} for n in range(len(dataset))]
+found = {
+    "episodes": dataset.num_episodes,
+    "fps": dataset.fps,
+    "features": {name: list(one["shape"]) for name, one in dataset.features.items()},
+    "stats": {name: one["mean"].tolist() for name, one in dataset.meta.stats.items()},
+    "frames": frames,
+    "chunks": [chunks[n]["action"].tolist() for n in range(len(chunks))],
+    "padded": [chunks[n]["action_is_pad"].tolist() for n in range(len(chunks))],
+}
+print(json.dumps(found))

@@ -1,0 +1,78 @@
+"""Motion-capture logs in, a calibrated digital twin of a tendon-driven soft arm out.
+
+Each verb tells its own options: `trunkline VERB --help`. `python -m trunkline` is the same command.
+"""
+
+import sys
+from importlib import import_module
+from typing import NamedTuple
+
+from trunkline.called import COMMAND, set_called
+from trunkline.errors import InputError, in_one_line, nearest
+from trunkline.version import __version__
+
+
+class Verb(NamedTuple):
+    """module: whose `main` takes the verb's arguments. extra: of pyproject.toml, what it needs besides `pipeline`."""
+
+    module: str
+    line: str
+    extra: str = ""
+
+
+VERBS = {
+    "inspect": Verb("trunkline.preparation.inspect", "what logs hold, and a session.yaml for them"),
+    "motive": Verb("trunkline.preparation.motive", "OptiTrack Motive's CSV exports as logs of a session"),
+    "describe": Verb("trunkline.describe.__main__", "what an arm's description gives, in words and drawn"),
+    "check": Verb("trunkline.check.__main__", "what a session will and will not tell, before hours of fits"),
+    "suggest": Verb("trunkline.suggest.__main__", "which experiments to record next"),
+    "evaluate": Verb("trunkline.evaluate.__main__", "how far a model is from a session, without a fit"),
+    "report": Verb("trunkline.pipeline.report", "the certificate: one page on how far the twin can be trusted"),
+    "watch": Verb("trunkline.watch.__main__", "whether the arm has changed since it was identified"),
+    "fleet": Verb("trunkline.fleet.__main__", "several arms beside each other"),
+    "randomise": Verb("trunkline.randomise.__main__", "what was identified, as domain randomisation for learning"),
+    "live": Verb("trunkline.live.__main__", "a session in a browser or a headset", "live,hybrid,teleop"),
+    "demonstrations": Verb(
+        "trunkline.demonstrations.__main__",
+        "what operators did in live sessions, as a dataset for LeRobot",
+        "live,teleop",
+    ),
+}  # in the order in which a lab comes to them
+HELP = ("-h", "--help")
+
+
+def overview() -> str:
+    """What `trunkline --help` prints."""
+    width = max(map(len, VERBS))
+    lines = [f"  {name:{width}}  {verb.line}" for name, verb in VERBS.items()]
+    return "\n".join([f"usage: {COMMAND} VERB [ARGUMENT...]", "", (__doc__ or "").strip(), "", *lines])
+
+
+@in_one_line
+def main(arguments: list[str] | None = None) -> int:
+    told = sys.argv[1:] if arguments is None else arguments
+    if not told or told[0] in HELP:
+        print(overview())
+        return 0 if told else 2
+    name, *rest = told
+    if name == "--version":
+        print(f"{COMMAND} {__version__}")
+        return 0
+    if name not in VERBS:
+        meant = nearest(name, list(VERBS)) or ", expected one of " + ", ".join(VERBS)
+        raise InputError(f"{COMMAND}: found {name!r}, no such verb{meant}")
+    verb = VERBS[name]
+    try:
+        module = import_module(verb.module)
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] == "trunkline":
+            raise
+        extras = ",".join(filter(None, ("pipeline", verb.extra)))
+        found = f"found no module {error.name!r}, expected what `pip install 'trunkline[{extras}]'` brings"
+        raise InputError(f"{COMMAND} {name}: {found}") from error
+    set_called(name)
+    return module.main(rest)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

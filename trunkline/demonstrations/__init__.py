@@ -1,0 +1,1 @@
+"""What operators did in live sessions, for robots that learn from it."""

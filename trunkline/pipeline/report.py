@@ -1,0 +1,43 @@
+"""The certificate, brought up to date: `python -m trunkline.pipeline.report`
+
+It is the stage `report`, by DVC: stages before it run where code, settings or logs changed since, which may take hours;
+`--dry-run` says what changed. The page is artifacts/report/certificate.html, the same facts as JSON lie beside it.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+from trunkline.called import called
+from trunkline.errors import in_one_line
+from trunkline.pipeline.checkout import require_checkout
+
+PAGE = Path("artifacts/report/certificate.html")
+
+
+@in_one_line
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog=called("trunkline.pipeline.report"), description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
+    parser.add_argument("--dry-run", action="store_true", help="say what changed since they ran, and run none")
+    parser.add_argument("--project", type=Path, metavar="FOLDER", default=Path("."),
+                        help="where dvc.yaml is; default: the current folder")  # fmt: skip
+    told = parser.parse_args(arguments)
+    require_checkout(told.project)
+    # a stage is `python -m ...`: of this Python, also where its environment is not the activated one
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
+    # `dvc repro --dry` ends at the first stage whose inputs another one has yet to write, as in a fresh clone
+    verb = ["status", "--with-deps"] if told.dry_run else ["repro"]
+    command = [sys.executable, "-m", "dvc", *verb, "report"]
+    code = subprocess.run(command, cwd=told.project, env=os.environ | {"PATH": path}).returncode
+    if code == 0 and not told.dry_run:
+        print(f"report: {told.project / PAGE}")
+    return code
+
+
+if __name__ == "__main__":
+    sys.exit(main())
