@@ -15,6 +15,7 @@ from pathlib import Path
 import mujoco
 
 from trunkline.arm.kinds import described_arm
+from trunkline.called import called
 from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.evaluate.model import read_arm
 from trunkline.evaluate.session import trials_of
@@ -47,7 +48,7 @@ Stages = list[StageInformation]
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m trunkline.suggest", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=called("trunkline.suggest"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("session", type=Path, metavar="SESSION",
                         help="folder of logs and session.yaml, or of filtered trials")  # fmt: skip
