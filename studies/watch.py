@@ -1,0 +1,165 @@
+"""In how many trials a watch finds that the arm has become softer, and how often it cries wolf: `python -m studies.watch`
+
+The stand-in lab records the arm as it is and with all joints 5 % softer, under conditions that its session mostly does
+not have, each trial with noise of its own. `trunkline.watch` takes the logs in as a lab's and scores them; the
+reference is the demo session, of whose arm the model is. Trials that are scored are kept in docs/results/watch.csv, as
+they take long; the charts are made anew from them. Each chart begins with trials of the unchanged arm.
+"""
+
+import argparse
+import json
+import sys
+import tempfile
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from benchmarks.identification.case import require_demo
+from demo.experiments import Experiments, Motion, Pull
+from demo.instruments import measure
+from demo.laboratory import Laboratory
+from demo.plants.choice import plant_of
+from demo.plants.stranger import Stranger
+from demo.record import Config
+from demo.recorder import write_log, write_session
+from demo.rig import ROOT
+from demo.truth import Truth
+from studies.rows import Rows, digest
+from trunkline.errors import InputError, in_one_line
+from trunkline.pipeline.config import load_config
+from trunkline.progress import progress
+from trunkline.watch.intake import take
+from trunkline.watch.ledger import read_score, told
+from trunkline.watch.scores import Score, Scorer
+from trunkline.watch.watch import scorer_of
+
+MODEL, TRIALS = Path("artifacts/identify_control/arm.xml"), Path("data/processed/filter")
+SOFTER = 0.95  # of the stiffness
+SEED, SEEDS = 7, 20
+EACH = {"static_tilt": 140, "release": 140, "curl": 60, "static_pull": 60, "motion": 20}  # of the unchanged arm
+AFTER = {"static_tilt": 3, "release": 3, "curl": 3, "static_pull": 3}  # of the softer one, a seed
+BEFORE = 8  # trials of the unchanged arm with which a chart begins
+LATEST = 3  # trials within which a change should be found
+
+
+def planned(kind: str, base: Experiments, rng: np.random.Generator) -> Experiments:
+    """One trial of a kind under conditions that are drawn."""
+    empty = replace(base, tilts=[], release_directions=[], curl_levels=[], pulls=[], motions=[], loads=[])
+    empty.tilt_repeats = 1
+    if kind == "static_tilt":  # half of them as the session has them
+        usual = float(rng.choice(base.tilts[1:]))
+        return replace(empty, tilts=[usual if rng.random() < 0.5 else float(rng.uniform(25, 100))])
+    if kind == "release":
+        factor = float(rng.uniform(1.0, 1.3))
+        return replace(empty, release_directions=[float(rng.uniform(0, 360))], release_factors=[factor])
+    if kind == "curl":
+        tendons = [[1], [2], [3], [1, 2], [2, 3], [1, 3]][rng.integers(6)]
+        return replace(empty, curl_levels=[float(rng.uniform(20, 100))], curl_tendons=[tendons])
+    if kind == "static_pull":
+        levels: list[float | None] = [None, None, None]
+        for tendon in rng.choice(3, size=rng.integers(1, 3), replace=False):
+            levels[tendon] = float(rng.uniform(10, 55))
+        return replace(empty, pulls=[Pull(levels, bool(rng.random() < 0.5))])
+    frequencies = np.sort(rng.uniform(0.3, 1.8, 3)).round(2).tolist()
+    return replace(empty, motions=[Motion(frequencies, float(rng.uniform(15, 40)), float(rng.uniform(-4, 1)))])
+
+
+def done(lab: Laboratory, kind: str, plan: Experiments, rng: np.random.Generator) -> Truth:
+    """The trial of a kind."""
+    ways: dict[str, Callable[[], list[Truth]]] = {
+        "static_tilt": lambda: lab.tilts(plan, rng),
+        "release": lambda: lab.releases(plan),
+        "curl": lambda: lab.curls(plan),
+        "static_pull": lambda: lab.pulls(plan),
+        "motion": lambda: lab.motions(plan, rng),
+    }
+    return ways[kind]()[0]
+
+
+def softened(plant: Stranger) -> Stranger:
+    """The same arm, all of its joints softer: what is elastic, what relaxes and what keeps a memory alike."""
+    plant.links = plant.links._replace(stiffness=SOFTER * plant.links.stiffness)
+    return plant
+
+
+def scored(lab: Laboratory, config: Config, kind: str, rng: np.random.Generator, scorer: Scorer) -> Score:
+    """A trial of a kind, recorded as a log and taken in from there."""
+    truth = done(lab, kind, planned(kind, config.experiments, rng), rng)
+    measurement = measure(truth, config.instruments, rng)
+    with tempfile.TemporaryDirectory() as name:
+        session = Path(name)
+        write_log(session / f"{truth.name}.mcap", measurement)
+        write_session(session, [measurement], config.instruments)
+        taken = take(session, {f"{truth.name}.mcap"}, Path("."))
+    if not taken.trials:
+        raise InputError(next(iter(taken.refused.values())))
+    return scorer.score(taken.trials[truth.name])
+
+
+def wanted(seeds: int, unchanged: int) -> list[tuple[str, str, int]]:
+    """Arm, kind and number of every trial, in the order in which they are done."""
+    after = [("softer", kind, i) for kind, each in AFTER.items() for i in range(each * seeds)]
+    before = [("unchanged", kind, i) for kind, each in EACH.items() for i in range(each)]
+    order = np.random.default_rng(SEED).permutation(len(before))  # the mixture is the same, however many are done
+    first = len(TELLING) * AFTER[TELLING[0]] * seeds
+    return after[:first] + [before[i] for i in order[:unchanged]] + after[first:]
+
+
+def collect(rows: Rows, trials: list[tuple[str, str, int]], scorer: Scorer) -> None:
+    """Record and score what is not among the rows yet."""
+    config = load_config(Config, "record", ROOT)
+    tracked = [number - 1 for number in config.arm.tracked]
+    plants = {"unchanged": plant_of(config), "softer": softened(plant_of(config))}
+    labs = {arm: Laboratory(plant, config.experiments.mount_position, tracked) for arm, plant in plants.items()}
+    known = rows.read()
+    with redirect_stdout(sys.stderr), progress(len(trials), "watch", "trials") as bar:
+        for arm, kind, index in trials:
+            key = f"{arm}_{kind}_{index}"
+            if key not in known:
+                draw = [SEED, list(labs).index(arm), list(EACH).index(kind), index]
+                try:
+                    score = scored(labs[arm], config, kind, np.random.default_rng(draw), scorer)
+                    rows.add(key, arm=arm, number=index, told=packed(score))
+                except InputError as error:  # refused by what looks over logs, as a lab's would be
+                    rows.add(key, arm=arm, number=index, told=f"refused: {error}")
+            bar.update(1, trial=key)
+
+
+def packed(score: Score) -> str:
+    """A score in few bytes: the curvature is symmetric."""
+    row = told(score)
+    upper = score.curvature[np.triu_indices(len(score.slope))]
+    row |= {"slope": [f"{value:.5g}" for value in score.slope], "curvature": [f"{value:.5g}" for value in upper]}
+    return json.dumps({"trial": score.name} | row)
+
+
+def unpacked(text: str) -> Score:
+    row = json.loads(text)
+    row["slope"] = [float(value) for value in row["slope"]]
+    upper = np.zeros((len(row["slope"]),) * 2)
+    upper[np.triu_indices(len(upper))] = [float(value) for value in row["curvature"]]
+    row["curvature"] = upper + np.triu(upper, 1).T
+    return read_score(row)
+
+
+@in_one_line
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="studies.watch", description=__doc__)
+    parser.add_argument("--seeds", type=int, default=SEEDS, help="charts of the softer arm, of each kind of trial")
+    parser.add_argument("--unchanged", type=int, default=sum(EACH.values()), help="trials of the unchanged arm, at most")
+    arguments = parser.parse_args()
+    require_demo(MODEL)
+    scorer = scorer_of(MODEL, Path("."))
+    lab = [*sorted(Path("demo").rglob("*.py")), ROOT / "conf"]
+    rows = Rows("watch", digest((SEED, SOFTER, scorer.parameters), MODEL, TRIALS, *lab), "trial")
+    with threadpool_limits(1, user_api="blas"):
+        collect(rows, wanted(arguments.seeds, arguments.unchanged), scorer)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
