@@ -1,4 +1,4 @@
-"""In how many trials a watch finds that the arm has become softer, and how often it cries wolf: `python -m studies.watch`
+"""In how many trials a watch finds a softer arm, and how often it cries wolf: `python -m studies.watch`
 
 The stand-in lab records the arm as it is and with all joints 5 % softer, under conditions that its session mostly does
 not have, each trial with noise of its own. `trunkline.watch` takes the logs in as a lab's and scores them; the
@@ -42,6 +42,7 @@ SOFTER = 0.95  # of the stiffness
 SEED, SEEDS = 7, 20
 EACH = {"static_tilt": 140, "release": 140, "curl": 60, "static_pull": 60, "motion": 20}  # of the unchanged arm
 AFTER = {"static_tilt": 3, "release": 3, "curl": 3, "static_pull": 3}  # of the softer one, a seed
+TELLING = ("static_tilt", "release")  # kinds that tell stiffness well
 BEFORE = 8  # trials of the unchanged arm with which a chart begins
 LATEST = 3  # trials within which a change should be found
 
@@ -150,7 +151,7 @@ def unpacked(text: str) -> Score:
 def main() -> int:
     parser = argparse.ArgumentParser(prog="studies.watch", description=__doc__)
     parser.add_argument("--seeds", type=int, default=SEEDS, help="charts of the softer arm, of each kind of trial")
-    parser.add_argument("--unchanged", type=int, default=sum(EACH.values()), help="trials of the unchanged arm, at most")
+    parser.add_argument("--unchanged", type=int, default=sum(EACH.values()), help="trials of the other, at most")
     arguments = parser.parse_args()
     require_demo(MODEL)
     scorer = scorer_of(MODEL, Path("."))
