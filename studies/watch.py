@@ -40,7 +40,8 @@ from trunkline.watch.watch import scorer_of
 MODEL, TRIALS = Path("artifacts/identify_control/arm.xml"), Path("data/processed/filter")
 SOFTER = 0.95  # of the stiffness
 SEED, SEEDS = 7, 20
-EACH = {"static_tilt": 140, "release": 140, "curl": 60, "static_pull": 60, "motion": 20}  # of the unchanged arm
+KINDS = ("static_tilt", "release", "curl", "static_pull", "motion")  # a number of its own for the draws of each
+EACH = {"static_tilt": 160, "release": 130, "static_pull": 60, "curl": 40, "motion": 10}  # of the unchanged arm
 AFTER = {"static_tilt": 3, "release": 3, "curl": 3, "static_pull": 3}  # of the softer one, a seed
 TELLING = ("static_tilt", "release")  # kinds that tell stiffness well
 BEFORE = 8  # trials of the unchanged arm with which a chart begins
@@ -121,7 +122,7 @@ def collect(rows: Rows, trials: list[tuple[str, str, int]], scorer: Scorer) -> N
         for arm, kind, index in trials:
             key = f"{arm}_{kind}_{index}"
             if key not in known:
-                draw = [SEED, list(labs).index(arm), list(EACH).index(kind), index]
+                draw = [SEED, list(labs).index(arm), KINDS.index(kind), index]
                 try:
                     score = scored(labs[arm], config, kind, np.random.default_rng(draw), scorer)
                     rows.add(key, arm=arm, number=index, told=packed(score))

@@ -19,7 +19,7 @@ from scipy.special import ndtri, stdtr
 from trunkline.watch.scores import Score
 
 LEAST = 4  # degrees of freedom of a spread
-TELLING = 0.05  # share of the most information of a kind's trials, below which a trial does not tell a parameter
+TELLING = 0.05  # share of the usual information of a kind's trials, below which a trial does not tell a parameter
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class Baseline:
 
 def _groups(kind: str, own: list[Score], p: int) -> tuple[float, Group | None, dict[tuple, Group]]:
     """The least information that counts, the group of the whole kind, and those of its conditions."""
-    least = TELLING * max(score.information[p] for score in own)
+    least = TELLING * float(np.median([score.information[p] for score in own]))
     telling = [score for score in own if score.information[p] > least]
     if len(telling) <= LEAST:
         return least, None, {}

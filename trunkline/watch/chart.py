@@ -23,6 +23,7 @@ from trunkline.watch.scores import Score
 
 FORGETTING = 0.25  # λ: Montgomery (2013, section 9.2) advises 0.05 to 0.25; the largest sees a few per cent soonest
 ALONE = 0.75  # of the limit, that one trial may move the chart
+NEAR = 1.0  # a chart's standard deviation; a change begins where the chart was last within (after Nishina 1992: at 0)
 FALSE_ALARMS = 1 / 500  # a trial, for all parameters together: an average run length of 500, as in the tables of EWMA
 RUNS, LENGTH, SEED = 2000, 200, 1  # of the simulation
 WIDEST = 12.0  # a limit; with more, a chart says nothing
@@ -38,7 +39,6 @@ class Line:
     best: float
     mean: float = 0.0
     variance: float = LONG_RUN
-    since: int = 0  # trials since the mean was last on the other side: when a change began (Nishina 1992)
 
     @property
     def level(self) -> float:
@@ -52,7 +52,6 @@ class Line:
         """One trial more."""
         weight = min(1.0, self.best / departure.deviation)
         mean, variance = _advance(self.mean, self.variance, departure.z, weight, self.limit)
-        self.since = self.since + 1 if mean * self.mean > 0 else 1
         self.mean, self.variance = float(mean), float(variance)
 
 
@@ -91,15 +90,14 @@ class Chart:
         return next((i for i, one in enumerate(self.trials) if one.alarms), None)
 
     def suspects(self) -> list[Charted]:
-        """The trials up to the first alarm since the chart that raised it was last on the other side."""
+        """The trials up to the first alarm since the chart that is furthest beyond was last near its middle."""
         at = self.changed()
         if at is None:
             return []
-        begun = at
-        for p in self.trials[at].alarms:
-            side, own = np.sign(self.trials[at].levels[p]), at
-            while own >= 0 and side * self.trials[own].levels.get(p, side) > 0:
-                begun, own = min(begun, own), own - 1
+        levels, begun = self.trials[at].levels, at
+        worst = max(self.trials[at].alarms, key=lambda p: abs(levels[p]) / self.lines[p].limit)
+        while begun and np.sign(levels[worst]) * self.trials[begun - 1].levels.get(worst, levels[worst]) > NEAR:
+            begun -= 1
         return self.trials[begun : at + 1]
 
 

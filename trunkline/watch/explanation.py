@@ -5,9 +5,10 @@ for one parameter shows on the charts of those that move the arm alike. So Δ is
 at once by generalised least squares, and the parameter is the one that takes most from χ². The covariance is of chance
 (each trial's, correlated between parameters as the reference trials of its kind are) and of the reference's own means,
 which trials of one group share. Correlations of few reference trials are shrunk towards 0 (Schäfer, Strimmer 2005).
+Where more is left than chance leaves, the interval of Δ is widened by the ratio (Birge 1932).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri, stdtrit
@@ -65,10 +66,11 @@ def explain(trials: list[Charted], baseline: Baseline, parameters: list[int]) ->
             half = float(stdtrit(degrees, 0.975)) / np.sqrt(information)
             changes.append(Change(p, size, half, size**2 * information))
     changes.sort(key=lambda change: -change.gain)
-    best, others = changes[0], changes[1:]
-    left = float(off @ inverse @ off) - best.gain
-    whole = len(rows) < 2 or left <= float(chdtri(len(rows) - 1, CHANCE))
-    return Explanation(best, [one for one in others if best.gain - one.gain < APART], whole)
+    left, free = float(off @ inverse @ off) - changes[0].gain, max(len(rows) - 1, 1)
+    wider = np.sqrt(max(left / free, 1.0))
+    best, *others = (replace(change, half_width=float(wider * change.half_width)) for change in changes)
+    alike = [one for one in others if best.gain - one.gain < APART * wider**2]
+    return Explanation(best, alike, left <= float(chdtri(free, CHANCE)))
 
 
 def _shared(one: Charted, p: int, other: Charted, q: int, same: bool) -> float:

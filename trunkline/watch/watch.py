@@ -60,9 +60,11 @@ class Watch:
         made_of = {"model": digest(model), "parameters": list(scorer.parameters)}
         with alone(out):
             ledger = Ledger.opened(out / "scores.jsonl", made_of)
-            known = [] if reference is None else reference_scores(reference, scorer, out, made_of, settings)
+            known, is_new = [], False
+            if reference is not None:
+                known, is_new = reference_scores(reference, scorer, out, made_of, settings)
             watch = cls(folder, out, settings, scorer, ledger, known, Patience(out / "awaited.json"))
-            if known:
+            if is_new:
                 print("\n".join(f"watch: {line}" for line in reference_lines(
                     watch.chart.baseline, watch.chart, scorer.parameters)), flush=True)  # fmt: skip
             for line in watch._alarm():
@@ -201,8 +203,10 @@ def scorer_of(model: Path, settings: Path) -> Scorer:
     return Scorer(arm, watched_in(arm), loss, written.frames, written.command_delay)
 
 
-def reference_scores(reference: Path, scorer: Scorer, out: Path, made_of: dict, settings: Path) -> list[Score]:
-    """Those of the trials of a session that may decide, scored once and kept beside the chart.
+def reference_scores(
+    reference: Path, scorer: Scorer, out: Path, made_of: dict, settings: Path
+) -> tuple[list[Score], bool]:
+    """Those of the trials of a session that may decide, scored once and kept beside the chart; whether only now.
 
     Raises:
         InputError: it is no session, or the model does not fit it.
@@ -211,7 +215,7 @@ def reference_scores(reference: Path, scorer: Scorer, out: Path, made_of: dict, 
     marks = [f"{file.name} {state.mark}" for file in files if (state := state_of(file)) is not None]
     ledger = Ledger.opened(out / "reference.jsonl", made_of | {"reference": marks}, kept=True)
     if ledger.rows and ledger.rows[-1].get("last"):
-        return [read_score(row) for row in ledger.rows]
+        return [read_score(row) for row in ledger.rows], False
     trials = [trial for trial in trials_of(reference, settings) if trial.split in DECIDING]
     check_trials(trials, scorer.model)
     with progress(len(trials), "watch: reference", "trials") as bar:
@@ -219,4 +223,4 @@ def reference_scores(reference: Path, scorer: Scorer, out: Path, made_of: dict, 
             score = scorer.score(trial)
             ledger.add(session=reference.name, trial=trial.name, last=number == len(trials), **told(score))
             bar.update(1, trial=trial.name)
-    return [read_score(row) for row in ledger.rows]
+    return [read_score(row) for row in ledger.rows], True

@@ -9,6 +9,7 @@ from trunkline.watch.chart import Chart, Charted
 from trunkline.watch.explanation import Change, Explanation
 
 TWO_SIDED = 1.96
+HARDLY = 100.0  # %, of a change that one trial does not tell from none
 
 
 def amount(name: str, size: float, half_width: float | None = None) -> str:
@@ -18,7 +19,13 @@ def amount(name: str, size: float, half_width: float | None = None) -> str:
         value, width = size * scale, None if half_width is None else half_width * scale
     else:
         value, width = 100 * np.expm1(size), None if half_width is None else 100 * np.exp(size) * half_width
-    return f"{name} {value:+.2g} {unit}".rstrip() + ("" if width is None else f" ± {width:.2g}")
+    sign = "-" if value < 0 else "+"
+    return f"{name} {sign}{_short(abs(value))} {unit}".rstrip() + ("" if width is None else f" ± {_short(width)}")
+
+
+def _short(value: float) -> str:
+    """Two digits that count, and no power of ten."""
+    return f"{value:.0f}" if value >= 10 else f"{value:.2g}"
 
 
 def shown_in(name: str) -> tuple[str, float]:
@@ -35,10 +42,11 @@ def trial_line(where: str, charted: Charted, chart: Chart, names: tuple[str, ...
     if not charted.levels:
         return f"{where}: says nothing: no reference trials of {charted.score.kind} to compare it with"
     most = max(charted.levels, key=lambda p: abs(charted.levels[p]) / chart.lines[p].limit)
-    own, limit = charted.departures[most], chart.lines[most].limit
-    state = "beyond" if charted.alarms else "within"
-    said = amount(names[most], own.change, TWO_SIDED * own.deviation)
-    return f"{where}: {state} limits; nearest: {said} in this trial, chart {charted.levels[most]:+.1f} of ± {limit:.1f}"
+    own, name = charted.departures[most], names[most]
+    state = "beyond limits: chart of" if charted.alarms else "within limits, nearest: chart of"
+    level = f"{name} at {charted.levels[most]:+.1f} of ± {chart.lines[most].limit:.1f}"
+    alone = amount(name, own.change, TWO_SIDED * own.deviation).removeprefix(f"{name} ")
+    return f"{where}: {state} {level}, this trial alone {alone}"
 
 
 def change_lines(chart: Chart, found: Explanation, names: tuple[str, ...], wheres: list[str]) -> list[str]:
@@ -75,7 +83,8 @@ def reference_lines(baseline: Baseline, chart: Chart, names: tuple[str, ...]) ->
             if own:
                 unit, scale = shown_in(names[p])
                 width = TWO_SIDED * scale * float(np.median([one.deviation for one in own]))
-                told.append(f"{names[p]} {width:.2g} {unit}".rstrip())
+                if unit != "%" or width < HARDLY:
+                    told.append(f"{names[p]} {_short(width)} {unit}".rstrip())
         lines.append(f"  one {kind} tells to ±: {', '.join(told) or f'nothing, it takes {LEAST + 1} or more'}")
     idle = [name for p, name in enumerate(names) if p not in chart.lines]
     return lines + ([f"  not charted, as the reference does not tell them: {', '.join(idle)}"] if idle else [])
