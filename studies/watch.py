@@ -12,7 +12,9 @@ import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import redirect_stdout
+from copy import deepcopy
 from dataclasses import replace
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -22,16 +24,23 @@ from benchmarks.identification.case import require_demo
 from demo.experiments import Experiments, Motion, Pull
 from demo.instruments import measure
 from demo.laboratory import Laboratory
+from demo.plants.bench import Plant
 from demo.plants.choice import plant_of
 from demo.plants.stranger import Stranger
 from demo.record import Config
 from demo.recorder import write_log, write_session
 from demo.rig import ROOT
 from demo.truth import Truth
-from studies.rows import Rows, digest
+from studies.rows import Rows, digest, other_commits
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import load_config
+from trunkline.pipeline.results import recorded
 from trunkline.progress import progress
+from trunkline.trials.splits import DECIDING
+from trunkline.trials.trial import read_trials
+from trunkline.watch.baseline import Baseline
+from trunkline.watch.chart import Chart, chart_of
+from trunkline.watch.explanation import explain
 from trunkline.watch.intake import take
 from trunkline.watch.ledger import read_score, told
 from trunkline.watch.scores import Score, Scorer
@@ -82,8 +91,9 @@ def done(lab: Laboratory, kind: str, plan: Experiments, rng: np.random.Generator
     return ways[kind]()[0]
 
 
-def softened(plant: Stranger) -> Stranger:
+def softened(plant: Plant) -> Plant:
     """The same arm, all of its joints softer: what is elastic, what relaxes and what keeps a memory alike."""
+    assert isinstance(plant, Stranger), "the demo's arm"
     plant.links = plant.links._replace(stiffness=SOFTER * plant.links.stiffness)
     return plant
 
@@ -148,6 +158,105 @@ def unpacked(text: str) -> Score:
     return read_score(row)
 
 
+def referred(rows: Rows, scorer: Scorer) -> list[Score]:
+    """Scores of the session's trials that may decide."""
+    trials, known = read_trials(TRIALS, DECIDING), rows.read()
+    with redirect_stdout(sys.stderr), progress(len(trials), "reference", "trials") as bar:
+        for index, trial in enumerate(trials):
+            if f"reference_{trial.name}" not in known:
+                rows.add(f"reference_{trial.name}", arm="reference", number=index, told=packed(scorer.score(trial)))
+            bar.update(1, trial=trial.name)
+    known = rows.read()
+    return [unpacked(known[f"reference_{trial.name}"]["told"]) for trial in trials]
+
+
+def false_alarms(scores: list[Score], baseline: Baseline, names: tuple[str, ...]) -> list[str]:
+    """Of charts over the unchanged arm's trials, begun anew after each alarm."""
+    lines = ["| trials of the unchanged arm | trials | false alarms | one in | charts that raised them |"]
+    lines.append("|---|---:|---:|---:|---|")
+    kinds = {"of all kinds, mixed": KINDS} | {f"`{kind}` alone": (kind,) for kind in TELLING}
+    for words, chosen in kinds.items():
+        chart = chart_of(baseline, len(names), restart=True)
+        own = [score for score in scores if score.kind in chosen]
+        alarms = [charted.alarms for charted in map(chart.add, own) if charted.alarms]
+        who = ", ".join(sorted({names[p] for found in alarms for p in found})) or "–"
+        often = f"{len(own) / len(alarms):.0f}" if alarms else f"more than {len(own)}"
+        lines.append(f"| {words} | {len(own)} | {len(alarms)} | {often} | {who} |")
+    return lines
+
+
+def found_lines(
+    seeds: int, pool: dict[str, list[Score]], softer: dict[str, dict[int, Score]], baseline, names
+) -> list[str]:
+    """In how many trials of the softer arm each kind of trial finds it, and what is said to have changed."""
+    heads = ["softer by 5 %, seen in", "charts", *(f"found in {n}" for n in range(1, LATEST + 1)), "later or not"]
+    heads += ["named stiffness", "said to be, median", "± holds it", "not told apart from"]
+    lines = [f"| {' | '.join(heads)} |", "|---|" + "---:|" * (len(heads) - 2) + "---|"]
+    mixed = {"tilts and releases in turn": ("static_tilt", "release", "static_tilt")}
+    streams = mixed | {f"`{kind}` alone": (kind,) * LATEST for kind in AFTER}
+    empty = chart_of(baseline, len(names))
+    for words, kinds in streams.items():
+        cases = [case for seed in range(seeds) if (case := stream(seed, kinds, pool, softer)) is not None]
+        found = [outcome(empty, case) for case in cases]
+        told = [(when, explain(chart.suspects(), baseline, list(chart.lines))) for when, chart in found if when]
+        if not cases:
+            continue
+        cells = [str(sum(when == n for when, _ in found)) for n in range(1, LATEST + 1)]
+        cells.append(str(sum(not when for when, _ in found)))
+        right = [one for _, one in told if names[one.best.parameter] == "stiffness"]
+        cells.append(f"{len(right)} of {len(told)}")
+        true = float(np.log(SOFTER))
+        held = sum(abs(one.best.size - true) <= one.best.half_width for one in right)
+        size = np.median([one.best.size for one in right]) if right else np.nan
+        cells += [f"{100 * np.expm1(size):+.1f} %", f"{held} of {len(right)}"]
+        cells.append(", ".join(sorted({names[c.parameter] for _, one in told for c in one.alike})) or "–")
+        lines.append(f"| {words} | {len(cases)} | {' | '.join(cells)} |")
+    return lines
+
+
+def stream(seed: int, kinds: tuple[str, ...], pool, softer) -> tuple[list[Score], list[Score]] | None:
+    """Trials of the unchanged arm, drawn, and those of the softer one that follow; None where they are not done."""
+    rng = np.random.default_rng([SEED, seed])
+    places = {kind: count(seed * AFTER[kind]) for kind in kinds}
+    found = [softer[kind].get(next(places[kind])) for kind in kinds]
+    after = [score for score in found if score is not None]
+    if len(after) < len(found):
+        return None
+    usual = [score for kind in dict.fromkeys(kinds) for score in pool[kind]]
+    if len(usual) < BEFORE:
+        return None
+    return [usual[i] for i in rng.choice(len(usual), BEFORE, replace=False)], after
+
+
+def outcome(empty: Chart, case: tuple[list[Score], list[Score]]) -> tuple[int, Chart]:
+    """After how many trials of the softer arm the alarm came, 0 for none of them, and the chart up to there."""
+    chart = deepcopy(empty)
+    for score in case[0]:
+        if chart.add(score).alarms:  # a false one, counted elsewhere: the chart begins anew
+            chart = deepcopy(empty)
+    for number, score in enumerate(case[1], 1):
+        if chart.add(score).alarms:
+            return number, chart
+    return 0, chart
+
+
+def report(reference: list[Score], trials: list, known: dict[str, dict], seeds: int, scorer: Scorer) -> None:
+    """What the scores so far say."""
+    baseline, names = Baseline(reference), scorer.parameters
+    told = {key: str(known[name]["told"]) for key in trials if (name := "_".join(map(str, key))) in known}
+    refused = [text for text in told.values() if text.startswith("refused")]
+    scores = {key: unpacked(text) for key, text in told.items() if not text.startswith("refused")}
+    unchanged = [score for (arm, _, _), score in scores.items() if arm == "unchanged"]
+    pool = {kind: [score for score in unchanged if score.kind == kind] for kind in KINDS}
+    softer = {kind: {i: s for (arm, k, i), s in scores.items() if (arm, k) == ("softer", kind)} for kind in AFTER}
+    print("\n".join(found_lines(seeds, pool, softer, baseline, names)))
+    print()
+    print("\n".join(false_alarms(unchanged, baseline, names)))
+    print(f"\nrefused as logs: {len(refused)} of {len(told)} trials; {len(reference)} reference trials")
+    if line := other_commits(known):
+        print(line)
+
+
 @in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(prog="studies.watch", description=__doc__)
@@ -159,7 +268,12 @@ def main() -> int:
     lab = [*sorted(Path("demo").rglob("*.py")), ROOT / "conf"]
     rows = Rows("watch", digest((SEED, SOFTER, scorer.parameters), MODEL, TRIALS, *lab), "trial")
     with threadpool_limits(1, user_api="blas"):
-        collect(rows, wanted(arguments.seeds, arguments.unchanged), scorer)
+        reference = referred(rows, scorer)
+        trials = wanted(arguments.seeds, arguments.unchanged)
+        collect(rows, trials, scorer)
+        known, whole = rows.read(), (arguments.seeds, arguments.unchanged) == (SEEDS, sum(EACH.values()))
+        with recorded("watch", keep=whole):
+            report(reference, trials, known, arguments.seeds, scorer)
     return 0
 
 

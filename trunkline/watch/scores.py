@@ -28,7 +28,7 @@ WATCHED = (
 AROUND = 3.0  # times a value, and rad of a signed one, within which differences are taken
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Score:
     """slope: Jᵀr, shape (P,). curvature: JᵀJ, (P, P). Both 0 for what trials of this kind do not tell.
 

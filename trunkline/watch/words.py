@@ -53,7 +53,7 @@ def change_lines(chart: Chart, found: Explanation, names: tuple[str, ...], where
     """That the arm has changed, and which parameter would explain it. wheres: of the chart's trials."""
     at, since = chart.changed(), chart.suspects()
     assert at is not None, "asked for where there was an alarm"
-    first = wheres[chart.trials.index(since[0])]
+    first = wheres[at - len(since) + 1]
     trials = f"{len(since)} trial{'s' if len(since) > 1 else ''}"
     lines = [f"the arm has changed: seen at {wheres[at]}, by {trials} since {first}"]
     lines.append(f"explained best by {_told(found.best, names)}")
