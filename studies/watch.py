@@ -2,8 +2,9 @@
 
 The stand-in lab records the arm as it is and with all joints 5 % softer, under conditions that its session mostly does
 not have, each trial with noise of its own. `trunkline.watch` takes the logs in as a lab's and scores them; the
-reference is the demo session, of whose arm the model is. Trials that are scored are kept in docs/results/watch.csv, as
-they take long; the charts are made anew from them. Each chart begins with trials of the unchanged arm.
+reference is the first trials of each kind that come, and, beside it, the demo session's, which were planned and not
+drawn. Trials that are scored are kept in docs/results/watch.csv, as they take long; the charts are made anew from
+them. Each chart begins with trials of the unchanged arm.
 """
 
 import argparse
@@ -44,7 +45,7 @@ from trunkline.watch.explanation import explain
 from trunkline.watch.intake import take
 from trunkline.watch.ledger import read_score, told
 from trunkline.watch.scores import Score, Scorer
-from trunkline.watch.watch import scorer_of
+from trunkline.watch.watch import LEARN, scorer_of
 
 MODEL, TRIALS = Path("artifacts/identify_control/arm.xml"), Path("data/processed/filter")
 SOFTER = 0.95  # of the stiffness
@@ -170,35 +171,32 @@ def referred(rows: Rows, scorer: Scorer) -> list[Score]:
     return [unpacked(known[f"reference_{trial.name}"]["told"]) for trial in trials]
 
 
-def false_alarms(scores: list[Score], baseline: Baseline, names: tuple[str, ...]) -> list[str]:
+def false_alarms(empty: Chart, scores: list[Score], words: str, names: tuple[str, ...]) -> list[str]:
     """Of charts over the unchanged arm's trials, begun anew after each alarm."""
-    lines = ["| trials of the unchanged arm | trials | false alarms | one in | charts that raised them |"]
-    lines.append("|---|---:|---:|---:|---|")
+    lines = []
     kinds = {"of all kinds, mixed": KINDS} | {f"`{kind}` alone": (kind,) for kind in TELLING}
-    for words, chosen in kinds.items():
-        chart = chart_of(baseline, len(names), restart=True)
+    for mixture, chosen in kinds.items():
+        chart = deepcopy(empty)
+        chart.restart = True
         own = [score for score in scores if score.kind in chosen]
         alarms = [charted.alarms for charted in map(chart.add, own) if charted.alarms]
         who = ", ".join(sorted({names[p] for found in alarms for p in found})) or "–"
         often = f"{len(own) / len(alarms):.0f}" if alarms else f"more than {len(own)}"
-        lines.append(f"| {words} | {len(own)} | {len(alarms)} | {often} | {who} |")
+        lines.append(f"| {words} | {mixture} | {len(own)} | {len(alarms)} | {often} | {who} |")
     return lines
 
 
 def found_lines(
-    seeds: int, pool: dict[str, list[Score]], softer: dict[str, dict[int, Score]], baseline, names
+    empty: Chart, seeds: int, pool: dict[str, list[Score]], softer: dict[str, dict[int, Score]], words: str, names
 ) -> list[str]:
     """In how many trials of the softer arm each kind of trial finds it, and what is said to have changed."""
-    heads = ["softer by 5 %, seen in", "charts", *(f"found in {n}" for n in range(1, LATEST + 1)), "later or not"]
-    heads += ["named stiffness", "said to be, median", "± holds it", "not told apart from"]
-    lines = [f"| {' | '.join(heads)} |", "|---|" + "---:|" * (len(heads) - 2) + "---|"]
+    lines = []
     mixed = {"tilts and releases in turn": ("static_tilt", "release", "static_tilt")}
     streams = mixed | {f"`{kind}` alone": (kind,) * LATEST for kind in AFTER}
-    empty = chart_of(baseline, len(names))
-    for words, kinds in streams.items():
+    for mixture, kinds in streams.items():
         cases = [case for seed in range(seeds) if (case := stream(seed, kinds, pool, softer)) is not None]
         found = [outcome(empty, case) for case in cases]
-        told = [(when, explain(chart.suspects(), baseline, list(chart.lines))) for when, chart in found if when]
+        told = [(when, explain(chart.suspects(), chart.baseline, list(chart.lines))) for when, chart in found if when]
         if not cases:
             continue
         cells = [str(sum(when == n for when, _ in found)) for n in range(1, LATEST + 1)]
@@ -209,8 +207,8 @@ def found_lines(
         held = sum(abs(one.best.size - true) <= one.best.half_width for one in right)
         size = np.median([one.best.size for one in right]) if right else np.nan
         cells += [f"{100 * np.expm1(size):+.1f} %", f"{held} of {len(right)}"]
-        cells.append(", ".join(sorted({names[c.parameter] for _, one in told for c in one.alike})) or "–")
-        lines.append(f"| {words} | {len(cases)} | {' | '.join(cells)} |")
+        cells.append(", ".join(sorted({names[c.parameter] for one in right for c in one.alike})) or "–")
+        lines.append(f"| {words} | {mixture} | {len(cases)} | {' | '.join(cells)} |")
     return lines
 
 
@@ -242,17 +240,27 @@ def outcome(empty: Chart, case: tuple[list[Score], list[Score]]) -> tuple[int, C
 
 def report(reference: list[Score], trials: list, known: dict[str, dict], seeds: int, scorer: Scorer) -> None:
     """What the scores so far say."""
-    baseline, names = Baseline(reference), scorer.parameters
+    names = scorer.parameters
     told = {key: str(known[name]["told"]) for key in trials if (name := "_".join(map(str, key))) in known}
     refused = [text for text in told.values() if text.startswith("refused")]
     scores = {key: unpacked(text) for key, text in told.items() if not text.startswith("refused")}
     unchanged = [score for (arm, _, _), score in scores.items() if arm == "unchanged"]
-    pool = {kind: [score for score in unchanged if score.kind == kind] for kind in KINDS}
     softer = {kind: {i: s for (arm, k, i), s in scores.items() if (arm, k) == ("softer", kind)} for kind in AFTER}
-    print("\n".join(found_lines(seeds, pool, softer, baseline, names)))
-    print()
-    print("\n".join(false_alarms(unchanged, baseline, names)))
-    print(f"\nrefused as logs: {len(refused)} of {len(told)} trials; {len(reference)} reference trials")
+    first = [score for kind in KINDS for score in [score for score in unchanged if score.kind == kind][:LEARN]]
+    seen, wolf = [], []
+    for words, known_trials in (("as they come", first), ("as planned", reference)):
+        empty = chart_of(Baseline(known_trials), len(names))
+        rest = [score for score in unchanged if not any(score is one for one in known_trials)]
+        pool = {kind: [score for score in rest if score.kind == kind] for kind in KINDS}
+        seen += found_lines(empty, seeds, pool, softer, words, names)
+        wolf += false_alarms(empty, rest, words, names)
+    heads = ["reference", "trials of the softer arm", "charts", *(f"found in {n}" for n in range(1, LATEST + 1))]
+    heads += ["later or not", "named stiffness", "said to be, median", "± holds it", "not told apart from"]
+    print("\n".join([f"| {' | '.join(heads)} |", "|---|---|" + "---:|" * (len(heads) - 3) + "---|", *seen]))
+    heads = ["reference", "trials of the unchanged arm", "trials", "false alarms", "one in", "by the charts of"]
+    print("\n".join([f"\n| {' | '.join(heads)} |", "|---|---|---:|---:|---:|---|", *wolf]))
+    print(f"\nrefused as logs: {len(refused)} of {len(told)} trials")
+    print(f"reference: as they come, the first {LEARN} of each kind; as planned, {len(reference)} of the session")
     if line := other_commits(known):
         print(line)
 

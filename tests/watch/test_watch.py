@@ -10,6 +10,7 @@ import pytest
 from tests.watch.sessions import TILTS, record, write_model
 from trunkline.watch import patience
 from trunkline.watch.__main__ import main
+from trunkline.watch.watch import LEARN
 
 ROOT = Path(__file__).parents[2]
 
@@ -169,7 +170,7 @@ def test_without_a_reference_the_first_trials_of_a_kind_stand_for_the_unchanged_
     given = [str(lab / "arm.xml"), str(lab / "drop"), "--settings", str(lab), "--out", str(lab / "learned"), "--once"]
     assert main(given) == 1
     said = capsys.readouterr().out
-    assert said.count("kept to learn from") == 8
+    assert said.count("kept to learn from") == LEARN == 12
     assert "explained best by stiffness -" in said
 
 
