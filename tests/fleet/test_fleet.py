@@ -44,7 +44,8 @@ def test_a_table_and_a_picture_over_arms_that_have_run(tmp_path, capsys):
     said = capsys.readouterr().out
     scored = json.loads((EXAMPLES / "pairs/artifacts/score/metrics.json").read_text())
     errors = next(iter(scored.values()))["identified"]["test"]
-    assert f"| pairs | {errors['trials']} of `test` | {errors['e_position_mm']:.3g} / {errors['e_tip_mm']:.3g} |" in said
+    pair = f"{errors['e_position_mm']:.3g} / {errors['e_tip_mm']:.3g}"
+    assert f"| pairs | {errors['trials']} of `test` | {pair} |" in said
     table = pd.read_csv(tmp_path / "out/fleet.csv")
     assert set(table.arm) == {"asl_trunk", "pairs", "ftdcr"}
     assert table.drift.isna().all()

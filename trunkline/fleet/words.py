@@ -43,7 +43,8 @@ def drift_words(name: str, own: Drift) -> str:
     if PARAMETERS[name].signed:
         said = f"{own.change:+.2g} ± {own.half_width:.2g}"
     else:
-        said = f"{100 * np.expm1(own.change):+.2g} % ± {100 * np.exp(own.change) * own.half_width:.2g}"
+        size, width = 100 * np.expm1(own.change), 100 * np.exp(own.change) * own.half_width
+        said = f"{'-' if size < 0 else '+'}{_number(abs(size))} % ± {_number(width)}"
     return f"**{said}**" if own.beyond else said
 
 
@@ -72,7 +73,7 @@ def long_table(fleet: list[Results], drifts: dict[str, dict[str, Drift]], since:
 
 
 def _number(value: float) -> str:
-    """Three digits that count, without a power of ten where that is short."""
+    """Three digits that count, without a power of ten where that is as short."""
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
 
 
