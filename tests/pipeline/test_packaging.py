@@ -23,7 +23,7 @@ UNSEEN = {
 NEEDS_EXTRA = (
     "trunkline/pipeline", "trunkline/evaluate", "trunkline/execution", "trunkline/figures", "trunkline/ik/learn.py",
     "trunkline/ik/network.py", "trunkline/ik/onnx.py", "trunkline/ik/tip_loss.py", "trunkline/ik/training.py",
-    "trunkline/live", "trunkline/teleop",
+    "trunkline/live", "trunkline/teleop", "trunkline/watch",
 )  # fmt: skip
 
 
