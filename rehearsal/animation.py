@@ -6,7 +6,7 @@ import numpy as np
 
 from rehearsal.experiments.bench import Bench, perform
 from rehearsal.experiments.registry import EXPERIMENTS
-from rehearsal.film import SHOTS_PER_SECOND, Shot, filming
+from rehearsal.film import SHOTS_PER_SECOND, Shot, filmed
 from trunkline.frames import rotation_from_wxyz
 
 AZIMUTH, ELEVATION = np.radians(-58), np.radians(22)  # from where it is seen
@@ -23,10 +23,11 @@ def animate(bench: Bench, names: list[str], seed: int, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     stills = {}
     for name in names:
-        film = filming(bench)
-        result, _ = perform(EXPERIMENTS[name](film, seed))
-        write_gif(film.shots, name, folder / f"{name}.gif")
-        stills[name] = film.shots[: telling(film.shots) + 1]
+        staged = EXPERIMENTS[name](bench, seed)
+        shots = filmed(staged.session)
+        result, _ = perform(staged)
+        write_gif(shots, name, folder / f"{name}.gif")
+        stills[name] = shots[: telling(shots) + 1]
         told = "success" if result.success else result.cause
         print(f"{folder / name}.gif: seed {seed}, {told}, {result.seconds:.0f} s", flush=True)
     figure, plots = _figure(len(names))
@@ -140,19 +141,29 @@ def _circle(centre: np.ndarray, axis: np.ndarray, radius: float) -> np.ndarray:
 
 
 def _outlines(shot: Shot) -> list[np.ndarray]:
-    """Lines of the object: three great circles of a sphere, else its rims and four edges."""
+    """Lines of the object: three great circles of a sphere, else the rims and four edges of each of its parts."""
     turn, thing = rotation_from_wxyz(shot.turn), shot.object
     radius = thing.diameter / 2
     if thing.shape == "sphere":
         return [_circle(shot.thing, axis, radius) for axis in turn.as_matrix()]
-    if thing.shape == "cylinder":
-        rim = radius * np.column_stack([np.cos(AROUND), np.sin(AROUND), np.zeros_like(AROUND)])
+    if thing.shape == "basket":
+        parts = [(part.shape, part.half, part.turn, part.place) for part in thing.parts().values()]
     else:
-        rim = radius * np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0), (1, 1, 0)], dtype=float)
-    up = np.array([0.0, 0.0, thing.half_height])
-    corners = rim[:-1:(len(rim) - 1) // 4]
-    lines = [rim + up, rim - up, *(np.array([corner + up, corner - up]) for corner in corners)]
+        half = np.array([radius, radius, thing.half_height])
+        parts = [("cylinder" if thing.shape == "cylinder" else "box", half, np.eye(3), np.zeros(3))]
+    lines = [line @ own.T + place for shape, half, own, place in parts for line in _edges(shape, half)]
     return [turn.apply(line) + shot.thing for line in lines]
+
+
+def _edges(shape: str, half: np.ndarray) -> list[np.ndarray]:
+    """Rims and four edges of a cylinder about z, or of a box, with half its sizes (3,), m."""
+    if shape == "cylinder":
+        rim = np.column_stack([np.cos(AROUND), np.sin(AROUND), np.zeros_like(AROUND)])
+    else:
+        rim = np.array([(1, 1, 0), (-1, 1, 0), (-1, -1, 0), (1, -1, 0), (1, 1, 0)], dtype=float)
+    rim, up = rim * half, np.array([0.0, 0.0, half[2]])
+    corners = rim[: -1 : (len(rim) - 1) // 4]
+    return [rim + up, rim - up, *(np.array([corner + up, corner - up]) for corner in corners)]
 
 
 def _top(surface) -> np.ndarray:

@@ -1,12 +1,12 @@
-"""A bench whose runs are filmed: what a picture shows of a session, several times a second."""
+"""A session that is filmed: what a picture shows of it, several times a second."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench
 from rehearsal.robot.scene import Object, Surface
 from rehearsal.session import RATE, Session
+from trunkline.frames import rotation_from_wxyz
 from trunkline.panda.kinematics import FLANGE, joint_frames
 
 EVERY = 5  # frames of the session from shot to shot
@@ -40,36 +40,27 @@ class Shot:
     surfaces: list[Surface]
 
 
-@dataclass(frozen=True)
-class Film(Bench):
-    """A bench that keeps a shot of every fifth frame of the sessions that are held on it."""
+def filmed(session: Session) -> list[Shot]:
+    """Of every fifth frame of a session that has not begun: filled as it goes on."""
+    frame, shots, count = session.frame, [], 0
 
-    shots: list[Shot] = field(default_factory=list)
+    def shot():
+        nonlocal count
+        view = frame()
+        if count % EVERY == 0:
+            shots.append(shoot(session, view.intent.mode))
+        count += 1
+        return view
 
-    def session(self, *args, **kwargs) -> Session:
-        session = super().session(*args, **kwargs)
-        frame, count = session.frame, 0
-
-        def filmed():
-            nonlocal count
-            view = frame()
-            if count % EVERY == 0:
-                self.shots.append(shoot(session, view.intent.mode))
-            count += 1
-            return view
-
-        session.frame = filmed
-        return session
-
-
-def filming(bench: Bench) -> Film:
-    return Film(**{one.name: getattr(bench, one.name) for one in fields(bench)})
+    session.frame = shot
+    return shots
 
 
 def shoot(session: Session, mode: str) -> Shot:
     """What is so now; what the client takes for the base frame is turned back into the true one."""
     robot, scene = session.robot, session.robot.scene
     truth, (units, axes) = robot.truth(), robot.links()
+    grip = rotation_from_wxyz(truth.quaternion).apply(scene.object.grip)
     frames = joint_frames(robot.joints[:1])
     origins = [frame.p[:, 0] for frame in frames]
     flange = frames[-1].p[:, 0] + FLANGE * frames[-1].z[:, 0]
@@ -79,7 +70,7 @@ def shoot(session: Session, mode: str) -> Shot:
     return Shot(
         session.now, mode, np.array([np.zeros(3), *origins, flange]), robot.base()[1], units, axes,
         np.array(robot.arm.chain.widths) / 2, _true(session, hands), _true(session, ends),
-        None if shown is None else _true(session, shown), np.array(session.place(session.now)), truth.quaternion,
+        None if shown is None else _true(session, shown), session.place(session.now) - grip, truth.quaternion,
         np.array(scene.hook) if truth.hanging and scene.hook is not None else None,
         scene.object, list(scene.surfaces.values()),
     )  # fmt: skip

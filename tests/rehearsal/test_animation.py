@@ -1,13 +1,14 @@
 """A run that is filmed is the same run, and what is drawn of it is where it is."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib.image import imread
 
 from rehearsal.animation import _circle, _outlines, _seen, telling, write_gif
-from rehearsal.film import Shot
+from rehearsal.film import Shot, filmed
 from rehearsal.robot.scene import Object
 
 SPHERE = Object("sphere", 0.06, 0.06, 0.1, [0.0, 0.0, 0.0])
@@ -42,6 +43,13 @@ def test_outlines_are_as_large_as_the_object(shape, lines):
     np.testing.assert_allclose(points.min(axis=0), np.negative(half), atol=1e-9)
 
 
+def test_a_basket_is_drawn_from_its_floor_to_its_bar():
+    basket = Object("basket", 0.03, 0.1, 0.1, [0.0, 0.0, 0.0])
+    points = np.concatenate(_outlines(shot(thing=basket))) - shot().thing
+    assert points[:, 2].min() == pytest.approx(-basket.half_height)
+    assert points[:, 2].max() == pytest.approx(basket.grip[2] + 0.015)
+
+
 def test_what_is_higher_is_drawn_higher_and_lengths_in_the_picture_s_plane_are_kept():
     low, high = _seen(np.array([[0.3, 0.2, 0.0], [0.3, 0.2, 0.5]]))
     assert low[0] == pytest.approx(high[0])
@@ -59,3 +67,18 @@ def test_a_film_has_a_picture_a_shot(tmp_path):
     assert film.startswith(b"GIF89a")
     assert film.count(b"\x21\xf9\x04") == 3, "a graphic control block before each picture"
     assert imread(tmp_path / "reach.gif").std() > 10, "something is drawn"
+
+
+def test_whatever_session_is_staged_is_filmed_every_fifth_frame(monkeypatch):
+    monkeypatch.setattr("rehearsal.film.shoot", lambda session, mode: (session.now, mode))
+    session = SimpleNamespace(now=0)
+
+    def frame():
+        session.now += 1
+        return SimpleNamespace(intent=SimpleNamespace(mode="aim"))
+
+    session.frame = frame
+    shots = filmed(session)
+    for _ in range(11):
+        session.frame()
+    assert shots == [(1, "aim"), (6, "aim"), (11, "aim")]
