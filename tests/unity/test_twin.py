@@ -307,7 +307,7 @@ def test_branches_of_joints_are_packed_under_names_that_unity_can_hold(sources):
 
 def test_the_component_for_unity_reads_what_the_manifest_holds(files):
     script = files["Runtime/Twin.cs"].decode()
-    classes = re.findall(r"\[Serializable\]\s+public class (\w+) \{(.*?)\}", script, re.DOTALL)
+    classes = re.findall(r"\[Serializable\]\s+private class (\w+) \{(.*?)\}", script, re.DOTALL)
     read = {name: set(re.findall(r"public [\w[\]]+ (\w+);", body)) for name, body in classes}
     blocks = {
         "Manifest": Manifest.model_fields, "Model": Model.model_fields, "Names": Names.model_fields,

@@ -348,7 +348,16 @@ public enum TextAnchor { UpperLeft, UpperCenter, UpperRight, MiddleLeft, MiddleC
 
 public enum TextAlignment { Left, Center, Right }
 
+public class Font : Object {
+  public Material material { get; set; }
+}
+
+public static class Resources {
+  public static T GetBuiltinResource<T>(string path) where T : Object, new() => new T { name = path };
+}
+
 public class TextMesh : Component {
+  public Font font { get; set; }
   public string text { get; set; }
   public TextAnchor anchor { get; set; }
   public TextAlignment alignment { get; set; }
