@@ -244,6 +244,7 @@ public static class Physics {
 
 public static class Time {
   public static double realtimeSinceStartupAsDouble { get; set; }
+  public static float unscaledTime { get; set; }
   public static float unscaledDeltaTime { get; set; }
   public static float deltaTime { get; set; }
   public static float fixedDeltaTime { get; set; } = 0.02f;
@@ -261,6 +262,18 @@ public struct Resolution {
 
 public static class Screen {
   public static Resolution currentResolution => new Resolution();
+}
+
+public interface ISubsystem {}
+
+public static class SubsystemManager {
+  /// <summary>Not of Unity's: those that run.</summary>
+  public static readonly List<ISubsystem> Running = new List<ISubsystem>();
+
+  public static void GetSubsystems<T>(List<T> subsystems) where T : ISubsystem {
+    subsystems.Clear();
+    subsystems.AddRange(Running.OfType<T>());
+  }
 }
 
 public static class Application {
@@ -429,6 +442,34 @@ public struct InputDevice {
     value = Quaternion.identity;
     return false;
   }
+}
+
+public class XRDisplaySubsystem : ISubsystem {
+  /// <summary>Not of Unity's: the rate that a test sets.</summary>
+  public float Rate;
+
+  public bool running => true;
+
+  public bool TryGetDisplayRefreshRate(out float displayRefreshRate) {
+    displayRefreshRate = Rate;
+    return true;
+  }
+}
+
+[Flags]
+public enum TrackingOriginModeFlags { Unknown = 0, Device = 1, Floor = 2 }
+
+public class XRInputSubsystem : ISubsystem {
+  private TrackingOriginModeFlags _origin = TrackingOriginModeFlags.Device;
+
+  public bool running => true;
+
+  public bool TrySetTrackingOriginMode(TrackingOriginModeFlags origin) {
+    _origin = origin;
+    return true;
+  }
+
+  public TrackingOriginModeFlags GetTrackingOriginMode() => _origin;
 }
 
 public static class InputDevices {
