@@ -87,8 +87,9 @@ def run(program: Path, files, folder: Path, happens, manifest: bytes | None = No
     one, two = models
     told = [[{"one": one, "two": two}.get(word, word) if isinstance(word, str) else word for word in line]
             for line in happens]  # fmt: skip
-    scene = {"manifest": str(folder / "manifest.json"), "models": models, "display_rate": RATE, "happens": told} | told_too
-    (folder / "scene.json").write_text(json.dumps(scene | fields(without_component(files, [PREFIX]))))
+    scene = {"manifest": str(folder / "manifest.json"), "models": models, "display_rate": RATE, "happens": told}
+    scene |= told_too | fields(without_component(files, [PREFIX]))
+    (folder / "scene.json").write_text(json.dumps(scene))
     environment = os.environ | {"LD_LIBRARY_PATH": str(program.parent)}
     command = ["mono", str(program), str(folder / "scene.json")]
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
