@@ -16,6 +16,7 @@ using Unity.InferenceEngine;
 using UnityEditor;
 using UnityEngine;
 using UnityEngine.Rendering;
+using UnityEngine.XR;
 using PackageInfo = UnityEditor.PackageManager.PackageInfo;
 
 namespace Trunkline.Tests {
@@ -383,7 +384,7 @@ internal static class Program {
     Require(_unready == 7, "what is not ready refuses");
 
     network.NetworkFile = Model((int)Number(_cases["inputs"]),
-                                (poses, count) => throw new NotSupportedException("no op\nat"));
+                                (poses, count) => { throw new NotSupportedException("no op\nat"); });
     Refused("Arm Network", network, "ik: found that the inference engine does not run it (no op), expected "
         + "Runtime/Network/ik.onnx");
   }
