@@ -8,8 +8,8 @@ by the processor's clock, as this machine does other work as well.
 
 The estimate divides published single-core scores of Geekbench 6, which are of phones' and laptops' highest clock: a
 Snapdragon XR2+ Gen 2 has PLUS (SamMobile, May 2025), its clock is FASTER times that of the XR2 Gen 2 in a Quest 3
-(Road to VR, January 2024), and a laptop's Zen 5 core has ZEN_5 (PC Gamer, March 2026). Other processors than a Zen 5
-need another score. No headset was there; heat, Android and Unity take what they take on top.
+(Road to VR, January 2024), and a laptop's Zen 5 core has ZEN_5 (PC Gamer, March 2026). Measured on a slower core, the
+estimate is too long; on a faster one too short. No headset was there; heat, Android and Unity take their part on top.
 """
 
 import argparse
