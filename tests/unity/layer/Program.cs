@@ -419,6 +419,11 @@ internal static class Program {
         count++;
       }
     }
+    string written = Path.Combine(PackageInfo.Folder, "package.json");
+    string before = File.ReadAllText(written);
+    File.WriteAllText(written, "{\"_fingerprint\": 0," + before.Substring(1));  // as Unity 6 does
+    tests.ReadPackage();
+    File.WriteAllText(written, before);
     Console.WriteLine($"runner {count} cases");
   }
 
