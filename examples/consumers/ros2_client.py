@@ -34,12 +34,14 @@ straight = json.loads(files["Runtime/manifest.json"])["model"]["rest_lengths"]
 pulls = [float(length - command) for length, command in zip(straight.values(), commands, strict=True)]
 model = model_of(files)
 model.body("base").quat = 1, 0, 0, 0  # the world is the base frame
-data, end = mujoco.MjData(model), time.monotonic() + float(sys.argv[2])
+data, end, heard = mujoco.MjData(model), time.monotonic() + float(sys.argv[2]), 0
 while time.monotonic() < end:  # until it rests
     teller.write(JointState(Header(Time(0, 0), ""), list(straight), pulls, [], []))
     for state in [one for one in hearer.take() if isinstance(one, JointState)]:
-        data.qpos = state.position
+        data.qpos, heard = state.position, heard + 1
     time.sleep(0.1)
+if not heard:
+    sys.exit(f"/joint_states: found none in {sys.argv[2]} s, expected those of ros2_node.py, of the same ROS domain")
 mujoco.mj_kinematics(model, data)
 tip = data.site("tip").xpos
 print(f"tip at {', '.join(f'{x:.6f}' for x in tip)} m, {1e3 * np.linalg.norm(tip - pose[3:6]):.2f} mm from its target")

@@ -1,6 +1,7 @@
 """The twin as a node of ROS 2, by DDS and without ROS: pulls in, pulls and joints out, in real time.
 
-    python ros2_node.py org.trunkline.twin-0.1.0.tgz    # after pip install 'trunkline[ros2]'
+    pip install 'path/to/checkout[ros2]'    # of this repository: it is in no registry
+    python ros2_node.py org.trunkline.twin-0.1.0.tgz
 """
 # pyright: reportArgumentType=false, reportCallIssue=false
 
@@ -32,6 +33,7 @@ model.body("base").quat, model.opt.gravity = (1, 0, 0, 0), 9.80665 * np.array(do
 data, straight = mujoco.MjData(model), json.loads(files["Runtime/manifest.json"])["model"]["rest_lengths"]
 data.ctrl = data.act = list(straight.values())  # its controls are commands: at these nothing pulls
 joints = [model.joint(i).name for i in range(model.njnt)]
+begun = time.monotonic()
 while True:
     for command in [one for one in heard.take() if isinstance(one, JointState)]:
         for name, pull in zip(command.name, command.position, strict=True):  # m
@@ -40,4 +42,4 @@ while True:
     pulls = [length - data.tendon(name).length[0] for name, length in straight.items()]
     states.write(JointState(Header(Time(0, 0), ""), list(straight), pulls, [], []))
     angles.write(JointState(Header(Time(0, 0), ""), joints, data.qpos.tolist(), [], []))
-    time.sleep(0.02)
+    time.sleep(max(0.0, begun + data.time - time.monotonic()))  # steps and messages take time too

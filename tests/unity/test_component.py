@@ -76,7 +76,7 @@ def without_component(files, prefixes) -> mujoco.MjModel:
     return scene.model
 
 
-def run(program: Path, files, folder: Path, happens, manifest: bytes | None = None) -> list[list]:
+def run(program: Path, files, folder: Path, happens, manifest: bytes | None = None, **told_too) -> list[list]:
     """What the component does where it is told: angles, activations, times (s), and what the console says."""
     models = {}
     for count, prefixes in ((1, [PREFIX]), (2, [PREFIX, "other_"])):
@@ -88,7 +88,8 @@ def run(program: Path, files, folder: Path, happens, manifest: bytes | None = No
     told = [[{"one": one, "two": two}.get(word, word) if isinstance(word, str) else word for word in line]
             for line in happens]  # fmt: skip
     scene = {"manifest": str(folder / "manifest.json"), "models": models, "display_rate": RATE, "happens": told}
-    (folder / "scene.json").write_text(json.dumps(scene | fields(without_component(files, [PREFIX]))))
+    scene |= told_too | fields(without_component(files, [PREFIX]))
+    (folder / "scene.json").write_text(json.dumps(scene))
     environment = os.environ | {"LD_LIBRARY_PATH": str(program.parent)}
     command = ["mono", str(program), str(folder / "scene.json")]
     done = subprocess.run(command, capture_output=True, text=True, env=environment)
@@ -182,3 +183,20 @@ def test_a_file_that_is_no_manifest_is_one_line(program, files, tmp_path, bad):
         "error: Trunkline Twin: found no Manifest File that says all of an arm, expected Runtime/manifest.json of this "
         "package"
     ]
+
+
+def test_a_scene_that_is_only_written_is_left_alone(program, files, tmp_path):
+    """`CreateScene(skipCompile: true)` raises the event without a model."""
+    happens = [["arm", PREFIX, "one"], ["write"], ["compile", "one"], ["tell"]]
+    ((angles, _, _, told),) = run(program, files, tmp_path, happens)
+    assert np.abs(angles).max() > 1e-4
+    assert told == []
+
+
+def test_another_libmujoco_than_the_plug_in_s_is_one_line(program, files, tmp_path):
+    ((angles, _, _, told),) = run(
+        program, files, tmp_path, [["arm", PREFIX, "one"], ["compile", "one"], ["tell"]], header=3012000
+    )
+    found = f"found libmujoco {mujoco.__version__}, expected 3.12.0, which org.mujoco is made for"
+    assert told == [f"error: Trunkline Twin: {found}"]
+    assert not angles.any()  # a model of other structures is not touched

@@ -188,6 +188,32 @@ def test_a_scene_moves_an_arm_as_mujoco_does(files):
     np.testing.assert_allclose(scene.data.qpos, data.qpos, atol=1e-9)
 
 
+def test_a_mount_that_is_turned_turns_gravity_and_carries_the_arm(files):
+    """Below an MjMocapBody: exactly as an arm that stands still and whose gravity turns the other way."""
+    turn, place = turns(np.radians([40.0]).tolist())[0], np.array([0.3, -0.2, 1.5])
+    scene, still = scene_of(files, UPRIGHT, STEP), scene_of(files, UPRIGHT, STEP)
+    scene.arms[0] = replace(scene.arms[0], mount="mount")
+    for one in (scene, still):
+        one.start()
+        assert off(one, at_rest(model_of(files), UPRIGHT, rest_of(files))) < 0.1 * MM
+    mocap = scene.model.body("mount").mocapid[0]
+    scene.data.mocap_pos[mocap], scene.data.mocap_quat[mocap] = place, turn.as_quat()[[3, 0, 1, 2]]
+    still.model.opt.gravity[:] = turn.inv().apply(still.model.opt.gravity)
+    for one in (scene, still):
+        one.fixed_update(100)
+    np.testing.assert_allclose(scene.site(TIP), place + turn.apply(still.site(TIP)), atol=1e-7)
+    assert np.abs(still.data.qpos).max() > 0.01
+
+
+def test_an_arm_below_a_mount_that_is_turned_starts_at_rest(files):
+    turned = turns([np.radians(60)])[0]
+    scene = scene_of(files, turned, STEP)
+    scene.arms[0] = replace(scene.arms[0], mount="mount")
+    scene.start()
+    scene.fixed_update(round(0.5 / STEP))
+    assert off(scene, at_rest(model_of(files), turned, rest_of(files))) < 0.1 * MM
+
+
 def test_both_languages_settle_by_the_same_numbers():
     script = (CSHARP / "Twin.cs").read_text()
     known = {name: float(value) for name, value in re.findall(r"private const \w+ _(\w+) = ([\d.e-]+);", script)}

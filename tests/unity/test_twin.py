@@ -15,6 +15,7 @@ import numpy as np
 import onnx
 import pytest
 import trimesh
+import yaml
 from onnx import TensorProto, helper
 
 from tests.support.small_arm import small_mjcf
@@ -29,10 +30,12 @@ from trunkline.unity import manifest as schema
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with
 from trunkline.unity.manifest import Manifest, Model, Names
-from trunkline.unity.package import MANIFEST, MODEL, NETWORK, read_tarball, write_tarball
+from trunkline.unity.package import MANIFEST, MODEL, NETWORK, package_json, read_tarball, write_tarball
+from trunkline.unity.plugin import VERSION
 from trunkline.unity.readers import refusals
 from trunkline.unity.roundtrip import curl, simulate
-from trunkline.unity.twin import Label, Sources, Trajectory, assemble, compare
+from trunkline.unity.sources import read_sources
+from trunkline.unity.twin import CSHARP, Label, Sources, Trajectory, assemble, compare
 
 ROOT = Path(__file__).parents[2]
 LABEL = Label("org.trunkline.twin", "1.2.3", "Twin", "A twin.", "6000.0")
@@ -307,7 +310,7 @@ def test_branches_of_joints_are_packed_under_names_that_unity_can_hold(sources):
 
 def test_the_component_for_unity_reads_what_the_manifest_holds(files):
     script = files["Runtime/Twin.cs"].decode()
-    classes = re.findall(r"\[Serializable\]\s+public class (\w+) \{(.*?)\}", script, re.DOTALL)
+    classes = re.findall(r"\[Serializable\]\s+private class (\w+) \{(.*?)\}", script, re.DOTALL)
     read = {name: set(re.findall(r"public [\w[\]]+ (\w+);", body)) for name, body in classes}
     blocks = {
         "Manifest": Manifest.model_fields, "Model": Model.model_fields, "Names": Names.model_fields,
@@ -393,7 +396,7 @@ def project(tmp_path, sources) -> Path:
     root = tmp_path / "project"
     for folder in ("package_unity", "shared"):
         shutil.copytree(ROOT / "conf" / folder, root / "conf" / folder)
-    for name in ("params.yaml", "LICENSE", "CHANGELOG.md", "docs/unity.md"):
+    for name in ("params.yaml", "LICENSE", "trunkline/unity/CHANGELOG.md", "docs/unity.md"):
         (root / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(ROOT / name, root / name)
     stages = (
@@ -513,3 +516,20 @@ def test_sheets_of_other_shapes_are_one_line(sources):
     np.savez(sources.grids, **grids(), **sheets_of_a_ball().arrays() | {"sheets_downs": np.zeros((3, 3))})
     with pytest.raises(InputError, match=r"sheets_points of shape \(20, 12, 8, 3\), sheets_downs of shape \(3, 3\)"):
         assemble(LABEL, sources, TRAJECTORY, ROBOT)
+
+
+def test_the_package_s_changelog_names_its_version(project):
+    label = yaml.safe_load((project / "params.yaml").read_text())["package_unity"]
+    assert f"## [{label['version']}] - " in read_sources(project).texts["CHANGELOG.md"].decode()
+
+
+def test_package_json_has_the_modules_that_the_scripts_use():
+    told = json.loads(package_json("org.a.b", "1.2.3", "A", "6000.0", "B"))
+    script = "".join(path.read_text() for path in CSHARP.rglob("*.cs"))
+    uses = {"jsonserialize": "JsonUtility.", "physics": "Physics.gravity", "xr": "using UnityEngine.XR;"}
+    assert {f"com.unity.modules.{name}" for name in uses} == set(told["dependencies"])
+    assert all(words in script for words in uses.values())
+
+
+def test_the_manifest_names_the_plug_in_s_version(files):
+    assert Manifest.model_validate_json(files[MANIFEST]).versions.unity_plugin == VERSION

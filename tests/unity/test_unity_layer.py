@@ -174,6 +174,7 @@ def test_components_menu_and_sample_do_as_python(layer, files, tmp_path):
     assert wanted.items() <= told.items()
     assert steps > 400
     assert told["offers"] > 5
+    assert told["mounts"] > 20
     assert told["touches"] == len(asked["touches"])
 
 

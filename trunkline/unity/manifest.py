@@ -10,6 +10,7 @@ from trunkline.elements import BRANCH, all_elements, cables
 from trunkline.hybrid.robots import Robot
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw, TendonLaw
+from trunkline.unity.plugin import VERSION
 from trunkline.unity.pulls import rest_lengths
 from trunkline.unity.rounding import ROUNDED
 
@@ -23,6 +24,7 @@ class Versions(_Block):
     trunkline: str
     mujoco: str
     unity: str = Field(description="the oldest editor that it is meant for")
+    unity_plugin: str = Field(default=VERSION, description="of org.mujoco, with the libmujoco of the same version")
 
 
 class Units(_Block):

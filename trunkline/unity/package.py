@@ -20,6 +20,8 @@ MODEL = "Runtime/Model/arm.xml"
 CALIBRATED, PARAMETERS = "Runtime/Model/calibrated.xml", "Runtime/Model/parameters.json"
 NETWORK = "Runtime/Network/ik.onnx"
 MANIFEST, README = "Runtime/manifest.json", "README.md"
+# of Unity's own, which a project may have switched off: JsonUtility, Physics.gravity, controllers of the sample
+MODULES = ["com.unity.modules.jsonserialize", "com.unity.modules.physics", "com.unity.modules.xr"]
 SAMPLES = [{
     "displayName": "Pointing",
     "description": "Two rays set the targets of a robot that carries the arm; the twin bends as the network says.",
@@ -35,7 +37,8 @@ def package_json(name: str, version: str, display_name: str, unity: str, descrip
         "displayName": display_name,
         "unity": unity,
         "description": description,
-        "dependencies": {"com.unity.modules.jsonserialize": "1.0.0"},  # JsonUtility; org.mujoco is in no registry
+        "author": {"name": "Trunkline maintainers"},
+        "dependencies": dict.fromkeys(MODULES, "1.0.0"),  # org.mujoco is in no registry
         "keywords": ["mujoco", "soft robot", "tendon-driven", "digital twin", "teleoperation", "xr"],
         "license": "MIT",
         "samples": SAMPLES,

@@ -11,17 +11,20 @@ from typing import Protocol
 import mujoco
 import numpy as np
 
+VERSION = "3.12.0"  # of org.mujoco, the newest release whose sources were read
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 APART = 2.0  # m, between the arms of a scene
 
 
 @dataclass(frozen=True)
 class Imported:
-    """An arm in a scene: what stands before its names there, its MJCF `as_imported`, its root's quaternion, w first."""
+    """An arm in a scene: what stands before its names there, its MJCF `as_imported`, its root's quaternion, w first,
+    and the name of the `MjMocapBody` above the root, none where it stands still."""
 
     prefix: str
     mjcf: str
     turn: tuple[float, float, float, float] = UPRIGHT
+    mount: str = ""
 
 
 class Component(Protocol):
@@ -104,8 +107,11 @@ class Scene:
             own = mujoco.MjSpec.from_string(arm.mjcf)
             if number == 0:  # MjGlobalSettings, of which a scene has one
                 spec.option = own.option
-            place = spec.worldbody.add_frame(pos=[number * APART, 0, 0], quat=arm.turn)
-            spec.attach(own, prefix=arm.prefix, frame=place)
+            parent, place, turn = spec.worldbody, [number * APART, 0.0, 0.0], arm.turn
+            if arm.mount:
+                parent = parent.add_body(name=arm.mount, mocap=True, pos=place, quat=turn)
+                place, turn = [0.0, 0.0, 0.0], UPRIGHT
+            spec.attach(own, prefix=arm.prefix, frame=parent.add_frame(pos=place, quat=turn))
         self.model = spec.compile()
         self.model.opt.gravity[:] = np.float32(self.gravity)
         self.model.opt.timestep = np.float32(self.step)

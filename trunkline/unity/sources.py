@@ -33,7 +33,7 @@ def read_sources(root: Path) -> Sources:
         texts={
             "README.md": existing(root / "docs/unity.md").read_bytes(),
             "LICENSE.md": existing(root / "LICENSE").read_bytes(),
-            "CHANGELOG.md": existing(root / "CHANGELOG.md").read_bytes(),
+            "CHANGELOG.md": existing(root / "trunkline/unity/CHANGELOG.md").read_bytes(),
         },
         trunkline=__version__,
     )

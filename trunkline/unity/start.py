@@ -28,13 +28,14 @@ class Twin:
     Attributes:
         arm: the manifest's block `model`. prefix: before the arm's names in the scene.
         activations: of its actuators, m, as they were after the last step; none before it has been settled.
-        pulls: the last finite controls of its actuators, m.
+        pulls: the last finite controls of its actuators, m. steps: that it took to settle the arm.
     """
 
     arm: Model
     prefix: str = ""
     activations: np.ndarray | None = None
     pulls: dict[str, float] = field(default_factory=dict)
+    steps: int = 0
 
     def compiled(self, scene: Scene) -> None:
         """Springs and dampers into the new model; then the arm at rest, or its activations as they were."""
@@ -95,17 +96,18 @@ class Twin:
         data.ctrl[:], data.act[:] = scene.data.ctrl, scene.data.act
         places = model.actuator_actadr[actuators]
         data.act[places[places >= 0]] = data.ctrl[actuators][places >= 0]
-        rests = _led_to_rest(model, data, own, others)
+        rests, self.steps = _led_to_rest(model, data, own, others)
         for (values, places), before in zip(let_go, kept, strict=True):
             values[places] = before
         data.qpos[branch] = data.qpos[joint]
         return own, data.qpos[own] if rests else model.qpos0[own]
 
 
-def _led_to_rest(model: mujoco.MjModel, data: mujoco.MjData, own: np.ndarray, others: np.ndarray) -> bool:
-    """Step until the arm of the joints `own` rests, the `others` standing still; whether it does."""
+def _led_to_rest(model: mujoco.MjModel, data: mujoco.MjData, own: np.ndarray, others: np.ndarray) -> tuple[bool, int]:
+    """Step until the arm of the joints `own` rests, the `others` standing still; whether it does, and after how many
+    steps."""
     energy, since, peaks, last = 0.0, 0, 0, data.qpos[own].copy()
-    for _ in range(MOST_STEPS):
+    for step in range(MOST_STEPS):
         mujoco.mj_step(model, data)
         data.qpos[others], data.qvel[others] = model.qpos0[others], 0
         mujoco.mj_energyVel(model, data)
@@ -117,5 +119,5 @@ def _led_to_rest(model: mujoco.MjModel, data: mujoco.MjData, own: np.ndarray, ot
         peaks = peaks + 1 if np.abs(data.qpos[own] - last).max() < STILL else 0
         last = data.qpos[own].copy()
         if peaks == PEAKS:
-            return True
-    return False
+            return True, step + 1
+    return False, MOST_STEPS

@@ -59,6 +59,8 @@ internal sealed class More {
     _shared.Record(Block(asked["network"]));
     var found = _shared.Kinematics.Bend(Vector(asked["tip"]), Vector(asked["gravity"]), (double)asked["tolerance"]);
     _shared.CompareAsked(List(asked["poses"]));
+    Require(_shared.Kinematics.TryBend(Vector(asked["tip"]), Vector(asked["gravity"]), (double)asked["tolerance"],
+                                       out var again) && again.Tip == found.Tip, "the answer without an exception");
     var told = Json(found);
     told.Remove("doubtful");
     told["pulls"] = Json(_shared.Kinematics.PullsOf(found));
@@ -76,6 +78,11 @@ internal sealed class More {
         default: Unpacked.KinematicsOf(_files, new Recorded { Inputs = 7, Outputs = new[] { 3, 3, 3 } }); break;
       }
     } catch (InputError error) {
+      if ((string)asked["of"] == "bend" && List(asked["poses"]).Count > 0) {
+        Require(!_shared.Kinematics.TryBend(Vector(asked["tip"]), Vector(asked["gravity"]), (double)asked["tolerance"],
+                                            out var nearest), "a refusal without an exception");
+        Require(nearest == null == error.Message.StartsWith("gravity: "), "the nearest answer where gravity is known");
+      }
       return new Dictionary<string, object> { ["says"] = error.Message };
     }
     throw new InputError($"{asked["of"]}: found no refusal, expected: {expected["says"]}");

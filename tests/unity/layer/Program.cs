@@ -16,6 +16,7 @@ using Unity.InferenceEngine;
 using UnityEditor;
 using UnityEngine;
 using UnityEngine.Rendering;
+using UnityEngine.XR;
 using PackageInfo = UnityEditor.PackageManager.PackageInfo;
 
 namespace Trunkline.Tests {
@@ -25,7 +26,7 @@ internal static class Program {
   private const double _single = 2e-6;  // of numbers of 32 bits, and m
 
   private static Dictionary<string, object> _cases;
-  private static int _offers;
+  private static int _offers, _mounts, _asked, _unready;
 
   public static int Main(string[] given) {
     PackageInfo.Folder = given[0];
@@ -75,7 +76,10 @@ internal static class Program {
     GraphicsSettings.currentRenderPipeline = new RenderPipelineAsset {
       defaultMaterial = new Material(Shader.Find("another pipeline's")),
     };
+    SceneView.lastActiveSceneView = new SceneView();
     CreateTwin.Apply();
+    Require(SceneView.lastActiveSceneView.Framed == Selection.activeGameObject, "the twin in the middle of the view");
+    Require(Selection.activeGameObject.transform.position.y == CreateTwin.Height, "the twin above the floor");
     var root = Selection.activeGameObject;
     Require(root.name == "Trunkline twin" && Undo.Registered.Contains(root), "the menu entry's object");
     Require(root.GetComponent<Twin>().ManifestFile.name == "manifest", "Twin's manifest");
@@ -94,6 +98,10 @@ internal static class Program {
     Require(Last().StartsWith($"error: Trunkline: {folder}/nowhere/Runtime/Model/arm.xml: found that MuJoCo does not"),
             "one line about a model that is not imported");
     PackageInfo.Folder = folder;
+    PackageInfo.Copied = true;
+    Require(CreateTwin.InScene() == null && Last().StartsWith("error: Trunkline: found these scripts in no package"),
+            "one line about scripts that were copied");
+    PackageInfo.Copied = false;
   }
 
   private static void Sample() {
@@ -105,7 +113,17 @@ internal static class Program {
     var shown = bending.Pointing.GetComponent<ShownTargets>();
     Call(shown, "OnEnable");
     Call(bending, "OnEnable");
-    Call(bending.Pointing.GetComponent<TrackedHands>(), "Update");
+    Require(bending.Base.name == "base" && bending.Mount.position.y == CreateTwin.Height
+        && twin.transform.parent == bending.Mount, "a twin below its mount");
+    Awake(bending);
+    Require(shown.LeftRay.sharedMaterial != null, "a ray's material");
+    var hands = bending.Pointing.GetComponent<TrackedHands>();
+    var floor = new XRInputSubsystem();
+    SubsystemManager.Running.AddRange(new ISubsystem[] { floor, new XRDisplaySubsystem { Rate = 90 } });
+    Call(hands, "Update");
+    Require(hands.Twin.DisplayRate == 90 && floor.GetTrackingOriginMode() == TrackingOriginModeFlags.Floor,
+            "the headset's rate and floor");
+    SubsystemManager.Running.Clear();
     Call(bending.Pointing, "Update");
     Require(bending.Pointing.Intent.Mode == Mode.Hold && !shown.Tip.enabled && !shown.LeftRay.enabled,
             "a sample without controllers holds");
@@ -156,6 +174,7 @@ internal static class Program {
       pointing.RightHand = new GameObject("right").transform;
       pointing.RobotBase = new GameObject("base").transform;
       Awake(pointing);
+      var bending = Bending(pointing);
       var modes = new List<Mode>();
       var asked = new List<int>();
       pointing.ModeChanged += modes.Add;
@@ -166,7 +185,9 @@ internal static class Program {
       foreach (object one in List(Block(sequence)["steps"])) {
         var step = Block(one);
         Give(pointing, Input(step["input"]));
+        Time.unscaledTime += 1;
         pointing.Step(Number(Block(step["input"])["stamp"]), Number(step["dt"]));
+        Follows(bending, pointing);
         new Comparison().Of($"steps: {Block(sequence)["name"]}[{count++}]", step["intent"], Json(pointing.Intent));
         if (pointing.Intent.Mode != before) {
           expectedModes.Add(before = pointing.Intent.Mode);
@@ -188,7 +209,68 @@ internal static class Program {
     }
     Console.WriteLine($"steps {count} cases");
     Console.WriteLine($"offers {_offers} cases");
+    Console.WriteLine($"mounts {_mounts} cases");
+    Console.WriteLine($"asked {_asked} times");
   }
+
+  // The sample's twin, whose network foresees the tip wherever it is asked for.
+  private static BendingTwin Bending(Pointing pointing) {
+    var twin = new GameObject("twin");
+    var bending = twin.AddComponent<BendingTwin>();
+    bending.Pointing = pointing;
+    bending.Twin = twin.AddComponent<Twin>();
+    bending.Network = twin.AddComponent<ArmNetwork>();
+    bending.Network.ManifestFile = Asset("manifest.json");
+    bending.Network.NetworkFile = Model((int)Number(_cases["inputs"]), (poses, count) => {
+      _asked++;
+      int width = poses.Length / count;
+      return new Dictionary<string, float[]> {
+        ["commands"] = new float[3 * count], ["lengths"] = new float[3 * count],
+        ["tip"] = Enumerable.Range(0, 3 * count).Select(i => poses[i / 3 * width + width - 7 + i % 3]).ToArray(),
+      };
+    });
+    Awake(bending.Network);
+    bending.Mount = new GameObject("mount").transform;
+    bending.Base = new GameObject("base").transform;
+    bending.Base.parent = bending.Mount;
+    bending.Base.localPosition = new Vector3(0.01f, 0.02f, 0.03f);
+    bending.Base.localRotation = new UnityEngine.Quaternion(0.6f, 0, 0, 0.8f);
+    Awake(bending);
+    Call(bending, "OnEnable");
+    return bending;
+  }
+
+  // Its base is where the robot will have it, under gravity as the network was told; and it asks for nothing twice.
+  private static void Follows(BendingTwin bending, Pointing pointing) {
+    var targets = pointing.Intent.Targets;
+    bool inside = targets != null && targets.Rigid.Reach == Where.Inside && targets.Tip.Reach == Where.Inside;
+    if (!inside) {
+      return;
+    }
+    var turn = Alignment.BaseQuaternion(targets.Pointing, targets.Heading);
+    if (bending.Network.TryBend(Vector3.forward, UnityFrames.ToUnity(Rotated(turn)), 1, out _)) {
+      _mounts++;
+      var there = pointing.InScene(targets.Rigid.Position).Value;
+      Near(there, bending.Base.position, 2e-3, "the base at the rigid target");
+      Near(UnityFrames.ToUnity(Trunkline.Vectors.Rotate(Trunkline.Vectors.Conjugate(turn), Trunkline.Vectors.Down)),
+           bending.Base.InverseTransformDirection(RobotDown(pointing)), 0.02, "gravity on the twin");
+    }
+    int before = _asked;
+    Time.unscaledTime += 1;
+    typeof(BendingTwin).GetMethod("Follow", BindingFlags.Instance | BindingFlags.NonPublic)
+        .Invoke(bending, new object[] { pointing.Intent });
+    Require(_asked == before, "targets that stand still ask for nothing");
+  }
+
+  private static Vector Rotated(Quaternion turn) =>
+      Trunkline.Vectors.Rotate(Trunkline.Vectors.Conjugate(turn), Trunkline.Vectors.Down);
+
+  // Down in the robot's base, in the scene: recorded bases need not stand upright.
+  private static Vector3 RobotDown(Pointing pointing) =>
+      pointing.RobotBase.rotation * UnityFrames.ToUnity(Trunkline.Vectors.Down);
+
+  private static void Near(Vector3 expected, Vector3 found, double within, string what) => Require(
+      Trunkline.Vectors.Distance(UnityFrames.ToCore(expected), UnityFrames.ToCore(found)) < within, what);
 
   private static void Offered(Pointing pointing, Vector? offer, Vector3? found) {
     Require(offer == null == (found == null), "an offer where there is one");
@@ -299,6 +381,12 @@ internal static class Program {
     pointing.SettingsFile = Asset("teleoperation.json");
     Refused("Pointing", pointing, expected["no maps"]);
     Console.WriteLine("refusals 7 cases");
+    Require(_unready == 7, "what is not ready refuses");
+
+    network.NetworkFile = Model((int)Number(_cases["inputs"]),
+                                (poses, count) => { throw new NotSupportedException("no op\nat"); });
+    Refused("Arm Network", network, "ik: found that the inference engine does not run it (no op), expected "
+        + "Runtime/Network/ik.onnx");
   }
 
   private static void Refused(string name, MonoBehaviour component, object expected) {
@@ -306,6 +394,18 @@ internal static class Program {
     Awake(component);
     Compare(name, $"error: {name}: {expected}", Last());
     Require(!component.enabled, $"{name} is off");
+    NotReady(() => (component as SoftReach)?.Signal(Vector3.forward, out _), name);
+    NotReady(() => (component as ArmNetwork)?.Bend(Vector3.forward, Vector3.forward, 1), name);
+    NotReady(() => (component as Pointing)?.Step(0, 0), name);
+  }
+
+  private static void NotReady(Action asked, string name) {
+    try {
+      asked();
+    } catch (InputError error) {
+      _unready++;
+      Require(error.Message.StartsWith($"{name}: found one that is not ready"), "one line about what is not ready");
+    }
   }
 
   // As Unity's test runner does.
@@ -319,6 +419,11 @@ internal static class Program {
         count++;
       }
     }
+    string written = Path.Combine(PackageInfo.Folder, "package.json");
+    string before = File.ReadAllText(written);
+    File.WriteAllText(written, "{\"_fingerprint\": 0," + before.Substring(1));  // as Unity 6 does
+    tests.ReadPackage();
+    File.WriteAllText(written, before);
     Console.WriteLine($"runner {count} cases");
   }
 

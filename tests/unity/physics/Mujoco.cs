@@ -15,6 +15,9 @@ namespace Mujoco {
 public static unsafe class MujocoLib {
   public const double mjMAXVAL = 10000000000.0;
 
+  /// <summary>In the plug-in a constant.</summary>
+  public static int mjVERSION_HEADER;
+
   /// <summary>Bytes from the start of the real struct to each field, by its name.</summary>
   public static Dictionary<string, int> ModelFields, DataFields;
 
@@ -60,6 +63,9 @@ public static unsafe class MujocoLib {
 
   [DllImport("mujoco", EntryPoint = "mj_resetData")]
   private static extern void ResetData(byte* m, byte* d);
+
+  [DllImport("mujoco")]
+  public static extern int mj_version();
 
   public static mjModel_* Load(string file) {
     var m = (mjModel_*)Marshal.AllocHGlobal(sizeof(mjModel_));
@@ -161,6 +167,9 @@ public class MjScene : MonoBehaviour {
     Data = MujocoLib.mj_makeData(Model);
     postInitEvent?.Invoke(this, new MjStepArgs(Model, Data));
   }
+
+  /// <summary>`CreateScene(skipCompile: true)`, which writes the scene's MJCF and compiles none.</summary>
+  public unsafe void WriteScene() => postInitEvent?.Invoke(this, new MjStepArgs(null, null));
 
   public unsafe void FixedUpdate() {
     preUpdateEvent?.Invoke(this, new MjStepArgs(Model, Data));

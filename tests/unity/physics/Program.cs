@@ -23,11 +23,13 @@ internal static unsafe class Program {
   private static readonly Dictionary<string, GameObject> _roots = new Dictionary<string, GameObject>();
 
   public static int Main(string[] given) {
-    CultureInfo.CurrentCulture = CultureInfo.InvariantCulture;
+    CultureInfo.CurrentCulture = CultureInfo.GetCultureInfo("de-DE");  // whose decimals have a comma
     _scene = Block(Json.Read(File.ReadAllBytes(given[0]), given[0]));
     JsonUtility.Read = ReadAs.Text;
     MujocoLib.ModelFields = Places("model_fields");
     MujocoLib.DataFields = Places("data_fields");
+    MujocoLib.mjVERSION_HEADER = _scene.TryGetValue("header", out object header) ? (int)Number(header)
+        : MujocoLib.mj_version();
     MjScene.Instance.Components = () => _components;
     MjScene.Instance.Bind = Bind;
     foreach (object one in List(_scene["happens"])) {
@@ -44,6 +46,9 @@ internal static unsafe class Program {
     switch ((string)what[0]) {
       case "arm":
         Add((string)what[1], (string)what[2]);
+        break;
+      case "write":
+        scene.WriteScene();
         break;
       case "compile":
         scene.CreateScene((string)what[1]);
@@ -100,12 +105,15 @@ internal static unsafe class Program {
   }
 
   private static void Tell(MjScene scene) {
+    var told = CultureInfo.CurrentCulture;
+    CultureInfo.CurrentCulture = CultureInfo.InvariantCulture;
     var angles = Enumerable.Range(0, MujocoLib.Nq).Select(i => scene.Data->qpos[i].ToString("R"));
     int actuators = _components.OfType<MjActuator>().Count();
     var activations = Enumerable.Range(0, actuators).Select(i => scene.Data->act[i].ToString("R"));
     Console.WriteLine(string.Join(" ", angles) + ";" + string.Join(" ", activations) + ";"
         + $"{Time.fixedDeltaTime:R} {Time.maximumDeltaTime:R};" + string.Join("|", Debug.Told));
     Debug.Told.Clear();
+    CultureInfo.CurrentCulture = told;
   }
 }
 }

@@ -9,6 +9,7 @@ namespace Mujoco {
 
 public static class MujocoLib {
   public const double mjMAXVAL = 10000000000.0;
+  public const int mjVERSION_HEADER = 3012001;
 
   public unsafe struct mjOption_ {
     public double timestep;
@@ -40,6 +41,8 @@ public static class MujocoLib {
     public double* ctrl;
   }
 
+  public static unsafe int mj_version() => mjVERSION_HEADER;
+
   public static unsafe mjData_* mj_makeData(mjModel_* m) => null;
 
   public static unsafe void mj_deleteData(mjData_* d) {}
@@ -58,6 +61,8 @@ public abstract class MjComponent : MonoBehaviour {
 public abstract class MjBaseBody : MjComponent {}
 
 public class MjBody : MjBaseBody {}
+
+public class MjMocapBody : MjBaseBody {}
 
 public abstract class MjBaseJoint : MjComponent {
   public int QposAddress { get; private set; } = -1;

@@ -20,6 +20,9 @@ public class MenuItem : Attribute {
 }
 
 public static class AssetDatabase {
+  public static T GetBuiltinExtraResource<T>(string path) where T : UnityEngine.Object =>
+      (T)(UnityEngine.Object)new Material(Shader.Find("Standard")) { name = path };
+
   public static T LoadAssetAtPath<T>(string assetPath) where T : UnityEngine.Object {
     string path = assetPath.Replace(PackageManager.PackageInfo.Only.assetPath, PackageManager.PackageInfo.Folder);
     if (!File.Exists(path)) {
@@ -31,6 +34,18 @@ public static class AssetDatabase {
     }
     found.name = Path.GetFileNameWithoutExtension(path);
     return (T)found;
+  }
+}
+
+public class SceneView {
+  /// <summary>Not of Unity's: what it looks at.</summary>
+  public GameObject Framed;
+
+  public static SceneView lastActiveSceneView { get; set; }
+
+  public bool FrameSelected() {
+    Framed = Selection.activeGameObject;
+    return Framed != null;
   }
 }
 
@@ -57,11 +72,14 @@ public class PackageInfo {
   public static string Folder;
   internal static readonly PackageInfo Only = new PackageInfo();
 
+  /// <summary>Not of Unity's: whether assemblies are of no package.</summary>
+  public static bool Copied;
+
   public string name => "org.trunkline.twin";
   public string assetPath => "Packages/org.trunkline.twin";
   public string resolvedPath => Folder;
 
-  public static PackageInfo FindForAssembly(Assembly assembly) => Only;
+  public static PackageInfo FindForAssembly(Assembly assembly) => Copied ? null : Only;
 }
 }
 

@@ -244,6 +244,7 @@ public static class Physics {
 
 public static class Time {
   public static double realtimeSinceStartupAsDouble { get; set; }
+  public static float unscaledTime { get; set; }
   public static float unscaledDeltaTime { get; set; }
   public static float deltaTime { get; set; }
   public static float fixedDeltaTime { get; set; } = 0.02f;
@@ -261,6 +262,18 @@ public struct Resolution {
 
 public static class Screen {
   public static Resolution currentResolution => new Resolution();
+}
+
+public interface ISubsystem {}
+
+public static class SubsystemManager {
+  /// <summary>Not of Unity's: those that run.</summary>
+  public static readonly List<ISubsystem> Running = new List<ISubsystem>();
+
+  public static void GetSubsystems<T>(List<T> subsystems) where T : ISubsystem {
+    subsystems.Clear();
+    subsystems.AddRange(Running.OfType<T>());
+  }
 }
 
 public static class Application {
@@ -348,7 +361,16 @@ public enum TextAnchor { UpperLeft, UpperCenter, UpperRight, MiddleLeft, MiddleC
 
 public enum TextAlignment { Left, Center, Right }
 
+public class Font : Object {
+  public Material material { get; set; }
+}
+
+public static class Resources {
+  public static T GetBuiltinResource<T>(string path) where T : Object, new() => new T { name = path };
+}
+
 public class TextMesh : Component {
+  public Font font { get; set; }
   public string text { get; set; }
   public TextAnchor anchor { get; set; }
   public TextAlignment alignment { get; set; }
@@ -420,6 +442,34 @@ public struct InputDevice {
     value = Quaternion.identity;
     return false;
   }
+}
+
+public class XRDisplaySubsystem : ISubsystem {
+  /// <summary>Not of Unity's: the rate that a test sets.</summary>
+  public float Rate;
+
+  public bool running => true;
+
+  public bool TryGetDisplayRefreshRate(out float displayRefreshRate) {
+    displayRefreshRate = Rate;
+    return true;
+  }
+}
+
+[Flags]
+public enum TrackingOriginModeFlags { Unknown = 0, Device = 1, Floor = 2 }
+
+public class XRInputSubsystem : ISubsystem {
+  private TrackingOriginModeFlags _origin = TrackingOriginModeFlags.Device;
+
+  public bool running => true;
+
+  public bool TrySetTrackingOriginMode(TrackingOriginModeFlags origin) {
+    _origin = origin;
+    return true;
+  }
+
+  public TrackingOriginModeFlags GetTrackingOriginMode() => _origin;
 }
 
 public static class InputDevices {

@@ -1,33 +1,34 @@
-// The time step, and whether a device keeps up with it. Nothing of Unity's is used here.
-
 using System;
+using static System.FormattableString;
 
 namespace Trunkline {
 
-// Whole steps a frame of the display, as few as keep each short enough: so every frame shows the arm after as many
-// steps as the last, and nothing judders. Python: trunkline/unity/pace.py.
+/// <summary>The time step: whole steps a frame of the display, as few as keep each short enough, so that every frame
+/// shows the arm after as many steps as the last, and nothing judders. Nothing of Unity's is used here. Python:
+/// trunkline/unity/pace.py.</summary>
 public static class Pace {
 
   private const double _exact = 1e-9;  // share by which a step may be longer: of rounding
   private const double _usual = 60;  // Hz, of a display that does not say its rate
 
-  // The least number of steps in a frame of a display of `rate` Hz of which none is longer than `longest` s.
+  /// <summary>The least number of steps in a frame of a display of `rate` Hz of which none is longer than `longest`
+  /// s.</summary>
   public static int StepsPerFrame(double rate, double longest) {
     return Math.Max(1, (int)Math.Ceiling(1 / (Known(rate) * longest) * (1 - _exact)));
   }
 
-  // The length of each of them, s.
+  /// <summary>The length of each of them, s.</summary>
   public static double Step(double rate, double longest) {
     return 1 / (Known(rate) * StepsPerFrame(rate, longest));
   }
 
-  // The rate itself, Hz, if it is one.
+  /// <summary>The rate itself, Hz, if it is one.</summary>
   public static double Known(double rate) {
     return rate > 0 && !double.IsInfinity(rate) ? rate : _usual;
   }
 }
 
-// Simulated time against real time, a second at a time.
+/// <summary>Simulated time against real time, a second at a time: whether a device keeps up.</summary>
 public class KeepUp {
 
   private const double _window = 1;  // s of real time, over which the share is taken
@@ -35,13 +36,14 @@ public class KeepUp {
 
   private double _real, _simulated, _before = 1;
 
-  // The share of real time that was simulated in the last whole window, 1 before the first.
+  /// <summary>The share of real time that was simulated in the last whole window, 1 before the first.</summary>
   public double Share { get; private set; } = 1;
 
-  // Whether the simulation falls behind.
+  /// <summary>Whether the simulation falls behind.</summary>
   public bool Behind => Math.Max(Share, _before) < _enough;
 
-  // One frame: seconds that have passed and that were simulated. True when a window is full and `Share` is new.
+  /// <summary>One frame: seconds that have passed and that were simulated. True when a window is full and `Share` is
+  /// new.</summary>
   public bool Add(double real, double simulated) {
     _real += real;
     _simulated += simulated;
@@ -54,16 +56,16 @@ public class KeepUp {
     return true;
   }
 
-  // Begin a window anew, as after a pause.
+  /// <summary>Begin a window anew, as after a pause.</summary>
   public void Restart() {
     _real = 0;
     _simulated = 0;
   }
 
-  // What to tell, at most a line.
+  /// <summary>What to tell, at most a line.</summary>
   public static string Warning(double share, double step) {
-    return $"Trunkline: found {100 * share:F0} % of real time simulated in steps of {1000 * step:F1} ms, expected "
-        + "100 %: this device does not keep up, the arm moves too slowly";
+    return Invariant($"Trunkline: found {100 * share:F0} % of real time simulated in steps of {1000 * step:F1} ms, ")
+        + "expected 100 %: this device does not keep up, the arm moves too slowly";
   }
 }
 }

@@ -1,18 +1,18 @@
-// Makes the imported arm the calibrated one: its springs, its rest at the start, its time step.
-//
-// To every model that MuJoCo's scene compiles it gives what the importer cannot read: springs and dampers that are no
-// straight lines. Where the arm is compiled for the first time it is led to rest under the scene's gravity and the
-// controls that are set, 0 for none; later its activations, which the plug-in forgets, are restored. It sets the time
-// step by the display's rate, and says where the device does not keep up. All it knows of the arm is in manifest.json.
-// `trunkline/unity/start.py` in the repository does the same, and is tested against the arm's statics.
-
 using System;
 using System.Collections.Generic;
 using Mujoco;
 using UnityEngine;
+using static System.FormattableString;
 
 namespace Trunkline {
 
+/// <summary>Makes the imported arm the calibrated one: its springs, its rest at the start, its time step.
+///
+/// To every model that MuJoCo's scene compiles it gives what the importer cannot read: springs and dampers that are no
+/// straight lines. Where the arm is compiled for the first time it is led to rest under the scene's gravity and the
+/// controls that are set, 0 for none; later its activations, which the plug-in forgets, are restored. It sets the time
+/// step by the display's rate, and says where the device does not keep up. All it knows of the arm is in manifest.json.
+/// `trunkline/unity/start.py` in the repository does the same, and is tested against the arm's statics.</summary>
 [AddComponentMenu("Trunkline/Twin")]
 [DisallowMultipleComponent]
 public class Twin : MonoBehaviour {
@@ -26,14 +26,15 @@ public class Twin : MonoBehaviour {
   [Tooltip("Set Project Settings > Physics > Gravity to that of the arm's calibration, straight down.")]
   public bool SetGravity;
 
+#pragma warning disable 649  // JsonUtility fills the fields
   // The part of the manifest that is read. JsonUtility goes by these names and skips all others.
   [Serializable]
-  public class Manifest {
+  private class Manifest {
     public Model model;
   }
 
   [Serializable]
-  public class Model {
+  private class Model {
     public double longest_step;
     public float[] gravity_unity;
     public Names names;
@@ -45,35 +46,36 @@ public class Twin : MonoBehaviour {
   }
 
   [Serializable]
-  public class Names {
+  private class Names {
     public string[] joints;
     public string[] tendons;
   }
 
   [Serializable]
-  public class Actuator {
+  private class Actuator {
     public string name;
     public double rest_length;
   }
 
   [Serializable]
-  public class Branch {
+  private class Branch {
     public string joint;
     public string branch;
     public string tie;
   }
 
   [Serializable]
-  public class JointLaw {
+  private class JointLaw {
     public string joint;
     public double[] coefficients;
   }
 
   [Serializable]
-  public class TendonLaw {
+  private class TendonLaw {
     public string tendon;
     public double[] coefficients;
   }
+#pragma warning restore 649
 
   private const int _higherOrders = 2;  // mjNPOLY: b and c
   private const double _still = 1e-5;  // rad, by which no joint has turned between two peaks of an arm at rest
@@ -96,10 +98,14 @@ public class Twin : MonoBehaviour {
   private double _simulated;  // s, since the last frame
   private TextMesh _warning;
 
-  // Draw the tendons in: path lengths in m, as the network gives them, in the order of the manifest's actuators. Where
-  // one is no finite number, all pulls stay as they are.
+  /// <summary>Whether commands may be sent: the scene has been compiled, and has all of the arm.</summary>
+  public bool IsReady => _actuators != null && _fits;
+
+  /// <summary>Draw the tendons in: path lengths in m, as the network gives them, in the order of the manifest's
+  /// actuators. Where one is no finite number, all pulls stay as they are; that, and what else is wrong, is one line in
+  /// the console.</summary>
   public void Send(double[] commands) {
-    if (_actuators == null || !_fits) {
+    if (!IsReady) {
       Complain("found no arm that is ready, expected commands after the scene's start");
       return;
     }
@@ -109,7 +115,7 @@ public class Twin : MonoBehaviour {
     }
     foreach (double command in commands) {
       if (!IsControl(command)) {
-        Complain($"found the command {command}, expected finite numbers; the pulls stay as they are");
+        Complain(Invariant($"found the command {command}, expected finite numbers; the pulls stay as they are"));
         return;
       }
     }
@@ -119,7 +125,7 @@ public class Twin : MonoBehaviour {
     }
   }
 
-  // Show frames at another rate, Hz, from now on.
+  /// <summary>Show frames at another rate, Hz, from now on.</summary>
   public void SetDisplayRate(float rate) {
     DisplayRate = rate;
     SetStep();
@@ -129,6 +135,10 @@ public class Twin : MonoBehaviour {
     _arm = ReadArm();
     if (_arm == null) {
       Complain("found no Manifest File that says all of an arm, expected Runtime/manifest.json of this package");
+      return;
+    }
+    if (!HasItsLibrary()) {
+      _arm = null;
       return;
     }
     SetStep();
@@ -189,6 +199,23 @@ public class Twin : MonoBehaviour {
     }
   }
 
+  // The plug-in's structures are those of one version of libmujoco. Of another they are misread, or crash.
+  private bool HasItsLibrary() {
+    string expected = Version(MujocoLib.mjVERSION_HEADER);
+    try {
+      int found = MujocoLib.mj_version();
+      if (found == MujocoLib.mjVERSION_HEADER) {
+        return true;
+      }
+      Complain($"found libmujoco {Version(found)}, expected {expected}, which org.mujoco is made for");
+    } catch (DllNotFoundException) {
+      Complain($"found no libmujoco, expected that of MuJoCo {expected}, which org.mujoco is made for");
+    }
+    return false;
+  }
+
+  private static string Version(int number) => $"{number / 1000000}.{number / 1000 % 1000}.{number % 1000}";
+
   // A step that is no whole part of a frame would show one frame after more steps than the next. A late frame is not
   // made up for beyond the next: what is slow already would have still more to do.
   private unsafe void SetStep() {
@@ -204,6 +231,9 @@ public class Twin : MonoBehaviour {
   }
 
   private unsafe void OnCompiled(object sender, MjStepArgs args) {
+    if (args.model == null || args.data == null) {  // CreateScene(skipCompile: true), which writes an MJCF alone
+      return;
+    }
     _fits = FindAll();
     if (!_fits) {
       foreach (var joint in GetComponentsInChildren<MjHingeJoint>()) {
@@ -343,8 +373,9 @@ public class Twin : MonoBehaviour {
         data->qvel[dofs[i]] = 0;
       }
     } else {
-      Complain($"found no rest in {_mostSteps} steps of {1000 * model->opt.timestep:F1} ms, expected one; the arm "
-          + "starts straight");
+      double step = 1000 * model->opt.timestep;
+      Complain(Invariant($"found no rest in {_mostSteps} steps of {step:F1} ms, expected one; ")
+          + "the arm starts straight");
     }
     MujocoLib.mj_deleteData(scratch);
   }
@@ -415,8 +446,8 @@ public class Twin : MonoBehaviour {
     for (int i = 0; i < _actuators.Length; i++) {
       var actuator = _actuators[i];
       if (!IsControl(actuator.Control)) {
-        Complain($"{actuator.name}: found the control {actuator.Control}, expected a finite number; it stays at "
-            + $"{_pulls[i]} m");
+        Complain(Invariant($"{actuator.name}: found the control {actuator.Control}, expected a finite number; it ")
+            + Invariant($"stays at {_pulls[i]} m"));
         actuator.Control = _pulls[i];
       } else if (actuator.Control != _pulls[i]) {
         _pulls[i] = actuator.Control;
@@ -449,6 +480,8 @@ public class Twin : MonoBehaviour {
       _warning = new GameObject("Trunkline warning").AddComponent<TextMesh>();
       _warning.transform.SetParent(Camera.main.transform, false);
       _warning.transform.localPosition = _ahead * Vector3.forward;
+      _warning.font = Resources.GetBuiltinResource<Font>("LegacyRuntime.ttf");
+      _warning.GetComponent<Renderer>().sharedMaterial = _warning.font.material;
       _warning.anchor = TextAnchor.MiddleCenter;
       _warning.alignment = TextAlignment.Center;
       _warning.characterSize = _letter;

@@ -20,6 +20,7 @@ public static class Program {
       bool told = keepUp.Add(numbers[i], numbers[i + 1]);
       Console.WriteLine($"{told} {keepUp.Share:R} {keepUp.Behind}");
     }
+    CultureInfo.CurrentCulture = CultureInfo.GetCultureInfo("de-DE");  // whose decimals have a comma
     Console.WriteLine(KeepUp.Warning(keepUp.Share, 0.004));
     return 0;
   }

@@ -45,6 +45,7 @@ public sealed class ArmKinematics {
   private readonly IReadOnlyList<double> _restLengths;
   private readonly int _tendons;
   private readonly double _doubtBeyond;
+  private double[][] _poses;  // of Bend, filled anew at each
 
   /// <param name="network">Runs the package's file.</param>
   /// <param name="inputs">Names of its inputs: the manifest's network.input_order.</param>
@@ -76,17 +77,10 @@ public sealed class ArmKinematics {
 
   /// <summary>Of several poses at once.</summary>
   public Answer[] Ask(double[][] poses) {
-    var given = Checked(poses);
-    var answers = _network.Run(given, poses.Length);
-    float[] commands = Output(answers, "commands", _tendons, poses.Length);
-    float[] lengths = Output(answers, "lengths", _tendons, poses.Length);
-    float[] tips = Output(answers, "tip", 3, poses.Length);
+    var outputs = Run(poses);
     var found = new Answer[poses.Length];
     for (int row = 0; row < found.Length; row++) {
-      var tip = new Vector(tips[3 * row], tips[3 * row + 1], tips[3 * row + 2]);
-      int at = (row + 1) * _inputs.Count - 7;
-      double missed = Distance(tip, new Vector(given[at], given[at + 1], given[at + 2]));
-      found[row] = new Answer(Row(commands, row), Row(lengths, row), tip, missed > _doubtBeyond);
+      found[row] = AnswerOf(outputs, row);
     }
     return found;
   }
@@ -99,13 +93,26 @@ public sealed class ArmKinematics {
   /// <exception cref="InputError">No bend comes so near, or a network of one tilt is asked about gravity out of its
   /// plane.</exception>
   public Answer Bend(Vector tip, Vector gravity, double tolerance) {
-    var found = _inputs.Count == _tilt ? AtTilt(tip, gravity) : Asked(tip, gravity.X, gravity.Y, gravity.Z);
+    var found = Nearest(tip, gravity, out string refused) ?? throw new InputError(refused);
     double missed = Distance(found.Tip, tip);
     if (missed > tolerance) {
       throw new InputError("out of reach: the soft arm's tip comes no nearer to its target than "
           + $"{Formats.Fixed(1e3 * missed, 0)} mm");
     }
     return found;
+  }
+
+  /// <summary>The same for each frame: false where <see cref="Bend"/> refuses. The answer then is that whose tip comes
+  /// nearest, and null under gravity that the network does not know.</summary>
+  /// <exception cref="InputError">What is given is no number, or the network has no finite answer.</exception>
+  public bool TryBend(Vector tip, Vector gravity, double tolerance, out Answer found) {
+    found = Nearest(tip, gravity, out _);
+    return found != null && Distance(found.Tip, tip) <= tolerance;
+  }
+
+  private Answer Nearest(Vector tip, Vector gravity, out string refused) {
+    refused = null;
+    return _inputs.Count == _tilt ? AtTilt(tip, gravity, out refused) : Asked(tip, gravity.X, gravity.Y, gravity.Z);
   }
 
   /// <summary>Commands as pulls, m: by how much each is shorter than the tendon when the arm is straight. These are the
@@ -120,23 +127,38 @@ public sealed class ArmKinematics {
 
   private Answer Asked(Vector tip, params double[] told) {
     double plane = Math.Atan2(tip.Y, tip.X), x = -Math.Sin(plane), y = Math.Cos(plane);
+    _poses = _poses ?? EmptyPoses();
+    for (int i = 0; i < _bends; i++) {
+      double half = Radians(-330 + 2 * i) / 2, cos = Math.Cos(half), sin = Math.Sin(half);
+      var pose = _poses[i];
+      told.CopyTo(pose, 0);
+      int at = told.Length;
+      pose[at] = tip.X;
+      pose[at + 1] = tip.Y;
+      pose[at + 2] = tip.Z;
+      pose[at + 3] = cos;
+      pose[at + 4] = sin * x;
+      pose[at + 5] = sin * y;
+    }
+    var outputs = Run(_poses);
+    int best = 0;
+    for (int i = 1; i < _bends; i++) {
+      best = Distance(outputs.Tip(i), tip) < Distance(outputs.Tip(best), tip) ? i : best;
+    }
+    return AnswerOf(outputs, best);
+  }
+
+  private double[][] EmptyPoses() {
     var poses = new double[_bends][];
     for (int i = 0; i < _bends; i++) {
-      double half = Radians(-330 + 2 * i) / 2;
-      var pose = poses[i] = new double[told.Length + 7];
-      told.CopyTo(pose, 0);
-      double cos = Math.Cos(half), sin = Math.Sin(half);
-      new[] { tip.X, tip.Y, tip.Z, cos, sin * x, sin * y, 0 }.CopyTo(pose, told.Length);
+      poses[i] = new double[_inputs.Count];
     }
-    Answer best = null;
-    foreach (var one in Ask(poses)) {
-      best = best == null || Distance(one.Tip, tip) < Distance(best.Tip, tip) ? one : best;
-    }
-    return best;
+    return poses;
   }
 
   // Of a network that knows tilts about +y alone: gravity in another tendon's plane is the same arm, turned.
-  private Answer AtTilt(Vector tip, Vector gravity) {
+  private Answer AtTilt(Vector tip, Vector gravity, out string refused) {
+    refused = null;
     double level = Hypot(gravity.X, gravity.Y), angle = Math.Atan2(level, -gravity.Z);
     int turns = 0;
     if (angle > TiltReach.StraightDown) {
@@ -144,8 +166,9 @@ public sealed class ArmKinematics {
       turns = (int)Math.Round(azimuth / TiltReach.Symmetry);
       double off = azimuth - turns * TiltReach.Symmetry;
       if (level * Math.Abs(Math.Sin(off)) > Math.Sin(TiltReach.Azimuth)) {
-        throw new InputError($"gravity: comes {Formats.Fixed(off * (180 / Math.PI), 0)}° beside a tendon's plane, "
-            + "which the package does not know");
+        refused = $"gravity: comes {Formats.Fixed(off * (180 / Math.PI), 0)}° beside a tendon's plane, which the "
+            + "package does not know";
+        return null;
       }
     }
     double cos = Math.Cos(turns * TiltReach.Symmetry), sin = Math.Sin(turns * TiltReach.Symmetry);
@@ -153,6 +176,29 @@ public sealed class ArmKinematics {
     var there = new Vector(cos * found.Tip.X - sin * found.Tip.Y, sin * found.Tip.X + cos * found.Tip.Y, found.Tip.Z);
     // A tendon that stands where another one did does what that one did.
     return new Answer(Rolled(found.Commands, turns), Rolled(found.Lengths, turns), there, found.Doubtful);
+  }
+
+  // What the network gave: rows of numbers, one after the other, and the poses that it was asked for.
+  private struct Outputs {
+    public float[] Asked, Commands, Lengths, Tips;
+
+    public Vector Tip(int row) => new Vector(Tips[3 * row], Tips[3 * row + 1], Tips[3 * row + 2]);
+  }
+
+  private Outputs Run(double[][] poses) {
+    var asked = Checked(poses);
+    var answers = _network.Run(asked, poses.Length);
+    return new Outputs {
+      Asked = asked, Commands = Output(answers, "commands", _tendons, poses.Length),
+      Lengths = Output(answers, "lengths", _tendons, poses.Length), Tips = Output(answers, "tip", 3, poses.Length),
+    };
+  }
+
+  private Answer AnswerOf(Outputs outputs, int row) {
+    var tip = outputs.Tip(row);
+    int at = (row + 1) * _inputs.Count - 7;
+    double missed = Distance(tip, new Vector(outputs.Asked[at], outputs.Asked[at + 1], outputs.Asked[at + 2]));
+    return new Answer(Row(outputs.Commands, row), Row(outputs.Lengths, row), tip, missed > _doubtBeyond);
   }
 
   private static double[] Rolled(double[] values, int turns) {

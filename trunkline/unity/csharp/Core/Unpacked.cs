@@ -46,15 +46,17 @@ public static class Unpacked {
   public static MapReach MapsOf(IReadOnlyDictionary<string, byte[]> files) {
     var manifest = Manifest(files);
     RequireOneLattice(manifest);
-    var grids = manifest.Block("reach").Has("sheets") ? null : GridsOf(files);
+    var grids = manifest.Block("reach").Has("sheets") ? null : GridsOf(files, manifest);
     var rigid = Grid(files, manifest.Block("grids"), "rigid");
-    return new MapReach(rigid, (ISoftReach)grids ?? SheetsOf(files));
+    return new MapReach(rigid, (ISoftReach)grids ?? SheetsOf(files, manifest));
   }
 
   /// <summary>The tip's reach by the soft grids, for gravity of one tilt.</summary>
   /// <exception cref="InputError">As for <see cref="MapsOf"/>.</exception>
-  public static TiltReach GridsOf(IReadOnlyDictionary<string, byte[]> files) {
-    JsonBlock manifest = Manifest(files), reach = manifest.Block("reach"), grids = manifest.Block("grids");
+  public static TiltReach GridsOf(IReadOnlyDictionary<string, byte[]> files) => GridsOf(files, Manifest(files));
+
+  private static TiltReach GridsOf(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
+    JsonBlock reach = manifest.Block("reach"), grids = manifest.Block("grids");
     RequireOneLattice(manifest);
     var maps = Array.ConvertAll(reach.Texts("grids"), name => Grid(files, grids, name));
     return new TiltReach(maps, reach.Numbers("angles"));
@@ -75,15 +77,18 @@ public static class Unpacked {
 
   /// <summary>The surface of the soft arm's tips; null in a package for gravity of one tilt.</summary>
   /// <exception cref="InputError">A file is missing, or of another size.</exception>
-  public static SheetReach SheetsOf(IReadOnlyDictionary<string, byte[]> files) {
-    var reach = Manifest(files).Block("reach");
+  public static SheetReach SheetsOf(IReadOnlyDictionary<string, byte[]> files) => SheetsOf(files, Manifest(files));
+
+  private static SheetReach SheetsOf(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
+    var reach = manifest.Block("reach");
     return reach.Has("sheets") ? Sheets(files, reach.Block("sheets"), reach.Number("tolerance")) : null;
   }
 
   /// <summary>The package's inverse kinematics by a <paramref name="network"/> that runs its file.</summary>
   /// <exception cref="InputError">The network is of other inputs or outputs.</exception>
   public static ArmKinematics KinematicsOf(IReadOnlyDictionary<string, byte[]> files, INetwork network) {
-    JsonBlock block = Manifest(files).Block("network"), lengths = Manifest(files).Block("model").Block("rest_lengths");
+    var manifest = Manifest(files);
+    JsonBlock block = manifest.Block("network"), lengths = manifest.Block("model").Block("rest_lengths");
     var tendons = block.Texts("output_order");
     var rest = Array.ConvertAll(tendons, lengths.Number);
     return new ArmKinematics(network, block.Texts("input_order"), tendons, rest, block.Number("doubt_beyond"));

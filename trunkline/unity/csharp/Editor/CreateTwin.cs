@@ -15,21 +15,35 @@ namespace Trunkline {
 /// <summary>The menu entry that puts the calibrated arm into the open scene, ready to play. It changes no project
 /// setting.</summary>
 public static class CreateTwin {
+  /// <summary>m, at which the arm's root stands: the arm hangs below it.</summary>
+  public const float Height = 1.2f;
+
   private const string _undo = "Create twin in scene";
 
+  /// <summary>The menu entry: the twin in the open scene, in the middle of the view.</summary>
   [MenuItem("Trunkline/Create twin in scene")]
-  public static void Apply() => InScene();
+  public static void Apply() {
+    if (InScene() != null && SceneView.lastActiveSceneView != null) {
+      SceneView.lastActiveSceneView.FrameSelected();
+    }
+  }
 
   /// <summary>The imported model's root with its components; null, and one line in the console, where it cannot be
   /// made.</summary>
   public static GameObject InScene() {
 #if MUJOCO_HAS_POLYNOMIAL_SPRINGS
     var package = PackageInfo.FindForAssembly(typeof(CreateTwin).Assembly);
+    if (package == null) {  // as where the scripts were copied into Assets
+      Debug.LogError("Trunkline: found these scripts in no package, expected org.trunkline.twin as the package manager "
+          + "installs it");
+      return null;
+    }
     var root = Import(Path.Combine(package.resolvedPath, "Runtime", "Model", "arm.xml"));
     if (root == null) {
       return null;
     }
     root.name = "Trunkline twin";
+    root.transform.position = new Vector3(0, Height, 0);
     PlaceMaterials(root);
     root.AddComponent<Twin>().ManifestFile = Asset(package, "manifest.json");
     var points = Asset(package, "Reachability/sheets.bytes");

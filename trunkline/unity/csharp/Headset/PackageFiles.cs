@@ -1,3 +1,4 @@
+using System;
 using System.Collections.Generic;
 using UnityEngine;
 
@@ -11,7 +12,12 @@ public static class PackageFiles {
   /// <summary>The manifest and `others`; each is known by its name and lies where the manifest says.</summary>
   /// <exception cref="InputError">One is missing in the component's fields, is none of the package's, or is of another
   /// version of it.</exception>
-  public static Dictionary<string, byte[]> Of(TextAsset manifest, params TextAsset[] others) {
+  public static Dictionary<string, byte[]> Of(TextAsset manifest, params TextAsset[] others) =>
+      Of(manifest, out _, others);
+
+  /// <summary>The same with the package's <paramref name="digest"/>.</summary>
+  /// <exception cref="InputError">As above.</exception>
+  public static Dictionary<string, byte[]> Of(TextAsset manifest, out string digest, params TextAsset[] others) {
     if (manifest == null) {
       throw new InputError($"Manifest File: found none, expected {Manifest}");
     }
@@ -23,13 +29,14 @@ public static class PackageFiles {
       }
       files[PathOf(asset.name, digests)] = asset.bytes;
     }
-    Unpacked.PartDigest(files);
+    digest = Unpacked.PartDigest(files);
     return files;
   }
 
   private static string PathOf(string name, JsonBlock digests) {
     foreach (string path in digests.Names) {
-      if (path.EndsWith($"/{name}.bytes") || path.EndsWith($"/{name}.json")) {
+      if (path.EndsWith($"/{name}.bytes", StringComparison.Ordinal)
+          || path.EndsWith($"/{name}.json", StringComparison.Ordinal)) {
         return path;
       }
     }

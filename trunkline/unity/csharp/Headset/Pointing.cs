@@ -54,6 +54,9 @@ public class Pointing : MonoBehaviour {
   /// <summary>When a plan is asked for; answer it by `Plan`, of the same serial.</summary>
   public event Action<Request> PlanAsked;
 
+  /// <summary>Whether it started: what is missing or bad is one line in the console, and it is off.</summary>
+  public bool IsReady => _core != null;
+
   /// <summary>Of the last step; null before the first.</summary>
   public Intent Intent { get; private set; }
   public State State { get; private set; }
@@ -77,17 +80,18 @@ public class Pointing : MonoBehaviour {
 
   protected void Awake() {
     try {
-      var files = PackageFiles.Of(ManifestFile, MapFiles ?? new TextAsset[0]);
+      var files = PackageFiles.Of(ManifestFile, out string package, MapFiles ?? new TextAsset[0]);
       if (SettingsFile == null) {
         throw new InputError("Settings File: found none, expected Runtime/teleoperation.json");
       }
       var settings = Teleop.Read(new JsonBlock(Json.Read(SettingsFile.bytes, SettingsFile.name), SettingsFile.name));
       var manifest = new JsonBlock(Json.Read(ManifestFile.bytes, ManifestFile.name), ManifestFile.name);
       var robot = manifest.Block("hybrid").Block("robot");
-      Package = Unpacked.PartDigest(files);
+      Package = package;
       Joints = Joints ?? robot.Numbers("ready");
-      _core = new Teleoperation(settings, Unpacked.MapsOf(files), Package, robot.Number("mount_offset"));
-      State = _core.Start();
+      var core = new Teleoperation(settings, Unpacked.MapsOf(files), Package, robot.Number("mount_offset"));
+      State = core.Start();
+      _core = core;
     } catch (InputError error) {
       Debug.LogError($"Pointing: {error.Message}", this);
       enabled = false;
@@ -97,7 +101,12 @@ public class Pointing : MonoBehaviour {
   protected void Update() => Step(Time.realtimeSinceStartupAsDouble, Time.unscaledDeltaTime);
 
   /// <summary>One step of the core, at `stamp` of this device's clock, s, `dt` s after the one before.</summary>
+  /// <exception cref="InputError">The component is not ready.</exception>
   public void Step(double stamp, double dt) {
+    if (!IsReady) {
+      throw new InputError("Pointing: found one that is not ready, expected all its files; the console says what is "
+          + "wrong");
+    }
     Align();
     var given = new Input(stamp, Heard(LeftHand, Left), Heard(RightHand, Right), Alignment, Joints, World, Package,
                           Plan, Shown, Executor, Offer);
@@ -117,8 +126,12 @@ public class Pointing : MonoBehaviour {
 
   /// <summary>Moves `RobotBase` to where touches say that the base stands: three or more places in the scene, and the
   /// same in the robot's base, m.</summary>
-  /// <exception cref="InputError">They are too few, or lie on a line, or four or more in a plane.</exception>
+  /// <exception cref="InputError">They are too few, or lie on a line, or four or more in a plane; or there is no
+  /// `RobotBase`.</exception>
   public void AlignBase(IReadOnlyList<Vector3> touched, IReadOnlyList<Vector> robotBase) {
+    if (RobotBase == null) {
+      throw new InputError("Robot Base: found none, expected the object that shall stand where the robot's base does");
+    }
     var reference = new List<Vector>();
     foreach (var place in touched) {
       reference.Add(UnityFrames.ToCore(place));
@@ -134,6 +147,14 @@ public class Pointing : MonoBehaviour {
       return null;
     }
     return UnityFrames.ToUnity(Aligning.InBase(Aligning.Inverse(Alignment), place.Value));
+  }
+
+  /// <summary>A rotation in the robot's base, in the scene; null where there is no base.</summary>
+  public UnityEngine.Quaternion? InScene(Quaternion turn) {
+    if (Alignment == null) {
+      return null;
+    }
+    return UnityFrames.ToUnity(Multiply(Aligning.Inverse(Alignment).Quaternion, turn));
   }
 
   private void Align() {

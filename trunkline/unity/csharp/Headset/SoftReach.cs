@@ -36,10 +36,18 @@ public class SoftReach : MonoBehaviour {
 
   /// <summary>Points of the surface under the gravity that was last given, one way around the arm after the other, to
   /// draw. They are summed when they are asked for.</summary>
-  public Vector3[] Points => _points = _points ?? Array.ConvertAll(_reach.Surface(_down), UnityFrames.ToUnity);
+  /// <exception cref="InputError">The component is not ready.</exception>
+  public Vector3[] Points => _points = _points ?? Array.ConvertAll(Ready.Surface(_down), UnityFrames.ToUnity);
 
   /// <summary>Whether gravity is one that the package knows; it is not where the arm points far up.</summary>
-  public bool Known => _reach.Knows(_down);
+  /// <exception cref="InputError">The component is not ready.</exception>
+  public bool Known => Ready.Knows(_down);
+
+  /// <summary>Whether it started: what is missing or bad is one line in the console, and it is off.</summary>
+  public bool IsReady => _reach != null;
+
+  private SheetReach Ready => _reach ?? throw new InputError("Soft Reach: found one that is not ready, expected its "
+      + "three files; the console says what is wrong");
 
   protected void Awake() {
     try {
@@ -66,8 +74,9 @@ public class SoftReach : MonoBehaviour {
 
   /// <summary>About how far a position in the arm's base frame, in Unity's axes, is out of reach, m: above 0 it is. And
   /// the point of the surface that is nearest to it.</summary>
+  /// <exception cref="InputError">The position is no number, or the component is not ready.</exception>
   public float Signal(Vector3 position, out Vector3 nearest) {
-    double outside = _reach.Signal(UnityFrames.ToCore(position), _down, out var found);
+    double outside = Ready.Signal(UnityFrames.ToCore(position), _down, out var found);
     nearest = UnityFrames.ToUnity(found);
     return (float)outside;
   }

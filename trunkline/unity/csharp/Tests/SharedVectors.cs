@@ -35,7 +35,6 @@ internal sealed class SharedVectors {
 
   public SharedVectors(IReadOnlyDictionary<string, byte[]> files) {
     _files = files;
-    Unpacked.PackageDigest(files);
     _steps = Block(Read("Tests/Vectors/steps.json"));
     Core = new Teleoperation(Teleop.Read(new JsonBlock(_steps["settings"], "settings")), Unpacked.MapsOf(files),
                              (string)_steps["package"], (double)_steps["mount_offset"]);

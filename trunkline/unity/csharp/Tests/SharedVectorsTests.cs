@@ -14,9 +14,12 @@ public class SharedVectorsTests {
   public void ReadPackage() {
     string root = PackageInfo.FindForAssembly(typeof(SharedVectorsTests).Assembly).resolvedPath;
     var files = new Dictionary<string, byte[]>();
-    foreach (string path in Directory.GetFiles(root, "*", SearchOption.AllDirectories)) {
-      files[path.Substring(root.Length + 1).Replace('\\', '/')] = File.ReadAllBytes(path);
+    foreach (string folder in new[] { "Runtime", "Tests" }) {  // Unity writes into package.json as it unpacks it
+      foreach (string path in Directory.GetFiles(Path.Combine(root, folder), "*", SearchOption.AllDirectories)) {
+        files[path.Substring(root.Length + 1).Replace('\\', '/')] = File.ReadAllBytes(path);
+      }
     }
+    Unpacked.PartDigest(files);
     _shared = new SharedVectors(files);
   }
 

@@ -1,3 +1,5 @@
+using System.Linq;
+using Mujoco;
 using Unity.InferenceEngine;
 using UnityEditor;
 using UnityEditor.SceneManagement;
@@ -6,9 +8,9 @@ using PackageInfo = UnityEditor.PackageManager.PackageInfo;
 
 namespace Trunkline.Samples {
 
-/// <summary>Builds the sample's scene: the twin, a robot's base, two hands, what shows the targets.</summary>
+/// <summary>Builds the sample's scene: the twin on a mount that moves, a robot's base, two hands, what shows the
+/// targets.</summary>
 public static class BuildScene {
-  private const float _mount = 1.2f;  // m above the floor, where the twin hangs
   private const float _ahead = 1;  // m from the origin, where the user stands
   private const float _target = 0.03f, _offer = 0.015f, _ray = 0.003f;  // m across
 
@@ -22,7 +24,10 @@ public static class BuildScene {
     if (twin == null) {
       return;
     }
-    twin.transform.position = new Vector3(0.5f, _mount, _ahead);
+    var mount = new GameObject("Mount").AddComponent<MjMocapBody>().transform;
+    mount.position = new Vector3(0.5f, CreateTwin.Height, _ahead);
+    twin.transform.SetParent(mount, false);
+    twin.transform.localPosition = Vector3.zero;
     var robot = new GameObject("Robot base").transform;
     robot.position = new Vector3(0, 0, _ahead);
 
@@ -34,7 +39,12 @@ public static class BuildScene {
     pointing.LeftHand = new GameObject("Left hand").transform;
     pointing.RightHand = new GameObject("Right hand").transform;
     pointing.RobotBase = robot;
-    pointing.gameObject.AddComponent<TrackedHands>().Pointing = pointing;
+    var hands = pointing.gameObject.AddComponent<TrackedHands>();
+    hands.Pointing = pointing;
+    hands.Twin = twin.GetComponent<Twin>();
+    if (Camera.main != null) {
+      hands.Head = Camera.main.transform;
+    }
 
     var shown = pointing.gameObject.AddComponent<ShownTargets>();
     shown.Pointing = pointing;
@@ -52,6 +62,8 @@ public static class BuildScene {
     bending.Pointing = pointing;
     bending.Network = network;
     bending.Twin = twin.GetComponent<Twin>();
+    bending.Mount = mount;
+    bending.Base = twin.GetComponentsInChildren<MjBody>().First(body => body.name == "base").transform;
   }
 
   private static LineRenderer Ray(Transform hand) {
@@ -59,6 +71,7 @@ public static class BuildScene {
     line.useWorldSpace = true;
     line.positionCount = 2;
     line.widthMultiplier = _ray;
+    line.sharedMaterial = AssetDatabase.GetBuiltinExtraResource<Material>("Default-Line.mat");
     return line;
   }
 
