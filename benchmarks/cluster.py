@@ -82,9 +82,8 @@ def measure(processes: list[int], repeats: int) -> None:
 
 
 def _cluster(processes: int) -> LocalCluster:
-    return LocalCluster(
-        n_workers=processes, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs="CRITICAL"
-    )
+    options: dict = {"dashboard_address": None, "silence_logs": "CRITICAL"}
+    return LocalCluster(n_workers=processes, threads_per_worker=1, processes=True, **options)
 
 
 def _nothing(_, piece: int) -> int:
@@ -107,12 +106,12 @@ def tell(times: dict[int, list[float]], piece: float, size: int, cores: int, pro
     print("one arm's fit (Amdahl; a core for each worker, a network as fast as here, a, b and c as here):")
     for n in (2, 8, 32):
         print(f"    {n} workers: {(a + b + c) / (a + b / n + c * n):.1f} times as fast as one")
-    print(f"{ARMS} arms, each with a client and a core of its own (Gustafson; arms share nothing but a scheduler, which")
-    print("does one piece after the other, each as long as an empty one):")
+    print(f"{ARMS} arms, each with a client and a core of its own (Gustafson; they share only a scheduler, which does")
+    print("one piece after the other, each as long as an empty one):")
     alone = a + b + c
     most = max(k for k in range(1, ARMS + 1) if k * pieces_of(k) * piece <= alone or k == 1)
-    print(f"    a scheduler keeps up with {most} arms and as many workers, so {-(-ARMS // most)} schedulers; of their time")
-    print(f"    workers are at work {b / alone:.0%}, and {ARMS * size / alone / 1e6:.0f} MB/s go back to clients in all")
+    print(f"    a scheduler keeps up with {most} arms and as many workers, so {-(-ARMS // most)} schedulers;")
+    print(f"    workers are at work {b / alone:.0%} of the time; {ARMS * size / alone / 1e6:.0f} MB/s go to clients in all")
 
 
 def pieces_of(workers: int) -> int:

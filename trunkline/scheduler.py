@@ -147,7 +147,7 @@ class _Cluster:
         self._given: dict[int, tuple[Any, Any]] = {}
         self._alike: set[tuple[str, str]] = set()
         try:
-            self._client = distributed.Client(address, timeout=CONNECTING, set_as_default=False)
+            self._client: Any = distributed.Client(address, timeout=CONNECTING, set_as_default=False)
             self._client.wait_for_workers(1, timeout=CONNECTING)
         except ValueError:
             raise InputError(f"{VARIABLE}: found {address!r}, expected an address such as tcp://host:8786") from None
