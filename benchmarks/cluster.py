@@ -111,7 +111,7 @@ def tell(times: dict[int, list[float]], piece: float, size: int, cores: int, pro
     alone = a + b + c
     most = max(k for k in range(1, ARMS + 1) if k * pieces_of(k) * piece <= alone or k == 1)
     print(f"    a scheduler keeps up with {most} arms and as many workers, so {-(-ARMS // most)} schedulers;")
-    print(f"    workers are at work {b / alone:.0%} of the time; {ARMS * size / alone / 1e6:.0f} MB/s go to clients in all")
+    print(f"    workers are at work {b / alone:.0%} of the time; {ARMS * size / alone / 1e6:.0f} MB/s go to clients")
 
 
 def pieces_of(workers: int) -> int:

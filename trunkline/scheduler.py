@@ -171,9 +171,9 @@ class _Cluster:
 
     def arriving(self, work: Callable, pieces: list, given: Any) -> Iterator[tuple[int, Any]]:
         expected = likeness(for_work=work)
-        self._check(expected)
         futures: list = []
         try:
+            self._check(expected)
             packed = [pickle.dumps(piece) for piece in pieces]
             futures = self._client.map(_Task(work, expected), [self._send(given)] * len(pieces), packed, pure=False)
             yield from self._gathered(futures)
@@ -223,13 +223,15 @@ class _Cluster:
 
     def _check(self, expected: Likeness) -> None:
         """Refuse workers that are not as this process, before they have any work."""
-        for address in self._client.scheduler_info(n_workers=-1)["workers"]:
-            if (address, expected.code_of) not in self._alike:
-                found = self._client.run(likeness, expected, workers=[address], on_error="return")[address]
-                told = unlike(found, expected)
-                if told:
-                    raise InputError(f"{VARIABLE}: worker {address}: {told}")
-                self._alike.add((address, expected.code_of))
+        if self._client.status != "running":
+            raise self._gone()
+        there = self._client.scheduler_info(n_workers=-1)["workers"]
+        new = [address for address in there if (address, expected.code_of) not in self._alike]
+        answers = self._client.run(likeness, expected, workers=new, on_error="return") if new else {}
+        for address, found in answers.items():
+            if told := unlike(found, expected):
+                raise InputError(f"{VARIABLE}: worker {address}: {told}")
+            self._alike.add((address, expected.code_of))
 
 
 def _itself(value: Any) -> Any:
