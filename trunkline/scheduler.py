@@ -11,7 +11,6 @@ import pickle
 import queue
 import threading
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from typing import Any
 
 from trunkline.errors import InputError
@@ -103,31 +102,25 @@ class _Given:
         return self._own.value
 
 
-@dataclass
-class _Task:
-    """What a worker does with each piece. expected: what the worker has to be like.
+def _do(work: Callable, expected: Likeness, given: _Given, piece: bytes) -> bytes:
+    """What a worker, which has to be as `expected`, does with a piece.
 
     Piece and result are packed here: Dask would look for tasks of its own in the one, and may hand over arrays that
     cannot be written to.
     """
+    if told := unlike(likeness(expected), expected):
+        import distributed
 
-    work: Callable
-    expected: Likeness
+        raise InputError(f"{VARIABLE}: worker {distributed.get_worker().address}: {told}")
+    from threadpoolctl import threadpool_limits
 
-    def __call__(self, given: _Given, piece: bytes) -> bytes:
-        if told := unlike(likeness(self.expected), self.expected):
-            import distributed
-
-            raise InputError(f"{VARIABLE}: worker {distributed.get_worker().address}: {told}")
-        from threadpoolctl import threadpool_limits
-
-        os.environ.setdefault("TRUNKLINE_THREADS", "1")  # workers are as many as the machine has cores
-        value, _on_worker.yes = given.unpacked(), True
-        try:
-            with threadpool_limits(1, user_api="blas"):  # as run_stage
-                return pickle.dumps(self.work(value, pickle.loads(piece)))
-        finally:
-            _on_worker.yes = False
+    os.environ.setdefault("TRUNKLINE_THREADS", "1")  # workers are as many as the machine has cores
+    value, _on_worker.yes = given.unpacked(), True
+    try:
+        with threadpool_limits(1, user_api="blas"):  # as run_stage
+            return pickle.dumps(work(value, pickle.loads(piece)))
+    finally:
+        _on_worker.yes = False
 
 
 class _Cluster:
@@ -142,7 +135,8 @@ class _Cluster:
             ) from None
         import logging
 
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is told in one line here
+        for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == "distributed"]:
+            logging.getLogger(name).setLevel(logging.CRITICAL)  # what goes wrong is told in one line here
         self._address, self._dask = address, distributed
         self._given: dict[int, tuple[Any, Any]] = {}
         self._alike: set[tuple[str, str]] = set()
@@ -175,7 +169,8 @@ class _Cluster:
         try:
             self._check(expected)
             packed = [pickle.dumps(piece) for piece in pieces]
-            futures = self._client.map(_Task(work, expected), [self._send(given)] * len(pieces), packed, pure=False)
+            do = functools.partial(_do, work, expected)
+            futures = self._client.map(do, [self._send(given)] * len(pieces), packed, pure=False)
             yield from self._gathered(futures)
         except self._dask.KilledWorker as error:
             raise InputError(
