@@ -16,7 +16,7 @@ from rehearsal import runs
 from rehearsal.experiments.result import Result
 from tests.identification.test_stage import settings, truth_of
 from tests.support.bent_chain import hardening_stump
-from tests.support.matched_plant import FRAME, begin_project, curl, motion, release, segments_of, small_model, tilt
+from tests.support.matched_plant import FRAME, begin_project, curl, release, segments_of, small_model, tilt
 from tests.support.small_arm import small_spec
 from trunkline import scheduler
 from trunkline.arm.holes import Holes, add_holes
@@ -76,7 +76,7 @@ def trials():
     model = rubbing_model()
     recorded = [
         tilt(model, 60), tilt(model, 30), release(model, 0.25, frames=30), release(model, -0.2, frames=20),
-        curl(model, 40, frames=30), curl(model, 25, tendon=1, frames=16), motion(model, 20, frames=20),
+        curl(model, 40, frames=30), curl(model, 25, tendon=1, frames=16), curl(model, 30, tendon=2, frames=20),
     ]  # fmt: skip
     experiments = [prepare(trial, model, 437) for trial in recorded]
     experiments[4] = replace(experiments[4], load=0.02, lead=0.6 / 120)
