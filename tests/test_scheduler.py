@@ -73,9 +73,9 @@ def rubbing_model():
 @pytest.fixture(scope="module")
 def trials():
     """Experiments of one model: at rest, let go, drawn in, of several lengths; a load hangs from one."""
-    model = rubbing_model()
+    model, at_rest = rubbing_model(), small_model(4)
     recorded = [
-        tilt(model, 60), tilt(model, 30), release(model, 0.25, frames=30), release(model, -0.2, frames=20),
+        tilt(at_rest, 60), tilt(at_rest, 30), release(model, 0.25, frames=30), release(model, -0.2, frames=20),
         curl(model, 40, frames=30), curl(model, 25, tendon=1, frames=16), curl(model, 30, tendon=2, frames=20),
     ]  # fmt: skip
     experiments = [prepare(trial, model, 437) for trial in recorded]
