@@ -30,6 +30,7 @@ from trunkline.identification.parameters import candidate_fields
 from trunkline.identification.population import Population, _run_piece
 from trunkline.identification.problem import Bounds, Problem
 from trunkline.likeness import likeness
+from trunkline.panda import labels
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.pipeline.stage import output_folder
 from trunkline.scheduler import VARIABLE, arriving, places, spread
@@ -171,6 +172,16 @@ def test_samples_of_forward_kinematics_are_the_same_bits(spreading, monkeypatch)
     monkeypatch.setattr(sampling, "LEAST", 20)
     for one, other in zip(made(), here, strict=True):
         assert one.equals(other)
+
+
+def test_labels_of_the_rigid_map_are_the_same(spreading, monkeypatch):
+    points = labels.draw_points(np.array([-0.9, -0.9, -0.3]), np.array([0.9, 0.9, 0.9]), 120, 5)
+    how = {"seed": 2, "starts": 6, "starts_in_doubt": 6, "mount_offset": 0.1, "avoid_collisions": True}
+    here = labels.label(points, **how)
+    assert 0.1 < here.mean() < 0.9
+    spreading()
+    monkeypatch.setattr(labels, "LEAST", 10)
+    assert np.array_equal(labels.label(points, **how), here)
 
 
 def test_rehearsals_arrive_from_workers_too(monkeypatch, tmp_path):
