@@ -24,7 +24,7 @@ from trunkline.pipeline.config import SHARED, check_settings, group_options
 from trunkline.pipeline.versions import LIBRARIES
 
 ROOT = Path(__file__).parents[2]
-OF_NO_STAGE = ["execution", "hybrid", "live", "teleop"]  # rooms whose settings no stage reads
+OF_NO_STAGE = ["execution", "hybrid", "live", "suggest", "teleop"]  # rooms whose settings no stage reads
 STAGES = list(yaml.safe_load((ROOT / "dvc.yaml").read_text())["stages"])
 EXAMPLES = sorted(
     f"{file.parent.relative_to(ROOT)}/dvc.yaml:{stage}"
