@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 
 from stages import build_mjcf, filter, identify_stiffness
+from trunkline.arm.joints import Slider
 from trunkline.arm.uniform import Uniform
 from trunkline.errors import in_one_line
 from trunkline.filtering.filter import filter_take
@@ -28,22 +29,31 @@ from trunkline.trials.splits import DECIDING, IDENTIFY, VALIDATE
 from trunkline.trials.take import Take, read_takes
 
 EXAMPLE = Path("examples/asl_trunk")
+SLIDERS = [Slider(2.0, 0.002), Slider(0.7, 0.015), Slider(0.3, 0.06)]  # they slip one after the other
 
 
 @dataclass
 class Case:
     """What is changed: numbers of the arm, what is fitted in addition, other settings of filter and identification.
 
-    quadratic_damping: share by which damping grows with speed v (rad/s), D (1 + share v). as_stamped: without the
-        time of lost frames.
+    sliders: Jenkins elements of every joint, as a search begins with them. quadratic_damping: share by which damping
+        grows with speed v (rad/s), D (1 + share v). as_stamped: without the time of lost frames.
     """
 
     arm: dict = field(default_factory=dict)
     parameters: dict[str, Bounds] = field(default_factory=dict)
     filtered: dict = field(default_factory=dict)
     settings: dict = field(default_factory=dict)
+    sliders: list[Slider] = field(default_factory=list)
     quadratic_damping: float = 0.0
     as_stamped: bool = False
+
+
+def slid(count: int) -> dict[str, Bounds]:
+    """Of the first `count` elements, what is fitted."""
+    numbers = ["", *(f"_{number}" for number in range(2, count + 1))]
+    shares = {f"hysteresis{number}": Bounds(low=0.01, high=20.0) for number in numbers}
+    return shares | {f"yield_bend{number}": Bounds(low=2e-4, high=0.5) for number in numbers}
 
 
 def cases() -> dict[str, Case]:
@@ -56,6 +66,8 @@ def cases() -> dict[str, Case]:
         "with hardening": Case(parameters={"hardening": Bounds(low=0.02, high=50.0)}),
         "with joint friction": Case(parameters={"joint_friction": Bounds(low=1e-4, high=0.1)}),
         "with quadratic damping": Case(quadratic_damping=1.0),
+        "with a Jenkins element": Case(sliders=SLIDERS[:1], parameters=slid(1)),
+        "with three": Case(sliders=SLIDERS, parameters=slid(3)),
         "with factors of every joint's stiffness": Case(settings={"per_joint": ["stiffness"]}),
         "with markers where they were measured": Case(settings={"markers": "measured"}),
         "hose half as heavy": Case(arm={"unit_masses": [mass / 2]}),
@@ -90,7 +102,8 @@ def cad_settings() -> tuple[build_mjcf.Config, Uniform]:
 def arm(case: Case) -> mujoco.MjModel:
     """The example's CAD model, changed."""
     config, hose = cad_settings()
-    model = build_mjcf.cad_arm(replace(config, arm=replace(hose, **case.arm))).spec.compile()
+    config = replace(config, arm=replace(hose, **case.arm), joints=replace(config.joints, sliders=case.sliders))
+    model = build_mjcf.cad_arm(config).spec.compile()
     model.dof_dampingpoly[:, 0] = case.quadratic_damping * model.dof_damping
     return model
 
