@@ -18,7 +18,7 @@ from trunkline.pipeline.config import PROJECT, load_folder
 
 ADDRESS, PORT = "127.0.0.1", 1337  # franka-sim listens to every address: give it a network of its own
 COMES = 30.0  # s
-NICE = -10  # asked for: a robot's own computer does nothing else
+URGENT = "41"  # of SCHED_FIFO: a robot's own computer does nothing else
 SERVER = """
 import sys
 import franka_sim.mujoco_franka_sim as simulator
@@ -51,7 +51,7 @@ async def franka_sim(python: Path, ready: np.ndarray) -> AsyncIterator[None]:
             raise InputError(f"{python}: found no franka-sim, expected it installed there")
         with open(Path(folder) / "log", "wb") as log:
             server = await asyncio.create_subprocess_exec(
-                "nice", "-n", str(NICE), str(python), "-c", SERVER, "--no-gripper", "--enforce-motion-limits",
+                "chrt", "--fifo", URGENT, str(python), "-c", SERVER, "--no-gripper", "--enforce-motion-limits",
                 "--enforce-comm-constraints", " ".join(map(str, ready)), env={**os.environ, "FR3_MJCF": str(model)},
                 stdout=log, stderr=log, start_new_session=True,
             )  # fmt: skip

@@ -64,15 +64,16 @@ def test_a_python_that_is_not_there_is_one_line():
 
 
 def test_it_imports_what_any_environment_has():
-    for name in ("adapter", "adapter_frames", "stream"):
+    for name in ("adapter", "adapter_frames", "stream", "urgency"):
         tree = ast.parse((ROOT / f"trunkline/execution/{name}.py").read_text(encoding="utf-8"))
         modules = {node.module for node in tree.body if isinstance(node, ast.ImportFrom)}
         assert modules <= {
             "collections", "collections.abc", "dataclasses", "typing", "trunkline.execution.adapter_frames",
-            "trunkline.execution.stream", "trunkline.panda.kinematics", "trunkline.panda.limits",
+            "trunkline.execution.stream", "trunkline.execution.urgency", "trunkline.panda.kinematics",
+            "trunkline.panda.limits",
         }  # fmt: skip
         plain = {alias.name for node in tree.body if isinstance(node, ast.Import) for alias in node.names}
-        assert plain <= {"contextlib", "importlib", "math", "numpy", "socket", "struct", "sys", "time"}
+        assert plain <= {"contextlib", "importlib", "math", "numpy", "os", "socket", "struct", "sys", "time"}
 
 
 class Library:
@@ -86,7 +87,7 @@ class Library:
             self.q, self.motion_finished = q, False
 
     class State:
-        q, q_d = adapter.Fake.READY, adapter.Fake.READY
+        q, q_d, dq_d, ddq_d = adapter.Fake.READY, adapter.Fake.READY, (0.0,) * 7, (0.5,) * 7
 
     class Duration:
         def to_sec(self):
@@ -113,16 +114,18 @@ class Robot:
         self.sent.append(command)
 
 
-@pytest.mark.parametrize("device", [adapter.PandaPython, adapter.PyLibfranka])
-def test_both_libraries_are_called_in_their_own_way(device):
+@pytest.mark.parametrize(
+    ("device", "rates"), [(adapter.PandaPython, None), (adapter.PyLibfranka, ((0.0,) * 7, (0.5,) * 7))]
+)
+def test_both_libraries_are_called_in_their_own_way(device, rates):
     made, counted = object.__new__(device), []
     made._library, made._robot = Library, Robot()
 
-    def cycle(measured, commanded, dt):
-        counted.append((measured, commanded, dt))
+    def cycle(measured, desired, dt, rates):
+        counted.append((measured, desired, dt, rates))
         return [0.1 * len(counted)] * 7, len(counted) == 3
 
     made.control(cycle)
     assert [command.motion_finished for command in made._robot.sent] == [False, False, True]
     assert made._robot.sent[1].q == [0.2] * 7
-    assert counted[0] == (adapter.Fake.READY, adapter.Fake.READY, 0.001)
+    assert counted[0] == (adapter.Fake.READY, adapter.Fake.READY, 0.001, rates)

@@ -138,6 +138,64 @@ def test_a_robot_whose_clock_runs_slower_is_kept_up_with():
     np.testing.assert_allclose(sent[-1], way(4.0), atol=1e-6)
 
 
+class LossyRobot:
+    """What does not reach it, it makes up: its last acceleration, integrated (libfranka, "Packet handling")."""
+
+    def __init__(self, seed, share, longest):
+        self.random, self.share, self.longest, self.left = np.random.default_rng(seed), share, longest, 0
+        self.place, self.speed, self.gain = READY.copy(), np.zeros(7), np.zeros(7)
+
+    def loses(self):
+        if not self.left and self.random.random() < self.share:
+            self.left = int(self.random.integers(1, self.longest + 1))
+        self.left = max(self.left - 1, 0)
+        return self.left > 0
+
+    def hear(self, place):
+        speed = (place - self.place) / DT
+        self.place, self.speed, self.gain = place, speed, (speed - self.speed) / DT
+
+    def guess(self):
+        self.speed = self.speed + DT * self.gain
+        self.place = self.place + DT * self.speed
+
+
+def lossy(tells, share=0.1, longest=12, at=way, robot=LIMITS["fr3"]):
+    """Where a robot went that lost commands, (T, 7), and the stream; `tells`: where it went meanwhile."""
+    stream, made, went, missed = Stream(READY, robot), LossyRobot(3, share, longest), [], 0
+    for step in range(3000):
+        now = step * DT
+        stream.hear(Setpoint(now + LEAD, tuple(at(now + LEAD))), now)
+        if made.loses():
+            made.guess()
+            missed += 1
+        else:
+            if tells:
+                stream.found(made.place, made.speed, made.gain)
+            made.hear(stream.cycle(now, (1 + missed) * DT))
+            missed = 0
+        went.append(made.place)
+    return np.array(went), stream
+
+
+def test_lost_commands_are_bridged_within_the_robots_limits():
+    went, stream = lossy(tells=True)
+    assert stream.fault == ""
+    assert max(shares(went, LIMITS["fr3"])) < 1.0
+    wanted = np.array([way(n * DT) for n in range(3000)])
+    assert np.abs(went - wanted).max() < 2e-3
+    np.testing.assert_allclose(went[-1], way(3.0), atol=1e-6)
+    assert max(shares(lossy(tells=False)[0], LIMITS["fr3"])) > 1.0
+
+
+def test_it_brakes_from_where_lost_commands_left_it():
+    """Setpoints ask for too much while commands are lost."""
+    went, stream = lossy(tells=True, at=jumping(0.02))
+    assert stream.fault.startswith("setpoint: joint ")
+    assert stream.resting
+    assert max(shares(went, LIMITS["fr3"])) < 1.0
+
+
 def test_frames_come_back():
     setpoint = Setpoint(12.5, tuple(READY))
     assert Setpoint.unpack(setpoint.pack()) == setpoint

@@ -26,6 +26,7 @@ from trunkline.live.settings import Config as Live
 from trunkline.live.simulated import Loop
 from trunkline.panda.limits import ACCELERATION
 from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.teleop.config import Config as Teleop
 from trunkline.teleop.executor import BRAKE, FOLLOWS
 from trunkline.teleop.following import KNOT, Following
 from trunkline.teleop.plan import Plan
@@ -307,6 +308,20 @@ def test_nothing_real_moves_unless_it_is_named():
     for motors, bus in (("gm6020", ""), ("simulated", "can0")):
         with pytest.raises(InputError, match="--motors, --bus: found one of them"):
             hardware_of("simulated", motors, bus, "", execution)
+
+
+def test_plans_are_slow_enough_for_the_robot_that_is_named():
+    """An FR3's last joints may accelerate half as much as a Panda's."""
+    execution, teleop = load_folder(Config, PROJECT / "conf/execution"), load_folder(Teleop, PROJECT / "conf/teleop")
+    panda, fr3 = (hardware_of(robot, "simulated", "", "", execution) for robot in ("panda", "fr3"))
+    assert panda.kept_by(teleop) == teleop
+    limits = limits_of(fr3.kept_by(teleop).motors)
+    assert (limits.acceleration[:7] < LIMITS["fr3"].acceleration).all()
+    assert (limits.acceleration[:7] >= 0.47 * LIMITS["panda"].acceleration).all()
+    hasty = replace(teleop, motors=replace(teleop.motors, share=1.0))
+    for robot in (panda, fr3):
+        found = limits_of(robot.kept_by(hasty).motors)
+        assert (found.velocity[:7] < robot.limits.velocity).all()
 
 
 def test_the_base_of_a_real_robot_is_never_put_in_place_by_eye():

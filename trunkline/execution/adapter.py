@@ -17,15 +17,21 @@ from typing import Protocol
 
 from trunkline.execution.adapter_frames import SENT, Frames, Setpoint, Told
 from trunkline.execution.stream import LIMITS, Stream
+from trunkline.execution.urgency import be_urgent
 
 TELL = 5  # cycles from one frame told to the next
 CUTOFF = 100.0  # Hz, of the filter that libfranka 0.9 has by default
 
-Cycle = Callable[[Sequence[float], Sequence[float], float], tuple[list[float], bool]]
+Joints = Sequence[float]
+Cycle = Callable[[Joints, Joints, float, tuple[Joints, Joints] | None], tuple[list[float], bool]]
 
 
 class Device(Protocol):
-    """A robot under control: `cycle(measured, commanded, dt)` gives what it is sent, rad, and whether that is all."""
+    """A robot under control: `cycle(measured, desired, dt, rates)` gives what it is sent, rad, and whether that is all.
+
+    `desired` is where the robot's own motion generator is, rad; `rates` its speed and acceleration, rad/s and rad/s²,
+    None where the robot's library itself evens out what lost commands leave.
+    """
 
     def control(self, cycle: Cycle) -> None: ...
 
@@ -41,7 +47,7 @@ class PandaPython:
         library = self._library
 
         def step(state, duration):
-            joints, ended = cycle(state.q, state.q_d, duration.to_sec())
+            joints, ended = cycle(state.q, state.q_d, duration.to_sec(), None)  # its rate limiter is on
             command = library.JointPositions(joints)
             command.motion_finished = ended
             return command
@@ -60,7 +66,7 @@ class PyLibfranka:
         control, ended = self._robot.start_joint_position_control(self._library.ControllerMode.JointImpedance), False
         while not ended:
             state, duration = control.readOnce()
-            joints, ended = cycle(state.q, state.q_d, duration.to_sec())
+            joints, ended = cycle(state.q, state.q_d, duration.to_sec(), (state.dq_d, state.ddq_d))
             command = self._library.JointPositions(joints)
             command.motion_finished = ended
             control.writeOnce(command)
@@ -77,7 +83,7 @@ class Fake:
     def control(self, cycle: Cycle) -> None:
         sent, ended, due = list(self.joints), False, time.monotonic()
         while not ended:
-            sent, ended = cycle(self.joints, sent, 0.001)
+            sent, ended = cycle(self.joints, sent, 0.001, None)
             self.joints = [q + 0.001 / self.LAG * (s - q) for q, s in zip(self.joints, sent, strict=True)]
             due = max(due + 0.001, time.monotonic() - 0.02)
             time.sleep(max(due - time.monotonic(), 0.0))
@@ -94,11 +100,15 @@ class Adapter:
         self._frames, self._stream, self._count, self._open = Frames(SENT.size), None, 0, True
         channel.setblocking(False)
 
-    def cycle(self, measured: Sequence[float], commanded: Sequence[float], dt: float) -> tuple[list[float], bool]:
+    def cycle(
+        self, measured: Joints, desired: Joints, dt: float, rates: tuple[Joints, Joints] | None
+    ) -> tuple[list[float], bool]:
         """One cycle of the robot; it ends once the other side is gone and the joints are at rest."""
         if self._stream is None:
-            self._stream = Stream(commanded, self._limits)
+            self._stream = Stream(desired, self._limits)
         now, stream = time.monotonic(), self._stream
+        if rates is not None:
+            stream.found(desired, *rates)
         for frame in self._heard():
             stream.hear(Setpoint.unpack(frame), now)
         if not self._open:
@@ -136,7 +146,10 @@ def main(arguments: list[str]) -> int:
     with socket.socket(fileno=int(descriptor)) as channel:
         adapter = Adapter(robot, channel)
         try:
-            DEVICES[robot](address).control(adapter.cycle)
+            device = DEVICES[robot](address)
+            if robot != "fake":
+                be_urgent()
+            device.control(adapter.cycle)
         except Exception as error:  # whatever the robot's library raises is the fault that is told
             adapter.fail(" ".join(f"{type(error).__name__}: {error}".split()))
             return 1

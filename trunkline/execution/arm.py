@@ -87,15 +87,12 @@ class Arm:
         try:
             self._socket.send(Setpoint(due, tuple(joints.tolist())).pack())
         except OSError as error:
+            self._hear()  # an adapter that has ended has told why
             self._fail(f"its adapter takes no setpoints ({error.strerror})")
 
     def turn(self, now: float) -> None:
         """Hear what the adapter tells, at `now`, s."""
-        while data := self._heard():
-            for frame in self._frames.cut(data):
-                self.told = Told.unpack(frame)
-                if self.told.fault:
-                    self._fail(self.told.fault)
+        self._hear()
         if self.told is not None:
             if (silent := now - self.told.time) > SILENT:
                 self._fail(f"its adapter is silent for {1e3 * silent:.0f} ms")
@@ -113,6 +110,13 @@ class Arm:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+
+    def _hear(self) -> None:
+        while data := self._heard():
+            for frame in self._frames.cut(data):
+                self.told = Told.unpack(frame)
+                if self.told.fault:
+                    self._fail(self.told.fault)
 
     def _heard(self) -> bytes:
         """What has come, b"" where nothing has."""

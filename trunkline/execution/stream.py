@@ -3,6 +3,9 @@
 Setpoints are stamped with when they are due, and come some time before. They are played by the robot's time, which is
 drawn towards this machine's, and every cycle is held against the robot's limits before it is sent. Where setpoints run
 out, do not come, or ask for too much, the joints brake by themselves and hold; nothing but a new stream moves them.
+
+A robot that a command does not reach in time goes on at its last acceleration (libfranka, "System requirements",
+"Packet handling"). What it is sent next starts where it went, and comes back to the setpoints within BRIDGED s.
 """
 
 import math
@@ -24,6 +27,9 @@ ROUNDING = 1.02  # share of a limit that differences may show of a way that keep
 BRAKING = 0.5  # share of accelerations and jerks with which it brakes
 SLOWEST, FASTEST = 0.9, 1.5  # of the robot's time, on which setpoints are played
 GAIN, SMOOTH = 5.0, 0.1  # 1/s, s: how its clock is drawn to this machine's
+CYCLE = 0.001  # s, of the robot
+LOST = 1e-6  # rad by which a robot that a command has reached may be elsewhere
+BRIDGED = 0.1  # s within which it is back where setpoints want it
 
 
 @dataclass(frozen=True)
@@ -53,25 +59,56 @@ LIMITS = {
 }
 
 
+class Bridge:
+    """An offset that goes to none within BRIDGED s, with the least jerk: from its place, speed and acceleration, the
+    rows of `offset` (3, 7)."""
+
+    def __init__(self, offset: np.ndarray) -> None:
+        self._place, self._speed, self._gain = offset
+        self._time = 0.0
+
+    def next(self, dt: float) -> np.ndarray:
+        """The offset `dt` s later, (7,)."""
+        self._time = min(self._time + dt, BRIDGED)
+        s = self._time / BRIDGED
+        place = 1 - s**3 * (10 - 15 * s + 6 * s**2)
+        speed = s - s**3 * (6 - 8 * s + 3 * s**2)
+        gain = s**2 / 2 - s**3 * (3 - 3 * s + s**2) / 2
+        return place * self._place + BRIDGED * speed * self._speed + BRIDGED**2 * gain * self._gain
+
+
 class Stream:
     """From rest at `joints` (7,), rad.
 
     Attributes:
-        joints: that were sent last, (7,), rad. fault: why it brakes, "" while it follows. resting: whether it is at
-            rest, its fault braked for.
+        fault: why it brakes, "" while it follows.
     """
 
     def __init__(self, joints: Sequence[float], limits: RobotLimits) -> None:
-        self.joints, self.fault = np.array(joints, dtype=float), ""
+        self.fault = ""
         self._limits = limits
-        self._speed, self._gain = np.zeros(len(self.joints)), np.zeros(len(self.joints))
+        still = np.zeros(len(joints))
+        self._sent = np.array([joints, still, still], dtype=float)  # place, speed and acceleration
+        self._planned = self._sent  # the same of the setpoints
+        self._bridge, self._lost = Bridge(0.0 * self._sent), False
         self._queue: deque[Setpoint] = deque()
         self._heard = self._clock = math.nan
         self._behind = 0.0
 
     @property
+    def joints(self) -> np.ndarray:
+        """As they were sent last, (7,), rad."""
+        return self._sent[0]
+
+    @property
     def resting(self) -> bool:
-        return bool(self.fault) and not self._speed.any() and not self._gain.any()
+        """Whether it is at rest, its fault braked for."""
+        return bool(self.fault) and not self._sent[1:].any()
+
+    def found(self, joints: Sequence[float], speed: Sequence[float], gain: Sequence[float]) -> None:
+        """Before a cycle: where the robot's own motion generator is, (7,) each, rad, rad/s, rad/s²."""
+        if np.abs(np.subtract(joints, self.joints)).max() > LOST:
+            self._sent, self._lost = np.array([joints, speed, gain], dtype=float), True
 
     def hear(self, setpoint: Setpoint, now: float) -> None:
         """A setpoint, at `now`, s."""
@@ -92,12 +129,18 @@ class Stream:
         """What the robot is sent at `now`, s, `dt` s of its own time after the last one; (7,), rad."""
         if not self.fault and self._queue and now - self._heard > SILENT:
             self.brake(f"silent for {1e3 * (now - self._heard):.0f} ms, expected setpoints every 1 ms")
-        wanted = self._wanted(now, dt) if not self.fault else None
-        if wanted is not None and dt > 0:
-            self._take(wanted, dt)
-        if self.fault and dt > 0:
-            self._slow(dt)
+        cycles, lost = max(round(dt / CYCLE), 1), self._lost
+        for later in range(cycles - 1, -1, -1) if dt > 0 else ():
+            self._go(now - later * dt / cycles, dt / cycles, missed=lost and later > 0)
         return self.joints.copy()
+
+    def _go(self, now: float, dt: float, missed: bool) -> None:
+        """One of the robot's cycles; of one that it `missed` nothing was sent."""
+        wanted = self._wanted(now, dt) if not self.fault else None
+        if wanted is not None:
+            self._take(wanted, dt, missed)
+        if self.fault and not missed:
+            self._slow(dt)
 
     def _wanted(self, now: float, dt: float) -> np.ndarray | None:
         """Where the setpoints want the joints now; None where there is nothing to follow yet, or no more."""
@@ -111,7 +154,7 @@ class Stream:
         else:
             self._behind += (now - self._clock - dt - self._behind) * min(dt / SMOOTH, 1.0)
             self._clock += dt * min(max(1.0 + GAIN * self._behind, SLOWEST), FASTEST)
-        if not self._speed.any():  # at rest nothing is missed by what is left out of it
+        if not self._planned[1].any():  # at rest nothing is missed by what is left out of it
             while len(queue) > 1 and queue[1].due <= now and _same(queue[0], queue[1]):
                 queue.popleft()
             self._clock = max(self._clock, min(queue[0].due, now))
@@ -131,10 +174,14 @@ class Stream:
         first, second = np.array(queue[0].joints), np.array(queue[1].joints)
         return first + max(share, 0.0) * (second - first)
 
-    def _take(self, wanted: np.ndarray, dt: float) -> None:
-        speed = (wanted - self.joints) / dt
-        gain = (speed - self._speed) / dt
-        jerk = (gain - self._gain) / dt
+    def _take(self, wanted: np.ndarray, dt: float, missed: bool) -> None:
+        if self._lost and not missed:
+            self._bridge, self._lost = Bridge(self._sent - self._planned), False
+        self._planned = _moved(self._planned, wanted, dt)
+        if missed:
+            return
+        place, speed, gain = sent = _moved(self._sent, wanted + self._bridge.next(dt), dt)
+        jerk = (gain - self._sent[2]) / dt
         limits = self._limits
         for found, most, unit in (
             (speed, limits.velocity, "rad/s"), (gain, limits.acceleration, "rad/s²"), (jerk, limits.jerk, "rad/s³")
@@ -145,23 +192,29 @@ class Stream:
                 asked = f"asks for {abs(found[joint]):.3g} {unit}, expected at most {most[joint]:.3g}"
                 self.brake(f"setpoint: joint {joint + 1} {asked}")
                 return
-        outside = np.maximum(limits.low - wanted, wanted - limits.high)
+        outside = np.maximum(limits.low - place, place - limits.high)
         if outside.max() > 0:
             joint = int(outside.argmax())
-            self.brake(f"setpoint: joint {joint + 1} leaves its range at {wanted[joint]:.3f} rad")
+            self.brake(f"setpoint: joint {joint + 1} leaves its range at {place[joint]:.3f} rad")
             return
-        self.joints, self._speed, self._gain = wanted, speed, gain
+        self._sent = sent
 
     def _slow(self, dt: float) -> None:
         """One cycle of braking, each joint by itself: the acceleration that a jerk still ends at rest."""
         jerk, most = BRAKING * self._limits.jerk, BRAKING * self._limits.acceleration
-        speed, gain = self._speed, self._gain
+        place, speed, gain = self._sent
         wanted = -np.sign(speed) * np.minimum(most, np.sqrt(jerk * np.abs(speed)))
         gain = gain + np.clip(wanted - gain, -jerk * dt, jerk * dt)
         after = speed + gain * dt
         ended = (after * speed <= 0) & (np.abs(gain) <= 4 * jerk * dt)
-        self._gain, self._speed = np.where(ended, 0.0, gain), np.where(ended, 0.0, after)
-        self.joints = self.joints + self._speed * dt
+        speed = np.where(ended, 0.0, after)
+        self._sent = np.array([place + speed * dt, speed, np.where(ended, 0.0, gain)])
+
+
+def _moved(before: np.ndarray, place: np.ndarray, dt: float) -> np.ndarray:
+    """Place, speed and acceleration `dt` s after those `before`, (3, 7)."""
+    speed = (place - before[0]) / dt
+    return np.array([place, speed, (speed - before[1]) / dt])
 
 
 def _same(first: Setpoint, second: Setpoint) -> bool:

@@ -1,16 +1,22 @@
 """What of a session's robot is real: nothing, unless it is named."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.execution.arm import ArmSettings
 from trunkline.execution.motors import MotorSettings
 from trunkline.execution.ros_settings import RosSettings
 from trunkline.execution.settings import Config
+from trunkline.execution.stream import LIMITS, RobotLimits
+from trunkline.panda.limits import ACCELERATION, JERK, VELOCITY
+from trunkline.teleop.config import Config as Teleop
 
 SIMULATED = "virtual"  # the bus behind which the motors are simulated
 ROBOTS = ("simulated", "panda", "fr3", "ros2")
 MOTORS = ("simulated", "gm6020")
+MARGIN = 0.95  # share of a robot's own limits that plans may come to: differences of what it is sent show a little more
 
 
 @dataclass(frozen=True)
@@ -29,6 +35,18 @@ class Hardware:
     def real(self) -> bool:
         """Whether anything but simulations would move."""
         return self.robot not in ("", "fake") or self.bus not in ("", SIMULATED)
+
+    @property
+    def limits(self) -> RobotLimits:
+        """Of the robot, a Panda's where none is named."""
+        return LIMITS["fr3" if self.robot == "fr3" else "panda"]
+
+    def kept_by(self, teleop: Teleop) -> Teleop:
+        """`teleop` with plans that are slow enough for the robot: some of an FR3's limits are half of a Panda's."""
+        own, panda = self.limits, (VELOCITY, ACCELERATION, JERK)
+        most = min(np.min(limit / p) for limit, p in zip((own.velocity, own.acceleration, own.jerk), panda, strict=True))
+        share = min(teleop.motors.share, MARGIN * float(most))
+        return replace(teleop, motors=replace(teleop.motors, share=share))
 
     def words(self) -> str:
         """What will move."""

@@ -10,7 +10,6 @@ import os
 import signal
 import sys
 import time
-from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,7 +23,7 @@ from trunkline.execution.machine import Machine
 from trunkline.execution.motors import MotorSettings
 from trunkline.execution.on_bus import BankOnBus, BusMotors, SimulatedMotors, open_bus
 from trunkline.execution.pace import PacedRobot
-from trunkline.execution.stream import LIMITS
+from trunkline.execution.urgency import be_urgent
 from trunkline.live.hardware import SIMULATED, Hardware
 from trunkline.live.robot import POSE, READY, Channel, RobotProcess, Standing
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
@@ -34,7 +33,6 @@ from trunkline.teleop.trajectory import Limits
 
 RESTS, STILL = 2.0, 2e-4  # s in which no pose changes by more (m), after which the twin rests
 NICE = 5  # of the twin: a picture may wait
-URGENT = 40  # of SCHED_FIFO; asked for, and done without where there is no right to it
 
 
 @dataclass(frozen=True)
@@ -102,14 +100,13 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
         arm = arm_of(hardware)
         machine = Moved(arm, motors_of(hardware), begins.commands)
         joints = machine.begin(begins.joints)
-        moved, limits = machine, LIMITS["fr3" if hardware.robot == "fr3" else "panda"]
+        moved = machine
         robot = PacedRobot(
-            joints, begins.commands, begins.limits, begins.package, lambda q, c, _: moved.move(q, c), limits
+            joints, begins.commands, begins.limits, begins.package, lambda q, c, _: moved.move(q, c), hardware.limits
         )  # fmt: skip
         gc.freeze()
-        if hardware.real:  # not before: what loads at that priority is stopped by the kernel for 50 ms of each second
-            with suppress(OSError, AttributeError):
-                os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(URGENT))
+        if hardware.real:
+            be_urgent()
         drive(Loop(channel, robot, machine), parent)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)

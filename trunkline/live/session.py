@@ -90,6 +90,8 @@ async def opened(
 
     config = config or load_folder(Config, PROJECT / "conf/live")
     teleop = teleop or load_folder(Teleop, PROJECT / "conf/teleop")
+    if hardware is not None:
+        teleop = hardware.kept_by(teleop)
     alignment = alignment_for(hardware, config.alignment)
     anchors = Anchors(Path(alignment.anchors))
     made = await asyncio.to_thread(make, package, teleop, config, heard, hardware)
