@@ -107,7 +107,8 @@ class Stream:
 
     def found(self, joints: Sequence[float], speed: Sequence[float], gain: Sequence[float]) -> None:
         """Before a cycle: where the robot's own motion generator is, (7,) each, rad, rad/s, rad/s²."""
-        if np.abs(np.subtract(joints, self.joints)).max() > LOST:
+        place, rate = np.abs(np.subtract([joints, speed], self._sent[:2])).max(axis=1)
+        if place > LOST or rate > LOST / CYCLE:
             self._sent, self._lost = np.array([joints, speed, gain], dtype=float), True
 
     def hear(self, setpoint: Setpoint, now: float) -> None:
