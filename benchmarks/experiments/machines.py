@@ -19,11 +19,15 @@ from trunkline.pipeline.config import PROJECT, load_folder
 ADDRESS, PORT = "127.0.0.1", 1337  # franka-sim listens to every address: give it a network of its own
 COMES = 30.0  # s
 URGENT = "41"  # of SCHED_FIFO: a robot's own computer does nothing else
+# A command that comes late is dropped, as a robot does (libfranka, "Network requirements"); franka-sim takes it.
 SERVER = """
 import sys
 import franka_sim.mujoco_franka_sim as simulator
 simulator.ARM_INITIAL_Q[:] = [float(word) for word in sys.argv.pop().split()]
+from franka_sim.franka_sim_server import FrankaSimServer
 from franka_sim.run_server import main
+taken = FrankaSimServer._absorb_within_motion_limits
+FrankaSimServer._absorb_within_motion_limits = lambda self, command, *, fresh: fresh and taken(self, command, fresh=True)
 main()
 """
 

@@ -16,7 +16,7 @@ from trunkline.teleop.config import Config as Teleop
 SIMULATED = "virtual"  # the bus behind which the motors are simulated
 ROBOTS = ("simulated", "panda", "fr3", "ros2")
 MOTORS = ("simulated", "gm6020")
-MARGIN = 0.95  # share of a robot's own limits that plans may come to: differences of what it is sent show a little more
+MARGIN = 0.8  # share of a robot's own limits that plans may come to; the rest is for what bridges lost commands
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,8 @@ class Hardware:
     def kept_by(self, teleop: Teleop) -> Teleop:
         """`teleop` with plans that are slow enough for the robot: some of an FR3's limits are half of a Panda's."""
         own, panda = self.limits, (VELOCITY, ACCELERATION, JERK)
-        most = min(np.min(limit / p) for limit, p in zip((own.velocity, own.acceleration, own.jerk), panda, strict=True))
+        both = zip((own.velocity, own.acceleration, own.jerk), panda, strict=True)
+        most = min(np.min(limit / other) for limit, other in both)
         share = min(teleop.motors.share, MARGIN * float(most))
         return replace(teleop, motors=replace(teleop.motors, share=share))
 
