@@ -26,8 +26,8 @@ import franka_sim.mujoco_franka_sim as simulator
 simulator.ARM_INITIAL_Q[:] = [float(word) for word in sys.argv.pop().split()]
 from franka_sim.franka_sim_server import FrankaSimServer
 from franka_sim.run_server import main
-taken = FrankaSimServer._absorb_within_motion_limits
-FrankaSimServer._absorb_within_motion_limits = lambda self, command, *, fresh: fresh and taken(self, command, fresh=True)
+take = FrankaSimServer._absorb_within_motion_limits
+FrankaSimServer._absorb_within_motion_limits = lambda self, sent, *, fresh: fresh and take(self, sent, fresh=True)
 main()
 """
 
