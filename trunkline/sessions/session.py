@@ -10,6 +10,7 @@ from omegaconf import OmegaConf
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     FiniteFloat,
@@ -33,6 +34,20 @@ def _folder_name(name: str) -> str:
 
 
 SessionName = Annotated[str, AfterValidator(_folder_name)]
+
+
+def _names(found) -> list:
+    """One name, or several of one arm."""
+    names = found if isinstance(found, list) else [found]
+    if not names:
+        raise ValueError("found an empty list, expected the name of a session, or several")
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"found {twice!r} twice, expected each session once")
+    return names
+
+
+SessionNames = Annotated[list[SessionName], BeforeValidator(_names)]
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
