@@ -32,7 +32,8 @@ class Config:
 def main(config: Config) -> None:
     folders = {name: RAW / name for name in config.session}
     sessions = {name: read_session(folder) for name, folder in folders.items()}
-    require_own_logs(folders, sessions)
+    if len(sessions) > 1:
+        require_own_logs(folders, sessions)
     found = {name: gathered_of(folders[name], session, config) for name, session in sessions.items()}
     if len(found) > 1:
         require_one_arm(found, config.plausible.distance)

@@ -55,4 +55,4 @@ def _contents(folder: Path, files: list[str]) -> dict[str, str]:
 def file_digest(path: Path) -> str:
     """Of its bytes, in hexadecimal."""
     with open(path, "rb") as log:
-        return hashlib.filefile_digest(log, "sha256").hexdigest()
+        return hashlib.file_digest(log, "sha256").hexdigest()

@@ -70,10 +70,17 @@ def by_sentence(qualities: list[Quality], said: Callable[[Findings], list[str]])
 
 def report(qualities: list[Quality], gathered: Gathered) -> dict:
     """The quality report, per trial and for the session; None where there is nothing to measure."""
+    several = len({log.path.parent for log in _logs(qualities)}) > 1
     return {
         "trials": {quality.take.name: _trial(quality) for quality in qualities},
         "refused": gathered.refused,
-        "logs": {log.path.name: {"messages": log.count, "without_checksum": log.unchecked} for log in _logs(qualities)},
+        "logs": {
+            (f"{log.path.parent.name}/{log.path.name}" if several else log.path.name): {
+                "messages": log.count,
+                "without_checksum": log.unchecked,
+            }
+            for log in _logs(qualities)
+        },
         "clock": clock_facts(gathered.clock),
     }
 
