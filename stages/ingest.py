@@ -8,7 +8,7 @@ from trunkline.figures.data import quality_figure
 from trunkline.figures.style import save_figure
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
-from trunkline.sessions.session import Session, SessionNames, read_session
+from trunkline.sessions.session import Session, SessionNames, read_session, session_folders
 from trunkline.settings import settings
 from trunkline.takes.checks import Limits
 from trunkline.takes.gathering import Gathered, Refusal, gather, require_enough, together
@@ -30,7 +30,7 @@ class Config:
 
 
 def main(config: Config) -> None:
-    folders = {name: RAW / name for name in config.session}
+    folders = session_folders(RAW, config.session)
     sessions = {name: read_session(folder) for name, folder in folders.items()}
     if len(sessions) > 1:
         require_own_logs(folders, sessions)

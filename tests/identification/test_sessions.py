@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -9,14 +10,15 @@ import pytest
 
 from tests.identification.test_stage import metrics_of, settings
 from tests.support.matched_plant import begin_project, tilt
+from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
-from trunkline.identification.parameters import candidate_fields, set_fields
-from trunkline.identification.per_session import model_in
+from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.per_session import make_room, model_in, names_apart
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.trials.trial import write_trials
 
 NOISE = 3e-4  # m
-MOUNTS = {"monday": (0.02, -0.03), "friday": (-0.04, 0.03)}  # rad: 4.2 degrees between them about one axis, 3.4 the other
+MOUNTS = {"monday": (0.02, -0.03), "friday": (-0.04, 0.03)}  # rad, about x and y: some 3.4 degrees apart about each
 STIFFNESS = 0.75  # of the true arm over the CAD model's
 NAMES = ("mount_tilt_x", "mount_tilt_y")
 
@@ -38,8 +40,6 @@ def found(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("trunkline.identification.certainty.RESAMPLINGS", 2000)
         patch.chdir(tmp_path_factory.mktemp("sessions"))
-        from pathlib import Path
-
         model = begin_project(Path("."), 6)
         middle = model.jnt_stiffness[0]
         truth = model.__copy__()
@@ -96,6 +96,19 @@ def test_the_written_model_holds_both_mounts(found):
     for session, mount in MOUNTS.items():
         turned = model_in(session, model).body("base").quat
         np.testing.assert_allclose(2 * turned[1:3], mount, atol=0.002)
+
+
+def test_what_a_session_has_for_itself_may_be_its_shape_at_rest():
+    spec = small_spec(6)
+    names = names_apart(["stiffness", "rest_bend_x", "mount_tilt_x"], ["rest_bend_x"], ["friday"])
+    make_room(spec, names)
+    model = spec.compile()
+    values = {"rest_bend_x": np.array([0.01]), "rest_bend_x@friday": np.array([0.03])}
+    set_fields(model, candidate_fields(model, values))
+    read = PARAMETERS["rest_bend_x"].read
+    assert names == {"rest_bend_x@friday": "rest_bend_x"}
+    assert (read(model), read(model_in("friday", model))) == pytest.approx((0.01, 0.03))
+    assert read(model_in("monday", model)) == pytest.approx(0.01)
 
 
 def test_a_single_session_leaves_no_trace_of_several(found):

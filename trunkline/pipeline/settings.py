@@ -51,7 +51,8 @@ def require_session(root: Path) -> None:
     params, raw = read_yaml(root / "params.yaml"), root / "data" / "raw"
     wanted = params.get("ingest", {}).get("session")
     tracked = [file.stem for file in raw.glob("*.dvc")]
-    there = sorted({LAB, *tracked, *sessions_in(raw)})
+    folders = [file.parents[1].name for file in raw.glob("[!.]*/[!.]*/session.yaml")]  # of several sessions
+    there = sorted({LAB, *tracked, *sessions_in(raw), *folders})
     if wanted is None:
         return
     for name in wanted if isinstance(wanted, ListConfig) else [wanted]:

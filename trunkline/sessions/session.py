@@ -232,6 +232,15 @@ def sessions_in(folder: Path) -> list[str]:
     return sorted(file.parent.name for file in folder.glob("[!.]*/session.yaml"))
 
 
+def session_folders(raw: Path, names: list[str]) -> dict[str, Path]:
+    """Folders of the sessions `names` in `raw`, by name. A single name may be that of a folder of sessions, which then
+    stands for all of them, in the order of their names: a list for which one path is enough."""
+    inside = sessions_in(raw / names[0]) if len(names) == 1 else []
+    if inside and not (raw / names[0] / "session.yaml").is_file():
+        return {name: raw / names[0] / name for name in inside}
+    return {name: raw / name for name in names}
+
+
 def read_session(folder: Path) -> Session:
     """Read and check `folder`/session.yaml.
 

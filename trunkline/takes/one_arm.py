@@ -42,8 +42,7 @@ def require_one_arm(sessions: dict[str, Gathered], distance: float) -> None:
 
 
 def require_own_logs(folders: dict[str, Path], sessions: dict[str, Session]) -> None:
-    """Refuse a log that two sessions hold: it would count twice, and may be fitted in one split and scored in another.
-    """
+    """Refuse a log that two sessions hold: it would count twice, and may be fitted here and scored there."""
     seen: dict[str, tuple[str, str]] = {}
     for name, session in sessions.items():
         for file in sorted({trial.file for trial in session.trials}):
