@@ -1,4 +1,4 @@
-"""All candidates times all trials as one batch of simulations."""
+"""All candidates times all trials as one batch of simulations, or as several on the workers of a scheduler."""
 
 import copy
 from dataclasses import dataclass
@@ -13,6 +13,7 @@ from trunkline.identification.at_rest import shapes_at_rest
 from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
 from trunkline.identification.winding import wound_by_each
+from trunkline.scheduler import PIECES, places, spread
 from trunkline.simulation.load import hang
 from trunkline.simulation.motion import batch_of, hold, move
 from trunkline.simulation.winch import Winches
@@ -36,6 +37,37 @@ class Simulated:
     rests: list[np.ndarray]
 
 
+@dataclass
+class _Pace:
+    """What trials in motion share that are simulated with each other, in one batch or in several.
+
+    frame_step: s. longest: s, from any start to the first frame. lengths: at which of them end, frames. loaded: whether
+    anything hangs from a tip.
+    """
+
+    frame_step: float
+    longest: float
+    lengths: list[int]
+    loaded: bool
+
+    @classmethod
+    def of(cls, experiments: list[Experiment]) -> "_Pace":
+        lengths = sorted({1, *(e.frames for e in experiments)})
+        loaded = any(e.load for e in experiments)
+        return cls(experiments[0].frame_step, max(e.lead for e in experiments), lengths, loaded)
+
+
+@dataclass
+class _Piece:
+    """Some candidates in some trials. fields: of the candidates. at_rest, moving: trials, by their numbers; those in
+    motion as `Population` groups them. rests: near which to look."""
+
+    fields: Fields
+    at_rest: list[int]
+    moving: dict[bool, list[int]]
+    rests: list[np.ndarray] | None
+
+
 class Population:
     """Simulates candidates of one model on a fixed list of experiments of the same segments.
 
@@ -56,9 +88,13 @@ class Population:
         # those in which all cables are slack are cheaper, and simulated by themselves
         slack = {i: experiments[i].slack(model) for i in moving}
         self._moving = {group: [i for i in moving if slack[i] == group] for group in sorted(set(slack.values()))}
+        self._paces = {group: _Pace.of([experiments[i] for i in own]) for group, own in self._moving.items()}
         self._experiments = experiments
         self._step_factor = step_factor
-        self._batches: dict[bool, Batch] = {}
+        self._batches: dict[tuple[int, ...], Batch] = {}
+
+    def __getstate__(self) -> dict:
+        return self.__dict__ | {"_batches": {}}  # a worker makes its own
 
     def simulate(self, fields: Fields, rests: list[np.ndarray] | None = None) -> Simulated:
         """Run every candidate (the first axis of `fields`) through every experiment.
@@ -67,33 +103,71 @@ class Population:
             rests: near which all of them rest, as `Simulated.rests` has it of another candidate.
         """
         count = len(next(iter(fields.values())))
+        edges, rounds = self._cut(count, places())
+        parts = [
+            _Piece({name: values[first:last] for name, values in fields.items()}, at_rest, moving, rests)
+            for first, last in pairwise(edges)
+            for at_rest, moving in rounds
+        ]
+        found = spread(_run_piece, parts, self)
+        if len(found) == 1:
+            return found[0]
+        blocks = [found[start : start + len(rounds)] for start in range(0, len(found), len(rounds))]
+        positions = [
+            np.concatenate([part.positions[i] for part in found if part.positions[i] is not None])
+            for i in range(len(self._experiments))
+        ]
+        diverged = np.concatenate([np.any([part.diverged for part in block], axis=0) for block in blocks])
+        return Simulated(positions, diverged, sum(part.steps for part in found), found[0].rests)
+
+    def _cut(self, count: int, places: int) -> tuple[list[int], list[tuple[list[int], dict[bool, list[int]]]]]:
+        """Where to cut `count` candidates, and into which trials at rest and in motion: a piece for each of either.
+
+        Where nothing is spread, all is one piece. Trials at rest stay together, as one may be looked for beside
+        another; to the first of them comes the shape near which the next evaluation looks.
+        """
+        pieces = PIECES * places if places > 1 else 1
+        slices = min(count, pieces)
+        edges = [count * i // slices for i in range(slices + 1)]
+        each = -(-pieces // slices)
+        rounds = [
+            ([], {group: own[i::each]}) for group, own in self._moving.items() for i in range(min(each, len(own)))
+        ]
+        if each == 1 or not rounds:
+            return edges, [(self._at_rest, self._moving)]
+        return edges, ([(self._at_rest, {})] if self._at_rest else []) + rounds
+
+    def run(self, piece: _Piece) -> Simulated:
+        """A piece; of other trials there are no positions."""
+        count = len(next(iter(piece.fields.values())))
         positions: list = [None] * len(self._experiments)
         found = [np.full((1, arm_hinges(self._model)), np.nan)] * len(self._experiments)
         steps = 0
-        if self._at_rest:
-            own = [self._experiments[i] for i in self._at_rest]
-            near = None if rests is None else [rests[i] for i in self._at_rest]
-            results, angles, steps = shapes_at_rest(self._model, fields, own, self._sites, near)
-            for index, result, angle in zip(self._at_rest, results, angles, strict=True):
+        if piece.at_rest:
+            own = [self._experiments[i] for i in piece.at_rest]
+            near = None if piece.rests is None else [piece.rests[i] for i in piece.at_rest]
+            results, angles, steps = shapes_at_rest(self._model, piece.fields, own, self._sites, near)
+            for index, result, angle in zip(piece.at_rest, results, angles, strict=True):
                 positions[index], found[index] = result, angle
-        for slack, chosen in self._moving.items():
-            own = [self._experiments[i] for i in chosen]
-            results, taken = self._run(slack, own, fields, count)
+        for slack, chosen in piece.moving.items():
+            results, taken = self._run(slack, chosen, piece.fields, count)
             steps += taken
             for index, result in zip(chosen, results, strict=True):
                 positions[index] = result
         diverged = np.zeros(count, dtype=bool)
         for result in positions:
-            diverged |= ~np.isfinite(result).all(axis=(1, 2, 3))
+            if result is not None:
+                diverged |= ~np.isfinite(result).all(axis=(1, 2, 3))
         return Simulated(positions, diverged, steps, found)
 
-    def _batch(self, slack: bool, experiments: list[Experiment], fields: Fields, count: int) -> Batch:
+    def _batch(self, slack: bool, chosen: list[int], fields: Fields, count: int) -> Batch:
         """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start, its motors yet to be set.
         """
-        batch = self._batches.get(slack)
+        experiments = [self._experiments[i] for i in chosen]
+        batch = self._batches.get(tuple(chosen))
         if batch is None or batch.nsim != count * len(experiments):
             model = _without_idle(self._model, slack, fields)
-            batch = self._batches[slack] = batch_of(model, count * len(experiments))
+            batch = self._batches[tuple(chosen)] = batch_of(model, count * len(experiments))
         if slack:  # cables do not rub, winches do not wind
             fields = {name: values for name, values in fields.items() if name != "numeric_data"}
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)
@@ -101,7 +175,7 @@ class Population:
             batch.expand(name)[:] = np.tile(values, (len(experiments),) + (1,) * (values.ndim - 1))
         batch.expand("opt.gravity")[:] = np.repeat([e.gravity for e in experiments], count, axis=0)
         loads = np.repeat([e.load for e in experiments], count)
-        if loads.any():
+        if self._paces[slack].loaded:
             hang(batch, batch.model, loads, tuple(fields))
         elif "jnt_pos" in fields:  # what softens joint limits follows, as when such a model is compiled
             batch.set_const()
@@ -122,12 +196,13 @@ class Population:
                 batch.bind("plastic")[:, place + end] = bend - np.clip(bend, -give, give)
 
     def _run(
-        self, slack: bool, experiments: list[Experiment], fields: Fields, count: int
+        self, slack: bool, chosen: list[int], fields: Fields, count: int
     ) -> tuple[list[np.ndarray], int]:
         """Trials in motion, all cables slack in all of them or in none: from the start to the first frame, then frame
         by frame."""
-        batch = self._batch(slack, experiments, fields, count)
-        frame_step, sites = experiments[0].frame_step, self._sites
+        experiments, pace = [self._experiments[i] for i in chosen], self._paces[slack]
+        batch = self._batch(slack, chosen, fields, count)
+        frame_step, sites = pace.frame_step, self._sites
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))
         timestep = batch.expand("opt.timestep")
         timestep[:] = np.repeat([e.lead / substeps for e in experiments], count)
@@ -135,12 +210,14 @@ class Population:
         if self._model.nu:
             hold(batch, self._model, first)
         winches = Winches(batch, first)
-        move(batch, np.repeat(first[:, None], substeps, axis=1), ())
+        move(batch, np.repeat(first[:, None], substeps, axis=1), (), longest=pace.longest / substeps)
         timestep[:] = frame_step / substeps
         lengths = [e.frames for e in experiments]
         results = [np.empty((count, frames, len(sites), 3)) for frames in lengths]
-        for start, end in pairwise(sorted({1, *lengths})):  # trials that are over stay behind
+        for start, end in pairwise(pace.lengths):  # trials that are over stay behind
             running = [e for e in experiments if e.frames >= end]
+            if not running:
+                break
             controls = wound_by_each(self._model, fields, np.array([e.controls[start:end] for e in running]))
             ids = np.arange(len(controls), dtype=np.int32)
             rows = winches.deliver(np.repeat(controls, substeps, axis=1), ids)
@@ -156,6 +233,10 @@ class Population:
             result[:, -1] = last[t * count : (t + 1) * count, sites]
             result[warned[t]] = np.nan
         return results, substeps * sum(lengths) * count
+
+
+def _run_piece(population: Population, piece: _Piece) -> Simulated:
+    return population.run(piece)
 
 
 def _without_idle(model: mujoco.MjModel, slack: bool, fields: Fields) -> mujoco.MjModel:

@@ -13,6 +13,9 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.panda.inverse import solve
 from trunkline.panda.kinematics import DH_A, DH_D, FLANGE
+from trunkline.scheduler import PIECES, places, spread
+
+LEAST = 100  # points that are worth being sent to another machine
 
 
 class Agreement(NamedTuple):
@@ -64,11 +67,21 @@ def label(
     reached = np.zeros(len(points), dtype=bool)
     todo = np.flatnonzero(~beyond_links(points, mount_offset))
     for round_seed, round_starts in ((seed, starts), (seed + 1, starts_in_doubt)):
-        result = solve(points[todo], seed=round_seed, starts=round_starts, mount_offset=mount_offset,
-                       avoid_collisions=avoid_collisions)
-        reached[todo] = result.success
-        todo = todo[~result.success]
+        pieces = max(1, min(PIECES * places(), len(todo) // LEAST)) if places() > 1 else 1
+        how = {"seed": round_seed, "starts": round_starts, "mount_offset": mount_offset,
+               "avoid_collisions": avoid_collisions}
+        # every n-th, as points that no start reaches, the slowest, may lie together
+        parts = [np.arange(piece, len(todo), pieces) for piece in range(pieces)]
+        for part, success in zip(parts, spread(_reached, parts, (points[todo], how)), strict=True):
+            reached[todo[part]] = success
+        todo = todo[~reached[todo]]
     return reached
+
+
+def _reached(given: tuple[np.ndarray, dict], part: np.ndarray) -> np.ndarray:
+    """Whether the solver reaches some of the points (N, 3), those with the numbers `part` (n,). Shape (n,)."""
+    points, how = given
+    return solve(points, only=part, **how).success[part]
 
 
 def agreement(claimed: np.ndarray, reachable: np.ndarray) -> Agreement:
