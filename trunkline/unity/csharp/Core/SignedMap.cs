@@ -4,7 +4,7 @@ using static Trunkline.Vectors;
 
 namespace Trunkline {
 
-/// <summary>s at a point, m, and its gradient there.</summary>
+/// <summary>Signed distance s at a point, m, negative within reach, and its gradient there, without a unit.</summary>
 public delegate double Signal(Vector point, out Vector slope);
 
 /// <summary>A map as a signed distance on a lattice, and the nearest point within it: trunkline/teleop/signed_map.py.
