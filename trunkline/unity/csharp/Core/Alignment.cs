@@ -23,7 +23,7 @@ public readonly struct Wrist {
 /// <summary>Heading (rad) that brings the target into the half-plane of that number, and by which the wrist is turned
 /// for it, rad; null where no half-plane is within the wrist's limits.</summary>
 public readonly struct Aligned {
-  /// <summary>rad, from -π to π, about the arm's axis: of tendon 1 from the base frame's x, turned down least.</summary>
+  /// <summary>rad, from -π to less than π: of tendon 1 about the arm's axis.</summary>
   public readonly double Heading;
   /// <summary>Its number in <see cref="BendingPlane.HalfPlanes"/>.</summary>
   public readonly int HalfPlane;

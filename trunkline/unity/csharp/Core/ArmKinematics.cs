@@ -21,7 +21,8 @@ public interface INetwork {
 /// of network.output_order, where the tip will come to rest, m, base frame, and whether that is so far from its target
 /// that the arm cannot take the pose.</summary>
 public sealed class Answer {
-  /// <summary>m, one a tendon. Commands are absolute: <see cref="ArmKinematics.PullsOf"/> makes pulls of them.</summary>
+  /// <summary>m, one a tendon. Commands are no pulls: <see cref="ArmKinematics.PullsOf"/> makes these of
+  /// them.</summary>
   public readonly double[] Commands, Lengths;
   /// <summary>Soft arm's base frame, m.</summary>
   public readonly Vector Tip;

@@ -30,6 +30,11 @@ public sealed class SignedMap {
 
   /// <param name="values">m, the base frame's x fastest, then z, then y: the order of the package's file, where y and z
   /// have changed places.</param>
+  /// <param name="countX">Points along the base frame's x, at least 2, as along the others.</param>
+  /// <param name="countY">Along y.</param>
+  /// <param name="countZ">Along z.</param>
+  /// <param name="origin">First point, base frame, m.</param>
+  /// <param name="spacing">Between points, along all axes, m.</param>
   public SignedMap(float[] values, int countX, int countY, int countZ, Vector origin, double spacing) {
     _values = values;
     CountX = countX;

@@ -113,8 +113,8 @@ public static class Vectors {
     return 2 * Math.Atan2(Math.Sqrt(r.X * r.X + r.Y * r.Y + r.Z * r.Z), Math.Abs(r.W));
   }
 
-  /// <summary><paramref name="p"/> turned by a <paramref name="share"/>, 0 to 1, of the shortest way to <paramref name="q"/>
-  /// (slerp; Shoemake 1985).</summary>
+  /// <summary><paramref name="p"/> turned by a <paramref name="share"/>, 0 to 1, of the shortest way to
+  /// <paramref name="q"/> (slerp; Shoemake 1985).</summary>
   public static Quaternion Toward(Quaternion p, Quaternion q, double share) {
     var r = Multiply(Conjugate(p), q);
     if (r.W < 0) {
