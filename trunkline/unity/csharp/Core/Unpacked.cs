@@ -74,7 +74,7 @@ public static class Unpacked {
   }
 
   /// <summary>The tip's reach by the soft grids, for gravity of one tilt.</summary>
-  /// <exception cref="InputError">As for <see cref="MapsOf"/>.</exception>
+  /// <exception cref="InputError">As for the maps.</exception>
   public static TiltReach GridsOf(IReadOnlyDictionary<string, byte[]> files) => GridsOf(files, ManifestOf(files));
 
   private static TiltReach GridsOf(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
