@@ -13,12 +13,13 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.execution.settings import Config
+from trunkline.execution.urgency import URGENT
 from trunkline.live.hardware import SIMULATED, Hardware, hardware_of
 from trunkline.pipeline.config import PROJECT, load_folder
 
 ADDRESS, PORT = "127.0.0.1", 1337  # franka-sim listens to every address: give it a network of its own
 COMES = 30.0  # s
-URGENT = "41"  # of SCHED_FIFO: a robot's own computer does nothing else
+FIRST = str(URGENT + 1)  # of SCHED_FIFO: a robot's own computer does nothing else
 # A command that comes late is dropped, as a robot does (libfranka, "Network requirements"); franka-sim takes it.
 SERVER = """
 import sys
@@ -55,7 +56,7 @@ async def franka_sim(python: Path, ready: np.ndarray) -> AsyncIterator[None]:
             raise InputError(f"{python}: found no franka-sim, expected it installed there")
         with open(Path(folder) / "log", "wb") as log:
             server = await asyncio.create_subprocess_exec(
-                "chrt", "--fifo", URGENT, str(python), "-c", SERVER, "--no-gripper", "--enforce-motion-limits",
+                "chrt", "--fifo", FIRST, str(python), "-c", SERVER, "--no-gripper", "--enforce-motion-limits",
                 "--enforce-comm-constraints", " ".join(map(str, ready)), env={**os.environ, "FR3_MJCF": str(model)},
                 stdout=log, stderr=log, start_new_session=True,
             )  # fmt: skip

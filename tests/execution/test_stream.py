@@ -141,13 +141,15 @@ def test_a_robot_whose_clock_runs_slower_is_kept_up_with():
 class LossyRobot:
     """What does not reach it, it makes up: its last acceleration, integrated (libfranka, "Packet handling")."""
 
-    def __init__(self, seed, share, longest):
-        self.random, self.share, self.longest, self.left = np.random.default_rng(seed), share, longest, 0
+    SHARE, LONGEST = 0.1, 12  # of cycles at which commands begin to be lost, and how many in a row
+
+    def __init__(self):
+        self.random, self.left = np.random.default_rng(3), 0
         self.place, self.speed, self.gain = READY.copy(), np.zeros(7), np.zeros(7)
 
     def loses(self):
-        if not self.left and self.random.random() < self.share:
-            self.left = int(self.random.integers(1, self.longest + 1))
+        if not self.left and self.random.random() < self.SHARE:
+            self.left = int(self.random.integers(1, self.LONGEST + 1))
         self.left = max(self.left - 1, 0)
         return self.left > 0
 
@@ -160,9 +162,9 @@ class LossyRobot:
         self.place = self.place + DT * self.speed
 
 
-def lossy(tells, share=0.1, longest=12, at=way, robot=LIMITS["fr3"]):
-    """Where a robot went that lost commands, (T, 7), and the stream; `tells`: where it went meanwhile."""
-    stream, made, went, missed = Stream(READY, robot), LossyRobot(3, share, longest), [], 0
+def lossy(tells, at=way):
+    """Where an FR3 went that lost commands, (T, 7), and the stream; `tells`: where it went meanwhile."""
+    stream, made, went, missed = Stream(READY, LIMITS["fr3"]), LossyRobot(), [], 0
     for step in range(3000):
         now = step * DT
         stream.hear(Setpoint(now + LEAD, tuple(at(now + LEAD))), now)

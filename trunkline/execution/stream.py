@@ -130,8 +130,8 @@ class Stream:
         """What the robot is sent at `now`, s, `dt` s of its own time after the last one; (7,), rad."""
         if not self.fault and self._queue and now - self._heard > SILENT:
             self.brake(f"silent for {1e3 * (now - self._heard):.0f} ms, expected setpoints every 1 ms")
-        cycles, lost = max(round(dt / CYCLE), 1), self._lost
-        for later in range(cycles - 1, -1, -1) if dt > 0 else ():
+        cycles, lost = max(round(dt / CYCLE), 1) if dt > 0 else 0, self._lost
+        for later in reversed(range(cycles)):
             self._go(now - later * dt / cycles, dt / cycles, missed=lost and later > 0)
         return self.joints.copy()
 

@@ -10,7 +10,6 @@ from trunkline.execution.motors import MotorSettings
 from trunkline.execution.ros_settings import RosSettings
 from trunkline.execution.settings import Config
 from trunkline.execution.stream import LIMITS, RobotLimits
-from trunkline.panda.limits import ACCELERATION, JERK, VELOCITY
 from trunkline.teleop.config import Config as Teleop
 
 SIMULATED = "virtual"  # the bus behind which the motors are simulated
@@ -43,9 +42,8 @@ class Hardware:
 
     def kept_by(self, teleop: Teleop) -> Teleop:
         """`teleop` with plans that are slow enough for the robot: some of an FR3's limits are half of a Panda's."""
-        own, panda = self.limits, (VELOCITY, ACCELERATION, JERK)
-        both = zip((own.velocity, own.acceleration, own.jerk), panda, strict=True)
-        most = min(np.min(limit / other) for limit, other in both)
+        own, panda = self.limits, LIMITS["panda"]
+        most = min(np.min(getattr(own, what) / getattr(panda, what)) for what in ("velocity", "acceleration", "jerk"))
         share = min(teleop.motors.share, MARGIN * float(most))
         return replace(teleop, motors=replace(teleop.motors, share=share))
 

@@ -109,9 +109,9 @@ async def opened(
             await asyncio.sleep(0.05)
         server = Server(house)
         servers.append(server)
+        gc.collect()
+        gc.freeze()  # a collection of all that is loaded takes longer than a robot goes on without a permit
         async with listening(server, address):
-            gc.collect()
-            gc.freeze()  # a collection of all that is loaded takes longer than a robot goes on without a permit
             yield server, made
     finally:
         gc.unfreeze()
