@@ -19,18 +19,18 @@ from trunkline.execution.settings import Config
 from trunkline.execution.stream import LIMITS, Stream
 from trunkline.live.__main__ import parsed
 from trunkline.live.hardware import SIMULATED, hardware_of
-from trunkline.live.real import Moved, RealRobot
+from trunkline.live.real import Moved, Pursuit, RealRobot
 from trunkline.live.robot import DEAD_MAN, HELD, MODE, MODES, PERMIT, PERMITTED, STOPS, Channel, Goal
 from trunkline.live.session import alignment_for
 from trunkline.live.settings import Config as Live
-from trunkline.live.simulated import Loop
+from trunkline.live.simulated import Loop, Plant
 from trunkline.panda.limits import ACCELERATION
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.config import Config as Teleop
 from trunkline.teleop.executor import BRAKE, FOLLOWS
 from trunkline.teleop.following import KNOT, Following
 from trunkline.teleop.plan import Plan
-from trunkline.teleop.trajectory import gentle, limits_of
+from trunkline.teleop.trajectory import JOINTS, gentle, limits_of
 
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 STRAIGHT = np.array([0.5, 0.5, 0.5])
@@ -278,6 +278,22 @@ def test_a_session_runs_a_plan_on_it_and_draws_it(robot):
     pressed = time.monotonic()
     robot.stop()
     until(lambda: robot.channel.hear()[0][HELD] >= pressed)
+
+
+def test_the_twin_is_not_thrown_about_by_what_its_process_hears_late():
+    """The machine sways, and the process is told up to 4 ms late of where it is, 8 ms apart."""
+    asked, rng = simulation(), np.random.default_rng(0)
+    plant = Plant(asked)
+    pursuit, worst = Pursuit(asked, plant.tick), 0.0
+    for now in np.arange(0, 3, plant.tick):
+        heard = max(now - rng.uniform(0, 0.004), 0.0)
+        sway = 0.1 * np.sin(np.pi * heard) ** 2
+        pursuit.hear(now, np.append(asked.joints + sway, asked.commands))
+        here = pursuit.next(now)
+        plant.move(here[:JOINTS], here[JOINTS:])
+        worst = max(worst, np.abs(plant.measured() - here[:JOINTS]).max())
+    assert not plant.fault
+    assert worst < 0.06  # as it is heard: 0.3
 
 
 def test_without_its_twin_nothing_is_permitted(robot):

@@ -38,7 +38,8 @@ def simulation():
     arm = spec.compile()
     straight, known = arm.tendon_length0[arm.actuator_trnid[:, 0]], Believed(spec, Doubts(), robot)
     twin = compose_twin(known, make_world(()), None, SEARCH, straight, live.preview)
-    return Simulation(twin, SEARCH, straight, drawn(twin.model), limits_of(config().motors), PACKAGE)
+    limits, offset = limits_of(config().motors), config().mount_offset
+    return Simulation(twin, SEARCH, straight, drawn(twin.model), limits, PACKAGE, offset)
 
 
 @cache

@@ -108,7 +108,8 @@ def simulation_of(package: Package, teleop: Teleop, config: Config, joints: np.n
     world = make_world(_solids(config))
     twin = compose_twin(known, world, config.thing, joints, package.straight, config.preview)
     limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
-    return Simulation(twin, joints, package.straight, drawn(twin.model), limits, package.digest)
+    bodies, offset = drawn(twin.model), teleop.mount_offset
+    return Simulation(twin, joints, package.straight, bodies, limits, package.digest, offset)
 
 
 def _solids(config: Config) -> tuple[Box, ...]:

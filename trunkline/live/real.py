@@ -29,9 +29,11 @@ from trunkline.live.robot import POSE, READY, Channel, RobotProcess, Standing
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.panda.shipped import JOINTS
 from trunkline.processes import end_with_parent
+from trunkline.teleop.following import Follower, Following
 from trunkline.teleop.trajectory import Limits
 
-RESTS, STILL = 2.0, 2e-4  # s in which no pose changes by more (m), after which the twin rests
+DELAY, MEAN = 0.15, 0.1  # s that the twin is behind the machine, and over which it takes the mean of what it hears
+RESTS, STILL, LEAST = 2.0, 2e-4, 1e-9  # s in which no pose (m) and no axis (rad, m) changes by more: the twin rests
 NICE = 5  # of the twin: a picture may wait
 
 
@@ -145,27 +147,54 @@ def bank_of(settings: MotorSettings) -> list[PlantOfMotor]:
     ]
 
 
+class Pursuit:
+    """After the axes of a machine, DELAY s later, within the limits of a plan."""
+
+    def __init__(self, simulation: Simulation, tick: float) -> None:
+        self._simulation, self._tick = simulation, tick
+        self._begin(np.append(simulation.joints, simulation.commands))
+
+    def hear(self, now: float, axes: np.ndarray) -> None:
+        """That the machine's axes, rad and m, are at (7 + K,) at `now`, s."""
+        self._follower.hear(now, axes)
+
+    def next(self, now: float) -> np.ndarray:
+        """Where the twin's axes are sent a tick later, (7 + K,), rad and m."""
+        try:
+            self._here = np.append(*self._follower.tick(now))
+        except InputError:  # there is no way that keeps the limits: on from here, at rest
+            self._begin(self._here)
+        return self._here
+
+    def _begin(self, here: np.ndarray) -> None:
+        following = Following(DELAY, MEAN, self._simulation.mount_offset)
+        self._here = here
+        self._follower = Follower(self._simulation.limits, following, *np.split(here, [len(JOINTS)]), self._tick)
+
+
 def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
-    """The twin's process: it goes where the machine's axes are sent, no faster than a plan would. Once it rests where
-    they rest, it is left alone: a preview needs the processor more."""
+    """The twin's process: it follows what the machine's axes are sent, DELAY s later, as a robot follows targets: this
+    process hears of them unevenly, and a jump from one to the next would throw the twin about. Once it rests where they
+    rest, it is left alone: a preview needs the processor more."""
     os.environ["TRUNKLINE_THREADS"] = "1"
     os.nice(NICE)
     threadpool_limits(1)
     end_with_parent()
-    plant, limits = Plant(simulation), simulation.limits
-    here, furthest = np.append(simulation.joints, simulation.commands), limits.velocity * plant.tick
+    plant = Plant(simulation)
+    pursuit, here = Pursuit(simulation, plant.tick), np.append(simulation.joints, simulation.commands)
     due, poses, since = time.monotonic(), np.append(plant.thing(), plant.poses()), 0.0
     while True:
         numbers, before = machine.hear()[0], here
         if numbers[READY] > 0:
-            there = numbers[5 : 5 + len(here)]
-            here = here + np.clip(there - here, -furthest, furthest)
-        if np.array_equal(here, before) and due - since > RESTS:
+            pursuit.hear(time.monotonic(), numbers[5 : 5 + len(here)])
+        here = pursuit.next(due)
+        moves = np.abs(here - before).max() > LEAST
+        if not moves and due - since > RESTS:
             time.sleep(plant.tick)
         else:
             plant.move(here[: len(JOINTS)], here[len(JOINTS) :])
             now = np.append(plant.thing(), plant.poses())
-            if not np.array_equal(here, before) or np.nanmax(np.abs(now - poses)) > STILL:
+            if moves or np.nanmax(np.abs(now - poses)) > STILL:
                 poses, since = now, due
         told = np.zeros(channel.size)
         told[READY] = 1.0

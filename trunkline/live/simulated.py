@@ -40,7 +40,7 @@ NICE = -5  # asked for; without the right to it, none
 @dataclass(frozen=True)
 class Simulation:
     """`twin`: at rest where all begins, its motors at `commands` (K,), m, the Panda at `joints` (7,), rad. `bodies`:
-    names of those whose poses are told."""
+    names of those whose poses are told. `mount_offset`: m."""
 
     twin: Twin
     joints: np.ndarray
@@ -48,6 +48,7 @@ class Simulation:
     bodies: tuple[str, ...]
     limits: Limits
     package: str
+    mount_offset: float
 
 
 class Plant:
