@@ -5,11 +5,12 @@
 Seeds and operator are the rehearsal's. Each run is a live session of its own: the operator's hands go into the page in
 a headless browser, and the machines do what was confirmed there. What they did is then done again by the rehearsal's
 stand-in among true objects, from the session's log, and judged as the rehearsal is. Rates stand beside the rehearsal's
-own, where it has any for this package.
+own.
 
 ROBOT_PYTHON is of an environment with pylibfranka and franka-sim; franka-sim listens to every address, so the whole
 belongs in a network of its own (docs/execution.md). A run is a row of docs/results/experiments.csv as soon as it is
-done; stopped, the command goes on from there.
+done; stopped, the command goes on from there, also with another package: each row names its own, and the line under the
+table how many there are of which. Delete the file to begin anew.
 """
 
 import argparse
@@ -20,6 +21,7 @@ import os
 import sys
 import tempfile
 import time
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,7 +33,7 @@ from rehearsal import settings
 from rehearsal.experiments.bench import FLOOR, Bench, Staged, bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, append_result, causes, rate, read_results
-from rehearsal.runs import Source, source_of
+from rehearsal.runs import source_of
 from trunkline.errors import InputError, in_one_line
 from trunkline.foresight.package import only_package
 from trunkline.live.session import Address, opened
@@ -99,12 +101,16 @@ def told(name: str, rows: list[Result], rehearsed: dict) -> str:
     return f"| {name} | {len(rows)} | {own} | {beside} | {mean:.0f} | {why} |"
 
 
-def rehearsed_with(source: Source) -> dict:
-    """The rehearsal's rates, where they are of the same package."""
-    if not REHEARSED.is_file():
-        return {}
-    found = json.loads(REHEARSED.read_text())
-    return found if found.get("package") == source.package else {}
+def rehearsal() -> dict:
+    """Its metrics; none where there are none."""
+    return json.loads(REHEARSED.read_text()) if REHEARSED.is_file() else {}
+
+
+def packages(rows: list[Result], rehearsed: dict) -> str:
+    """Which packages the runs were made with, and the rehearsal."""
+    counts = Counter(row.package for row in rows)
+    told = ", ".join(f"{package} ({count} runs)" for package, count in counts.items())
+    return f"\nPackages: {told}; rehearsed: {rehearsed.get('package', 'none')}."
 
 
 @in_one_line
@@ -124,15 +130,18 @@ def main() -> int:
     with recorded("experiments", keep=given.runs >= FEWEST and not given.only):
         print("| experiment | runs | success (95 %) | rehearsed | s a run | why it failed |")
         print("|---|---:|---:|---:|---:|---|", flush=True)
+        made, rehearsed = [], rehearsal()
         for name in names:
-            rows = {row.seed: row for row in source.of(read_results(table)) if row.experiment == name}
+            rows = {row.seed: row for row in read_results(table) if row.experiment == name}
             for seed in range(given.runs):
                 if seed not in rows:
                     found = made_of(bench, name, seed, python.absolute(), package)
                     rows[seed] = replace(found, package=source.package, code=source.code)
                     append_result(table, rows[seed])
                     print(f"{name} {seed}: {found.cause or 'success'}; {found.seconds:.0f} s", file=sys.stderr)
-            print(told(name, [rows[seed] for seed in range(given.runs)], rehearsed_with(source)), flush=True)
+            made += (counted := [rows[seed] for seed in range(given.runs)])
+            print(told(name, counted, rehearsed), flush=True)
+        print(packages(made, rehearsed))
     return 0
 
 
