@@ -24,10 +24,6 @@ from trunkline.unity.package import read_tarball
 from trunkline.unity.unpacked import model_of
 
 files = read_tarball(Path(sys.argv[1]))
-# more threads than one would end only by a packet to themselves, which a firewall may drop: it would hang at exit
-ONE = "<Internal><MultipleReceiveThreads>false</MultipleReceiveThreads></Internal>"
-URIS = os.environ.get("CYCLONEDDS_URI"), f"<CycloneDDS><Domain>{ONE}</Domain></CycloneDDS>"  # the last one counts
-os.environ["CYCLONEDDS_URI"] = ",".join(filter(None, URIS))
 network = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0)))
 teller = DataWriter(network, Topic(network, "rt/tendons/command", JointState))
 hearer = DataReader(network, Topic(network, "rt/joint_states", JointState))

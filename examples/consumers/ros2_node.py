@@ -23,10 +23,6 @@ from trunkline.unity.package import read_tarball
 from trunkline.unity.unpacked import model_of
 
 files = read_tarball(Path(sys.argv[1]))
-# more threads than one would end only by a packet to themselves, which a firewall may drop: it would hang at exit
-ONE = "<Internal><MultipleReceiveThreads>false</MultipleReceiveThreads></Internal>"
-URIS = os.environ.get("CYCLONEDDS_URI"), f"<CycloneDDS><Domain>{ONE}</Domain></CycloneDDS>"  # the last one counts
-os.environ["CYCLONEDDS_URI"] = ",".join(filter(None, URIS))
 bus = DomainParticipant(int(os.environ.get("ROS_DOMAIN_ID", 0)))
 heard = DataReader(bus, Topic(bus, "rt/tendons/command", JointState))
 states, angles = (DataWriter(bus, Topic(bus, f"rt/{name}", JointState)) for name in ("tendons/state", "joint_states"))
