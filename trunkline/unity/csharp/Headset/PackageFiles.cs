@@ -7,8 +7,6 @@ namespace Trunkline {
 /// <summary>Files of the package by their paths in it, as the core takes them, from text assets: as such Unity imports
 /// `.json` and `.bytes`. Nothing is read from StreamingAssets.</summary>
 public static class PackageFiles {
-  public const string Manifest = "Runtime/manifest.json";
-
   /// <summary>The manifest and `others`; each is known by its name and lies where the manifest says.</summary>
   /// <param name="said">The manifest as read, for <see cref="Unpacked"/>: it is long, and read here alone.</param>
   /// <param name="digest">The package's.</param>
@@ -17,9 +15,9 @@ public static class PackageFiles {
   public static Dictionary<string, byte[]> Of(TextAsset manifest, out JsonBlock said, out string digest,
                                               params TextAsset[] others) {
     if (manifest == null) {
-      throw new InputError($"Manifest File: found none, expected {Manifest}");
+      throw new InputError($"Manifest File: found none, expected {Unpacked.Manifest}");
     }
-    var files = new Dictionary<string, byte[]> { [Manifest] = manifest.bytes };
+    var files = new Dictionary<string, byte[]> { [Unpacked.Manifest] = manifest.bytes };
     said = Unpacked.ManifestOf(files);
     var digests = said.Block("sha256");
     foreach (var asset in others) {

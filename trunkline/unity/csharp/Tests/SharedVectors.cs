@@ -37,8 +37,9 @@ internal sealed class SharedVectors {
     _files = files;
     _steps = Block(Read("Tests/Vectors/steps.json"));
     var manifest = Unpacked.ManifestOf(files);
-    Core = new Teleoperation(Teleop.Read(new JsonBlock(_steps["settings"], "settings")), Unpacked.MapsOf(files, manifest),
-                             (string)_steps["package"], (double)_steps["mount_offset"]);
+    Core = new Teleoperation(Teleop.Read(new JsonBlock(_steps["settings"], "settings")),
+                             Unpacked.MapsOf(files, manifest), (string)_steps["package"],
+                             (double)_steps["mount_offset"]);
     var block = manifest.Block("network");
     int tendons = block.Texts("output_order").Length;
     _network = new Recorded {
