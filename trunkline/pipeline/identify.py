@@ -15,7 +15,8 @@ from trunkline.identification.evaluation import Prediction, halved_step, replay
 from trunkline.identification.identify import Identification, identify, with_parameters
 from trunkline.identification.null_model import references
 from trunkline.identification.parameter_table import parameter_table, undetermined
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import parameter_named
+from trunkline.identification.per_session import make_room, names_apart, other_sessions, require_told
 from trunkline.identification.problem import Bounds
 from trunkline.identification.repeatability import repeatability
 from trunkline.identification.saving import save_model
@@ -50,7 +51,13 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     check_parameters(stage, config, model)
     reported = read_reported(config)
     # of an arm with tendons also the trials of later stages: a wrong name is told now, not after minutes
-    check_trials(read_trials(TRIALS, DECIDING) if model.nu else reported, model)
+    every = read_trials(TRIALS, DECIDING)
+    check_trials(every if model.nu else reported, model)
+    names = names_apart(list(config.parameters), config.per_session, other_sessions(every))
+    require_told(stage, names, [trial for trial in reported if trial.experiment in config.experiments])
+    if names:
+        make_room(spec, names)
+        model = spec.compile()
     model, experiments, fit = set_up(config, reported, model)
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)
@@ -183,7 +190,7 @@ def write_plots(
 
     curves.convergence_table(result).to_csv(folder / "convergence.csv", **CSV)
     save_figure(plots.convergence_figure(result), folder / "convergence.png")
-    units = {name: PARAMETERS[name].unit for name in result.values}
+    units = {name: parameter_named(name).unit for name in result.values}
     save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
     validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
     save_figure(segment_figure({"validate split": segment_table(validate, segments)}), folder / "segments.png")

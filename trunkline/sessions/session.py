@@ -10,6 +10,7 @@ from omegaconf import OmegaConf
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     FiniteFloat,
@@ -33,6 +34,20 @@ def _folder_name(name: str) -> str:
 
 
 SessionName = Annotated[str, AfterValidator(_folder_name)]
+
+
+def _names(found) -> list:
+    """One name, or several of one arm."""
+    names = found if isinstance(found, list) else [found]
+    if not names:
+        raise ValueError("found an empty list, expected the name of a session, or several")
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"found {twice!r} twice, expected each session once")
+    return names
+
+
+SessionNames = Annotated[list[SessionName], BeforeValidator(_names)]
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
@@ -215,6 +230,15 @@ class Session(Entry):
 def sessions_in(folder: Path) -> list[str]:
     """Names of the sessions that a folder holds."""
     return sorted(file.parent.name for file in folder.glob("[!.]*/session.yaml"))
+
+
+def session_folders(raw: Path, names: list[str]) -> dict[str, Path]:
+    """Folders of the sessions `names` in `raw`, by name. A single name may be that of a folder of sessions, which then
+    stands for all of them, in the order of their names: a list for which one path is enough."""
+    inside = sessions_in(raw / names[0]) if len(names) == 1 else []
+    if inside and not (raw / names[0] / "session.yaml").is_file():
+        return {name: raw / names[0] / name for name in inside}
+    return {name: raw / name for name in names}
 
 
 def read_session(folder: Path) -> Session:
