@@ -1,6 +1,8 @@
 """Read the session's MCAP logs: trials as Parquet, and a report on the quality of the data."""
 
 import sys
+from dataclasses import field
+from functools import partial
 from pathlib import Path
 
 from trunkline.errors import InputError
@@ -8,12 +10,12 @@ from trunkline.figures.data import quality_figure
 from trunkline.figures.style import save_figure
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
-from trunkline.sessions.session import Session, SessionNames, read_session, session_folders
+from trunkline.sessions.session import OneFolder, Session, SomeSessions, session_folders
 from trunkline.settings import settings
 from trunkline.takes.checks import Limits
 from trunkline.takes.gathering import Gathered, Refusal, gather, require_enough, together
 from trunkline.takes.intake import take_in
-from trunkline.takes.one_arm import name_apart, require_one_arm, require_own_logs
+from trunkline.takes.one_arm import gather_each
 from trunkline.takes.plausible import Plausible
 from trunkline.takes.quality import by_sentence, clock_facts, judge, remarks, report, summary
 from trunkline.trials.take import write_takes
@@ -23,22 +25,18 @@ RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Pat
 
 @settings
 class Config:
-    session: SessionNames
+    """only: of several sessions in the folder `session` those to read, in this order; by default all."""
+
+    session: OneFolder
     refused_trials: Refusal
     limits: Limits
     plausible: Plausible
+    only: SomeSessions = field(default_factory=list)
 
 
 def main(config: Config) -> None:
-    folders = session_folders(RAW, config.session)
-    sessions = {name: read_session(folder) for name, folder in folders.items()}
-    if len(sessions) > 1:
-        require_own_logs(folders, sessions)
-    found = {name: gathered_of(folders[name], session, config) for name, session in sessions.items()}
-    if len(found) > 1:
-        require_one_arm(found, config.plausible.distance)
-        for name, gathered in found.items():
-            name_apart(gathered, name)
+    folders = session_folders(RAW / config.session, config.only)
+    found = gather_each(folders, partial(gathered_of, config=config), config.plausible.distance)
     gathered = together(list(found.values()))
     qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
     for take, said in zip(gathered.takes, gathered.findings, strict=True):

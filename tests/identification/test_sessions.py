@@ -117,11 +117,13 @@ def test_a_single_session_leaves_no_trace_of_several(found):
     assert not any("@" in model.numeric(i).name for i in range(model.nnumeric))
 
 
-def test_a_session_that_does_not_tell_its_mount_is_refused(found, tmp_path, monkeypatch):
+@pytest.mark.parametrize("untold", ["monday", "friday"])
+def test_a_session_that_does_not_tell_its_mount_is_refused(tmp_path, monkeypatch, untold):
     monkeypatch.chdir(tmp_path)
     model = begin_project(tmp_path, 6)
-    days = [*session_of(model, "monday", 0), *(t for t in session_of(model, "friday", 9) if t.split == "validate")]
-    write_trials(tmp_path / "data/processed/filter", days)
+    days = [*session_of(model, "monday", 0), *session_of(model, "friday", 9)]
+    kept = [trial for trial in days if trial.session != untold or trial.split == "validate"]
+    write_trials(tmp_path / "data/processed/filter", kept)
     ranges = {"stiffness": (0.1, 10.0), "mount_tilt_x": (-0.1, 0.1)}
-    with pytest.raises(InputError, match="mount_tilt_x: found no trial of the session friday with split identify"):
+    with pytest.raises(InputError, match=f"mount_tilt_x: found no static_tilt of the session {untold} with split identify"):
         run("identify_stiffness", settings(["static_tilt"], ["static_tilt"], ranges), CAD_MODEL)

@@ -20,20 +20,19 @@ from trunkline.trials.trial import read_trials
 CLOCKS = {"monday": 0.137, "friday": -0.061}  # s, by which the motors' clock is ahead
 
 
-def project(folder, session: str):
-    workbench(folder)
-    params = (ROOT / "params.yaml").read_text().replace("session: demo ", f"session: {session} ")
-    (folder / "params.yaml").write_text(params)
-    return folder
+def set_session(root, lines: str) -> None:
+    """lines: of the section `ingest`."""
+    (root / "params.yaml").write_text((ROOT / "params.yaml").read_text().replace("session: demo ", f"{lines} #"))
 
 
 @pytest.fixture
 def two(tmp_path, monkeypatch):
-    """A project whose two sessions have clocks of their own."""
-    project(tmp_path, "[monday, friday]")
+    """A project with an arm of two sessions, which have clocks of their own."""
+    workbench(tmp_path)
     shutil.rmtree(tmp_path / "data/raw/demo")
     for seed, (name, clock) in enumerate(CLOCKS.items()):
-        record(tmp_path / "data/raw" / name, all_truths(), instruments(clock_offset_s=clock), seed)
+        record(tmp_path / "data/raw/arm_7" / name, all_truths(), instruments(clock_offset_s=clock), seed)
+    set_session(tmp_path, "session: arm_7\n  only: [monday, friday]")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -58,49 +57,49 @@ def test_each_session_has_its_names_and_its_clock(two):
     assert [trial.session for trial in trials] == [take.session for take in takes]
 
 
-def test_a_folder_of_sessions_is_read_as_all_of_them(two):
+def test_without_only_all_sessions_of_the_folder_are_read_by_name(two):
     run_ingest(two)
     listed = {take.name: take.clock_offset for take in read_takes(two / "data/processed/ingest", SPLITS)}
-    for name in CLOCKS:
-        shutil.move(two / "data/raw" / name, two / "data/raw/arm_7" / name)
-    (two / "params.yaml").write_text((ROOT / "params.yaml").read_text().replace("session: demo ", "session: arm_7 "))
+    set_session(two, "session: arm_7")
     require_session(two)
     run_ingest(two)
-    assert {take.name: take.clock_offset for take in read_takes(two / "data/processed/ingest", SPLITS)} == listed
+    takes = read_takes(two / "data/processed/ingest", SPLITS)
+    assert {take.name: take.clock_offset for take in takes} == listed
+    assert takes[0].session == "friday"
 
 
-def test_a_list_of_one_is_the_session_itself(tmp_path, monkeypatch):
-    monkeypatch.chdir(project(tmp_path, "demo"))
+def test_one_of_several_sessions_by_itself_is_as_if_it_were_alone(two):
     files = {}
-    for session in ("demo", "[demo]"):
-        text = (ROOT / "params.yaml").read_text().replace("session: demo ", f"session: {session} ")
-        (tmp_path / "params.yaml").write_text(text)
-        run_ingest(tmp_path)
-        files[session] = {f.name: f.read_bytes() for f in (tmp_path / "data/processed/ingest").iterdir()}
-    assert files["demo"] == files["[demo]"]
-    assert not any(take.session for take in read_takes(tmp_path / "data/processed/ingest", SPLITS))
+    shutil.copytree(two / "data/raw/arm_7/monday", two / "data/raw/monday")
+    for lines in ("session: arm_7\n  only: [monday]", "session: monday"):
+        set_session(two, lines)
+        run_ingest(two)
+        files[lines] = {f.name: f.read_bytes() for f in (two / "data/processed/ingest").iterdir()}
+        assert not any(take.session for take in read_takes(two / "data/processed/ingest", SPLITS))
+    one, other = files.values()
+    assert one == other
 
 
 @pytest.mark.parametrize(
-    ("names", "said"),
+    ("lines", "said"),
     [
-        ("[]", "found an empty list, expected the name of a session, or several"),
-        ("[monday, friday, monday]", "found 'monday' twice, expected each session once"),
-        ("[monday, fri/day]", "expected the name of a folder"),
+        ("session: [monday, friday]", "ingest.session: found a list, expected one folder: move these sessions into "
+         "one, such as data/raw/arm_7, and write session: arm_7, only: [monday, friday]"),
+        ("session: arm_7\n  only: [monday, friday, monday]", "ingest.only: found 'monday' twice, expected each"),
+        ("session: arm_7\n  only: [monday, fri/day]", "ingest.only.1: found 'fri/day', expected the name of a folder"),
+        ("session: arm_7\n  only: [monday, fridy]", "ingest.only: found 'fridy', expected one of the sessions in "
+         "data/raw/arm_7: friday, monday, did you mean 'friday'?"),
+        ("session: monday\n  only: [monday]", "ingest.only: found 'monday', expected none, as data/raw/monday holds"),
     ],
-)
-def test_a_list_that_names_no_sessions_is_refused_in_one_line(tmp_path, names, said):
-    project(tmp_path, names)
-    with pytest.raises(InputError, match=said) as caught:
-        load_config(ingest.Config, "ingest", tmp_path)
+)  # fmt: skip
+def test_what_names_no_sessions_is_refused_in_one_line(two, lines, said):
+    shutil.copytree(two / "data/raw/arm_7/monday", two / "data/raw/monday")
+    set_session(two, lines)
+    with pytest.raises(InputError) as caught:
+        run_ingest(two)
+    assert said in str(caught.value)
     assert "\n" not in str(caught.value)
-    assert "ingest.session" in str(caught.value)
-
-
-def test_a_session_that_is_not_there_is_named(two):
-    shutil.rmtree(two / "data/raw/friday")
-    with pytest.raises(InputError, match="ingest.session: found 'friday', expected one of the sessions"):
-        require_session(two)
+    assert not (two / "data/processed").exists()
 
 
 def test_another_arm_is_refused(two):
@@ -110,15 +109,15 @@ def test_another_arm_is_refused(two):
     cables = [release_truth(), replace(curl_truth(split="identify"), tendons=threads)]
     for truths, said in ((longer, "from the body before it, expected about"), (renamed, "found segments part_02"),
                          (cables, "found tendons thread_1")):  # fmt: skip
-        shutil.rmtree(two / "data/raw/friday")
-        record(two / "data/raw/friday", truths, instruments(), 7)
+        shutil.rmtree(two / "data/raw/arm_7/friday")
+        record(two / "data/raw/arm_7/friday", truths, instruments(), 7)
         with pytest.raises(InputError, match=f"session friday: .*{said}"):
             run_ingest(two)
         assert not (two / "data/processed/ingest").exists()
 
 
 def test_a_log_in_two_sessions_is_refused(two):
-    shutil.rmtree(two / "data/raw/friday")
-    shutil.copytree(two / "data/raw/monday", two / "data/raw/friday")
+    shutil.rmtree(two / "data/raw/arm_7/friday")
+    shutil.copytree(two / "data/raw/arm_7/monday", two / "data/raw/arm_7/friday")
     with pytest.raises(InputError, match="session friday: found .* with the bytes of .* of the session monday"):
         run_ingest(two)

@@ -6,10 +6,9 @@ The model is the first session's. What another has is a number in the MJCF, call
 import mujoco
 import numpy as np
 
-from trunkline.errors import InputError
 from trunkline.identification.parameters import APART, PARAMETERS, candidate_fields, set_fields
 from trunkline.trials.splits import IDENTIFY
-from trunkline.trials.trial import Trial
+from trunkline.trials.trial import Trial, sessions_of
 
 
 def model_in(session: str, model: mujoco.MjModel) -> mujoco.MjModel:
@@ -33,7 +32,7 @@ def values_in(session: str, values: dict[str, np.ndarray]) -> dict[str, np.ndarr
 
 def other_sessions(trials: list[Trial]) -> list[str]:
     """All but the first, in the order of the trials."""
-    return list(dict.fromkeys(trial.session for trial in trials))[1:]
+    return sessions_of(trials)[1:]
 
 
 def names_apart(parameters: list[str], per_session: list[str], sessions: list[str]) -> dict[str, str]:
@@ -56,12 +55,18 @@ def make_room(spec: mujoco.MjSpec, names: dict[str, str]) -> None:
             spec.add_numeric(name=name, size=1, data=[PARAMETERS[shared].read(model)])
 
 
-def require_told(stage: str, names: dict[str, str], fitted: list[Trial]) -> None:
-    """Refuse a session of which no trial tells what it has for itself."""
-    told = {trial.session for trial in fitted if trial.split == IDENTIFY}
-    for name, shared in names.items():
-        if (session := name.partition(APART)[2]) not in told:
-            raise InputError(
-                f"{stage}.per_session: {shared}: found no trial of the session {session} with split identify to tell "
-                f"it, expected one, or {shared} taken out of `per_session`"
-            )
+def untold_apart(names: dict[str, str], trials: list[Trial], kinds: list[str]) -> list[str]:
+    """Which sessions of `trials` have something for themselves, of which `names_apart` has the `names`, that none of
+    their own trials to identify from tells, a line each.
+
+    Args:
+        kinds: of experiment, to identify from.
+    """
+    told = {trial.session for trial in trials if trial.split == IDENTIFY and trial.experiment in kinds}
+    return [
+        f"per_session: {shared}: found no {' or '.join(kinds)} of the session {session} with split identify to tell "
+        f"it, expected one, or {shared} taken out of `per_session`"
+        for shared in dict.fromkeys(names.values())
+        for session in sessions_of(trials)
+        if session not in told
+    ]

@@ -15,8 +15,8 @@ from trunkline.identification.evaluation import Prediction, halved_step, replay
 from trunkline.identification.identify import Identification, identify, with_parameters
 from trunkline.identification.null_model import references
 from trunkline.identification.parameter_table import parameter_table, undetermined
-from trunkline.identification.parameters import parameter_named
-from trunkline.identification.per_session import make_room, names_apart, other_sessions, require_told
+from trunkline.identification.parameters import PARAMETERS, parameter_named
+from trunkline.identification.per_session import make_room, names_apart, names_in, other_sessions, untold_apart
 from trunkline.identification.problem import Bounds
 from trunkline.identification.repeatability import repeatability
 from trunkline.identification.saving import save_model
@@ -54,7 +54,8 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     every = read_trials(TRIALS, DECIDING)
     check_trials(every if model.nu else reported, model)
     names = names_apart(list(config.parameters), config.per_session, other_sessions(every))
-    require_told(stage, names, [trial for trial in reported if trial.experiment in config.experiments])
+    for line in untold_apart(names, every, config.experiments):
+        raise InputError(f"{stage}.{line}")
     if names:
         make_room(spec, names)
         model = spec.compile()
@@ -74,7 +75,9 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     if not result.factors and not any(map(has_factors, whole)):
         models["coarse"] = models["identified"]
     elif whole:
-        models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
+        room = read_spec(CAD_MODEL)
+        make_room(room, names_in(model, PARAMETERS))
+        models["coarse"] = with_parameters(room.compile(), read_scalars(whole) | result.values)
         # rest shape and markers are no matter of scalars
         for field in ("qpos_spring", "tendon_lengthspring", "site_pos", "site_sameframe"):
             getattr(models["coarse"], field)[:] = getattr(model, field)
@@ -137,7 +140,8 @@ def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
     values = {}
     for stage in stages:
         table = json.loads(existing(Path("artifacts") / stage / "parameters.json").read_text())
-        values |= {name: row["value"] for name, row in table["parameters"].items()}
+        rows = table["parameters"] | table.get("per_session", {})
+        values |= {name: row["value"] for name, row in rows.items()}
     return values
 
 

@@ -4,8 +4,6 @@ import hashlib
 import sys
 from pathlib import Path
 
-from omegaconf import ListConfig
-
 from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.config import PROJECT, check_settings, own_or_project
@@ -53,12 +51,9 @@ def require_session(root: Path) -> None:
     tracked = [file.stem for file in raw.glob("*.dvc")]
     folders = [file.parents[1].name for file in raw.glob("[!.]*/[!.]*/session.yaml")]  # of several sessions
     there = sorted({LAB, *tracked, *sessions_in(raw), *folders})
-    if wanted is None:
-        return
-    for name in wanted if isinstance(wanted, ListConfig) else [wanted]:
-        if name not in there:
-            expected = f"one of the sessions in {raw}: {', '.join(there)}{nearest(str(name), there)}"
-            raise InputError(f"{root / 'params.yaml'}: ingest.session: found {name!r}, expected {expected}")
+    if wanted is not None and wanted not in there:
+        expected = f"one of the sessions in {raw}: {', '.join(there)}{nearest(str(wanted), there)}"
+        raise InputError(f"{root / 'params.yaml'}: ingest.session: found {wanted!r}, expected {expected}")
 
 
 @in_one_line

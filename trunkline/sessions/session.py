@@ -36,18 +36,25 @@ def _folder_name(name: str) -> str:
 SessionName = Annotated[str, AfterValidator(_folder_name)]
 
 
-def _names(found) -> list:
-    """One name, or several of one arm."""
-    names = found if isinstance(found, list) else [found]
-    if not names:
-        raise ValueError("found an empty list, expected the name of a session, or several")
+def _no_list(found):
+    if isinstance(found, list):
+        names = ", ".join(map(str, found))
+        raise ValueError(
+            f"found a list, expected one folder: move these sessions into one, such as data/raw/arm_7, and write "
+            f"session: arm_7, only: [{names}]"
+        )
+    return found
+
+
+def _each_once(names: list[str]) -> list[str]:
     twice = next((name for name in names if names.count(name) > 1), None)
     if twice is not None:
         raise ValueError(f"found {twice!r} twice, expected each session once")
     return names
 
 
-SessionNames = Annotated[list[SessionName], BeforeValidator(_names)]
+OneFolder = Annotated[SessionName, BeforeValidator(_no_list)]
+SomeSessions = Annotated[list[SessionName], AfterValidator(_each_once)]
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
@@ -232,13 +239,20 @@ def sessions_in(folder: Path) -> list[str]:
     return sorted(file.parent.name for file in folder.glob("[!.]*/session.yaml"))
 
 
-def session_folders(raw: Path, names: list[str]) -> dict[str, Path]:
-    """Folders of the sessions `names` in `raw`, by name. A single name may be that of a folder of sessions, which then
-    stands for all of them, in the order of their names: a list for which one path is enough."""
-    inside = sessions_in(raw / names[0]) if len(names) == 1 else []
-    if inside and not (raw / names[0] / "session.yaml").is_file():
-        return {name: raw / names[0] / name for name in inside}
-    return {name: raw / name for name in names}
+def session_folders(folder: Path, only: list[str] | None = None) -> dict[str, Path]:
+    """Folders of the sessions that are to be read together, by name: of several that `folder` holds all, in the order
+    of their names, or `only` those; else `folder` itself.
+
+    Raises:
+        InputError: `only` names what it does not hold.
+    """
+    inside = [] if (folder / "session.yaml").is_file() else sessions_in(folder)
+    for name in only or []:
+        if name not in inside:
+            there = f"one of the sessions in {folder}: {', '.join(inside)}{nearest(name, inside)}"
+            expected = there if inside else f"none, as {folder} holds no several sessions"
+            raise InputError(f"ingest.only: found {name!r}, expected {expected}")
+    return {name: folder / name for name in only or inside} or {folder.name: folder}
 
 
 def read_session(folder: Path) -> Session:

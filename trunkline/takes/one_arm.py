@@ -1,14 +1,35 @@
 """Several sessions together: whether they are of one arm, and their takes under names that no other has."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.sessions.session import Session
+from trunkline.sessions.session import Session, read_session
 from trunkline.sessions.splits import file_digest
 from trunkline.takes.gathering import Gathered
 from trunkline.takes.swaps import usual_distances
+
+
+def gather_each(
+    folders: dict[str, Path], take: Callable[[Path, Session], Gathered], distance: float
+) -> dict[str, Gathered]:
+    """What `take` gathers of each of the sessions in `folders`, by name; of several, refused unless of one arm, and
+    under names that no other has.
+
+    Args:
+        distance: as `require_one_arm` has it.
+    """
+    sessions = {name: read_session(folder) for name, folder in folders.items()}
+    if len(sessions) > 1:
+        require_own_logs(folders, sessions)
+    found = {name: take(folders[name], session) for name, session in sessions.items()}
+    if len(found) > 1:
+        require_one_arm(found, distance)
+        for name, gathered in found.items():
+            name_apart(gathered, name)
+    return found
 
 
 def name_apart(gathered: Gathered, session: str) -> None:

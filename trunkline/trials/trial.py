@@ -42,6 +42,11 @@ class Trial(Recording):
     repairs: int = 0
 
 
+def sessions_of(trials: list[Trial]) -> list[str]:
+    """Names of the sessions to which trials belong, in their order; [""] where there is one."""
+    return list(dict.fromkeys(trial.session for trial in trials))
+
+
 def write_trials(folder: Path, trials: list[Trial]) -> None:
     """Write trials.parquet (a row a trial), poses.parquet (a row a frame and segment) and commands.parquet
     (a row a frame and tendon) into `folder`, in the order of `trials`."""
