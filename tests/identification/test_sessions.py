@@ -23,13 +23,18 @@ STIFFNESS = 0.75  # of the true arm over the CAD model's
 NAMES = ("mount_tilt_x", "mount_tilt_y")
 
 
+def mounted(truth: mujoco.MjModel, mount: tuple[float, float]) -> mujoco.MjModel:
+    """The arm on a mount that leans by so much about x and y, rad."""
+    arm = truth.__copy__()
+    set_fields(arm, candidate_fields(truth, dict(zip(NAMES, np.array(mount)[:, None], strict=True))))
+    return arm
+
+
 def session_of(truth: mujoco.MjModel, session: str, seed: int) -> list:
     """Tilts of the arm on the mount of that session, some of them held out."""
-    mounted = truth.__copy__()
-    values = dict(zip(NAMES, np.array(MOUNTS[session])[:, None], strict=True))
-    set_fields(mounted, candidate_fields(truth, values))
+    arm = mounted(truth, MOUNTS[session])
     plan = [(25, "identify"), (45, "identify"), (65, "identify"), (85, "identify"), (55, "validate"), (75, "validate")]
-    trials = [tilt(mounted, angle, split, NOISE, seed + i) for i, (angle, split) in enumerate(plan)]
+    trials = [tilt(arm, angle, split, NOISE, seed + i) for i, (angle, split) in enumerate(plan)]
     return [replace(t, session=session, name=f"{session}/{t.name}") for t in trials]
 
 
