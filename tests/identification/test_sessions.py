@@ -130,5 +130,6 @@ def test_a_session_that_does_not_tell_its_mount_is_refused(tmp_path, monkeypatch
     kept = [trial for trial in days if trial.session != untold or trial.split == "validate"]
     write_trials(tmp_path / "data/processed/filter", kept)
     ranges = {"stiffness": (0.1, 10.0), "mount_tilt_x": (-0.1, 0.1)}
-    with pytest.raises(InputError, match=f"mount_tilt_x: found no static_tilt of the session {untold} with split identify"):
+    said = f"mount_tilt_x: found no static_tilt of the session {untold} with split identify"
+    with pytest.raises(InputError, match=said):
         run("identify_stiffness", settings(["static_tilt"], ["static_tilt"], ranges), CAD_MODEL)

@@ -11,6 +11,7 @@ from stages import ingest
 from tests.support.sessions import all_truths, curl_truth, instruments, record, release_truth
 from tests.support.workbench import ROOT, workbench
 from trunkline.errors import InputError
+from trunkline.evaluate.session import trials_of
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.settings import require_session
 from trunkline.trials.splits import SPLITS
@@ -55,6 +56,8 @@ def test_each_session_has_its_names_and_its_clock(two):
     filtering.main(load_config(filtering.Config, "filter", two))
     trials = read_trials(two / "data/processed/filter", SPLITS)
     assert [trial.session for trial in trials] == [take.session for take in takes]
+    seen = {trial.name: trial.positions.tobytes() for trial in trials_of(two / "data/raw/arm_7", two)}
+    assert seen == {trial.name: trial.positions.tobytes() for trial in trials}  # as `check` and `evaluate` read them
 
 
 def test_without_only_all_sessions_of_the_folder_are_read_by_name(two):

@@ -82,7 +82,7 @@ def gather(
 
 
 def together(sessions: list[Gathered]) -> Gathered:
-    """Of several sessions of one arm all takes, each of which has its offset by now; the clock is the one told least."""
+    """Of several sessions of one arm all takes, each with its own offset by now; the clock is the one told least."""
     if len(sessions) == 1:
         return sessions[0]
     takes = [take for one in sessions for take in one.takes]
