@@ -168,8 +168,9 @@ class Pursuit:
 
     def _begin(self, here: np.ndarray) -> None:
         following = Following(DELAY, MEAN, self._simulation.mount_offset)
-        self._here = here
-        self._follower = Follower(self._simulation.limits, following, *np.split(here, [len(JOINTS)]), self._tick)
+        joints, commands = np.split(here, [len(JOINTS)])
+        self._here, limits = here, self._simulation.limits
+        self._follower = Follower(limits, following, joints, commands, self._tick)
 
 
 def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
