@@ -36,11 +36,13 @@ class _Affine(torch.autograd.Function):
     kind of processor, and training makes other networks of other last digits."""
 
     @staticmethod
+    @np.errstate(over="ignore", invalid="ignore")  # `train` tells of errors that are not finite
     def forward(ctx: FunctionCtx, x: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor) -> torch.Tensor:
         ctx.save_for_backward(x, weight)
         return torch.from_numpy(x.detach().numpy() @ weight.detach().numpy().T + bias.detach().numpy())
 
     @staticmethod
+    @np.errstate(over="ignore", invalid="ignore")
     def backward(ctx: Any, *slopes: torch.Tensor) -> tuple[torch.Tensor | None, torch.Tensor, torch.Tensor]:
         x, weight = (saved.detach().numpy() for saved in ctx.saved_tensors)
         slope = slopes[0].numpy()
