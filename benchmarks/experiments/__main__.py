@@ -101,11 +101,6 @@ def told(name: str, rows: list[Result], rehearsed: dict) -> str:
     return f"| {name} | {len(rows)} | {own} | {beside} | {mean:.0f} | {why} |"
 
 
-def rehearsal() -> dict:
-    """Its metrics; none where there are none."""
-    return json.loads(REHEARSED.read_text()) if REHEARSED.is_file() else {}
-
-
 def packages(rows: list[Result], rehearsed: dict) -> str:
     """Which packages the runs were made with, and the rehearsal."""
     counts = Counter(row.package for row in rows)
@@ -130,7 +125,7 @@ def main() -> int:
     with recorded("experiments", keep=given.runs >= FEWEST and not given.only):
         print("| experiment | runs | success (95 %) | rehearsed | s a run | why it failed |")
         print("|---|---:|---:|---:|---:|---|", flush=True)
-        made, rehearsed = [], rehearsal()
+        made, rehearsed = [], json.loads(REHEARSED.read_text()) if REHEARSED.is_file() else {}
         for name in names:
             rows = {row.seed: row for row in read_results(table) if row.experiment == name}
             for seed in range(given.runs):
@@ -139,8 +134,9 @@ def main() -> int:
                     rows[seed] = replace(found, package=source.package, code=source.code)
                     append_result(table, rows[seed])
                     print(f"{name} {seed}: {found.cause or 'success'}; {found.seconds:.0f} s", file=sys.stderr)
-            made += (counted := [rows[seed] for seed in range(given.runs)])
+            counted = [rows[seed] for seed in range(given.runs)]
             print(told(name, counted, rehearsed), flush=True)
+            made += counted
         print(packages(made, rehearsed))
     return 0
 

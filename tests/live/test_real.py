@@ -289,11 +289,25 @@ def test_the_twin_is_not_thrown_about_by_what_its_process_hears_late():
         heard = max(now - rng.uniform(0, 0.004), 0.0)
         sway = 0.1 * np.sin(np.pi * heard) ** 2
         pursuit.hear(now, np.append(asked.joints + sway, asked.commands))
-        here = pursuit.next(now)
+        pursuit.go(now)
+        here = pursuit.here
         plant.move(here[:JOINTS], here[JOINTS:])
         worst = max(worst, np.abs(plant.measured() - here[:JOINTS]).max())
     assert not plant.fault
     assert worst < 0.06  # as it is heard: 0.3
+
+
+def test_a_pursuit_is_there_once_it_has_come_to_where_the_machine_stays():
+    asked, tick = simulation(), 1 / 120
+    pursuit, rest = Pursuit(asked, tick), np.append(asked.joints, asked.commands)
+    assert pursuit.there
+    for now in np.arange(0, 2, tick):
+        pursuit.hear(now, rest + 0.05)
+        if now == 0:
+            assert not pursuit.there
+        pursuit.go(now)
+    assert pursuit.there
+    np.testing.assert_allclose(pursuit.here, rest + 0.05, atol=1e-9)
 
 
 def test_without_its_twin_nothing_is_permitted(robot):

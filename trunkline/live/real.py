@@ -148,28 +148,33 @@ def bank_of(settings: MotorSettings) -> list[PlantOfMotor]:
 
 
 class Pursuit:
-    """After the axes of a machine, DELAY s later, within the limits of a plan."""
+    """After the axes of a machine, DELAY s later, within the limits of a plan. `here`: where the twin's axes are sent,
+    (7 + K,), rad and m."""
 
     def __init__(self, simulation: Simulation, tick: float) -> None:
         self._simulation, self._tick = simulation, tick
         self._begin(np.append(simulation.joints, simulation.commands))
 
+    @property
+    def there(self) -> bool:
+        """Whether `here` is where the machine was last heard of."""
+        return bool(np.abs(self._follower.goal - self.here).max() <= LEAST)
+
     def hear(self, now: float, axes: np.ndarray) -> None:
         """That the machine's axes, rad and m, are at (7 + K,) at `now`, s."""
         self._follower.hear(now, axes)
 
-    def next(self, now: float) -> np.ndarray:
-        """Where the twin's axes are sent a tick later, (7 + K,), rad and m."""
+    def go(self, now: float) -> None:
+        """A tick on, at `now`, s."""
         try:
-            self._here = np.append(*self._follower.tick(now))
+            self.here = np.append(*self._follower.tick(now))
         except InputError:  # there is no way that keeps the limits: on from here, at rest
-            self._begin(self._here)
-        return self._here
+            self._begin(self.here)
 
     def _begin(self, here: np.ndarray) -> None:
         following = Following(DELAY, MEAN, self._simulation.mount_offset)
         joints, commands = np.split(here, [len(JOINTS)])
-        self._here, limits = here, self._simulation.limits
+        self.here, limits = here, self._simulation.limits
         self._follower = Follower(limits, following, joints, commands, self._tick)
 
 
@@ -182,20 +187,20 @@ def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
     threadpool_limits(1)
     end_with_parent()
     plant = Plant(simulation)
-    pursuit, here = Pursuit(simulation, plant.tick), np.append(simulation.joints, simulation.commands)
+    pursuit = Pursuit(simulation, plant.tick)
     due, poses, since = time.monotonic(), np.append(plant.thing(), plant.poses()), 0.0
     while True:
-        numbers, before = machine.hear()[0], here
+        numbers, before = machine.hear()[0], pursuit.here
         if numbers[READY] > 0:
-            pursuit.hear(time.monotonic(), numbers[5 : 5 + len(here)])
-        here = pursuit.next(due)
-        moves = np.abs(here - before).max() > LEAST
-        if not moves and due - since > RESTS:
+            pursuit.hear(time.monotonic(), numbers[5 : 5 + len(before)])
+        if pursuit.there and due - since > RESTS:
             time.sleep(plant.tick)
         else:
+            pursuit.go(due)
+            here = pursuit.here
             plant.move(here[: len(JOINTS)], here[len(JOINTS) :])
             now = np.append(plant.thing(), plant.poses())
-            if moves or np.nanmax(np.abs(now - poses)) > STILL:
+            if np.abs(here - before).max() > LEAST or np.nanmax(np.abs(now - poses)) > STILL:
                 poses, since = now, due
         told = np.zeros(channel.size)
         told[READY] = 1.0
