@@ -2,10 +2,11 @@
 
     python -m benchmarks.arm64                             # the one in MuJoCo's own wheel for Linux on Arm
     python -m benchmarks.arm64 --library libmujoco.so      # one that was built for Android
+    python -m benchmarks.arm64 --sources mujoco            # one that is built of MuJoCo's sources, for Linux
 
-What a file is, readelf of Debian's binutils-aarch64-linux-gnu says. If gcc-aarch64-linux-gnu and qemu-user are there, a
-program of benchmarks/arm64.c steps `calibrated.xml` with the library, emulated; one for Android is not run, as its C
-library is not Linux's. Nothing is measured of an Arm processor's speed.
+What a file is, readelf of Debian's binutils-aarch64-linux-gnu says. A program of benchmarks/arm64.c then steps the
+package's `arm.xml` with the library, emulated by qemu-user; one for Android is not run, as its C library is not
+Linux's. Nothing is measured of an Arm processor's speed. To build takes Debian's cmake and g++-aarch64-linux-gnu.
 """
 
 import argparse
@@ -24,13 +25,26 @@ import numpy as np
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT
 from trunkline.pipeline.results import recorded
-from trunkline.unity.package import CALIBRATED, read_tarball
+from trunkline.unity.package import MANIFEST, MODEL, read_tarball
 
 SOURCE = PROJECT / "benchmarks/arm64.c"
 VECTORS = "Tests/Vectors/network.json"
 SECONDS = 2.0  # of simulation, in the midst of the swing
-READELF, COMPILER, EMULATOR = "aarch64-linux-gnu-readelf", "aarch64-linux-gnu-gcc", "qemu-aarch64"
 PLATFORM = "manylinux_2_28_aarch64"
+TARGET = "aarch64-linux-gnu"
+READELF, COMPILER, EMULATOR = f"{TARGET}-readelf", f"{TARGET}-gcc", "qemu-aarch64"
+CROSS = {  # as docs/headset.md builds it for Android, but for Linux
+    "CMAKE_SYSTEM_NAME": "Linux",
+    "CMAKE_SYSTEM_PROCESSOR": "aarch64",
+    "CMAKE_C_COMPILER": f"{TARGET}-gcc",
+    "CMAKE_CXX_COMPILER": f"{TARGET}-g++",
+    "CMAKE_FIND_ROOT_PATH": f"/usr/{TARGET}",
+    "CMAKE_BUILD_TYPE": "Release",
+    "MUJOCO_BUILD_EXAMPLES": "OFF",
+    "MUJOCO_BUILD_SIMULATE": "OFF",
+    "MUJOCO_BUILD_TESTS": "OFF",
+    "MUJOCO_TEST_PYTHON_UTIL": "OFF",
+}
 
 
 def run(*command: str | Path) -> str:
@@ -40,7 +54,7 @@ def run(*command: str | Path) -> str:
         InputError: it is not there, or its complaint's last line.
     """
     if shutil.which(str(command[0])) is None:
-        raise InputError(f"{command[0]}: no such program; Debian's gcc-aarch64-linux-gnu and qemu-user have them")
+        raise InputError(f"{command[0]}: no such program; Debian has it: see {Path(__file__).name}")
     done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False)
     if done.returncode:
         raise InputError(f"{command[0]}: found {(done.stderr.strip().splitlines() or ['no word'])[-1]}")
@@ -54,6 +68,13 @@ def of_the_wheel(folder: Path) -> Path:
     with zipfile.ZipFile(next(folder.glob("*.whl"))) as wheel:
         wheel.extractall(folder)
     return next(folder.rglob("libmujoco.so*"))
+
+
+def built(sources: Path, folder: Path) -> Path:
+    """The library of MuJoCo's sources, cross-compiled for Linux on Arm. CMake fetches what they need besides."""
+    run("cmake", "-S", sources, "-B", folder / "build", *(f"-D{name}={value}" for name, value in CROSS.items()))
+    run("cmake", "--build", folder / "build", "--target", "mujoco")
+    return folder / "build/lib/libmujoco.so"
 
 
 def what_it_is(library: Path) -> dict[str, str]:
@@ -71,28 +92,30 @@ def what_it_is(library: Path) -> dict[str, str]:
     }
 
 
-def tips(library: Path, package: Path, folder: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Of the calibrated arm after SECONDS: by the library, emulated, and by this machine's MuJoCo, m (3,)."""
+def tips(library: Path, include: Path, package: Path, folder: Path) -> tuple[str, np.ndarray, np.ndarray]:
+    """Of the imported arm after SECONDS: the library's version, and the tip by it, emulated, and by this machine's
+    MuJoCo, m (3,)."""
     files = read_tarball(package)
-    (folder / "arm.xml").write_bytes(files[CALIBRATED])
+    (folder / "arm.xml").write_bytes(files[MODEL])
     case = next(one for one in json.loads(files[VECTORS])["cases"] if not one["answer"]["doubtful"])
-    commands = case["answer"]["commands"]
-    include, program = Path(mujoco.HEADERS_DIR).parent, folder / "step"
+    straight = json.loads(files[MANIFEST])["model"]["rest_lengths"].values()
+    pulls = [length - command for length, command in zip(straight, case["answer"]["commands"], strict=True)]
+    program = folder / "step"
     run(COMPILER, "-O2", SOURCE, f"-I{include}", library, "-Wl,--allow-shlib-undefined", "-o", program)
     paths = f"LD_LIBRARY_PATH={library.parent}:{next(iter(library.parents[1].glob('*.libs')), library.parent)}"
-    given = [folder / "arm.xml", str(SECONDS), *map(str, commands)]
-    said = run(EMULATOR, "-L", "/usr/aarch64-linux-gnu", "-E", paths, program, *given)
+    given = [folder / "arm.xml", str(SECONDS), *map(str, pulls)]
+    number, *tip = run(EMULATOR, "-L", f"/usr/{TARGET}", "-E", paths, program, *given).split()
     model = mujoco.MjModel.from_xml_path(str(folder / "arm.xml"))
     data = mujoco.MjData(model)
-    data.ctrl = commands
+    data.ctrl = pulls
     while data.time < SECONDS:
         mujoco.mj_step(model, data)
-    return np.array(said.split()[1:], dtype=float), data.site("tip").xpos.copy()
+    return number, np.array(tip, dtype=float), data.site("tip").xpos.copy()
 
 
-def show(library: Path, package: Path | None, folder: Path) -> None:
+def show(library: Path, include: Path, package: Path | None, folder: Path) -> None:
+    """Args: include: the folder that has the library's own `mujoco/mujoco.h`."""
     found = what_it_is(library)
-    print(f"MuJoCo {mujoco.__version__}, {library.name}")
     print("| of the library | found |")
     print("|---|---|")
     for name, value in found.items():
@@ -100,18 +123,28 @@ def show(library: Path, package: Path | None, folder: Path) -> None:
     if found["machine"] != "AArch64" or found["`mj_step` exported"] != "yes":
         raise InputError(f"{library}: found {found}, expected an AArch64 library with mj_step")
     if found["C library of"] == "Linux" and package is not None:
-        emulated, here = tips(library, package, folder)
-        print(f"| tip after {SECONDS:g} s, from this machine's | {1e3 * np.linalg.norm(emulated - here):.2g} mm |")
+        number, emulated, here = tips(library, include, package, folder)
+        apart = 1e3 * np.linalg.norm(emulated - here)
+        print(f"| MuJoCo | {number} |")
+        print(f"| tip after {SECONDS:g} s, from that of this machine's MuJoCo {mujoco.__version__} | {apart:.2g} mm |")
 
 
 @in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--library", type=Path)
-    given = parser.parse_args().library
+    one_of = parser.add_mutually_exclusive_group()
+    one_of.add_argument("--library", type=Path)
+    one_of.add_argument("--sources", type=Path)
+    given = parser.parse_args()
     package = next(iter(sorted((PROJECT / "artifacts/package_unity").glob("*.tgz"))), None)
-    with tempfile.TemporaryDirectory() as folder, recorded("arm64", keep=given is None):
-        show(given or of_the_wheel(Path(folder)), package, Path(folder))
+    with tempfile.TemporaryDirectory() as temporary:
+        folder, include = Path(temporary), Path(mujoco.HEADERS_DIR).parent
+        if given.sources:
+            with recorded("arm64_built"):
+                show(built(given.sources, folder), given.sources / "include", package, folder)
+        else:
+            with recorded("arm64", keep=given.library is None):
+                show(given.library or of_the_wheel(folder), include, package, folder)
     return 0
 
 

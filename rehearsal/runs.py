@@ -7,7 +7,9 @@ import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from dvc.repo import Repo
 from threadpoolctl import threadpool_limits
@@ -16,8 +18,11 @@ from rehearsal.experiments.ablations import VARIANTS, varied
 from rehearsal.experiments.bench import Bench, bench_of, perform
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, append_result, read_results
+from trunkline.cluster import VARIABLE
+from trunkline.errors import InputError
 from trunkline.foresight.package import PACKAGES
 from trunkline.processes import end_with_parent
+from trunkline.scheduler import arriving, elsewhere
 from trunkline.unity.unpacked import package_digest
 from trunkline.unity.unpacked import read_package as read_files
 
@@ -96,6 +101,10 @@ def performed(runs: list[Run], package: Path, workers: int) -> Iterator[tuple[Re
     """Each run as it ends, and its seconds of processor; of no package or code yet."""
     if not runs:
         return
+    if elsewhere():
+        sent = _Sent(package.read_bytes(), source_of(package))
+        yield from (found for _, found in arriving(_make_sent, runs, sent))
+        return
     if workers == 1 or len(runs) == 1:
         bench = bench_of(package)
         yield from (make_one(bench, run) for run in runs)
@@ -108,6 +117,31 @@ def performed(runs: list[Run], package: Path, workers: int) -> Iterator[tuple[Re
         except BaseException:
             pool.shutdown(cancel_futures=True)
             raise
+
+
+@dataclass
+class _Sent:
+    """What a worker of a scheduler makes runs with: the package's bytes, and where `source` is from."""
+
+    packed: bytes
+    source: Source
+
+    @cached_property
+    def bench(self) -> Bench:
+        with TemporaryDirectory() as folder:
+            package = Path(folder) / "package.tgz"
+            package.write_bytes(self.packed)
+            if (own := source_of(package)) != self.source:
+                raise InputError(
+                    f"{VARIABLE}: a worker: found code and settings {own.code}, expected {self.source.code} as here"
+                )
+            return bench_of(package)
+
+
+def _make_sent(sent: _Sent, run: Run) -> tuple[Result, float]:
+    bench = sent.bench
+    with threadpool_limits(1):
+        return make_one(bench, run)
 
 
 _bench: Bench | None = None  # of a worker

@@ -1,6 +1,8 @@
 """Read the session's MCAP logs: trials as Parquet, and a report on the quality of the data."""
 
 import sys
+from dataclasses import field
+from functools import partial
 from pathlib import Path
 
 from trunkline.errors import InputError
@@ -8,13 +10,14 @@ from trunkline.figures.data import quality_figure
 from trunkline.figures.style import save_figure
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
-from trunkline.sessions.session import SessionName, read_session
+from trunkline.sessions.session import OneFolder, Session, SomeSessions, session_folders
 from trunkline.settings import settings
 from trunkline.takes.checks import Limits
-from trunkline.takes.gathering import Refusal, gather, require_enough
+from trunkline.takes.gathering import Gathered, Refusal, gather, require_enough, together
 from trunkline.takes.intake import take_in
+from trunkline.takes.one_arm import gather_each
 from trunkline.takes.plausible import Plausible
-from trunkline.takes.quality import by_sentence, judge, remarks, report, summary
+from trunkline.takes.quality import by_sentence, clock_facts, judge, remarks, report, summary
 from trunkline.trials.take import write_takes
 
 RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Path("artifacts/ingest")
@@ -22,15 +25,38 @@ RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Pat
 
 @settings
 class Config:
-    session: SessionName
+    """only: of several sessions in the folder `session` those to read, in this order; by default all."""
+
+    session: OneFolder
     refused_trials: Refusal
     limits: Limits
     plausible: Plausible
+    only: SomeSessions = field(default_factory=list)
 
 
 def main(config: Config) -> None:
-    folder = RAW / config.session
-    session = read_session(folder)
+    folders = session_folders(RAW / config.session, config.only)
+    found = gather_each(folders, partial(gathered_of, config=config), config.plausible.distance)
+    gathered = together(list(found.values()))
+    qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
+    for take, said in zip(gathered.takes, gathered.findings, strict=True):
+        take.repairs = len(said.repairs)
+    for line in remarks(qualities):
+        print(f"ingest: {line}")
+    clocks = {name: clock_facts(one.clock) for name, one in found.items()} if len(found) > 1 else None
+    with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
+        write_takes(processed, gathered.takes)
+        write_json(artifacts / "quality.json", report(qualities, gathered) | ({"clocks": clocks} if clocks else {}))
+        write_json(artifacts / "metrics.json", summary(qualities, gathered))
+        save_figure(quality_figure(qualities, gathered), artifacts / "quality.png")
+    for reason in gathered.refused.values():
+        print(f"ingest: warning: left out: {reason}", file=sys.stderr)
+    for line in by_sentence(qualities, lambda found: found.warnings):
+        print(f"ingest: warning: {line}", file=sys.stderr)
+
+
+def gathered_of(folder: Path, session: Session, config: Config) -> Gathered:
+    """The takes of one session, whose clock and vertical are its own."""
     with progress(len(session.trials), "ingest", "trials") as bar:
         taken = []
         for trial, take, found in take_in(folder, session, config.limits):
@@ -40,20 +66,7 @@ def main(config: Config) -> None:
             bar.update(1, trial=trial.name)
     gathered = gather(taken, session, config.plausible, config.refused_trials, f"{folder}")
     require_enough(gathered, session.trials)
-    qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
-    for take, found in zip(gathered.takes, gathered.findings, strict=True):
-        take.repairs = len(found.repairs)
-    for line in remarks(qualities):
-        print(f"ingest: {line}")
-    with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
-        write_takes(processed, gathered.takes)
-        write_json(artifacts / "quality.json", report(qualities, gathered))
-        write_json(artifacts / "metrics.json", summary(qualities, gathered))
-        save_figure(quality_figure(qualities, gathered), artifacts / "quality.png")
-    for said in gathered.refused.values():
-        print(f"ingest: warning: left out: {said}", file=sys.stderr)
-    for line in by_sentence(qualities, lambda found: found.warnings):
-        print(f"ingest: warning: {line}", file=sys.stderr)
+    return gathered
 
 
 if __name__ == "__main__":

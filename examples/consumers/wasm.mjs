@@ -1,17 +1,17 @@
 // MuJoCo's WASM: the file that every MuJoCo reads, with the springs that the manifest lists, goes to a target.
 //
 //     npm install @mujoco/mujoco onnxruntime-web
-//     node wasm.mjs org.trunkline.twin-0.1.0.tgz
+//     tar xzf org.trunkline.twin-0.1.0.tgz && node wasm.mjs
 
-import { execFileSync } from "node:child_process";
+import { readFileSync } from "node:fs";
 import loadMujoco from "@mujoco/mujoco";
 import { InferenceSession, Tensor } from "onnxruntime-web";
 
-const read = (path) => execFileSync("tar", ["xzOf", process.argv[2], `package/${path}`], { maxBuffer: 2 ** 28 });
+const read = (path) => readFileSync(`package/${path}`);
 const { springs, dampers, diagonals, rest_lengths: straight } = JSON.parse(read("Runtime/manifest.json")).model;
 const { pose } = JSON.parse(read("Tests/Vectors/network.json")).cases.find((one) => !one.answer.doubtful).question;
 const network = await InferenceSession.create(read("Runtime/Network/ik.onnx"));
-const answer = await network.run({ [network.inputNames[0]]: new Tensor("float32", pose, [1, pose.length]) });
+const answer = await network.run({ pose: new Tensor("float32", pose, [1, pose.length]) });
 const curved = (xml, { joint, tendon, coefficients }, attribute) =>
   xml.replace(RegExp(`(name="${joint ?? tendon}"[^>]* ${attribute}=")[^"]*`), `$1${coefficients.join(" ")}`);
 let xml = [...springs, ...diagonals].reduce((xml, law) => curved(xml, law, "stiffness"), `${read("Runtime/Model/arm.xml")}`);

@@ -40,8 +40,8 @@ def test_a_step_at_which_the_arm_diverges_has_no_time():
 def test_another_library_is_refused(flag, text, said, monkeypatch, tmp_path, capsys):
     told = dict(LIBRARY)
     monkeypatch.setattr(arm64, "run", lambda program, option, *more: told[option])
-    arm64.show(Path("libmujoco.so"), None, tmp_path)
+    arm64.show(Path("libmujoco.so"), tmp_path, None, tmp_path)
     assert "| C library of | Android |" in capsys.readouterr().out
     told[flag] = text
     with pytest.raises(InputError, match=said):
-        arm64.show(Path("libmujoco.so"), None, tmp_path)
+        arm64.show(Path("libmujoco.so"), tmp_path, None, tmp_path)

@@ -1,19 +1,22 @@
 """`python -m trunkline.check`: what a session will tell, before any fit."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import yaml
 
 from tests.identification.test_stage import settings
 from tests.support.matched_plant import curl, motion, release, small_model, static_pull, tilt
-from tests.support.workbench import workbench
+from tests.support.small_arm import small_spec
+from tests.support.workbench import ROOT, workbench
 from trunkline.check.__main__ import main
 from trunkline.check.recorded import missing_lines, recorded_lines
 from trunkline.check.told import described_lines, to_identify_from, told_by, untold
 from trunkline.identification.search import search
 from trunkline.identification.setup import set_up
-from trunkline.trials.trial import Trial
+from trunkline.trials.trial import Trial, write_trials
 
 
 @pytest.fixture(scope="module")
@@ -127,3 +130,27 @@ def test_the_command_reads_logs_and_writes_nothing(tmp_path, monkeypatch, capsys
     assert sorted(path.name for path in tmp_path.iterdir()) == ["conf", "data", "params.yaml"]
     assert main(["data/raw/nowhere"]) == 1
     assert "no such folder" in capsys.readouterr().err
+
+
+def test_of_several_sessions_each_is_told_and_what_it_has_for_itself(model, tmp_path, monkeypatch, capsys):
+    params = yaml.safe_load((ROOT / "params.yaml").read_text())
+    wanted = ("build_mjcf", "identify_stiffness")
+    (tmp_path / "params.yaml").write_text(yaml.safe_dump({stage: params[stage] for stage in wanted}))
+    monkeypatch.chdir(tmp_path)
+    rested = [tilt(model, 30), tilt(model, 60), *(static_pull(model, (pull, 0, 0)) for pull in (10, 20))]
+    days = [replace(trial, session=session, name=f"{session}/{trial.name}")
+            for session in ("monday", "friday") for trial in rested]  # fmt: skip
+    write_trials(tmp_path, days)
+    monkeypatch.setattr("trunkline.check.__main__.described_arm", lambda *_: SimpleNamespace(spec=small_spec(4)))
+    assert main(["."]) == 0
+    told = capsys.readouterr().out
+    for session in ("monday", "friday"):
+        assert f"  {session}: static tilts: 2 identify, 0 validate, 0 test; tilted by 30 to 60°\n" in told
+        assert f"  {session}: static pulls: 2 identify" in told
+    assert "  mount_tilt_x to ± " in told
+    assert "  mount_tilt_x@friday to ± " in told
+    swing = replace(release(model, 0.2), session="friday", name="friday/release")
+    write_trials(tmp_path, [*(trial for trial in days if trial.session == "monday"), swing])
+    assert main(["."]) == 0
+    said = "  per_session: mount_tilt_x: found no static_tilt or static_pull of the session friday with split identify"
+    assert said in capsys.readouterr().out

@@ -69,7 +69,9 @@ def test_pipelines_run_in_folders_of_their_own_go_on_and_one_that_fails_stops_no
     record(tmp_path / "good", all_truths(), instruments())
     shutil.copytree(tmp_path / "good", tmp_path / "bad")
     (tmp_path / "bad/session.yaml").write_text("trials: none\n")
-    arms = [{"name": name, "session": name} for name in ("bad", "good")]
+    for seed, name in enumerate(("a", "b"), 1):
+        record(tmp_path / "both" / name, all_truths(), instruments(), seed)
+    arms = [{"name": name, "session": name} for name in ("bad", "good", "both")]
     words = [str(listing(tmp_path, arms)), "--out", str(tmp_path / "out"), "--until", "ingest"]
     assert main(words) == 1
     told = capsys.readouterr()
@@ -79,6 +81,7 @@ def test_pipelines_run_in_folders_of_their_own_go_on_and_one_that_fails_stops_no
     assert "fleet: bad: failed: data/raw/bad/session.yaml: " in failed[0]
     log = tmp_path / "out/good/fleet.log"
     assert json.loads((tmp_path / "out/good/artifacts/ingest/metrics.json").read_text())["trials"] == 4
+    assert json.loads((tmp_path / "out/both/artifacts/ingest/metrics.json").read_text())["trials"] == 8
     shutil.copy(tmp_path / "good/session.yaml", tmp_path / "bad/session.yaml")
     assert main(words) == 0
     assert "didn't change, skipping" in log.read_text()

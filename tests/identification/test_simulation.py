@@ -13,6 +13,7 @@ from trunkline.elements import BRANCH, SLIDER, elements
 from trunkline.errors import InputError
 from trunkline.identification.evaluation import replay
 from trunkline.identification.experiment import prepare
+from trunkline.identification.in_motion import InMotion
 from trunkline.identification.loss import position_error
 from trunkline.identification.parameters import candidate_fields
 from trunkline.identification.population import Population
@@ -227,11 +228,12 @@ def test_what_joints_remember_begins_as_the_hand_left_it():
     model = spec.compile()
     start = np.tile([0.1, -0.01], 8)
     experiment = SimpleNamespace(
+        lead=0.01, frame_step=0.01,
         kind="release", frames=1, gravity=np.zeros(3), start=start, velocity=0 * start, load=0.0,
-        controls=np.zeros((1, 3)), slack=lambda _: False,
+        controls=np.zeros((1, 3)),
     )  # fmt: skip
-    population = Population(model, [experiment], ())
-    batch = population._batch(False, [experiment], {"jnt_stiffness": model.jnt_stiffness[None]}, 1)
+    moving = InMotion(model, {0: experiment}, False, np.zeros(0, int), 1.0)
+    batch = moving._batch({"jnt_stiffness": model.jnt_stiffness[None]}, [0])
     branch, slider = elements(model, BRANCH), elements(model, SLIDER)
     np.testing.assert_allclose(batch.bind("qpos")[0, branch.own], start)
     places = model.tendon_plasticadr[slider.tendon]

@@ -21,9 +21,9 @@ UNSEEN = {
     "pyright", "ruff", "setuptools",
 }  # fmt: skip
 NEEDS_EXTRA = (
-    "trunkline/pipeline", "trunkline/evaluate", "trunkline/execution", "trunkline/figures", "trunkline/ik/learn.py",
+    "trunkline/cluster.py", "trunkline/evaluate", "trunkline/execution", "trunkline/figures", "trunkline/ik/learn.py",
     "trunkline/ik/network.py", "trunkline/ik/onnx.py", "trunkline/ik/tip_loss.py", "trunkline/ik/training.py",
-    "trunkline/live", "trunkline/teleop", "trunkline/watch",
+    "trunkline/live", "trunkline/pipeline", "trunkline/teleop", "trunkline/watch", "trunkline/worker.py",
 )  # fmt: skip
 
 
@@ -79,9 +79,9 @@ def test_the_library_needs_its_dependencies_alone():
 @pytest.mark.parametrize(
     ("extra", "folders"),
     [
-        ("pipeline,teleop,live,motors,ros2", ["trunkline", "stages", "demo", *EXAMPLES]),
+        ("pipeline,teleop,live,motors,ros2,cluster", ["trunkline", "stages", "demo", *EXAMPLES]),
         ("teleop", ["rehearsal"]),
-        ("bench,live", ["benchmarks", "studies"]),
+        ("bench,live,cluster", ["benchmarks", "studies"]),
         ("test", ["tests"]),
     ],
 )

@@ -18,7 +18,7 @@ from trunkline.certificate.identified import identified
 from trunkline.certificate.poses import conditions_of, draw_poses, posed
 from trunkline.certificate.replays import packed
 from trunkline.certificate.words import Use, limits_of, verdict
-from trunkline.check.recorded import missing_lines, recorded_lines
+from trunkline.check.recorded import missing_lines, recorded_of_each
 from trunkline.errors import InputError
 from trunkline.identification.checks import check_trials
 from trunkline.identification.evaluation import Prediction, replay
@@ -26,7 +26,7 @@ from trunkline.identification.experiment import prepare
 from trunkline.identification.scoring import fingerprint
 from trunkline.settings import Seed
 from trunkline.trials.splits import DECIDING, VALIDATE
-from trunkline.trials.trial import Trial
+from trunkline.trials.trial import Trial, sessions_of
 from trunkline.version import __version__
 
 LIBRARIES = ("mujoco", "numpy", "scipy")
@@ -86,6 +86,8 @@ def certify(
     if inputs.lacking:
         uncertainty["lacking_pct"] = dict(zip(("of_what_gravity_moves", "of_what_cables_move"),
                                               100 * inputs.lacking.rms, strict=True))  # fmt: skip
+    if len(sessions := sessions_of(trials)) > 1:
+        uncertainty["mounted_as_in"] = sessions[0]
     rows = error_rows({stage: metrics[stage] for stage in tables}, metrics["score"])
     limits = limits_of(conditions, [trial.load for trial in trials])
     headline = headline_of(list(tables), metrics)
@@ -95,7 +97,7 @@ def certify(
         "arm": {"name": asked.arm, "length_m": length, "segments": len(trials[0].segments), "tendons": model.nu},
         "session": {
             "name": asked.session,
-            "recorded": recorded_lines(trials, DECIDING),
+            "recorded": recorded_of_each(trials, DECIDING),
             "missing": missing_lines(trials),
         },
         "verdict": verdict(*headline, asked.uses, asked.factor, radius, limits),

@@ -35,16 +35,16 @@ def error_rows(stages: dict[str, dict], scored: dict[str, dict]) -> list[dict]:
 
 
 def parameter_facts(tables: dict[str, dict]) -> dict[str, dict]:
-    """By stage: values with their intervals, what trades off, what is told least, and what is open."""
+    """By stage: values with their intervals, of several sessions also what all but the first have for themselves; what
+    trades off, what is told least, and what is open."""
     found = {}
     for stage, table in tables.items():
-        rows = {}
-        for name, row in table["parameters"].items():
-            keys = ("value", "unit", "interval_95_given_model", "range", "at_bound", "undetermined")
-            words = {"words": certainty_words(name, row), "told_by": telling(name)}
-            rows[name] = {key: row[key] for key in keys} | words
-        found[stage] = {
-            "parameters": rows,
+        rows = {
+            key: {name: _told(name, row) for name, row in table[key].items()}
+            for key in ("parameters", "per_session")
+            if key in table
+        }
+        found[stage] = rows | {
             "trials": len(table["fitted_to"]),
             "weakest_direction": table["weakest_direction"],
             "hardly_told_apart": strong_pairs(table),
@@ -52,6 +52,11 @@ def parameter_facts(tables: dict[str, dict]) -> dict[str, dict]:
             "open": open_lines(table),
         }
     return found
+
+
+def _told(name: str, row: dict) -> dict:
+    keys = ("value", "unit", "interval_95_given_model", "range", "at_bound", "undetermined")
+    return {key: row[key] for key in keys} | {"words": certainty_words(name, row), "told_by": telling(name)}
 
 
 def uncertainty_facts(found: Budget, conditions: Conditions, length: float, draws: int) -> dict:

@@ -6,9 +6,10 @@ import numpy as np
 from trunkline.certificate.arms import arm_of
 from trunkline.certificate.poses import posed
 from trunkline.identification.evaluation import segment_positions
+from trunkline.identification.per_session import model_in
 from trunkline.trials.experiments import is_static
 from trunkline.trials.splits import VALIDATE
-from trunkline.trials.trial import Trial
+from trunkline.trials.trial import Trial, sessions_of
 
 
 def at_rest(trials: list[Trial]) -> list[Trial]:
@@ -20,10 +21,12 @@ def at_rest(trials: list[Trial]) -> list[Trial]:
 def tip_residuals(model: mujoco.MjModel, trials: list[Trial], tip: int) -> np.ndarray:
     """Distances of the twin's segment of number `tip` from where `trials` at rest saw it, m, NaN where they did not.
     Shape (N,)."""
-    found = arm_of(model).rest(posed(trials, model))
-    lengths = []
-    for trial, qpos, rested in zip(trials, found.qpos, found.converged, strict=True):
-        place = segment_positions(model, trial.segments, qpos)[tip]
-        seen = rested and trial.measured[-1, tip]
-        lengths.append(np.linalg.norm(place - trial.positions[-1, tip]) if seen else np.nan)
-    return np.array(lengths)
+    lengths = np.full(len(trials), np.nan)
+    for session in sessions_of(trials):
+        own, places = model_in(session, model), [i for i, trial in enumerate(trials) if trial.session == session]
+        found = arm_of(own).rest(posed([trials[i] for i in places], own))
+        for i, qpos, rested in zip(places, found.qpos, found.converged, strict=True):
+            if rested and trials[i].measured[-1, tip]:
+                place = segment_positions(own, trials[i].segments, qpos)[tip]
+                lengths[i] = np.linalg.norm(place - trials[i].positions[-1, tip])
+    return lengths

@@ -121,7 +121,7 @@ def _parameters(facts: dict) -> str:
     parts = ["<h2>Parameters</h2>\n"]
     for stage, told in facts["parameters"].items():
         rows = []
-        for name, row in told["parameters"].items():
+        for name, row in (told["parameters"] | told.get("per_session", {})).items():
             low, high = row["interval_95_given_model"]
             state = "on a bound" if row["at_bound"] else "undetermined" if row["undetermined"] else ""
             rows.append((False, [name, f"{row['value']:.4g}", f"{low:.4g} … {high:.4g}", row["unit"] or "–",
@@ -162,6 +162,9 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
     lacking = "Too few held-out trials at rest tell what the model lacks: it is not in here."
     if count := told["held_out_trials"]:
         lacking = f"What the model lacks, which no interval holds, is taken from the {count} held-out trials at rest."
+    mounted = ""
+    if session := told.get("mounted_as_in"):
+        mounted = f" It is of the arm as it was mounted in the session {escape(session)}."
     pulled = (
         f"pulls of up to {1e3 * where['pull']:.0f} mm, together {1e3 * where['pulls']:.0f} mm, with the mount tilted "
         f"by up to {where['pulled_tilt_deg']:.1f}°; no pull, with the mount tilted by up to {where['tilt_deg']:.0f}°"
@@ -170,7 +173,7 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
         f"<h2>Uncertainty of the tip</h2>\n<p>At rest the tip is within <strong>{radius['median']:.3g} mm</strong> of "
         f"the twin's in 95 of 100 cases in the median pose, within {radius['p95']:.3g} mm in 95 of 100 poses. That is "
         f"the expanded uncertainty, from {told['draws']} draws of all sources through the model (JCGM 100, 101, 102). "
-        f"{lacking} It holds for what the session's trials at rest went up to: {pulled}.</p>\n"
+        f"{lacking} It holds for what the session's trials at rest went up to: {pulled}.{mounted}</p>\n"
         f"{_table(caption, head, rows)}{still}"
         f'<figure><img src="{_png(pictures["uncertainty"])}" alt="Tips at rest over the workspace from two sides, '
         f'coloured by their expanded uncertainty, {radius["median"]:.3g} mm in the median, at most '

@@ -9,6 +9,8 @@ from trunkline.dataset.sampling import around_the_arm
 from trunkline.elements import actuators
 from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity
 from trunkline.identification.experiment import SLACK, commanded_lengths
+from trunkline.identification.per_session import model_in
+from trunkline.simulation.rest import base_frame
 from trunkline.statics.chain import Chain
 from trunkline.trials.experiments import is_static
 from trunkline.trials.trial import Trial
@@ -66,11 +68,19 @@ def _pulls(trial: Trial) -> np.ndarray:
 
 
 def posed(trials: list[Trial], model: mujoco.MjModel) -> Poses:
-    """The poses of trials at rest, the last one of each."""
+    """The poses of trials at rest, the last one of each, with gravity as the mount of `model` has it."""
     order = actuators(model)
     commands = [commanded_lengths(trial, model)[-1][order] for trial in trials]
-    gravity = np.array([trial.gravity for trial in trials]).reshape(-1, 3)
+    gravity = np.array([_gravity(trial, model) for trial in trials]).reshape(-1, 3)
     return Poses(gravity, np.array(commands).reshape(-1, model.nu))
+
+
+def _gravity(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+    """What pulled at the arm in a trial, base frame of the session whose mount `model` has, m/s². Shape (3,)."""
+    own = model_in(trial.session, model)
+    if own is model:
+        return trial.gravity
+    return base_frame(model)[1] @ base_frame(own)[1].T @ trial.gravity
 
 
 def draw_poses(chain: Chain, conditions: Conditions, count: int, rng: np.random.Generator) -> Poses:

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from trunkline.certificate.poses import Conditions
 from trunkline.check.told import Told
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import parameter_named
 from trunkline.trials.experiments import EXPERIMENTS
 
 FEW_TILTS = 10.0  # deg, up to which a mount counts as upright
@@ -63,7 +63,7 @@ def limits_of(conditions: Conditions, loads: list[float]) -> list[str]:
 
 def certainty_words(name: str, row: dict) -> str:
     """How well a parameter of `parameters.json` is told, in the words of `trunkline.check`."""
-    axis = PARAMETERS[name].coordinate
+    axis = parameter_named(name).coordinate
     low, high = axis(row["interval_95_given_model"])
     searched = np.diff(axis(row["range"]))[0]
     half = float(high - low) / 2
@@ -73,7 +73,7 @@ def certainty_words(name: str, row: dict) -> str:
 def open_lines(table: dict) -> list[str]:
     """What a stage's trials leave open, and which experiment would tell it."""
     lines = []
-    for name, row in table["parameters"].items():
+    for name, row in (table["parameters"] | table.get("per_session", {})).items():
         if row["at_bound"] or row["undetermined"]:
             why = "ended on a bound of its range" if row["at_bound"] else "is not determined"
             lines.append(f"{name} {why}; told by {_listed([EXPERIMENTS[kind].plural for kind in telling(name)])}")
@@ -82,7 +82,7 @@ def open_lines(table: dict) -> list[str]:
 
 def telling(name: str) -> list[str]:
     """The kinds of experiment that tell a parameter."""
-    return [kind for kind, told in EXPERIMENTS.items() if PARAMETERS[name].told_by(told)]
+    return [kind for kind, told in EXPERIMENTS.items() if parameter_named(name).told_by(told)]
 
 
 def strong_pairs(table: dict) -> list[str]:

@@ -10,11 +10,12 @@ import sys
 from pathlib import Path
 
 from trunkline.arm.kinds import described_arm
-from trunkline.check.recorded import missing_lines, recorded_lines
+from trunkline.check.recorded import missing_lines, recorded_of_each
 from trunkline.check.told import described_lines, to_identify_from, told_by, untold
 from trunkline.errors import in_one_line
 from trunkline.evaluate.session import trials_of
 from trunkline.identification.checks import check_trials
+from trunkline.identification.per_session import make_room, names_apart, other_sessions, untold_apart
 from trunkline.identification.setup import check_parameters
 from trunkline.pipeline.config import own_or_project, settings_of
 from trunkline.settings import read_yaml
@@ -29,7 +30,7 @@ def main(arguments: list[str] | None = None) -> int:
         prog="python -m trunkline.check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("session", type=Path, metavar="SESSION",
-                        help="folder of logs and session.yaml, or of filtered trials")  # fmt: skip
+                        help="folder of logs and session.yaml, or of several such, or of filtered trials")  # fmt: skip
     parser.add_argument("--error", type=float, default=0.5, metavar="PERCENT",
                         help="by which the fitted model will be off, of a point's distance from the base")  # fmt: skip
     parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
@@ -37,16 +38,20 @@ def main(arguments: list[str] | None = None) -> int:
     told = parser.parse_args(arguments)
     trials = trials_of(told.session, told.settings)
     description = settings_of("build_mjcf", told.settings)
-    model = described_arm(description, own_or_project(told.settings, "conf")).spec.compile()
+    spec = described_arm(description, own_or_project(told.settings, "conf")).spec
+    model = spec.compile()
     check_trials([trial for trial in trials if trial.split in DECIDING], model)
-    print("\n".join(["recorded:", *(f"  {line}" for line in recorded_lines(trials))]))
+    print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))
     if missing := missing_lines(trials):
         print("\n".join(["missing:", *(f"  {line}" for line in missing)]))
     given = read_yaml(told.settings / "params.yaml")
     for stage in (stage for stage in STAGES if stage in given):
         config = settings_of(stage, told.settings)
         check_parameters(stage, config, model)
-        lacking = untold(config, trials)
+        names = names_apart(list(config.parameters), config.per_session, other_sessions(trials))
+        make_room(spec, names)
+        model = spec.compile()
+        lacking = untold(config, trials) or untold_apart(names, trials, config.experiments)
         chosen = [t for t in trials if t.experiment in config.experiments and t.split == IDENTIFY]
         print(f"{stage}, from {len(chosen)} trials:", flush=True)
         for line in lacking:

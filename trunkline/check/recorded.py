@@ -5,7 +5,7 @@ import numpy as np
 from trunkline.frames import tilt_of_gravity
 from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.splits import DECIDING, IDENTIFY, SPLITS
-from trunkline.trials.trial import Trial
+from trunkline.trials.trial import Trial, sessions_of
 
 UPRIGHT = np.radians(3)  # of tilt, below which gravity has no direction across the arm
 PULLED = 1e-3  # m, from which on a tendon counts as pulled
@@ -23,6 +23,18 @@ def recorded_lines(trials: list[Trial], splits: tuple[str, ...] = SPLITS) -> lis
             counts = [f"{sum(t.split == split for t in own)} {split}" for split in splits]
             lines.append(f"{told.plural}: {', '.join(counts)}{_range([t for t in own if t.split in DECIDING])}")
     return lines
+
+
+def recorded_of_each(trials: list[Trial], splits: tuple[str, ...] = SPLITS) -> list[str]:
+    """`recorded_lines`; of several sessions those of each, behind its name."""
+    sessions = sessions_of(trials)
+    if len(sessions) == 1:
+        return recorded_lines(trials, splits)
+    return [
+        f"{session}: {line}"
+        for session in sessions
+        for line in recorded_lines([trial for trial in trials if trial.session == session], splits)
+    ]
 
 
 def _range(own: list[Trial]) -> str:

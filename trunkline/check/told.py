@@ -16,7 +16,7 @@ from trunkline.identification.experiment import Experiment
 from trunkline.identification.fit import Fit
 from trunkline.identification.linearisation import linearise
 from trunkline.identification.null_model import straight
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import parameter_named
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import set_up, with_every
 from trunkline.trials.experiments import EXPERIMENTS, is_static
@@ -42,7 +42,7 @@ class Told:
     share: float
 
     def words(self) -> str:
-        parameter = PARAMETERS[self.name]
+        parameter = parameter_named(self.name)
         if not np.isfinite(self.share):
             return f"{self.name} shows in no trial"
         if self.share >= 1:

@@ -8,6 +8,7 @@ from trunkline.dataset.columns import DOWN, command_columns, tension_columns
 from trunkline.elements import capstan_friction
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
+from trunkline.scheduler import spread_rows
 from trunkline.simulation.rest import settle
 from trunkline.statics.chain import Chain
 from trunkline.statics.hysteresis import friction_band, model_friction
@@ -30,18 +31,27 @@ def mujoco_deviation(
     rows = table.iloc[np.sort(rng.permutation(len(table))[:count])]
     tensions = rows[tension_columns(chain.tendons)].to_numpy()
     commands = rows[command_columns(chain.tendons)].to_numpy()
-    by_actuator = model.actuator_trnid[:, 0]
     gravity = STANDARD_GRAVITY * rows[DOWN].to_numpy()
-    settled = settle(model, commands[:, by_actuator], gravity)
+    settled, rested, width = spread_rows(_settled, (tensions, commands, gravity), (model, chain))
     position = rows[["x", "y", "z"]].to_numpy()
-    band = friction_band(chain, tensions, gravity, *model_friction(model), capstan=capstan_friction(model))
-    deviation = np.linalg.norm(settled.position - position, axis=1)
+    deviation = np.linalg.norm(settled - position, axis=1)
     return pd.DataFrame(
         {
             "theta_g": rows["theta_g"].to_numpy(),
             "largest_tension": tensions.max(axis=1),
             "deviation_mm": deviation * 1e3,
-            "rested": settled.rested,
-            "friction_band_mm": band.width * 1e3,
+            "rested": rested,
+            "friction_band_mm": width * 1e3,
         }
     )
+
+
+def _settled(
+    given: tuple[mujoco.MjModel, Chain], rows: tuple[np.ndarray, np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of some samples' `tensions`, N, and `commands`, m (n, K), under `gravity`, m/s² (n, 3): the tips in MuJoCo, m
+    (n, 3), which of them rested (n,), and how far apart friction may hold them, m (n,)."""
+    (model, chain), (tensions, commands, gravity) = given, rows
+    settled = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity)
+    band = friction_band(chain, tensions, gravity, *model_friction(model), capstan=capstan_friction(model))
+    return settled.position, settled.rested, band.width

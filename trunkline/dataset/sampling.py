@@ -15,11 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.scheduler import spread_rows
 from trunkline.statics.chain import Chain
 from trunkline.statics.equilibria import Equilibrium, equilibrium, equilibrium_paths
 
 COARSE_STEPS = 48  # of the first look at a path, to space the second one evenly along the tip's way
 SHEET_LOOK = 2  # rays of a sheet, of which one is looked at: places are along neighbouring rays as good as the same
+LEAST = 1000  # equilibria that are worth being sent to another machine
 COARSE_POWER = 3.0  # tension ~ (step / steps)^power there: the tip's soft units bend under the first newton
 
 
@@ -220,7 +222,7 @@ def _along(chain: Chain, gravity: np.ndarray, rays: np.ndarray, places: np.ndarr
     """Equilibria at `places` (rays, steps) on each ray, as shares of the tip's way."""
     shares = np.linspace(0, 1, COARSE_STEPS) ** COARSE_POWER
     looked = np.arange(0, len(rays), look_every)
-    coarse = equilibrium_paths(chain, rays[looked, None, :] * shares[:, None], gravity)
+    coarse = _paths(chain, rays[looked, None, :] * shares[:, None], gravity)
     tips = coarse.position.reshape(len(looked), COARSE_STEPS, 3)
     way = np.linalg.norm(np.diff(tips, axis=1), axis=2).cumsum(axis=1)
     way = np.concatenate([np.zeros((len(looked), 1)), way], axis=1)
@@ -228,7 +230,18 @@ def _along(chain: Chain, gravity: np.ndarray, rays: np.ndarray, places: np.ndarr
         every = np.arange(len(rays))
         way = np.stack([np.interp(every, looked, column, period=len(rays)) for column in way.T], axis=1)
     fine = np.stack([np.interp(p * w[-1], w, shares) for p, w in zip(places, way, strict=True)])
-    return equilibrium_paths(chain, rays[:, None, :] * fine[..., None], gravity)
+    return _paths(chain, rays[:, None, :] * fine[..., None], gravity)
+
+
+def _paths(chain: Chain, tensions: np.ndarray, gravity: np.ndarray) -> Equilibrium:
+    """As `equilibrium_paths` under one gravity."""
+    least = -(-LEAST // tensions.shape[1])
+    return Equilibrium(*spread_rows(_follow_some, (tensions,), (chain, gravity), least))
+
+
+def _follow_some(given: tuple[Chain, np.ndarray], rows: tuple[np.ndarray]) -> tuple[np.ndarray, ...]:
+    (chain, gravity), (tensions,) = given, rows
+    return tuple(vars(equilibrium_paths(chain, tensions, gravity)).values())
 
 
 def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:

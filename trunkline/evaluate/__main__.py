@@ -8,6 +8,7 @@ metrics.json, trials.csv, segments.csv and two pictures. With --reference, how t
 import argparse
 import hashlib
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -21,6 +22,7 @@ from trunkline.identification.checks import check_trials
 from trunkline.identification.error_tables import segment_table, trial_table
 from trunkline.identification.scoring import evaluate
 from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.trials.trial import sessions_of
 
 
 @in_one_line
@@ -30,8 +32,9 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("model", type=Path, metavar="MODEL", help="MJCF of the arm")
     parser.add_argument(
-        "session", type=Path, metavar="SESSION", help="folder of logs and session.yaml, or of filtered trials"
-    )
+        "session", type=Path, metavar="SESSION",
+        help="folder of logs and session.yaml, or of several such, or of filtered trials",
+    )  # fmt: skip
     parser.add_argument("--cad", type=Path, metavar="MODEL", help="another MJCF to stand beside, such as the CAD model")
     parser.add_argument("--reference", type=Path, metavar="EVALUATION", help="folder or metrics.json of an earlier one")
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="where to write; default: evaluation/<session>")
@@ -54,6 +57,12 @@ def _run(told: argparse.Namespace) -> int:
     models = {"model": read_arm(told.model)} | ({} if told.cad is None else {"cad": read_arm(told.cad)})
     written = written_beside(told.model, told.settings)
     trials = trials_of(told.session, told.settings)
+    if len(sessions_of(trials)) == 1 and (session := written.session_of(trials)):
+        print(f"evaluate: the session {session} of those that the model was fitted to")
+        trials = [replace(trial, session=session, name=f"{session}/{trial.name}") for trial in trials]
+    for session in written.namesakes(models["model"], trials):
+        doubt = "the model has numbers for a session of that name, and was fitted to no trial of this one"
+        print(f"evaluate: warning: session {session}: {doubt}", file=sys.stderr)
     segments = trials[0].segments
     for model in models.values():
         check_trials(trials, model)
@@ -69,6 +78,8 @@ def _run(told: argparse.Namespace) -> int:
     table = trial_table(predictions)
     print("\nErrors in mm; of what stands beside the model, position / tip error")
     print("\n".join(["", *trial_lines(table, fitted), "", *kind_lines(metrics)]))
+    for session, own in metrics.get("by_session", {}).items():
+        print("\n".join(["", f"session {session}", *kind_lines(own)]))
     if fitted:
         print(f"\n* the model was fitted to these {len(fitted)} of {len(trials)} trials")
     if reference is not None:

@@ -9,10 +9,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
+from trunkline.identification.parameters import APART, PARAMETERS
+from trunkline.identification.per_session import names_in
 from trunkline.identification.scoring import fingerprint
 from trunkline.pipeline.config import settings_of
 from trunkline.pipeline.inputs import read_spec
-from trunkline.trials.trial import Trial
+from trunkline.trials.trial import Trial, sessions_of
 
 MOST_TURN = np.radians(30)  # of the mount in the tracked base, as it may be identified; more is another frame
 
@@ -31,6 +33,22 @@ class Written:
     def saw(self, trial: Trial) -> bool:
         """Whether it was fitted to this very recording, filtered as it is here."""
         return self.fitted_to.get(trial.name) == fingerprint(trial)
+
+    def session_of(self, trials: list[Trial]) -> str:
+        """Which of the sessions that it was fitted to `trials` without a session's name are of: as it saw one of them.
+        Empty where it saw none, or was fitted to one session."""
+        for trial in trials:
+            digest = fingerprint(trial)
+            for name, seen in self.fitted_to.items():
+                if seen == digest and name != trial.name and name.endswith(f"/{trial.name}"):
+                    return name.removesuffix(f"/{trial.name}")
+        return ""
+
+    def namesakes(self, model: mujoco.MjModel, trials: list[Trial]) -> list[str]:
+        """Sessions of `trials` of whose names `model` has numbers, though it was fitted to none of their trials."""
+        named = {name.partition(APART)[2] for name in names_in(model, PARAMETERS)}
+        seen = {trial.session for trial in trials if self.saw(trial)}
+        return [session for session in sessions_of(trials) if self.fitted_to and session in named - seen]
 
 
 def written_beside(path: Path, root: Path) -> Written:

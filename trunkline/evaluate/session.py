@@ -1,15 +1,18 @@
 """The trials of a session for one look at them: from its logs, or as the stage `filter` wrote them."""
 
 import sys
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 from trunkline.errors import InputError
 from trunkline.filtering.filter import filter_take
 from trunkline.pipeline.config import settings_of
 from trunkline.progress import progress
-from trunkline.sessions.session import read_session
-from trunkline.takes.gathering import gather
+from trunkline.sessions.session import Session, session_folders
+from trunkline.takes.gathering import Gathered, gather, together
 from trunkline.takes.intake import take_in
+from trunkline.takes.one_arm import gather_each
 from trunkline.takes.quality import by_sentence, judge
 from trunkline.trials.splits import SPLITS
 from trunkline.trials.trial import Trial, read_trials
@@ -19,7 +22,7 @@ def trials_of(folder: Path, root: Path) -> list[Trial]:
     """Every trial of a session, of all splits, filtered; what is refused or doubtful is said on stderr.
 
     Args:
-        folder: logs and session.yaml, or what the stage `filter` writes.
+        folder: logs and session.yaml, several such folders of one arm, or what the stage `filter` writes.
         root: holds the params.yaml that says how to take logs in and to filter them.
 
     Raises:
@@ -42,14 +45,9 @@ def trials_of(folder: Path, root: Path) -> list[Trial]:
 
 
 def _from_logs(folder: Path, root: Path) -> list[Trial]:
-    session = read_session(folder)
     ingest, settings = settings_of("ingest", root), settings_of("filter", root)
-    taken = []
-    with progress(len(session.trials), "evaluate", "trials") as bar:
-        for entry in take_in(folder, session, ingest.limits):
-            taken.append(entry)
-            bar.update(1, trial=entry[0].name)
-    gathered = gather(taken, session, ingest.plausible, "leave_out", f"{folder}")
+    found = gather_each(session_folders(folder), partial(_gathered, ingest=ingest), ingest.plausible.distance)
+    gathered = together(list(found.values()))
     for name, reason in gathered.refused.items():
         print(f"evaluate: left out {name}: {reason}", file=sys.stderr)
     qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
@@ -60,3 +58,13 @@ def _from_logs(folder: Path, root: Path) -> list[Trial]:
         take.repairs = len(found.repairs)
         trials.append(filter_take(take, settings)[0])
     return trials
+
+
+def _gathered(folder: Path, session: Session, ingest: Any) -> Gathered:
+    """ingest: settings of the stage."""
+    taken = []
+    with progress(len(session.trials), "evaluate", "trials") as bar:
+        for entry in take_in(folder, session, ingest.limits):
+            taken.append(entry)
+            bar.update(1, trial=entry[0].name)
+    return gather(taken, session, ingest.plausible, "leave_out", f"{folder}")

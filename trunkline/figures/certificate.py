@@ -36,7 +36,7 @@ def pose_figure(shapes: list[tuple[str, np.ndarray, np.ndarray]]) -> Figure:
         ):  # fmt: skip
             axis.plot(points[:, :2] @ side * 1e3, points[:, 2] * 1e3, style, color=color, label=label, markersize=4)
         axis.set(aspect="equal", xlabel="mm")
-        axis.set_title(name, fontsize=8, fontweight="normal")
+        axis.set_title(name.replace("/", "\n"), fontsize=8, fontweight="normal")
     if shown:
         axes[0, 0].set_ylabel("z (mm)")
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=2)

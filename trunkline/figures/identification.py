@@ -10,7 +10,7 @@ from trunkline.figures.style import DOUBTFUL, IDENTIFIED, MEASURED
 from trunkline.identification.error_tables import LABELS
 from trunkline.identification.evaluation import Prediction
 from trunkline.identification.identify import Identification
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import parameter_named
 
 NARROWEST = 60.0  # mm, of an axis: noise shall not look like motion
 COLORS = {label: color for label, (color, *_) in MODELS.items()}
@@ -115,7 +115,7 @@ def parameter_figure(
     panels = 1 + bool(identification.factors)
     figure, axes = plt.subplots(1, panels, figsize=(5.5 * panels, 3.2), squeeze=False)
     for row, (name, value) in enumerate(identification.values.items()):
-        low, high, place = PARAMETERS[name].coordinate([bounds[name].low, bounds[name].high, value])
+        low, high, place = parameter_named(name).coordinate([bounds[name].low, bounds[name].high, value])
         place = (place - low) / (high - low)
         width = identification.certainty.half_width[row] / (high - low)
         doubt = "not determined" if name in undetermined else "on a bound" if name in identification.at_bound else ""

@@ -105,6 +105,7 @@ def _trial(
         split=take.split,
         level=take.level,
         load=take.load,
+        session=take.session,
         gravity=gravity,
         time=time,
         segments=take.segments,

@@ -8,7 +8,7 @@ from omegaconf import OmegaConf
 
 from trunkline.errors import InputError, nearest
 from trunkline.pipeline.config import validated
-from trunkline.sessions.session import SessionName
+from trunkline.sessions.session import SessionName, sessions_in
 from trunkline.settings import read_yaml, settings
 
 NONE = "none"  # as the reference: no drift is told
@@ -16,9 +16,9 @@ NONE = "none"  # as the reference: no drift is told
 
 @settings
 class Arm:
-    """name: of its folder and row. session: folder of its logs and session.yaml. like: folder whose dvc.yaml and
-    params.yaml it takes, by default the project's. params: what differs from those, by stage. folder: in place of all
-    of these, where a pipeline has run already; it is read and not run. since: which arm its drift is from.
+    """name: of its folder and row. session: folder of its logs and session.yaml, or of several such. like: folder whose
+    dvc.yaml and params.yaml it takes, by default the project's. params: what differs from those, by stage. folder: in
+    place of all of these, where a pipeline has run already; it is read and not run. since: which arm its drift is from.
     """
 
     name: SessionName
@@ -74,7 +74,7 @@ def read_listing(path: Path) -> Listing:
             if name is None or (key == "like" and (name == "." or arm.folder)):
                 continue
             place = (path.parent / name).resolve()
-            if not (place / wanted).exists():
+            if not (place / wanted).exists() and not (key == "session" and sessions_in(place)):
                 raise InputError(f"{path}: {arm.name}: {key}: found no {wanted} in {place}, expected one")
             setattr(arm, key, str(place))
     return listing

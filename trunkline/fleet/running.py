@@ -37,7 +37,8 @@ def prepare(arm: Arm, folder: Path, until: str) -> None:
                              f"{nearest(section, [str(key) for key in params])}")  # fmt: skip
     assert arm.session is not None, "arms that were run already are not prepared"
     session = Path(arm.session)
-    merged = OmegaConf.merge(params, arm.params, {"ingest": {"session": session.name}})
+    own = {"ingest": {"only": None}}, arm.params, {"ingest": {"session": session.name}}  # `only` is of another session
+    merged = OmegaConf.merge(params, *own)
     assert isinstance(merged, DictConfig)  # as both are
     kept = {key: value for key, value in _without_null(_plain(merged)).items() if key in stages}
     raw = folder / "data/raw"

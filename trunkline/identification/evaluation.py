@@ -16,8 +16,8 @@ from trunkline.identification.loss import (
     position_error,
     velocity_error,
 )
-from trunkline.identification.population import Population
 from trunkline.identification.resting import LAST, STILL
+from trunkline.identification.simulated_sessions import Sessions
 from trunkline.trials.experiments import EXPERIMENTS, is_static, is_stepwise
 from trunkline.trials.splits import SPLITS
 
@@ -72,8 +72,9 @@ def replay(
     model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], step_factor: float = 1.0
 ) -> Replay:
     """Simulate `experiments` with `model` as it is, its time step (times a factor) fitted to divide a frame evenly."""
-    fields = {STRUCTURE: np.array(getattr(model, STRUCTURE))[None]}
-    simulated = Population(model, experiments, segments, step_factor).simulate(fields)
+    simulated = Sessions(model, experiments, segments, step_factor).simulate(
+        lambda _, own: {STRUCTURE: np.array(getattr(own, STRUCTURE))[None]}
+    )
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     length = float(np.linalg.norm(data.site("tip").xpos - data.site("base_center").xpos))

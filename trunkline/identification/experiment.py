@@ -8,6 +8,7 @@ import numpy as np
 from trunkline.elements import arm_hinges, cables
 from trunkline.errors import InputError
 from trunkline.identification.loss import LossWeights
+from trunkline.identification.per_session import model_in
 from trunkline.identification.pose_fit import PoseFit, fit_pose
 from trunkline.trials.experiments import is_static, is_stepwise
 from trunkline.trials.trial import Trial
@@ -42,6 +43,7 @@ class Experiment:
         measured: where they count. Shape (T, S).
         fit: how well the start matches the measurement.
         repaired: whether `ingest` changed anything in the trial.
+        session: to which the trial belongs.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Experiment:
     fit: PoseFit
     repaired: bool = False
     load: float = 0.0
+    session: str = ""
 
     @property
     def frames(self) -> int:
@@ -91,7 +94,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
-    fit, start, velocity = _start(trial, model, seen)
+    fit, start, velocity = _start(trial, model_in(trial.session, model), seen)
     lengths = commanded_lengths(trial, model)
     if command_delay and model.nu:
         lengths = np.stack(
@@ -112,6 +115,7 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         fit=fit,
         repaired=trial.repairs > 0,
         load=trial.load,
+        session=trial.session,
     )
 
 
@@ -130,12 +134,19 @@ def own_starts(
     Args:
         experiments, trials: the same ones, in the same order.
     """
-    if all(np.allclose(getattr(fitted, name), getattr(model, name), rtol=0, atol=SAME_PLACE) for name in GEOMETRY):
+    same = {
+        session: all(
+            np.allclose(getattr(one, name), getattr(other, name), rtol=0, atol=SAME_PLACE) for name in GEOMETRY
+        )
+        for session in {trial.session for trial in trials}
+        for one, other in [(model_in(session, fitted), model_in(session, model))]
+    }
+    if all(same.values()):
         return experiments
     own = []
     for experiment, trial in zip(experiments, trials, strict=True):
-        if not is_static(experiment.kind):
-            fit, start, velocity = _start(trial, model, start_frames(trial)[1])
+        if not is_static(experiment.kind) and not same[trial.session]:
+            fit, start, velocity = _start(trial, model_in(trial.session, model), start_frames(trial)[1])
             experiment = replace(experiment, fit=fit, start=start, velocity=velocity)
         own.append(experiment)
     return own

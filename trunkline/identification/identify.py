@@ -12,7 +12,7 @@ from trunkline.identification.fit import Fit, Polish
 from trunkline.identification.influence import Influence, influence
 from trunkline.identification.linearisation import linearise
 from trunkline.identification.optimizers import Optimizer
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, follow_rest, set_fields
+from trunkline.identification.parameters import candidate_fields, follow_rest, parameter_named, set_fields
 from trunkline.identification.problem import Problem
 from trunkline.identification.resting import RestShape, spring_references
 from trunkline.identification.robust import reweighted
@@ -126,7 +126,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
 
 def values_of(parameters, vector: np.ndarray) -> dict[str, float]:
     """What the scalars at the head of a candidate z are, in their units."""
-    return {name: float(PARAMETERS[name].value(z)) for name, z in zip(parameters, vector, strict=False)}
+    return {name: float(parameter_named(name).value(z)) for name, z in zip(parameters, vector, strict=False)}
 
 
 def _few(experiments: list[Experiment], count: int) -> list[Experiment]:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import parameter_named
 from trunkline.identification.problem import Problem
 
 DIFFERENCE = 1e-3  # step of a one-sided difference: in ln(value), in a factor, or in a signed value
@@ -47,7 +47,7 @@ def linearise(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] 
     high = problem.bounds()[1]
     sizes = np.full(len(vector), DIFFERENCE)
     if problem.rubs:
-        sizes[[i for i, name in enumerate(problem.parameters) if not PARAMETERS[name].signed]] = RUBBING_DIFFERENCE
+        sizes[[i for i, name in enumerate(problem.parameters) if not parameter_named(name).signed]] = RUBBING_DIFFERENCE
     steps = np.where(vector + sizes > high, -sizes, sizes)
     candidates = vector + np.diag(steps)
     if residuals is None:

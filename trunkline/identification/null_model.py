@@ -11,6 +11,7 @@ import numpy as np
 
 from trunkline.identification.evaluation import Prediction, Replay, segment_positions
 from trunkline.identification.experiment import Experiment, measured_pose, start_frames
+from trunkline.identification.per_session import model_in
 from trunkline.identification.pose_fit import fit_pose
 from trunkline.trials.experiments import is_static, is_stepwise
 from trunkline.trials.splits import IDENTIFY
@@ -58,6 +59,7 @@ def hanging_still(experiments: list[Experiment], like: Replay, ended: list[Exper
     positions = []
     for experiment in experiments:
         same = [e for e in seen if e.kind == experiment.kind] or seen
+        same = [e for e in same if e.session == experiment.session] or same
         shape = np.nanmean([_last_shape(e) for e in same], axis=0)
         positions.append(np.broadcast_to(shape, experiment.positions.shape))
     return replace(like, positions=positions)
@@ -74,7 +76,7 @@ def held(trials: list[Trial], experiments: list[Experiment], model: mujoco.MjMod
     Trials at rest are left out: their start is fitted to the very frame that is compared.
     """
     pairs = [(trial, e) for trial, e in zip(trials, experiments, strict=True) if not is_static(e.kind)]
-    shapes = [segment_positions(model, trial.segments, e.start) for trial, e in pairs]
+    shapes = [segment_positions(model_in(trial.session, model), trial.segments, e.start) for trial, e in pairs]
     positions = [np.broadcast_to(shape, e.positions.shape) for shape, (_, e) in zip(shapes, pairs, strict=True)]
     return Prediction(replace(like, positions=positions), [e for _, e in pairs])
 
@@ -94,6 +96,7 @@ def noise_floor(
 
 
 def _floor(trial: Trial, experiment: Experiment, model: mujoco.MjModel, count: int) -> tuple[Experiment, np.ndarray]:
+    model = model_in(trial.session, model)
     first = 0 if is_static(trial.experiment) else start_frames(trial)[0] + 1
     seen = np.flatnonzero(experiment.measured.any(axis=1))
     frames = seen[np.linspace(0, len(seen) - 1, min(count, len(seen))).round().astype(int)]

@@ -4,7 +4,7 @@ import numpy as np
 
 from trunkline.identification.certainty import weakest_in_words
 from trunkline.identification.identify import Identification
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import APART, parameter_named
 from trunkline.identification.problem import Bounds
 
 ENDS = np.array([-1, 1])
@@ -19,14 +19,15 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
     hold the truth if the model is right; what biases every trial alike shows in none of them.
     """
     names, certainty = list(result.values), result.certainty
+    place = {name: i for i, name in enumerate(names)}
     initial, vague = result.models["initial"], undetermined(result, bounds)
     scalars = {
         name: {
             "value": value,
-            "unit": PARAMETERS[name].unit,
-            "initial": PARAMETERS[name].read(initial),
+            "unit": parameter_named(name).unit,
+            "initial": parameter_named(name).read(initial),
             "interval_95_given_model": _within(
-                name, bounds, PARAMETERS[name].coordinate(value) + ENDS * certainty.half_width[i]
+                name, bounds, parameter_named(name).coordinate(value) + ENDS * certainty.half_width[i]
             ),
             "bootstrap_95_given_model": _within(name, bounds, result.bootstrap[:, i]),
             "range": [bounds[name].low, bounds[name].high],
@@ -35,11 +36,14 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
         }
         for i, (name, value) in enumerate(result.values.items())
     }
+    own = {name: row for name, row in scalars.items() if APART in name}
+    names = [name for name in names if name not in own]
     return {
-        "parameters": scalars,
-        "correlation": {a: dict(zip(names, certainty.correlation[i], strict=True)) for i, a in enumerate(names)},
+        "parameters": {name: scalars[name] for name in names},
+        **({"per_session": own} if own else {}),
+        "correlation": {a: {b: certainty.correlation[place[a], place[b]] for b in names} for a in names},
         "condition": certainty.condition,
-        "weakest_direction": weakest_in_words(names, certainty.weakest),
+        "weakest_direction": weakest_in_words(list(result.values), certainty.weakest),
         "per_joint": _factor_table(result),
         "at_bound": result.at_bound,
         "influence": result.influence.table(),
@@ -49,14 +53,16 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
 
 def undetermined(result: Identification, bounds: dict[str, Bounds]) -> list[str]:
     """Which scalars the data leave open: a 95 % interval as wide as the range that was searched."""
-    searched = {name: np.diff(PARAMETERS[name].coordinate([span.low, span.high]))[0] for name, span in bounds.items()}
+    searched = {
+        name: np.diff(parameter_named(name).coordinate([span.low, span.high]))[0] for name, span in bounds.items()
+    }
     halves = zip(result.values, result.certainty.half_width, strict=True)
     return [name for name, half in halves if 2 * half > searched[name]]
 
 
 def _within(name: str, bounds: dict[str, Bounds], interval: np.ndarray) -> list[float]:
     """An interval on the axis of the search as values, its ends no further out than those of the range searched."""
-    parameter, span = PARAMETERS[name], bounds[name]
+    parameter, span = parameter_named(name), bounds[name]
     return parameter.value(np.clip(interval, *parameter.coordinate([span.low, span.high]))).tolist()
 
 

@@ -1,7 +1,7 @@
 """Identifiable parameters: from a name and values to the fields of a MuJoCo model, for many candidates at once."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Literal
 
@@ -508,6 +508,7 @@ NUMBERED: dict[str, tuple[Callable[[int], Parameter], int]] = {  # name to what 
     "tendon_angle": (_angle, 1), "preload": (_preload, 1), "section_stiffness": (_section_stiffness, 2),
 }  # fmt: skip
 PARAMETERS |= {f"{name}_{k}": make(k) for name, (make, first) in NUMBERED.items() for k in range(first, MOST + 1)}
+APART = "@"  # between a parameter and the session that has it for itself
 EVERY = "_*"  # ends the name of one of `NUMBERED` in params.yaml for all that the arm has
 
 # what a factor of each unit's own may scale: the fields, and how
@@ -522,7 +523,12 @@ else:  # so that whoever names another is told which there are
 
 
 def parameter_named(name: str) -> Parameter:
-    """Of PARAMETERS; of a name that stands for several, the first."""
+    """Of PARAMETERS; of a name that stands for several, the first; of `name@session` one that a number of that name in
+    the model holds."""
+    shared, apart, _ = name.partition(APART)
+    if apart:
+        own, number = PARAMETERS[shared], _number(name, "", "")
+        return replace(own, fields=number.fields, read=number.read, write=number.write)
     stem = name.removesuffix(EVERY)
     return PARAMETERS[name if stem == name else f"{stem}_{NUMBERED[stem][1]}"]
 
@@ -552,7 +558,7 @@ def candidate_fields(
     """
     factors = factors or {}
     count = len(next(iter((values | factors).values())))
-    names = {f for p in values for f in PARAMETERS[p].fields} | {f for p in factors for f in PER_JOINT[p][0]}
+    names = {f for p in values for f in parameter_named(p).fields} | {f for p in factors for f in PER_JOINT[p][0]}
     names -= {"tendon_stiffness"} if not model.ntendon else set()
     fields = {name: np.repeat(np.array(getattr(model, name))[None], count, axis=0) for name in sorted(names)}
     for parameter in PARAMETERS:
@@ -560,6 +566,9 @@ def candidate_fields(
             PARAMETERS[parameter].write(fields, np.asarray(values[parameter], dtype=float), model)
         if parameter in factors:
             PER_JOINT[parameter][1](fields, factors[parameter][:, unit_of_hinge(model)], model)
+    for name in values:
+        if APART in name and numeric_place(model, name) is not None:
+            parameter_named(name).write(fields, np.asarray(values[name], dtype=float), model)
     return fields
 
 

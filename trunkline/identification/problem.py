@@ -2,6 +2,7 @@
 
 import time
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated
 
 import mujoco
@@ -11,9 +12,10 @@ from pydantic import Field
 from trunkline.elements import capstan_friction
 from trunkline.identification.experiment import Experiment, weights_for
 from trunkline.identification.loss import RESIDUALS, LossWeights, loss_of
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, follow_rest, unit_of_hinge
-from trunkline.identification.population import Population
+from trunkline.identification.parameters import candidate_fields, follow_rest, parameter_named, unit_of_hinge
+from trunkline.identification.per_session import values_in
 from trunkline.identification.resting import RestShape, spring_references
+from trunkline.identification.simulated_sessions import Sessions
 from trunkline.trials.experiments import is_static
 
 DIVERGED_LOSS = 1e3  # finite, and with sensible weights far above the loss of any arm that stays in one piece
@@ -63,7 +65,7 @@ class Problem:
     def __post_init__(self):
         if self.trial_weights is None:
             self.trial_weights = np.ones(len(self.experiments))
-        self._population = Population(self.model, self.experiments, self.segments, self.step_factor)
+        self._sessions = Sessions(self.model, self.experiments, self.segments, self.step_factor)
         self._last: tuple[np.ndarray, list[np.ndarray]] | None = None  # candidate that was alone, and where it rests
         self.units = int(unit_of_hinge(self.model).max()) + 1
 
@@ -73,17 +75,20 @@ class Problem:
         rubbing = capstan_friction(self.model) > 0
         return rubbing and any(not is_static(e.kind) and not e.slack(self.model) for e in self.experiments)
 
-    def fields(self, vectors: np.ndarray) -> dict[str, np.ndarray]:
-        """Model fields of candidates (C, P)."""
+    def fields(
+        self, vectors: np.ndarray, session: str = "", model: mujoco.MjModel | None = None
+    ) -> dict[str, np.ndarray]:
+        """Model fields of candidates (C, P), of a session and the model as it was in that, or of the whole."""
+        model = model or self.model
         scalars = len(self.parameters)
-        values = {name: PARAMETERS[name].value(vectors[:, i]) for i, name in enumerate(self.parameters)}
+        values = {name: parameter_named(name).value(vectors[:, i]) for i, name in enumerate(self.parameters)}
         blocks = vectors[:, scalars:].reshape(len(vectors), len(self.per_joint), self.units)
         fields = candidate_fields(
-            self.model, values, {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
+            model, values_in(session, values), {name: blocks[:, i] for i, name in enumerate(self.per_joint)}
         )
         if self.rest is not None:
-            fields["qpos_spring"] = spring_references(fields, self.model, self.rest)
-            follow_rest(fields, self.model)
+            fields["qpos_spring"] = spring_references(fields, model, self.rest)
+            follow_rest(fields, model)
         return fields
 
     def residuals(self, vectors: np.ndarray, near: np.ndarray | None = None) -> list[np.ndarray]:
@@ -94,7 +99,7 @@ class Problem:
         """
         rests = None if near is None or not any(is_static(e.kind) for e in self.experiments) else self._rests_at(near)
         begun = time.perf_counter()
-        simulated = self._population.simulate(self.fields(vectors), rests)
+        simulated = self._sessions.simulate(partial(self.fields, vectors), rests)
         if len(vectors) == 1:
             self._last = vectors[0].copy(), simulated.rests
         self.seconds += time.perf_counter() - begun
@@ -116,7 +121,7 @@ class Problem:
     def _rests_at(self, vector: np.ndarray) -> list[np.ndarray]:
         """Angles at which a candidate rests, as `population.Simulated` has them."""
         if self._last is None or not np.array_equal(self._last[0], vector):
-            simulated = self._population.simulate(self.fields(vector[None]))
+            simulated = self._sessions.simulate(partial(self.fields, vector[None]))
             self._last = vector.copy(), simulated.rests
         return self._last[1]
 
@@ -132,8 +137,8 @@ class Problem:
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest vector z."""
-        low = [PARAMETERS[name].coordinate(b.low) for name, b in self.parameters.items()]
-        high = [PARAMETERS[name].coordinate(b.high) for name, b in self.parameters.items()]
+        low = [parameter_named(name).coordinate(b.low) for name, b in self.parameters.items()]
+        high = [parameter_named(name).coordinate(b.high) for name, b in self.parameters.items()]
         joints = len(self.per_joint) * self.units
         return (
             np.array(low + [1 - self.per_joint_range] * joints),
@@ -145,9 +150,9 @@ class Problem:
         low, high = self.bounds()
         vector = np.append(0.5 * (low + high)[: len(self.parameters)], np.ones(len(self.per_joint) * self.units))
         for index, name in enumerate(self.parameters):
-            value = PARAMETERS[name].read(self.model)
-            if value > 0 or PARAMETERS[name].signed:
-                vector[index] = PARAMETERS[name].coordinate(value)
+            value = parameter_named(name).read(self.model)
+            if value > 0 or parameter_named(name).signed:
+                vector[index] = parameter_named(name).coordinate(value)
         return np.clip(vector, low, high)
 
     def effort(self) -> dict[str, float]:

@@ -76,6 +76,8 @@ def _alike(ends: list[tuple[Trial, np.ndarray]]) -> list[list[np.ndarray]]:
 
 
 def _same(one: Trial, other: Trial) -> bool:
+    if one.session != other.session:
+        return False
     if np.abs(one.gravity - other.gravity).max() > SAME_GRAVITY or abs(one.load - other.load) > SAME_LOAD:
         return False
     if one.tendons != other.tendons or not one.tendons:

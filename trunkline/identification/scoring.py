@@ -12,7 +12,7 @@ from trunkline.identification.null_model import FLOOR_POSES, references
 from trunkline.identification.repeatability import repeatability
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.trials.splits import IDENTIFY, TEST
-from trunkline.trials.trial import Trial
+from trunkline.trials.trial import Trial, sessions_of
 
 
 @dataclass
@@ -67,16 +67,30 @@ def evaluate(
         frames: compared of each trial, at most. command_delay: s, from a logged command to the motor.
 
     Returns:
-        As `score`, over all splits at once.
+        As `score`, over all splits at once; where trials are of several sessions, `by_session` has the same of each.
     """
     model = models["model"]
     experiments = [prepare(trial, model, frames, command_delay) for trial in trials]
     predictions = _predictions(models, model, trials, experiments, experiments)
+    metrics = _evaluated(predictions, trials)
+    sessions = sessions_of(trials)
+    if len(sessions) > 1:
+        metrics["by_session"] = {
+            session: _evaluated(
+                {name: one.of(lambda e, own=session: e.session == own) for name, one in predictions.items()},
+                [trial for trial in trials if trial.session == session],
+            )
+            for session in sessions
+        }
+    return metrics, predictions
+
+
+def _evaluated(predictions: dict[str, Prediction], trials: list[Trial]) -> dict:
     metrics: dict = {name: prediction.overall() for name, prediction in predictions.items()}
     metrics["noise_floor_mm"] = metrics["noise_floor"]["e_position_mm"]
-    metrics["start_fit"] = start_fit(experiments)
+    metrics["start_fit"] = start_fit(predictions["model"].experiments)
     metrics["repeatability_mm"] = repeatability(trials, predictions["model"].replay.tip)
-    return metrics, predictions
+    return metrics
 
 
 def _predictions(

@@ -11,6 +11,7 @@ from trunkline.identification.problem import Bounds
 from trunkline.settings import settings
 from trunkline.trials.experiments import EXPERIMENTS, ExperimentName
 
+MOUNT = ("mount_tilt_x", "mount_tilt_y", "mount_twist")
 Experiments = Annotated[list[ExperimentName], Field(min_length=1)]
 
 
@@ -20,6 +21,7 @@ class IdentificationSettings(Method):
 
     frames: compared of each trial, at most. command_delay: s from a logged command to the motor.
     experiments: to fit. reported: to score, those and others.
+    per_session: which of the parameters each of several sessions of the arm has for itself.
     """
 
     frames: Annotated[int, Field(ge=1, le=100000)]
@@ -31,6 +33,7 @@ class IdentificationSettings(Method):
     loss: Loss
     parameters: Annotated[dict[ParameterName, Bounds], Field(min_length=1)]
     per_joint: list[PerJointName]
+    per_session: list[ParameterName] = Field(default_factory=lambda: list(MOUNT))
     cross_validation_folds: Annotated[int, Field(ge=0, le=100)]
 
     def __post_init__(self):

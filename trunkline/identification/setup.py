@@ -10,6 +10,7 @@ from trunkline.identification.experiment import Experiment, prepare
 from trunkline.identification.fit import Fit
 from trunkline.identification.markers import with_measured_markers
 from trunkline.identification.parameters import EVERY, PARAMETERS, names_of, parameter_named
+from trunkline.identification.per_session import names_in, other_sessions
 from trunkline.identification.problem import Bounds
 from trunkline.identification.resting import resting_shape
 from trunkline.identification.settings import IdentificationSettings
@@ -28,6 +29,11 @@ def set_up(
         model = with_measured_markers(model, [t for t in trials if t.experiment in config.experiments])
     experiments = [prepare(trial, model, config.frames, config.command_delay) for trial in trials]
     fit = fit_of(config, trials[0].segments)
+    names = names_in(model, config.parameters)
+    fit.parameters = fit.parameters | {name: config.parameters[shared] for name, shared in names.items()}
+    if config.rest_shape == "measured" and (others := other_sessions(trials)):
+        expected = "expected one, or rest_shape: unchanged"
+        raise InputError(f"rest_shape: measured: found {1 + len(others)} sessions, {expected}")
     if config.rest_shape == "measured":
         fitted = [e for e in experiments if e.kind in config.experiments]
         fit.rest = resting_shape(model, fitted, fit.segments)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import parameter_named
 from trunkline.identification.problem import Problem
 
 FEW = 12  # parameters, up to which the second order is taken along
@@ -119,7 +119,7 @@ def surrogate(problem: Problem, vector: np.ndarray, residuals: list[np.ndarray] 
 
 def reaches(problem: Problem) -> np.ndarray:
     """How far from its centre a surrogate of `problem` is made, along each axis. Shape (P,)."""
-    return np.array([SIGNED_REACH if PARAMETERS[name].signed else REACH for name in problem.parameters])
+    return np.array([SIGNED_REACH if parameter_named(name).signed else REACH for name in problem.parameters])
 
 
 def _stencil(reach: np.ndarray, second: bool) -> np.ndarray:

@@ -1,10 +1,11 @@
 """The inverse kinematics: a small network from gravity and tip pose to the commands of the motors."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
 from torch import nn
+from torch.autograd.function import FunctionCtx
 
 from trunkline.ik.inputs import position_of
 
@@ -28,6 +29,32 @@ class Answer(NamedTuple):
     commands: torch.Tensor
     lengths: torch.Tensor
     tip: torch.Tensor
+
+
+class _Affine(torch.autograd.Function):
+    """x Wᵀ + b by OpenBLAS, whose digits `trunkline.arithmetic` holds; PyTorch's own products (MKL) are others on each
+    kind of processor, and training makes other networks of other last digits."""
+
+    @staticmethod
+    @np.errstate(over="ignore", invalid="ignore")  # `train` tells of errors that are not finite
+    def forward(ctx: FunctionCtx, x: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor) -> torch.Tensor:
+        ctx.save_for_backward(x, weight)
+        return torch.from_numpy(x.detach().numpy() @ weight.detach().numpy().T + bias.detach().numpy())
+
+    @staticmethod
+    @np.errstate(over="ignore", invalid="ignore")
+    def backward(ctx: Any, *slopes: torch.Tensor) -> tuple[torch.Tensor | None, torch.Tensor, torch.Tensor]:
+        x, weight = (saved.detach().numpy() for saved in ctx.saved_tensors)
+        slope = slopes[0].numpy()
+        back = torch.from_numpy(slope @ weight) if ctx.needs_input_grad[0] else None
+        return back, torch.from_numpy(slope.T @ x), torch.from_numpy(slope.sum(axis=0))
+
+
+class Linear(nn.Linear):
+    """The same digits on every processor."""
+
+    def forward(self, input: torch.Tensor) -> torch.Tensor:
+        return _Affine.apply(input, self.weight, self.bias)
 
 
 class InverseKinematics(nn.Module):
@@ -60,16 +87,16 @@ class InverseKinematics(nn.Module):
         tendons, told = commands.shape[1], inputs.shape[1] - 7
         self.inputs = inputs.shape[1]
         self.layers = nn.Sequential(
-            nn.Linear(raw.shape[1], width), nn.ReLU(),
-            nn.Linear(width, width), nn.ReLU(),
-            nn.Linear(width, width), nn.ReLU(),
-            nn.Linear(width, 2 * tendons),
+            Linear(raw.shape[1], width), nn.ReLU(),
+            Linear(width, width), nn.ReLU(),
+            Linear(width, width), nn.ReLU(),
+            Linear(width, 2 * tendons),
         )  # fmt: skip
         self.tip_layers = nn.Sequential(
-            nn.Linear((2 if told == 1 else told) + tendons, width), nn.ReLU(),
-            nn.Linear(width, width), nn.ReLU(),
-            nn.Linear(width, width), nn.ReLU(),
-            nn.Linear(width, 3),
+            Linear((2 if told == 1 else told) + tendons, width), nn.ReLU(),
+            Linear(width, width), nn.ReLU(),
+            Linear(width, width), nn.ReLU(),
+            Linear(width, 3),
         )  # fmt: skip
 
     def normalise(self, inputs: torch.Tensor) -> torch.Tensor:
@@ -115,4 +142,7 @@ def gravity_features(inputs: torch.Tensor) -> torch.Tensor:
     """sin θ_G, cos θ_G of inputs (B, 8), the direction of gravity of inputs (B, 10), nothing of inputs (B, 7). Shape
     (B, 2, 3 or 0)."""
     told = inputs[:, :-7]
-    return torch.cat([torch.sin(told), torch.cos(told)], dim=1) if told.shape[1] == 1 else told
+    if told.shape[1] != 1:
+        return told
+    angle = told.to(torch.float64)  # a sine's last digit is each processor's own (MKL): here it is rounded away
+    return torch.cat([torch.sin(angle), torch.cos(angle)], dim=1).to(told.dtype)

@@ -8,6 +8,7 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import torch
 from pydantic import Field
+from torch import nn
 from torch.optim.adam import adam
 
 from trunkline.errors import InputError
@@ -120,9 +121,8 @@ def train(
         delta = commands - part.command
         moved = part.loss(delta)
         missed = network.foresee(part.pulling, part.pulls + spare * part.spare) - part.tip
-        errors = torch.cat([moved.square().sum(dim=1), missed.square().sum(dim=1)])
         plain = (TIE * delta.abs() + STRETCH * (stretches - part.stretch).abs()).sum() / delta.shape[1]
-        objective = ((errors + ROUNDING**2).sqrt().sum() + plain) / training.batch
+        objective = (rounded(moved).sum() + rounded(missed).sum() + plain) / training.batch
         return torch.autograd.grad(objective, parameters), moved.detach()[:, :3].norm(dim=1).sum()
 
     @torch.no_grad()
@@ -157,6 +157,12 @@ def train(
             validate = torch.cat(list(held))
             report(epoch, total / batches, float(validate.mean()))
     return network.eval()
+
+
+def rounded(errors: torch.Tensor) -> torch.Tensor:
+    """√(|e|² + ROUNDING²) of errors (N, D). As a norm, since PyTorch's square root (MKL) is another in its last digit
+    on each kind of processor."""
+    return torch.linalg.vector_norm(nn.functional.pad(errors, (0, 1), value=ROUNDING), dim=1)
 
 
 def pieces(count: int, size: int) -> list[slice]:

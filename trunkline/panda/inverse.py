@@ -47,6 +47,7 @@ def solve(
     starts: int,
     mount_offset: float = 0.0,
     avoid_collisions: bool = True,
+    only: np.ndarray | None = None,
 ) -> InverseResult:
     """Joint angles that bring the mount to targets.
 
@@ -57,12 +58,13 @@ def solve(
         starts: most starts per target.
         mount_offset: from the flange to the mount, in m.
         avoid_collisions: count a solution in which the arm touches itself as a failed start.
+        only: numbers of the targets that are looked for, all by default; the others count as not found.
     """
     positions = np.asarray(positions, dtype=float)
     n = len(positions)
     best = InverseResult(np.tile((Q_MIN + Q_MAX) / 2, (n, 1)), np.full(n, np.inf), np.full(n, np.inf),
                          np.zeros(n, int), np.zeros(n, bool))
-    left, done = np.arange(n), 0
+    left, done = np.arange(n) if only is None else only, 0
     while left.size and done < starts:
         # As many starts at once as there were before: at most twice as many descents as one start after the other.
         count = min(max(1, done), max(1, TOGETHER // left.size), starts - done)

@@ -13,6 +13,9 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.panda.inverse import solve
 from trunkline.panda.kinematics import DH_A, DH_D, FLANGE
+from trunkline.scheduler import spread_rows
+
+LEAST = 100  # points that are worth being sent to another machine
 
 
 class Agreement(NamedTuple):
@@ -64,11 +67,18 @@ def label(
     reached = np.zeros(len(points), dtype=bool)
     todo = np.flatnonzero(~beyond_links(points, mount_offset))
     for round_seed, round_starts in ((seed, starts), (seed + 1, starts_in_doubt)):
-        result = solve(points[todo], seed=round_seed, starts=round_starts, mount_offset=mount_offset,
-                       avoid_collisions=avoid_collisions)
-        reached[todo] = result.success
-        todo = todo[~result.success]
+        how = {"seed": round_seed, "starts": round_starts, "mount_offset": mount_offset,
+               "avoid_collisions": avoid_collisions}
+        (success,) = spread_rows(_reached, (np.arange(len(todo)),), (points[todo], how), LEAST)
+        reached[todo] = success
+        todo = todo[~success]
     return reached
+
+
+def _reached(given: tuple[np.ndarray, dict], rows: tuple[np.ndarray]) -> tuple[np.ndarray]:
+    """Whether the solver reaches some of the points (N, 3), those with the numbers (n,) in `rows`. Shape (n,)."""
+    (points, how), (numbers,) = given, rows
+    return (solve(points, only=numbers, **how).success[numbers],)
 
 
 def agreement(claimed: np.ndarray, reachable: np.ndarray) -> Agreement:

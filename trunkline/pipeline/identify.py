@@ -15,7 +15,8 @@ from trunkline.identification.evaluation import Prediction, halved_step, replay
 from trunkline.identification.identify import Identification, identify, with_parameters
 from trunkline.identification.null_model import references
 from trunkline.identification.parameter_table import parameter_table, undetermined
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import PARAMETERS, parameter_named
+from trunkline.identification.per_session import make_room, names_apart, names_in, other_sessions, untold_apart
 from trunkline.identification.problem import Bounds
 from trunkline.identification.repeatability import repeatability
 from trunkline.identification.saving import save_model
@@ -50,7 +51,14 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     check_parameters(stage, config, model)
     reported = read_reported(config)
     # of an arm with tendons also the trials of later stages: a wrong name is told now, not after minutes
-    check_trials(read_trials(TRIALS, DECIDING) if model.nu else reported, model)
+    every = read_trials(TRIALS, DECIDING)
+    check_trials(every if model.nu else reported, model)
+    names = names_apart(list(config.parameters), config.per_session, other_sessions(every))
+    for line in untold_apart(names, every, config.experiments):
+        raise InputError(f"{stage}.{line}")
+    if names:
+        make_room(spec, names)
+        model = spec.compile()
     model, experiments, fit = set_up(config, reported, model)
     fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
     check_folds(stage, config.cross_validation_folds, fitted)
@@ -67,7 +75,9 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     if not result.factors and not any(map(has_factors, whole)):
         models["coarse"] = models["identified"]
     elif whole:
-        models["coarse"] = with_parameters(models["cad"], read_scalars(whole) | result.values)
+        room = read_spec(CAD_MODEL)
+        make_room(room, names_in(model, PARAMETERS))
+        models["coarse"] = with_parameters(room.compile(), read_scalars(whole) | result.values)
         # rest shape and markers are no matter of scalars
         for field in ("qpos_spring", "tendon_lengthspring", "site_pos", "site_sameframe"):
             getattr(models["coarse"], field)[:] = getattr(model, field)
@@ -130,7 +140,8 @@ def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
     values = {}
     for stage in stages:
         table = json.loads(existing(Path("artifacts") / stage / "parameters.json").read_text())
-        values |= {name: row["value"] for name, row in table["parameters"].items()}
+        rows = table["parameters"] | table.get("per_session", {})
+        values |= {name: row["value"] for name, row in rows.items()}
     return values
 
 
@@ -183,7 +194,7 @@ def write_plots(
 
     curves.convergence_table(result).to_csv(folder / "convergence.csv", **CSV)
     save_figure(plots.convergence_figure(result), folder / "convergence.png")
-    units = {name: PARAMETERS[name].unit for name in result.values}
+    units = {name: parameter_named(name).unit for name in result.values}
     save_figure(plots.parameter_figure(result, bounds, units, undetermined(result, bounds)), folder / "parameters.png")
     validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
     save_figure(segment_figure({"validate split": segment_table(validate, segments)}), folder / "segments.png")

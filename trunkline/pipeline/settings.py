@@ -49,7 +49,8 @@ def require_session(root: Path) -> None:
     params, raw = read_yaml(root / "params.yaml"), root / "data" / "raw"
     wanted = params.get("ingest", {}).get("session")
     tracked = [file.stem for file in raw.glob("*.dvc")]
-    there = sorted({LAB, *tracked, *sessions_in(raw)})
+    folders = [file.parents[1].name for file in raw.glob("[!.]*/[!.]*/session.yaml")]  # of several sessions
+    there = sorted({LAB, *tracked, *sessions_in(raw), *folders})
     if wanted is not None and wanted not in there:
         expected = f"one of the sessions in {raw}: {', '.join(there)}{nearest(str(wanted), there)}"
         raise InputError(f"{root / 'params.yaml'}: ingest.session: found {wanted!r}, expected {expected}")

@@ -10,6 +10,7 @@ from omegaconf import OmegaConf
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     FiniteFloat,
@@ -33,6 +34,27 @@ def _folder_name(name: str) -> str:
 
 
 SessionName = Annotated[str, AfterValidator(_folder_name)]
+
+
+def _no_list(found):
+    if isinstance(found, list):
+        names = ", ".join(map(str, found))
+        raise ValueError(
+            f"found a list, expected one folder: move these sessions into one, such as data/raw/arm_7, and write "
+            f"session: arm_7, only: [{names}]"
+        )
+    return found
+
+
+def _each_once(names: list[str]) -> list[str]:
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"found {twice!r} twice, expected each session once")
+    return names
+
+
+OneFolder = Annotated[SessionName, BeforeValidator(_no_list)]
+SomeSessions = Annotated[list[SessionName], AfterValidator(_each_once)]
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
 
 
@@ -215,6 +237,22 @@ class Session(Entry):
 def sessions_in(folder: Path) -> list[str]:
     """Names of the sessions that a folder holds."""
     return sorted(file.parent.name for file in folder.glob("[!.]*/session.yaml"))
+
+
+def session_folders(folder: Path, only: list[str] | None = None) -> dict[str, Path]:
+    """Folders of the sessions that are to be read together, by name: of several that `folder` holds all, in the order
+    of their names, or `only` those; else `folder` itself.
+
+    Raises:
+        InputError: `only` names what it does not hold.
+    """
+    inside = [] if (folder / "session.yaml").is_file() else sessions_in(folder)
+    for name in only or []:
+        if name not in inside:
+            there = f"one of the sessions in {folder}: {', '.join(inside)}{nearest(name, inside)}"
+            expected = there if inside else f"none, as {folder} holds no several sessions"
+            raise InputError(f"ingest.only: found {name!r}, expected {expected}")
+    return {name: folder / name for name in only or inside} or {folder.name: folder}
 
 
 def read_session(folder: Path) -> Session:

@@ -49,9 +49,10 @@ def _contents(folder: Path, files: list[str]) -> dict[str, str]:
     """What tells files apart by what they hold: their names, or a digest where two are of one size."""
     sizes = {file: (folder / file).stat().st_size for file in files}
     alike = [size for size in sizes.values() if size]
-    return {file: _digest(folder / file) if alike.count(size) > 1 else file for file, size in sizes.items()}
+    return {file: file_digest(folder / file) if alike.count(size) > 1 else file for file, size in sizes.items()}
 
 
-def _digest(path: Path) -> str:
+def file_digest(path: Path) -> str:
+    """Of its bytes, in hexadecimal."""
     with open(path, "rb") as log:
         return hashlib.file_digest(log, "sha256").hexdigest()

@@ -46,6 +46,7 @@ def move(
     at: int = 0,
     ids: np.ndarray | None = None,
     moved=lambda rows: None,
+    longest: float | None = None,
 ) -> dict[str, np.ndarray]:
     """Take one step with each row of `controls`.
 
@@ -58,11 +59,12 @@ def move(
         every, at: of every `every` steps the one that is recorded.
         ids: which n simulations of the batch, all by default.
         moved: called with the number of new rows of the record.
+        longest: s, the longest step of all simulations that move now, where others do elsewhere.
 
     Returns:
         A record for each name. Shape (n, T / every, ...).
     """
-    rub = rubbing(batch)
+    rub = rubbing(batch, longest)
     own = np.arange(batch.nsim) if ids is None else ids
     length = rub.steps if rub else max(CHUNK // every, 1) * every
     if rub:

@@ -19,19 +19,23 @@ CREEP = 1e-3  # m/s of sliding below which s is less than ±1
 class Rubbing:
     """Sets the limits of `batch`'s simulations.
 
+    Args:
+        longest: s, of all steps taken now, in other batches too; this one's by default.
+
     Attributes:
         steps: after how many steps limits are to be set again.
     """
 
-    def __init__(self, batch: Batch) -> None:
+    def __init__(self, batch: Batch, longest: float | None = None) -> None:
         model = batch.model
         self._batch, self._tendons = batch, holes(model)
         self._actuators = actuators(model)
         self._hinges = _hinges(model)
         self._begins = stretch_edges(self._hinges.shape[1], self._tendons.shape[1])[:-1]
         self._place = numeric_place(model, CAPSTAN_FRICTION)
-        timestep = batch.expanded("opt.timestep")
-        longest = float(np.max(model.opt.timestep if timestep is None else timestep))
+        if longest is None:
+            timestep = batch.expanded("opt.timestep")
+            longest = float(np.max(model.opt.timestep if timestep is None else timestep))
         self.steps = max(1, round(REFRESH / longest))
         self._entries, self._slopes = _arms(model, self._tendons)
         self._limits, self._arms = batch.expand("tendon_frictionloss"), batch.expand("wrap_prm")
@@ -63,13 +67,13 @@ class Rubbing:
         self._arms[np.ix_(ids, self._entries)] = self._jacobian[np.ix_(ids, self._slopes)]
 
 
-def rubbing(batch: Batch) -> Rubbing | None:
-    """What sets the limits of a batch, None if nothing in it rubs."""
+def rubbing(batch: Batch, longest: float | None = None) -> Rubbing | None:
+    """What sets the limits of a batch, None if nothing in it rubs; `longest` as in `Rubbing`."""
     if not holes(batch.model).size:
         return None
     values = batch.expanded("numeric_data")
     values = batch.model.numeric_data[None] if values is None else values
-    return Rubbing(batch) if values[:, numeric_place(batch.model, CAPSTAN_FRICTION)].any() else None
+    return Rubbing(batch, longest) if values[:, numeric_place(batch.model, CAPSTAN_FRICTION)].any() else None
 
 
 def _hinges(model: mujoco.MjModel) -> np.ndarray:

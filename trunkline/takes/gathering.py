@@ -81,6 +81,16 @@ def gather(
     return gathered
 
 
+def together(sessions: list[Gathered]) -> Gathered:
+    """Of several sessions of one arm all takes, each with its own offset by now; the clock is the one told least."""
+    if len(sessions) == 1:
+        return sessions[0]
+    takes = [take for one in sessions for take in one.takes]
+    findings = [found for one in sessions for found in one.findings]
+    refused = {name: why for one in sessions for name, why in one.refused.items()}
+    return Gathered(takes, findings, refused, max((one.clock for one in sessions), key=lambda c: c.uncertainty or 0.0))
+
+
 def require_enough(gathered: Gathered, planned: list[TrialEntry]) -> None:
     """Refuse what is left of a session that had trials of an experiment in a split, all of which were refused."""
     left = {(take.experiment, take.split) for take in gathered.takes}

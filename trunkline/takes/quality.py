@@ -7,6 +7,7 @@ import numpy as np
 
 from trunkline.logs.log import Log
 from trunkline.signals.smoothing import noise_level
+from trunkline.takes.agreement import MotorClock
 from trunkline.takes.checks import Findings
 from trunkline.takes.gathering import Gathered
 from trunkline.trials.take import Take
@@ -69,18 +70,29 @@ def by_sentence(qualities: list[Quality], said: Callable[[Findings], list[str]])
 
 def report(qualities: list[Quality], gathered: Gathered) -> dict:
     """The quality report, per trial and for the session; None where there is nothing to measure."""
-    clock = gathered.clock
+    several = len({log.path.parent for log in _logs(qualities)}) > 1
     return {
         "trials": {quality.take.name: _trial(quality) for quality in qualities},
         "refused": gathered.refused,
-        "logs": {log.path.name: {"messages": log.count, "without_checksum": log.unchecked} for log in _logs(qualities)},
-        "clock": {
-            "by": clock.by,
-            "offset_s": clock.offset,
-            "spread_s": clock.spread,
-            "uncertainty_s": clock.uncertainty,
-            "lag_s": clock.lag,
+        "logs": {
+            (f"{log.path.parent.name}/{log.path.name}" if several else log.path.name): {
+                "messages": log.count,
+                "without_checksum": log.unchecked,
+            }
+            for log in _logs(qualities)
         },
+        "clock": clock_facts(gathered.clock),
+    }
+
+
+def clock_facts(clock: MotorClock) -> dict:
+    """What a session's trials say of the motors' clock; of several sessions, `clocks` has each one's."""
+    return {
+        "by": clock.by,
+        "offset_s": clock.offset,
+        "spread_s": clock.spread,
+        "uncertainty_s": clock.uncertainty,
+        "lag_s": clock.lag,
     }
 
 

@@ -11,7 +11,7 @@ class Planned:
 
     name: unique within the session. experiment: one of `experiments.EXPERIMENTS`. split: what the trial may be used
     for, one of `splits.SPLITS`. level: nominal, in the unit of its experiment; None where there is none. load: kg that
-    hang at the tip in this trial, beside what hangs there always.
+    hang at the tip in this trial, beside what hangs there always. session: to which it belongs; "" where there is one.
     """
 
     name: str
@@ -19,6 +19,7 @@ class Planned:
     split: str
     level: float | None
     load: float = 0.0
+    session: str = ""
 
 
 @dataclass(kw_only=True)

@@ -29,6 +29,11 @@ def read_tables(folder: Path, stage: str) -> tuple[list[dict], dict[str, np.ndar
     return trials.to_pylist(), columns_of(poses), columns_of(commands)
 
 
+def with_sessions(schema: pa.Schema, sessions: list[str]) -> pa.Schema:
+    """The schema of trials.parquet, of which a single session's, "", is without a column that names it."""
+    return schema.append(pa.field("session", pa.string())) if any(sessions) else schema
+
+
 def pose_table(
     trial: str,
     time: np.ndarray,

@@ -8,7 +8,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from trunkline.trials.recording import Recording
-from trunkline.trials.tables import long_table, pose_table, read_tables, stack
+from trunkline.trials.tables import long_table, pose_table, read_tables, stack, with_sessions
 
 BASE = "base"  # the base body's name in poses.parquet
 
@@ -68,6 +68,7 @@ def write_takes(folder: Path, takes: list[Take]) -> None:
                 "split": take.split,
                 "level": take.level,
                 "load": take.load,
+                "session": take.session,
                 "up": take.up.tolist(),
                 "clock_offset": float(take.clock_offset),
                 "repairs": take.repairs,
@@ -92,7 +93,8 @@ def write_takes(folder: Path, takes: list[Take]) -> None:
             table = long_table(take.name, time, "tendon", take.tendons, {"pull": values})
             commands.append(table.append_column("stream", pa.array([stream] * len(table), pa.string())))
     folder = Path(folder)
-    pq.write_table(pa.Table.from_pylist(rows, SCHEMA), folder / "trials.parquet")
+    schema = with_sessions(SCHEMA, [take.session for take in takes])
+    pq.write_table(pa.Table.from_pylist(rows, schema), folder / "trials.parquet")
     pq.write_table(pa.concat_tables(poses), folder / "poses.parquet")
     pq.write_table(pa.concat_tables(commands), folder / "commands.parquet")
 
@@ -121,6 +123,7 @@ def read_takes(folder: Path, splits: tuple[str, ...]) -> list[Take]:
                 split=row["split"],
                 level=row["level"],
                 load=row["load"],
+                session=row.get("session", ""),
                 up=np.array(row["up"]),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
                 segments=tuple(row["segments"]),

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from trunkline.trials.recording import Recording
-from trunkline.trials.tables import long_table, pose_table, read_tables, stack
+from trunkline.trials.tables import long_table, pose_table, read_tables, stack, with_sessions
 
 
 @dataclass(kw_only=True)
@@ -42,6 +42,11 @@ class Trial(Recording):
     repairs: int = 0
 
 
+def sessions_of(trials: list[Trial]) -> list[str]:
+    """Names of the sessions to which trials belong, in their order; [""] where there is one."""
+    return list(dict.fromkeys(trial.session for trial in trials))
+
+
 def write_trials(folder: Path, trials: list[Trial]) -> None:
     """Write trials.parquet (a row a trial), poses.parquet (a row a frame and segment) and commands.parquet
     (a row a frame and tendon) into `folder`, in the order of `trials`."""
@@ -52,6 +57,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "split": trial.split,
             "level": trial.level,
             "load": trial.load,
+            "session": trial.session,
             "gravity": list(map(float, trial.gravity)),
             "start": float(trial.start),
             "start_sigma": float(trial.start_sigma),
@@ -84,6 +90,7 @@ def write_trials(folder: Path, trials: list[Trial]) -> None:
             "orientations": pa.bool_(),
         }
     )
+    schema = with_sessions(schema, [trial.session for trial in trials])
     pq.write_table(pa.Table.from_pylist(rows, schema), Path(folder) / "trials.parquet")
     poses = [
         pose_table(t.name, t.time, t.segments, t.positions, t.quaternions).append_column(
@@ -121,6 +128,7 @@ def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
                 split=row["split"],
                 level=row["level"],
                 load=row["load"],
+                session=row.get("session", ""),
                 gravity=np.array(row["gravity"]),
                 time=pose["time"].reshape(shape)[:, 0].copy(),
                 segments=tuple(row["segments"]),

@@ -75,7 +75,9 @@ internal sealed class More {
         case "fit": AnswerFit(asked, null); break;
         case "network": _shared.Kinematics.Ask(Numbers(asked["pose"])); break;
         case "bend": AnswerBend(asked, null); break;
-        default: Unpacked.KinematicsOf(_files, new Recorded { Inputs = 7, Outputs = new[] { 3, 3, 3 } }); break;
+        default:
+          Unpacked.KinematicsOf(Unpacked.ManifestOf(_files), new Recorded { Inputs = 7, Outputs = new[] { 3, 3, 3 } });
+          break;
       }
     } catch (InputError error) {
       if ((string)asked["of"] == "bend" && List(asked["poses"]).Count > 0) {

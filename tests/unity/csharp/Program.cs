@@ -17,7 +17,7 @@ internal static class Program {
     CultureInfo.DefaultThreadCurrentCulture = CultureInfo.CurrentCulture = CultureInfo.GetCultureInfo("de-DE");
     try {
       var files = FilesIn(given[0]);
-      Unpacked.PackageDigest(files);
+      Unpacked.PackageDigest(files, Unpacked.ManifestOf(files));
       var shared = new SharedVectors(files);
       foreach (string name in SharedVectors.Names) {
         Console.WriteLine(shared.Test(name));

@@ -34,7 +34,7 @@ internal sealed class Timing {
     Tell("reach of the tip, gravity stands still", i => reach.Soft(tips[i % tips.Count], known[0]));
     Tell("reach of the tip, gravity turns each time",
          i => reach.Soft(tips[(i + i / known.Count) % tips.Count], known[i % known.Count]));
-    var grids = Unpacked.GridsOf(_files);  // as packages for gravity of one tilt have it
+    var grids = Unpacked.GridsOf(_files, Unpacked.ManifestOf(_files));  // as packages for gravity of one tilt have it
     Tell("the same by grids, gravity tilts each time", i => {
       double tilt = i % 100 * 0.01;
       grids.Read(tips[i % tips.Count], new Vector(Math.Sin(tilt), 0, -Math.Cos(tilt)));

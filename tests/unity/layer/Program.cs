@@ -14,6 +14,7 @@ using NUnit.Framework;
 using Trunkline.Samples;
 using Unity.InferenceEngine;
 using UnityEditor;
+using UnityEditor.SceneManagement;
 using UnityEngine;
 using UnityEngine.Rendering;
 using UnityEngine.XR;
@@ -105,7 +106,16 @@ internal static class Program {
   }
 
   private static void Sample() {
+    int made = Undo.Registered.Count;
+    EditorSceneManager.Cancelled = true;
     BuildScene.Apply();
+    Require(EditorSceneManager.Called.SequenceEqual(new[] { "save" }) && Undo.Registered.Count == made,
+            "the open scene as it was, where the user cancels");
+    EditorSceneManager.Cancelled = false;
+    EditorSceneManager.Called.Clear();
+    BuildScene.Apply();
+    Require(EditorSceneManager.Called.SequenceEqual(new[] { "save", $"Single scene beside {made} objects" })
+        && Undo.Registered.Count == made + 1, "a scene of its own before anything is made");
     var twin = Selection.activeGameObject;
     var bending = twin.GetComponent<BendingTwin>();
     Require(bending.Pointing.MapFiles.All(file => file != null), "the sample's maps");

@@ -90,8 +90,18 @@ public enum NewSceneSetup { EmptyScene, DefaultGameObjects }
 public enum NewSceneMode { Single, Additive }
 
 public static class EditorSceneManager {
-  public static bool SaveCurrentModifiedScenesIfUserWantsTo() => true;
+  /// <summary>Not of Unity's: whether the user cancels, and what was called, one after the other.</summary>
+  public static bool Cancelled;
+  public static readonly List<string> Called = new List<string>();
 
-  public static Scene NewScene(NewSceneSetup setup, NewSceneMode mode) => new Scene();
+  public static bool SaveCurrentModifiedScenesIfUserWantsTo() {
+    Called.Add("save");
+    return !Cancelled;
+  }
+
+  public static Scene NewScene(NewSceneSetup setup, NewSceneMode mode) {
+    Called.Add($"{mode} scene beside {Undo.Registered.Count} objects");
+    return new Scene();
+  }
 }
 }

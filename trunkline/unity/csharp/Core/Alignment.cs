@@ -7,7 +7,9 @@ namespace Trunkline {
 /// <summary>The mount as the joints hold it: position (m) and pointing in the base frame, heading and angle of joint 7
 /// (rad).</summary>
 public readonly struct Wrist {
+  /// <summary>Rigid base frame: m, and unit length.</summary>
   public readonly Vector Position, Pointing;
+  /// <summary>rad: of the soft arm's tendon 1 about its axis, and of joint 7.</summary>
   public readonly double Heading, Angle;
 
   public Wrist(Vector position, Vector pointing, double heading, double angle) {
@@ -21,8 +23,11 @@ public readonly struct Wrist {
 /// <summary>Heading (rad) that brings the target into the half-plane of that number, and by which the wrist is turned
 /// for it, rad; null where no half-plane is within the wrist's limits.</summary>
 public readonly struct Aligned {
+  /// <summary>rad, from -π to less than π: of tendon 1 about the arm's axis.</summary>
   public readonly double Heading;
+  /// <summary>Its number in <see cref="BendingPlane.HalfPlanes"/>.</summary>
   public readonly int HalfPlane;
+  /// <summary>rad, from where the wrist is; null where no half-plane is within its limits.</summary>
   public readonly double? Turned;
 
   public Aligned(double heading, int halfPlane, double? turned) {

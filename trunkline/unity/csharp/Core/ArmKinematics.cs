@@ -21,8 +21,12 @@ public interface INetwork {
 /// of network.output_order, where the tip will come to rest, m, base frame, and whether that is so far from its target
 /// that the arm cannot take the pose.</summary>
 public sealed class Answer {
+  /// <summary>m, one a tendon. Commands are no pulls: <see cref="ArmKinematics.PullsOf"/> makes these of
+  /// them.</summary>
   public readonly double[] Commands, Lengths;
+  /// <summary>Soft arm's base frame, m.</summary>
   public readonly Vector Tip;
+  /// <summary>The tip is further from its target than the manifest's network.doubt_beyond.</summary>
   public readonly bool Doubtful;
 
   public Answer(double[] commands, double[] lengths, Vector tip, bool doubtful) {
@@ -75,7 +79,8 @@ public sealed class ArmKinematics {
   /// <exception cref="InputError">It is no pose, or the network has no finite answer.</exception>
   public Answer Ask(params double[] pose) => Ask(new[] { pose })[0];
 
-  /// <summary>Of several poses at once.</summary>
+  /// <summary>Of several poses at once, each as network.input_order names it; an answer each, in their order.</summary>
+  /// <exception cref="InputError">One is no pose, or has no finite answer.</exception>
   public Answer[] Ask(double[][] poses) {
     var outputs = Run(poses);
     var found = new Answer[poses.Length];

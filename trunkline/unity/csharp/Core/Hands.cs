@@ -3,6 +3,7 @@ using static Trunkline.Vectors;
 
 namespace Trunkline {
 
+/// <summary>Of one controller, one bit each: what several say together is their sum.</summary>
 [Flags]
 public enum Buttons { None = 0, Trigger = 1, Grip = 2, StickPressed = 4, Primary = 8, Secondary = 16 }
 
@@ -12,17 +13,19 @@ public sealed class Hand {
   public double Length { get; internal set; }
   /// <summary>Its controller as last heard, tracked and finite; null where it was lost.</summary>
   public Controller Seen { get; internal set; }
+  /// <summary>Filtered, reference frame; null where it was lost.</summary>
   public Smoothed Pose { get; internal set; }
   /// <summary>s since it was seen.</summary>
   public double LostFor { get; internal set; }
   /// <summary>Where it stays, base frame, m; null until a grip has set it.</summary>
   public Vector? Target { get; internal set; }
-  /// <summary>End of the ray when the grip was pressed, m, of a press since a plan was asked for.</summary>
+  /// <summary>End of the ray when the grip was pressed, base frame, m, of a press since a plan was asked for.</summary>
   public Vector? GrippedAt { get; internal set; }
   public Buttons Held { get; internal set; }
   /// <summary>Buttons that went down at this step.</summary>
   public Buttons Pressed { get; internal set; }
 
+  /// <param name="length">Of the ray, m.</param>
   public Hand(double length) {
     Length = length;
   }
@@ -94,8 +97,8 @@ public static class Hands {
     return Add(alignment.Position, Rotate(alignment.Quaternion, reach));
   }
 
-  /// <summary>The controller's own downward direction in the base frame, to which the end effector is
-  /// aligned.</summary>
+  /// <summary>The controller's own downward direction in the base frame, unit length, to which the end effector is
+  /// aligned; null where the hand is not seen.</summary>
   public static Vector? Below(Hand hand, Pose alignment) =>
       hand.Pose == null ? (Vector?)null : Rotate(Multiply(alignment.Quaternion, hand.Pose.Quaternion), _below);
 }

@@ -159,6 +159,10 @@ public readonly struct JsonBlock {
   private readonly Dictionary<string, object> _values;
   private readonly string _source;
 
+  /// <param name="value">Of <see cref="Json.Read(string, string)"/>.</param>
+  /// <param name="source">Where it is from, for messages.</param>
+  /// <exception cref="InputError">It is no object. All below throw one too where what they are asked for is missing or
+  /// something else.</exception>
   public JsonBlock(object value, string source) {
     _source = source;
     _values = value as Dictionary<string, object> ?? throw new InputError($"{source}: found no block, expected one");
@@ -166,12 +170,14 @@ public readonly struct JsonBlock {
 
   public IEnumerable<string> Names => _values.Keys;
 
+  /// <summary>Whether there is one that is not null.</summary>
   public bool Has(string name) => _values.TryGetValue(name, out object value) && value != null;
 
   public JsonBlock Block(string name) => new JsonBlock(Raw(name), $"{_source}: {name}");
 
   public double Number(string name) => Raw(name) is double value ? value : throw Missing(name, "a number");
 
+  /// <summary>A number without what is behind its point.</summary>
   public int Integer(string name) => (int)Number(name);
 
   public string Text(string name) => Raw(name) as string ?? throw Missing(name, "a text");

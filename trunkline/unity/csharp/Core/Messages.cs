@@ -8,27 +8,47 @@ namespace Trunkline {
 // controller's pose is that of its ray: origin at the device, the ray along -z, y up from the back of the hand.
 // Positions in m, quaternions (w, x, y, z), stamps in s of the client's clock. `Frames` converts from Unity's.
 
+/// <summary>What the session is at. Hold: the robot stands still until all is sound. Aim: the user sets targets. Plan:
+/// one is awaited. Preview: it is being shown. Ready: it was shown and can be confirmed. Delay: it was confirmed and
+/// begins soon. Execute: the robot runs it. Follow: the robot follows the targets. Stopped: until a primary button goes
+/// down.</summary>
 public enum Mode { Hold, Aim, Plan, Preview, Ready, Delay, Execute, Follow, Stopped }
 
+/// <summary>What the robot may do now: stand still, run the plan, follow the targets.</summary>
 public enum Motion { Hold, Execute, Follow }
 
 /// <summary>Where a point is. Unknown: no map tells. Blocked: in a solid of the world.</summary>
 public enum Where { Inside, Outside, Unknown, Blocked }
 
+/// <summary>Of a thing. Toy: a soft box with round edges. Basket: a box with a bar above it, which the arm
+/// grips.</summary>
 public enum Shape { Cylinder, Box, Sphere, Toy, Basket }
 
+/// <summary>What bears a thing: a hook, a surface, or the arm.</summary>
 public enum Support { Hanging, Standing, Held }
 
+/// <summary>What the robot does with the plan whose digest its report has.</summary>
 public enum ExecutorMode { Idle, Running, Done, Fault }
 
-/// <summary>One tracked controller: its pose in the reference frame, its stick (x right, y forward, -1 to 1) and what
-/// is held.</summary>
+/// <summary>One tracked controller: its pose in the reference frame, its stick and what is held.</summary>
 public sealed class Controller {
+  /// <summary>Where the ray begins, reference frame, m.</summary>
   public readonly Vector Position;
+  /// <summary>Unit length, from the controller's axes (ray along -z, y up) to the reference frame's.</summary>
   public readonly Quaternion Quaternion;
-  public readonly bool Tracked, Trigger, Grip, StickPressed, Primary, Secondary;
+  /// <summary>Whether its pose is measured now; where it is not, pose and buttons count for nothing, but for
+  /// <see cref="Secondary"/>.</summary>
+  public readonly bool Tracked;
+  /// <summary>Held now: a press is what goes down from one input to the next. Trigger asks for a plan and confirms it,
+  /// a grip moves its hand's target and lets the robot move, the stick pressed begins and ends following.</summary>
+  public readonly bool Trigger, Grip, StickPressed;
+  /// <summary>Held now. Primary (A or X) takes an offer, with the grip tilts the end effector, and ends a stop;
+  /// secondary (B or Y) stops.</summary>
+  public readonly bool Primary, Secondary;
+  /// <summary>-1 to 1, x right, y forward; forward lengthens the ray.</summary>
   public readonly double StickX, StickY;
 
+  /// <summary>As the fields of the same names.</summary>
   public Controller(Vector position, Quaternion quaternion, bool tracked = true, bool trigger = false,
                     bool grip = false, double stickX = 0, double stickY = 0, bool stickPressed = false,
                     bool primary = false, bool secondary = false) {
@@ -47,7 +67,9 @@ public sealed class Controller {
 
 /// <summary>Of the reference frame in the base frame: p_base = position + rotate(quaternion, p_reference); m.</summary>
 public sealed class Pose {
+  /// <summary>Of the reference frame's origin, base frame, m.</summary>
   public readonly Vector Position;
+  /// <summary>Unit length, from the reference frame's axes to the base frame's.</summary>
   public readonly Quaternion Quaternion;
 
   public Pose(Vector position, Quaternion quaternion) {
@@ -61,7 +83,9 @@ public sealed class Pose {
 
 /// <summary>A solid, axes along the base frame: corners, m. A table, a chair's seat, the floor.</summary>
 public sealed class Box {
+  /// <summary>As the user reads it where a target is in it.</summary>
   public readonly string Name;
+  /// <summary>Opposite corners, base frame, m: none of Low's coordinates is above High's.</summary>
   public readonly Vector Low, High;
 
   public Box(string name, Vector low, Vector high) {
@@ -88,6 +112,7 @@ public readonly struct Basket {
     Rise = rise;
   }
 
+  /// <summary>That of the demo: 0.12, 0.16 and 0.22 m. Things of other shapes may have it too.</summary>
   public static Basket Usual => new Basket(0.12, 0.16, 0.22);
 
   internal bool IsAs(Basket other) => Width == other.Width && Length == other.Length && Rise == other.Rise;
@@ -96,6 +121,7 @@ public readonly struct Basket {
 /// <summary>Something to grasp, as the client believes it: position of its centre, m, and quaternion, in the base
 /// frame.</summary>
 public sealed class Thing {
+  /// <summary>Of no other thing of the world.</summary>
   public readonly string Name;
   public readonly Shape Shape;
   /// <summary>m, of a box its width along x and y, of a basket its bar's.</summary>
@@ -104,11 +130,15 @@ public sealed class Thing {
   public readonly double Height;
   /// <summary>kg.</summary>
   public readonly double Mass;
+  /// <summary>Of its centre (of mass, of a basket), base frame, m.</summary>
   public readonly Vector Position;
+  /// <summary>Unit length, from its own axes to the base frame's.</summary>
   public readonly Quaternion Quaternion;
   public readonly Support Support;
+  /// <summary>Counts where <see cref="Shape"/> is a basket.</summary>
   public readonly Basket Basket;
 
+  /// <summary>As the fields of the same names: m, kg, base frame.</summary>
   public Thing(string name, Shape shape, double diameter, double height, double mass, Vector position,
                Quaternion quaternion, Support support, Basket basket) {
     Name = name;
@@ -131,6 +161,7 @@ public sealed class Thing {
 /// <summary>What stands around the robot: a digest, which changes with it, the solids that no target may be in, and the
 /// things that can be grasped.</summary>
 public sealed class World {
+  /// <summary>Any text that differs whenever boxes or things do. A plan is void in a world of another.</summary>
   public readonly string Digest;
   public readonly IReadOnlyList<Box> Boxes;
   public readonly IReadOnlyList<Thing> Things;
@@ -174,11 +205,16 @@ public sealed class World {
   }
 }
 
-/// <summary>The assistant's: with the mount at <see cref="Rigid"/>, m, the end effector pointing along
+/// <summary>The assistant's: with the mount at <see cref="Rigid"/>, the end effector pointing along
 /// <see cref="Pointing"/>, the thing is held with a probability, more surely than where the user has it.</summary>
 public sealed class Offer {
+  /// <summary>Its name in the world.</summary>
   public readonly string Thing;
-  public readonly Vector Rigid, Pointing;
+  /// <summary>Of the mount, base frame, m.</summary>
+  public readonly Vector Rigid;
+  /// <summary>Direction, base frame, unit length.</summary>
+  public readonly Vector Pointing;
+  /// <summary>0 to 1.</summary>
   public readonly double Probability;
 
   public Offer(string thing, Vector rigid, Vector pointing, double probability) {
@@ -192,8 +228,14 @@ public sealed class Offer {
 /// <summary>What became of plan request <see cref="Serial"/>: its digest, or why it was refused; the package and world
 /// it was made for.</summary>
 public sealed class PlanReport {
+  /// <summary>That of the <see cref="Request"/> that it answers.</summary>
   public readonly int Serial;
-  public readonly string Digest, Refused, Package, World;
+  /// <summary>Of the plan, any text that no other plan has; "" where it was refused.</summary>
+  public readonly string Digest;
+  /// <summary>Why there is no plan, one line; "" where there is one.</summary>
+  public readonly string Refused;
+  /// <summary>Digests, as the request had them; a plan for others is refused.</summary>
+  public readonly string Package, World;
 
   public PlanReport(int serial, string digest = "", string refused = "", string package = "", string world = "") {
     Serial = serial;
@@ -208,7 +250,10 @@ public sealed class PlanReport {
 /// run.</summary>
 public sealed class ExecutorReport {
   public readonly ExecutorMode Mode;
-  public readonly string Digest, Fault;
+  /// <summary>Of the plan that it runs or has run; "" for none.</summary>
+  public readonly string Digest;
+  /// <summary>One line; counts where <see cref="Mode"/> is a fault.</summary>
+  public readonly string Fault;
 
   public ExecutorReport(ExecutorMode mode = ExecutorMode.Idle, string digest = "", string fault = "") {
     Mode = mode;
@@ -221,6 +266,7 @@ public sealed class ExecutorReport {
 public sealed class Input {
   /// <summary>s, of the client's clock.</summary>
   public readonly double Stamp;
+  /// <summary>Never null: a controller that is not there is one that is not tracked.</summary>
   public readonly Controller Left, Right;
   /// <summary>Null until the base is aligned.</summary>
   public readonly Pose Alignment;
@@ -231,8 +277,9 @@ public sealed class Input {
   public readonly string Package;
   /// <summary>The newest report; null where there is none.</summary>
   public readonly PlanReport Plan;
-  /// <summary>Digest of the plan whose preview has been shown to its end.</summary>
+  /// <summary>Digest of the plan whose preview has been shown to its end; "" for none.</summary>
   public readonly string Shown;
+  /// <summary>What the robot does now.</summary>
   public readonly ExecutorReport Executor;
   /// <summary>A place of the mount that the assistant has found better than that of the newest plan, or null.</summary>
   public readonly Offer Offer;
@@ -256,13 +303,13 @@ public sealed class Input {
 
 /// <summary>A target in the base frame, and whether it can be reached.</summary>
 public sealed class Target {
-  /// <summary>m.</summary>
+  /// <summary>Base frame, m.</summary>
   public readonly Vector Position;
   public readonly Where Reach;
-  /// <summary>m.</summary>
+  /// <summary>How far it is from the nearest place within reach, m; 0 unless outside.</summary>
   public readonly double OutsideBy;
-  /// <summary>Where outside, the nearest point that is inside, m, or null; the target stays where the user put
-  /// it.</summary>
+  /// <summary>Where outside, the nearest point that is inside, base frame, m, or null; the target stays where the user
+  /// put it.</summary>
   public readonly Vector? Offer;
   /// <summary>Name of the solid that it is in, "" for none.</summary>
   public readonly string Solid;
@@ -280,11 +327,12 @@ public sealed class Target {
 /// <summary>Rigid target (the mount) and soft tip target, and how the mount shall be turned.</summary>
 public sealed class Targets {
   public readonly Target Rigid, Tip;
-  /// <summary>Direction in which the end effector points, unit length.</summary>
+  /// <summary>Direction in which the end effector points, base frame, unit length.</summary>
   public readonly Vector Pointing;
   /// <summary>Angle of the soft arm's tendon 1 about the arm's axis, rad (<see cref="Alignment"/>).</summary>
   public readonly double Heading;
-  /// <summary>Which bends, 0 dorsal, 1 ventral.</summary>
+  /// <summary>In which the arm bends: its number in <see cref="BendingPlane.HalfPlanes"/>, 0 dorsal, 1
+  /// ventral.</summary>
   public readonly int HalfPlane;
   /// <summary>By which the wrist turns from where it is, rad; null where no half-plane is within its limits.</summary>
   public readonly double? Turned;
@@ -314,8 +362,10 @@ public sealed class Targets {
 
 /// <summary>A plan that the core asks for: answered by a <see cref="PlanReport"/> of the same serial.</summary>
 public sealed class Request {
+  /// <summary>From 1 on, one more at each request.</summary>
   public readonly int Serial;
   public readonly Targets Targets;
+  /// <summary>Digests of the world and the package that the plan shall be for.</summary>
   public readonly string World, Package;
 
   public Request(int serial, Targets targets, string world, string package) {
@@ -339,11 +389,11 @@ public sealed class Intent {
   public readonly Vector? LeftRay, RightRay;
   /// <summary>Null but in the mode plan.</summary>
   public readonly Request Request;
-  /// <summary>Digest to show, "" for none.</summary>
+  /// <summary>Digest of the plan to show, "" for none.</summary>
   public readonly string Preview;
-  /// <summary>Digest to run, with motion <see cref="Motion.Execute"/>.</summary>
+  /// <summary>Digest of the plan to run, with motion <see cref="Motion.Execute"/>, else "".</summary>
   public readonly string Execute;
-  /// <summary>s until execution begins.</summary>
+  /// <summary>s until execution begins; 0 but in the mode delay.</summary>
   public readonly double Countdown;
   /// <summary>Where the robot shall be now, with motion <see cref="Motion.Follow"/>, else null.</summary>
   public readonly Targets Follow;

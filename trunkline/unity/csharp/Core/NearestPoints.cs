@@ -25,6 +25,7 @@ public sealed class NearestPoints {
 
   public int Count => _order.Length;
 
+  /// <summary>m, in the order in which they were given.</summary>
   public Vector this[int index] =>
       new Vector(_points[3 * index], _points[3 * index + 1], _points[3 * index + 2]);
 

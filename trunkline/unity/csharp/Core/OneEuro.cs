@@ -6,7 +6,7 @@ namespace Trunkline {
 /// <summary>The One-Euro filter, a low-pass whose cutoff grows with speed: trunkline/teleop/one_euro.py, which has the
 /// equations and their source.</summary>
 public sealed class OneEuro {
-  /// <summary>f_min and f_d, Hz; β, Hz per m/s, or per rad/s.</summary>
+  /// <summary>Hz, Hz per m/s (of orientations per rad/s), and Hz: the paper's f_min, β and f_d.</summary>
   public readonly double MinCutoff, Beta, DerivativeCutoff;
 
   public OneEuro(double minCutoff, double beta, double derivativeCutoff) {
@@ -40,8 +40,10 @@ public sealed class OneEuro {
 /// <summary>A pose as filtered: position (m) and quaternion, their low-passed velocity (m/s) and spin
 /// (rad/s).</summary>
 public sealed class Smoothed {
+  /// <summary>Reference frame: m, m/s.</summary>
   public readonly Vector Position, Velocity;
   public readonly Quaternion Quaternion;
+  /// <summary>rad/s, not negative: how fast it turns, about whatever axis.</summary>
   public readonly double Spin;
 
   public Smoothed(Vector position, Quaternion quaternion, Vector velocity, double spin) {

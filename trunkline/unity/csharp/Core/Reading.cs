@@ -4,7 +4,9 @@ namespace Trunkline {
 /// where it is outside. Port of trunkline/teleop/reading.py.</summary>
 public readonly struct Reading {
   public readonly Where Where;
+  /// <summary>m; 0 unless outside.</summary>
   public readonly double OutsideBy;
+  /// <summary>m, in the frame in which the point was asked about; null where there is none.</summary>
   public readonly Vector? Offer;
 
   public Reading(Where where, double outsideBy = 0, Vector? offer = null) {

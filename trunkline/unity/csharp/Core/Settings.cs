@@ -8,7 +8,12 @@ namespace Trunkline {
 /// <summary>Length of the rays, m, and its rate at full deflection, m/s; dead zone of the stick, share of its
 /// way.</summary>
 public sealed class Rays {
-  public readonly double Start, Shortest, Longest, Rate, DeadZone;
+  /// <summary>m.</summary>
+  public readonly double Start, Shortest, Longest;
+  /// <summary>m/s.</summary>
+  public readonly double Rate;
+  /// <summary>0 to 1.</summary>
+  public readonly double DeadZone;
 
   public Rays(double start, double shortest, double longest, double rate, double deadZone) {
     if (!(shortest <= start && start <= longest)) {
@@ -26,6 +31,7 @@ public sealed class Rays {
 /// <summary>How far the end effector may be off straight down, rad, and how fast it follows the tilted controller,
 /// rad/s.</summary>
 public sealed class Orientation {
+  /// <summary>rad, rad/s.</summary>
   public readonly double MostTilt, Rate;
 
   /// <param name="mostTiltDeg">°.</param>
@@ -40,8 +46,12 @@ public sealed class Orientation {
 /// must turn for another than for the one in use, rad; m from the axis within which the tip target has no
 /// direction.</summary>
 public sealed class BendingPlane {
+  /// <summary>rad, two of them: 0 dorsal, 1 ventral.</summary>
   public readonly IReadOnlyList<double> HalfPlanes;
-  public readonly double Hysteresis, Axis;
+  /// <summary>rad.</summary>
+  public readonly double Hysteresis;
+  /// <summary>m.</summary>
+  public readonly double Axis;
 
   /// <param name="halfPlanesDeg">°.</param>
   /// <param name="hysteresisDeg">°.</param>
@@ -59,6 +69,7 @@ public sealed class BendingPlane {
 
 /// <summary>When the robot holds; s, and <see cref="Swap"/> in m.</summary>
 public sealed class Safety {
+  /// <summary>s; m of <see cref="Swap"/>; what each means, at the constructor.</summary>
   public readonly double Grace, Silence, Settle, Swap, PlanWait, StartWait;
 
   /// <param name="grace">A controller may be lost so long, s.</param>
@@ -84,6 +95,7 @@ public sealed class Teleop {
   public readonly Rays Rays;
   public readonly Orientation Orientation;
   public readonly BendingPlane BendingPlane;
+  /// <summary>Of the controllers' poses.</summary>
   public readonly OneEuro PositionFilter, OrientationFilter;
   /// <summary>s before a press from which the targets are taken.</summary>
   public readonly double LookBack;

@@ -4,7 +4,7 @@ using static Trunkline.Vectors;
 
 namespace Trunkline {
 
-/// <summary>s at a point, m, and its gradient there.</summary>
+/// <summary>Signed distance s at a point, m, negative within reach, and its gradient there, without a unit.</summary>
 public delegate double Signal(Vector point, out Vector slope);
 
 /// <summary>A map as a signed distance on a lattice, and the nearest point within it: trunkline/teleop/signed_map.py.
@@ -30,6 +30,11 @@ public sealed class SignedMap {
 
   /// <param name="values">m, the base frame's x fastest, then z, then y: the order of the package's file, where y and z
   /// have changed places.</param>
+  /// <param name="countX">Points along the base frame's x, at least 2, as along the others.</param>
+  /// <param name="countY">Along y.</param>
+  /// <param name="countZ">Along z.</param>
+  /// <param name="origin">First point, base frame, m.</param>
+  /// <param name="spacing">Between points, along all axes, m.</param>
   public SignedMap(float[] values, int countX, int countY, int countZ, Vector origin, double spacing) {
     _values = values;
     CountX = countX;

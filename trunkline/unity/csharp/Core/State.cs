@@ -6,6 +6,7 @@ namespace Trunkline {
 /// <summary>What a plan was asked for: any change of it voids the plan.</summary>
 public sealed class Pinned {
   public readonly Request Request;
+  /// <summary>Of the reference frame in the base frame, m.</summary>
   public readonly Pose Alignment;
   public readonly World World;
 
@@ -16,7 +17,7 @@ public sealed class Pinned {
   }
 }
 
-/// <summary>The targets at a stamp, s.</summary>
+/// <summary>The targets at a stamp, s, of the client's clock.</summary>
 public readonly struct Remembered {
   public readonly double Stamp;
   public readonly Targets Targets;
@@ -35,7 +36,7 @@ public sealed class State {
   public Hand Left { get; internal set; }
   public Hand Right { get; internal set; }
   public Mode Mode { get; internal set; } = Mode.Hold;
-  /// <summary>The last, s; null before the first.</summary>
+  /// <summary>The last, s, of the client's clock; null before the first.</summary>
   public double? Stamp { get; internal set; }
   /// <summary>s without a new stamp.</summary>
   public double Silent { get; internal set; }
@@ -43,21 +44,29 @@ public sealed class State {
   public double SoundFor { get; internal set; }
   /// <summary>s in this mode.</summary>
   public double Waited { get; internal set; }
+  /// <summary>Direction in which the end effector shall point, base frame, unit length.</summary>
   public Vector Pointing { get; internal set; } = Vectors.Down;
+  /// <summary>The controller was tilted further than the end effector may be.</summary>
   public bool Limited { get; internal set; }
+  /// <summary>How the wrist shall be turned, as of the last targets.</summary>
   public Aligned Aligned { get; internal set; } = new Aligned(0, 0, 0);
+  /// <summary>Of the reference frame in the base frame, m; null before the first.</summary>
   public Pose Alignment { get; internal set; }
   /// <summary>Its digest.</summary>
   public string World { get; internal set; } = "";
   /// <summary>Of the last while in this mode, to look back from a press and to follow with a delay.</summary>
   public IReadOnlyList<Remembered> History { get; internal set; } = Nothing;
+  /// <summary>Of the last request; 0 before the first.</summary>
   public int Serial { get; internal set; }
+  /// <summary>From a request, or the begin of following, until the mode is hold, aim or stopped; else null.</summary>
   public Pinned Pinned { get; internal set; }
   /// <summary>Of the plan that is there, "" for none.</summary>
   public string Digest { get; internal set; } = "";
   /// <summary>The robot was seen to run it.</summary>
   public bool Running { get; internal set; }
+  /// <summary>The last within reach that the robot follows; null but in the mode follow.</summary>
   public Targets Following { get; internal set; }
+  /// <summary>One line for the user, "" for none.</summary>
   public string Notice { get; internal set; } = "";
 
   public State(Hand left, Hand right) {

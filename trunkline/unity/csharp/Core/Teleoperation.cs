@@ -11,7 +11,9 @@ namespace Trunkline {
 public sealed class Teleoperation {
   public readonly Teleop Settings;
   public readonly IReach Reach;
+  /// <summary>Digest: an input that names another makes the robot hold.</summary>
   public readonly string Package;
+  /// <summary>m, from the flange to the mount.</summary>
   public readonly double MountOffset;
 
   /// <param name="settings">Of the core.</param>

@@ -6,32 +6,44 @@ using System.Text;
 namespace Trunkline {
 
 /// <summary>A finished package, read back: its digest, its maps in the base frames, what its network takes. Port of
-/// trunkline/unity/unpacked.py. Files are contents by path in the package.</summary>
+/// trunkline/unity/unpacked.py. Files are contents by path in the package; the manifest is read once, by
+/// <see cref="ManifestOf"/>, and handed on.</summary>
 public static class Unpacked {
-  private const string _manifest = "Runtime/manifest.json";
+  /// <summary>Where the manifest is in the package.</summary>
+  public const string Manifest = "Runtime/manifest.json";
+
   private static readonly double[] _powers = PowersOfTwo();  // of the last bit of a number of 16 bits, by its exponent
+
+  /// <summary>The manifest of <paramref name="files"/>, for all that is asked of them.</summary>
+  /// <exception cref="InputError">There is none, or it is no JSON.</exception>
+  public static JsonBlock ManifestOf(IReadOnlyDictionary<string, byte[]> files) {
+    if (!files.TryGetValue(Manifest, out var text)) {
+      throw new InputError($"package: found no {Manifest}, expected one of the stage package_unity");
+    }
+    return new JsonBlock(Json.Read(text, Manifest), Manifest);
+  }
 
   /// <summary>SHA-256 of the manifest, which has that of every other file: of another package, another
   /// digest.</summary>
   /// <exception cref="InputError">Naming the file that is not the one that the manifest means.</exception>
-  public static string PackageDigest(IReadOnlyDictionary<string, byte[]> files) {
-    var digests = Manifest(files).Block("sha256");
+  public static string PackageDigest(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
+    var digests = manifest.Block("sha256");
     foreach (string path in digests.Names) {
       Require(path, files.TryGetValue(path, out var data) ? Digest(data) : "none", digests.Text(path));
     }
-    return Digest(files[_manifest]);
+    return Digest(files[Manifest]);
   }
 
   /// <summary>The same of an app that brings some of the package's files: those that it brings are tested.</summary>
   /// <exception cref="InputError">Naming the file that is not the one that the manifest means.</exception>
-  public static string PartDigest(IReadOnlyDictionary<string, byte[]> files) {
-    var digests = Manifest(files).Block("sha256");
+  public static string PartDigest(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
+    var digests = manifest.Block("sha256");
     foreach (var file in files) {
-      if (file.Key != _manifest) {
+      if (file.Key != Manifest) {
         Require(file.Key, Digest(file.Value), digests.Has(file.Key) ? digests.Text(file.Key) : "none");
       }
     }
-    return Digest(files[_manifest]);
+    return Digest(files[Manifest]);
   }
 
   private static void Require(string path, string found, string expected) {
@@ -43,8 +55,7 @@ public static class Unpacked {
 
   /// <summary>The maps of the package's reach. Where it has sheets, the soft grids may be left out.</summary>
   /// <exception cref="InputError">A file is missing, or not of the lattice that the manifest says.</exception>
-  public static MapReach MapsOf(IReadOnlyDictionary<string, byte[]> files) {
-    var manifest = Manifest(files);
+  public static MapReach MapsOf(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
     RequireOneLattice(manifest);
     var grids = manifest.Block("reach").Has("sheets") ? null : GridsOf(files, manifest);
     var rigid = Grid(files, manifest.Block("grids"), "rigid");
@@ -53,9 +64,7 @@ public static class Unpacked {
 
   /// <summary>The tip's reach by the soft grids, for gravity of one tilt.</summary>
   /// <exception cref="InputError">As for <see cref="MapsOf"/>.</exception>
-  public static TiltReach GridsOf(IReadOnlyDictionary<string, byte[]> files) => GridsOf(files, Manifest(files));
-
-  private static TiltReach GridsOf(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
+  public static TiltReach GridsOf(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
     JsonBlock reach = manifest.Block("reach"), grids = manifest.Block("grids");
     RequireOneLattice(manifest);
     var maps = Array.ConvertAll(reach.Texts("grids"), name => Grid(files, grids, name));
@@ -77,17 +86,14 @@ public static class Unpacked {
 
   /// <summary>The surface of the soft arm's tips; null in a package for gravity of one tilt.</summary>
   /// <exception cref="InputError">A file is missing, or of another size.</exception>
-  public static SheetReach SheetsOf(IReadOnlyDictionary<string, byte[]> files) => SheetsOf(files, Manifest(files));
-
-  private static SheetReach SheetsOf(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
+  public static SheetReach SheetsOf(IReadOnlyDictionary<string, byte[]> files, JsonBlock manifest) {
     var reach = manifest.Block("reach");
     return reach.Has("sheets") ? Sheets(files, reach.Block("sheets"), reach.Number("tolerance")) : null;
   }
 
   /// <summary>The package's inverse kinematics by a <paramref name="network"/> that runs its file.</summary>
   /// <exception cref="InputError">The network is of other inputs or outputs.</exception>
-  public static ArmKinematics KinematicsOf(IReadOnlyDictionary<string, byte[]> files, INetwork network) {
-    var manifest = Manifest(files);
+  public static ArmKinematics KinematicsOf(JsonBlock manifest, INetwork network) {
     JsonBlock block = manifest.Block("network"), lengths = manifest.Block("model").Block("rest_lengths");
     var tendons = block.Texts("output_order");
     var rest = Array.ConvertAll(tendons, lengths.Number);
@@ -172,13 +178,6 @@ public static class Unpacked {
       throw new InputError($"{path}: {found}, expected {size} as the manifest's lattice says");
     }
     return data;
-  }
-
-  private static JsonBlock Manifest(IReadOnlyDictionary<string, byte[]> files) {
-    if (!files.TryGetValue(_manifest, out var text)) {
-      throw new InputError($"package: found no {_manifest}, expected one of the stage package_unity");
-    }
-    return new JsonBlock(Json.Read(text, _manifest), _manifest);
   }
 
   // SHA-256 in hexadecimal digits.

@@ -23,7 +23,8 @@ public readonly struct Vector : IEquatable<Vector> {
   public override int GetHashCode() => X.GetHashCode() ^ (397 * Y.GetHashCode()) ^ (7919 * Z.GetHashCode());
 }
 
-/// <summary>A rotation as a unit quaternion (w, x, y, z).</summary>
+/// <summary>A rotation as a unit quaternion (w, x, y, z); the constructor takes w first and does not scale it, and
+/// q and -q are the same rotation but not equal.</summary>
 public readonly struct Quaternion : IEquatable<Quaternion> {
   public readonly double W, X, Y, Z;
 
@@ -48,7 +49,9 @@ public readonly struct Quaternion : IEquatable<Quaternion> {
 
 /// <summary>Arithmetic of both: trunkline/teleop/vectors.py.</summary>
 public static class Vectors {
+  /// <summary>No rotation.</summary>
   public static readonly Quaternion Identity = new Quaternion(1, 0, 0, 0);
+  /// <summary>Along -z, unit length: gravity's direction in the rigid robot's base frame.</summary>
   public static readonly Vector Down = new Vector(0, 0, -1);
 
   public static Vector Add(Vector a, Vector b) => new Vector(a.X + b.X, a.Y + b.Y, a.Z + b.Z);
@@ -79,6 +82,7 @@ public static class Vectors {
       p.W * q.Y - p.X * q.Z + p.Y * q.W + p.Z * q.X,
       p.W * q.Z + p.X * q.Y - p.Y * q.X + p.Z * q.W);
 
+  /// <summary>Of a unit quaternion: the rotation back.</summary>
   public static Quaternion Conjugate(Quaternion q) => new Quaternion(q.W, -q.X, -q.Y, -q.Z);
 
   /// <summary><paramref name="v"/> turned by the unit quaternion <paramref name="q"/>.</summary>
@@ -94,8 +98,10 @@ public static class Vectors {
     return new Quaternion(Math.Cos(angle / 2), s * axis.X, s * axis.Y, s * axis.Z);
   }
 
+  /// <summary>1 of a rotation.</summary>
   public static double Length(Quaternion q) => Math.Sqrt(q.W * q.W + q.X * q.X + q.Y * q.Y + q.Z * q.Z);
 
+  /// <summary>Scaled to unit length; not a number where all are 0.</summary>
   public static Quaternion Unit(Quaternion q) {
     double length = Length(q);
     return new Quaternion(q.W / length, q.X / length, q.Y / length, q.Z / length);
@@ -107,8 +113,8 @@ public static class Vectors {
     return 2 * Math.Atan2(Math.Sqrt(r.X * r.X + r.Y * r.Y + r.Z * r.Z), Math.Abs(r.W));
   }
 
-  /// <summary><paramref name="p"/> turned by a <paramref name="share"/> of the shortest way to <paramref name="q"/>
-  /// (slerp; Shoemake 1985).</summary>
+  /// <summary><paramref name="p"/> turned by a <paramref name="share"/>, 0 to 1, of the shortest way to
+  /// <paramref name="q"/> (slerp; Shoemake 1985).</summary>
   public static Quaternion Toward(Quaternion p, Quaternion q, double share) {
     var r = Multiply(Conjugate(p), q);
     if (r.W < 0) {

@@ -70,7 +70,7 @@ public static class CreateTwin {
   /// <summary>The maps that Pointing takes: the mount's, and the tip's under gravity from any side or of one
   /// tilt.</summary>
   public static TextAsset[] Maps(PackageInfo package) {
-    var manifest = new JsonBlock(Json.Read(Asset(package, "manifest.json").bytes, "manifest.json"), "manifest.json");
+    PackageFiles.Of(Asset(package, "manifest.json"), out var manifest, out _);
     var reach = manifest.Block("reach");
     var names = new List<string> { "rigid" };
     names.AddRange(reach.Has("sheets") ? new[] { "sheets", "sheet_weights" } : reach.Texts("grids"));

@@ -7,29 +7,26 @@ namespace Trunkline {
 /// <summary>Files of the package by their paths in it, as the core takes them, from text assets: as such Unity imports
 /// `.json` and `.bytes`. Nothing is read from StreamingAssets.</summary>
 public static class PackageFiles {
-  public const string Manifest = "Runtime/manifest.json";
-
   /// <summary>The manifest and `others`; each is known by its name and lies where the manifest says.</summary>
+  /// <param name="said">The manifest as read, for <see cref="Unpacked"/>: it is long, and read here alone.</param>
+  /// <param name="digest">The package's.</param>
   /// <exception cref="InputError">One is missing in the component's fields, is none of the package's, or is of another
   /// version of it.</exception>
-  public static Dictionary<string, byte[]> Of(TextAsset manifest, params TextAsset[] others) =>
-      Of(manifest, out _, others);
-
-  /// <summary>The same with the package's <paramref name="digest"/>.</summary>
-  /// <exception cref="InputError">As above.</exception>
-  public static Dictionary<string, byte[]> Of(TextAsset manifest, out string digest, params TextAsset[] others) {
+  public static Dictionary<string, byte[]> Of(TextAsset manifest, out JsonBlock said, out string digest,
+                                              params TextAsset[] others) {
     if (manifest == null) {
-      throw new InputError($"Manifest File: found none, expected {Manifest}");
+      throw new InputError($"Manifest File: found none, expected {Unpacked.Manifest}");
     }
-    var files = new Dictionary<string, byte[]> { [Manifest] = manifest.bytes };
-    var digests = new JsonBlock(Json.Read(manifest.bytes, Manifest), Manifest).Block("sha256");
+    var files = new Dictionary<string, byte[]> { [Unpacked.Manifest] = manifest.bytes };
+    said = Unpacked.ManifestOf(files);
+    var digests = said.Block("sha256");
     foreach (var asset in others) {
       if (asset == null) {
         throw new InputError("files: found an empty field, expected the files that its tooltip names");
       }
       files[PathOf(asset.name, digests)] = asset.bytes;
     }
-    digest = Unpacked.PartDigest(files);
+    digest = Unpacked.PartDigest(files, said);
     return files;
   }
 

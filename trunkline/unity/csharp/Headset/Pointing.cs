@@ -80,16 +80,17 @@ public class Pointing : MonoBehaviour {
 
   protected void Awake() {
     try {
-      var files = PackageFiles.Of(ManifestFile, out string package, MapFiles ?? new TextAsset[0]);
+      var files = PackageFiles.Of(ManifestFile, out var manifest, out string package,
+                                  MapFiles ?? new TextAsset[0]);
       if (SettingsFile == null) {
         throw new InputError("Settings File: found none, expected Runtime/teleoperation.json");
       }
       var settings = Teleop.Read(new JsonBlock(Json.Read(SettingsFile.bytes, SettingsFile.name), SettingsFile.name));
-      var manifest = new JsonBlock(Json.Read(ManifestFile.bytes, ManifestFile.name), ManifestFile.name);
       var robot = manifest.Block("hybrid").Block("robot");
       Package = package;
       Joints = Joints ?? robot.Numbers("ready");
-      var core = new Teleoperation(settings, Unpacked.MapsOf(files), Package, robot.Number("mount_offset"));
+      var core = new Teleoperation(settings, Unpacked.MapsOf(files, manifest), Package,
+                                   robot.Number("mount_offset"));
       State = core.Start();
       _core = core;
     } catch (InputError error) {

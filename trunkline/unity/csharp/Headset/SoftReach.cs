@@ -51,9 +51,9 @@ public class SoftReach : MonoBehaviour {
 
   protected void Awake() {
     try {
-      var files = PackageFiles.Of(ManifestFile, PointsFile, WeightsFile);
-      _reach = Unpacked.SheetsOf(files) ?? throw new InputError("reach.sheets: found none, expected a package for "
-          + "gravity from any side");
+      var files = PackageFiles.Of(ManifestFile, out var manifest, out _, PointsFile, WeightsFile);
+      _reach = Unpacked.SheetsOf(files, manifest) ?? throw new InputError("reach.sheets: found none, expected a "
+          + "package for gravity from any side");
       SetGravity(DownOf(transform));
     } catch (InputError error) {
       Debug.LogError($"Soft Reach: {error.Message}", this);

@@ -28,9 +28,9 @@ public class ArmNetwork : MonoBehaviour {
       if (NetworkFile == null) {
         throw new InputError("Network File: found none, expected Runtime/Network/ik.onnx");
       }
-      var files = PackageFiles.Of(ManifestFile);
+      PackageFiles.Of(ManifestFile, out var manifest, out _);
       _network = new InferenceNetwork(NetworkFile);
-      Kinematics = Unpacked.KinematicsOf(files, _network);
+      Kinematics = Unpacked.KinematicsOf(manifest, _network);
     } catch (Exception error) {  // the inference engine's own are of many types
       string why = error is InputError ? error.Message
           : $"{NetworkFile.name}: found that the inference engine does not run it ({error.Message.Split('\n')[0]}), "

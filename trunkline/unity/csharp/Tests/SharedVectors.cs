@@ -36,14 +36,16 @@ internal sealed class SharedVectors {
   public SharedVectors(IReadOnlyDictionary<string, byte[]> files) {
     _files = files;
     _steps = Block(Read("Tests/Vectors/steps.json"));
-    Core = new Teleoperation(Teleop.Read(new JsonBlock(_steps["settings"], "settings")), Unpacked.MapsOf(files),
-                             (string)_steps["package"], (double)_steps["mount_offset"]);
-    var block = Block(Block(Read("Runtime/manifest.json"))["network"]);
-    int tendons = List(block["output_order"]).Count;
+    var manifest = Unpacked.ManifestOf(files);
+    Core = new Teleoperation(Teleop.Read(new JsonBlock(_steps["settings"], "settings")),
+                             Unpacked.MapsOf(files, manifest), (string)_steps["package"],
+                             (double)_steps["mount_offset"]);
+    var block = manifest.Block("network");
+    int tendons = block.Texts("output_order").Length;
     _network = new Recorded {
-      Inputs = List(block["input_order"]).Count, Outputs = new[] { tendons, tendons, 3 },
+      Inputs = block.Texts("input_order").Length, Outputs = new[] { tendons, tendons, 3 },
     };
-    Kinematics = Unpacked.KinematicsOf(files, _network);
+    Kinematics = Unpacked.KinematicsOf(manifest, _network);
   }
 
   private object Read(string path) {

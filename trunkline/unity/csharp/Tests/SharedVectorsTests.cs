@@ -19,7 +19,7 @@ public class SharedVectorsTests {
         files[path.Substring(root.Length + 1).Replace('\\', '/')] = File.ReadAllBytes(path);
       }
     }
-    Unpacked.PartDigest(files);
+    Unpacked.PartDigest(files, Unpacked.ManifestOf(files));
     _shared = new SharedVectors(files);
   }
 
