@@ -1,19 +1,22 @@
 """Keep the runs that older code or another package made, where a sample of them, made again now, comes to the same.
 
-    python -m rehearsal.carry [--each 2] [--table artifacts/rehearse/runs.csv]
+    python -m rehearsal.carry [--experiments grasp handle] [--each 2] [--table artifacts/rehearse/runs.csv]
 
 A run is drawn by its seed alone, so that what changes no result, as a name in the code or a word in the package, need
-not cost hours of runs. `each`: that are made again of each experiment, and as many of its variants.
+not cost hours of runs. `experiments`: to carry; a change may move some and leave others. `each`: that are made again of
+each experiment, and as many of its variants.
 """
 
 import argparse
 import sys
 from collections import Counter
+from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, as_row, read_results, rewrite_results
 from rehearsal.rehearse import OUT
 from rehearsal.runs import Source, performed, run_of, source_of
@@ -25,19 +28,23 @@ from trunkline.threads import thread_count
 OF_SOURCE = ("package", "code")  # columns
 
 
-def carry(table: Path, package: Path, source: Source, each: int, workers: int) -> tuple[int, int]:
-    """How many runs were made again, and how many became runs of `source`.
+def carry(
+    table: Path, package: Path, source: Source, each: int, workers: int, experiments: Collection[str] = ()
+) -> tuple[int, int]:
+    """How many runs of `experiments`, none for all, were made again, and how many became runs of `source`.
 
     Raises:
         InputError: there is none to carry, or one came to something else; the table is as it was.
     """
     results = read_results(table)
-    older = Counter(Source(one.package, one.code) for one in results if Source(one.package, one.code) != source)
+    asked = [one for one in results if not experiments or one.experiment in experiments]
+    older = Counter(Source(one.package, one.code) for one in asked if Source(one.package, one.code) != source)
     if not older:
-        raise InputError(f"{table}: found no runs of other code or another package, expected those to carry")
+        told = f" of {' or '.join(experiments)}" if experiments else ""
+        raise InputError(f"{table}: found no runs{told} by other code or of another package, expected those to carry")
     ((chosen, _),) = older.most_common(1)
     have = {run_of(one) for one in source.of(results)}
-    rows = {run_of(one): one for one in chosen.of(results) if run_of(one) not in have}
+    rows = {run_of(one): one for one in chosen.of(asked) if run_of(one) not in have}
     sample = _sample(list(rows.values()), each)
     for result, _ in performed([run_of(one) for one in sample], package, workers):
         run = run_of(result)
@@ -65,12 +72,13 @@ def _sample(rows: list[Result], each: int) -> list[Result]:
 @in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(prog="rehearsal.carry", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--experiments", nargs="+", default=[], choices=EXPERIMENTS, help="to carry; default: all")
     parser.add_argument("--each", type=int, default=2, choices=range(1, 1001), metavar="1..1000")
     parser.add_argument("--table", type=Path, default=OUT / "runs.csv")
     given = parser.parse_args()
     require_checkout(Path("."))
     package = only_package()
-    again, carried = carry(given.table, package, source_of(package), given.each, thread_count())
+    again, carried = carry(given.table, package, source_of(package), given.each, thread_count(), given.experiments)
     print(f"{again} runs made again, all the same; {carried} carried over")
     return 0
 

@@ -91,8 +91,21 @@ def test_no_run_of_older_code_is_kept_where_one_comes_to_something_else(made, tm
     with pytest.raises(InputError, match=r"runs\.csv: touch \d: found nearest_mm 99, expected \d"):
         carry(table, Path("package.tgz"), now, 1, workers=1)
     assert table.read_bytes() == before
-    with pytest.raises(InputError, match="found no runs of other code"):
+    with pytest.raises(InputError, match="found no runs by other code"):
         carry(table, Path("package.tgz"), SOURCE, 1, workers=1)
+
+
+def test_runs_of_one_experiment_are_kept_beside_another_that_changed(made, tmp_path, monkeypatch):
+    table, now = tmp_path / "runs.csv", replace(SOURCE, code="newer")
+    changing = lambda bench, seed: (Result("push", seed, True, "", nearest_mm=len(made)), [])  # noqa: E731
+    monkeypatch.setattr(runs, "EXPERIMENTS", {**runs.EXPERIMENTS, "push": changing})
+    make(wanted({"touch": 3, "push": 3}, 0), Path("package.tgz"), SOURCE, table, workers=1)
+    assert carry(table, Path("package.tgz"), now, 3, workers=1, experiments=["touch"]) == (3, 3)
+    assert {one.experiment for one in now.of(read_results(table))} == {"touch"}
+    with pytest.raises(InputError, match="push"):
+        carry(table, Path("package.tgz"), now, 3, workers=1)
+    with pytest.raises(InputError, match="found no runs of touch by other code"):
+        carry(table, Path("package.tgz"), now, 3, workers=1, experiments=["touch"])
 
 
 def test_a_run_that_breaks_off_has_failed(made):
