@@ -1,6 +1,7 @@
 """Pictures of the data: the quality page of a session, and what the filter did to it."""
 
 import textwrap
+from collections.abc import Sequence
 from itertools import cycle
 
 import matplotlib.pyplot as plt
@@ -9,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, PARTLY, SEEN, UNSEEN, VALIDATE
 from trunkline.signals.base_frame import average_base, to_base_frame
@@ -81,13 +83,13 @@ def _poses(axis: Axes, qualities: list[Quality]) -> None:
     axis.set(title=f"At rest in steps: {sum(counts)} poses", ylabel="poses")
 
 
-def _bars(axis: Axes, qualities: list[Quality], values: list[float], least: float) -> None:
+def _bars(axis: Axes, qualities: list[Quality], values: Sequence[float], least: float) -> None:
     """A bar a trial, coloured by its kind; the axis ends above `least`."""
     kinds = [quality.take.experiment for quality in qualities]
     axis.bar(np.arange(len(kinds)), values, color=[COLORS[kind] for kind in kinds])
     axis.set(xlim=(-1, len(kinds)), ylim=(0, max(1.4 * np.nanmax([0, *values]), least)), xlabel="trial")
-    for ticks in (axis.xaxis, axis.yaxis):
-        ticks.get_major_locator().set_params(integer=least >= 1 or ticks is axis.xaxis)
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axis.yaxis.set_major_locator(MaxNLocator(5, integer=least >= 1))
     axis.legend(handles=[Patch(color=COLORS[name], label=name) for name in COLORS if name in kinds], ncols=3)
 
 
@@ -105,7 +107,7 @@ def _clock(axis: Axes, qualities: list[Quality], agreed: MotorClock) -> None:
     found = "no trial tells" if agreed.by is None else f"{1e3 * agreed.offset:.1f}{uncertain} ms, by {agreed.by}"
     title = f"Cameras' clock − motors' clock:\n{found}"
     axis.set(title=title, xlabel="trial", ylabel="offset (ms)", xlim=(-1, len(qualities)))
-    axis.xaxis.get_major_locator().set_params(integer=True)
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 
 def _words(axis: Axes, qualities: list[Quality], refused: dict[str, str]) -> None:

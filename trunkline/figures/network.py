@@ -28,7 +28,7 @@ def tip_error_figure(errors: dict[str, np.ndarray], length: float) -> Figure:
         errors: name of a set of targets to tip errors, m.
         length: of the arm, m.
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.0))
     bins = np.geomspace(1e-2, 1e2, 70)
     for (name, values), color in zip(errors.items(), (IDENTIFIED, VALIDATE, INITIAL, MEASURED), strict=False):
         millimetres = np.sort(values) * 1e3
@@ -40,7 +40,7 @@ def tip_error_figure(errors: dict[str, np.ndarray], length: float) -> Figure:
     right.set(xscale="log", xlim=(1e-2, 1e2), xlabel="tip position error after FK (mm)", ylabel="targets below (%)")
     right.axvline(0.01 * length * 1e3, color=MEASURED, linestyle="--", linewidth=1)
     right.text(0.0105 * length * 1e3, 5, "1 % of length", fontsize=8)
-    right.legend(loc="center left")
+    figure.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     figure.suptitle("Tip error of the network: its lengths fed back through the statics")
     return figure
 

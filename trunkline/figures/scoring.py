@@ -81,7 +81,7 @@ def _dot_size(dot: str, width: float) -> float:
     return 12.0 if dot in "|_" else 4.0 + 1.4 * width
 
 
-def _shown(table: pd.DataFrame) -> dict[str, tuple[str, str, str]]:
+def _shown(table: pd.DataFrame) -> dict[str, tuple[str, str, str, float]]:
     found = set(table.model)
     return {model: style for model, style in MODELS.items() if model in found}
 
