@@ -136,7 +136,9 @@ def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
     several = len(heldout) > 1
     left.plot(heldout["angle_deg"], heldout["iou"], "o-", color=IDENTIFIED, markersize=4)
-    left.axhline(GOAL_IOU, color=VALIDATE, linestyle="--", label=f"goal, {GOAL_IOU:g}")
+    if several:  # otherwise the other tips are fewer, so their map is smaller
+        left.axhline(GOAL_IOU, color=VALIDATE, linestyle="--", label=f"goal, {GOAL_IOU:g}")
+        left.legend(loc="lower right")
     title = "Map in between against gravity's own" if several else "Map against that of other tips"
     left.set(ylim=(min(0.93, heldout["iou"].min() - 0.01), 1), ylabel="IoU", title=title)
     for name, color, label in (
@@ -144,12 +146,12 @@ def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
     ):  # fmt: skip
         right.plot(heldout["angle_deg"], 100 * heldout[name], "o-", color=color, markersize=4, label=label)
     right.set(ylim=(-3, 103), ylabel="called reachable (%)", title="The signal that a headset shows")
-    for ax, place in ((left, "lower right"), (right, "center right")):
+    right.legend(loc="center right")
+    for ax in (left, right):
         if several:
             ax.set_xlabel("gravity angle, between the maps (°)")
         else:
             ax.set_xticks([0], ["no gravity"])
-        ax.legend(loc=place)
     return figure
 
 
