@@ -68,8 +68,10 @@ def distance_figure(table: pd.DataFrame, trial: str) -> Figure:
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
     models = [name for name in table.source.unique() if name != "measured"]
     for axis, model in zip(axes, models, strict=True):
-        for source, style in (("measured", {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45}),
-                              (model, {"color": COLORS[model], "linewidth": 1.2})):
+        for source, style in (
+            ("measured", {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45}),
+            (model, {"color": COLORS[model], "linewidth": 1.2}),
+        ):
             for number, (_, rows) in enumerate(table[table.source == source].groupby("segment", sort=False)):
                 axis.plot(rows.time_s, rows.distance_mm, label=source if number == 0 else None, **style)
         axis.set(xlabel="time (s)", title=f"{trial}: {model} model", ylim=0)
@@ -122,9 +124,7 @@ def shape_figure(table: pd.DataFrame) -> Figure:
     return figure
 
 
-def parameter_figure(
-    identification: Identification, bounds, units: dict[str, str], undetermined: list[str]
-) -> Figure:
+def parameter_figure(identification: Identification, bounds, units: dict[str, str], undetermined: list[str]) -> Figure:
     """Each scalar with its 95 % interval within its range, grey if that is open or a bound, and per-joint factors."""
     panels, count = 1 + bool(identification.factors), len(identification.values)
     figure, axes = plt.subplots(1, panels, figsize=(6.5 * panels, max(1.4 + 0.42 * count, 2.4)), squeeze=False)
@@ -135,11 +135,22 @@ def parameter_figure(
         doubt = "not determined" if name in undetermined else "on a bound" if name in identification.at_bound else ""
         axes[0, 0].errorbar(place, row, xerr=width, fmt="o", color=DOUBTFUL if doubt else IDENTIFIED, capsize=4)
         side = "left" if place < 0.2 else "right" if place > 0.8 else "center"
-        axes[0, 0].annotate(f"{value:.4g} {units[name]} {doubt}".strip(), (place, row), xytext=(0, 7),
-                            textcoords="offset points", ha=side, fontsize=9)
-    axes[0, 0].set(xlim=(0, 1), ylim=(count - 0.6, -0.8), xlabel="place in the range searched",
-                   yticks=range(count), yticklabels=list(identification.values),
-                   title="Parameters, 95 % intervals given the model")
+        axes[0, 0].annotate(
+            f"{value:.4g} {units[name]} {doubt}".strip(),
+            (place, row),
+            xytext=(0, 7),
+            textcoords="offset points",
+            ha=side,
+            fontsize=9,
+        )
+    axes[0, 0].set(
+        xlim=(0, 1),
+        ylim=(count - 0.6, -0.8),
+        xlabel="place in the range searched",
+        yticks=range(count),
+        yticklabels=list(identification.values),
+        title="Parameters, 95 % intervals given the model",
+    )
     for name, factors in identification.factors.items():
         axes[0, 1].bar(np.arange(1, len(factors) + 1), (factors - 1) * 100, color=IDENTIFIED)
         axes[0, 1].set(xlabel="unit, from the base", ylabel="%", title=f"Per-joint factors of {name}, minus 1")

@@ -84,8 +84,15 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
         for reached, color in ((True, IDENTIFIED), (False, DOUBTFUL)):
             rows = (check.reachable == reached) & ((check.claimed == check.reachable) == right)
             name = ("reached" if reached else "not reached") + ("" if right else ", map wrong")
-            rigid.scatter(radius[rows], check.points[rows, 2], s=size, marker=mark, zorder=3,
-                          color=color if right else INITIAL, label=f"{name} ({rows.sum()})")
+            rigid.scatter(
+                radius[rows],
+                check.points[rows, 2],
+                s=size,
+                marker=mark,
+                zorder=3,
+                color=color if right else INITIAL,
+                label=f"{name} ({rows.sum()})",
+            )
     rigid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8, markerscale=1.5)
     rigid.set(title=f"Rigid: {100 * check.rigid.accuracy:.1f} % of labels agree", xlabel="±radius (m)", ylabel="z (m)")
 
@@ -100,8 +107,14 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
         told = f"{np.degrees(angle):.0f}°" if len(shown) > 1 else "no gravity"
         soft.scatter(near[:, 0], near[:, 2], s=2, color=color, label=told)
     soft.plot(0, 0, "^", color=BASE, markersize=8)
-    soft.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=5, fontsize=8, markerscale=4,
-                title="lines: maps, dots: tips" + (", at gravity angle" if len(shown) > 1 else ""))
+    soft.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.16),
+        ncols=5,
+        fontsize=8,
+        markerscale=4,
+        title="lines: maps, dots: tips" + (", at gravity angle" if len(shown) > 1 else ""),
+    )
     soft.set(title="Soft: the shell of its tips", xlabel="x (m)", ylabel="z (m)")
 
     _fill_slice(hybrid, maps.hybrid, HYBRID)
