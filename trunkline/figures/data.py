@@ -30,8 +30,9 @@ COLORS = dict(zip(EXPERIMENTS, cycle((MEASURED, IDENTIFIED, VALIDATE, INITIAL)),
 def quality_figure(qualities: list[Quality], gathered: Gathered) -> Figure:
     """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals; panels with something
     to show. Of poses in steps, the time between them says nothing: they are counted."""
-    stepwise = [quality for quality in qualities if is_stepwise(quality.take.experiment)]
-    timed = [quality for quality in qualities if not is_stepwise(quality.take.experiment)]
+    numbered = dict(enumerate(qualities))
+    stepwise = {number: one for number, one in numbered.items() if is_stepwise(one.take.experiment)}
+    timed = {number: one for number, one in numbered.items() if number not in stepwise}
     fits = [fit for q in qualities for fit in (q.findings.by_motion, q.findings.by_log_times) if fit is not None]
     panels = [_gaps, _noise, _stamps] * bool(timed)
     figure = plt.figure(figsize=(14, 13))
@@ -49,45 +50,47 @@ def quality_figure(qualities: list[Quality], gathered: Gathered) -> Figure:
     return figure
 
 
-def _gaps(axis: Axes, qualities: list[Quality]) -> None:
-    lengths = 1e3 * np.concatenate([quality.gaps for quality in qualities])
+def _gaps(axis: Axes, qualities: dict[int, Quality]) -> None:
+    lengths = 1e3 * np.concatenate([quality.gaps for quality in qualities.values()])
     if len(lengths):
         axis.hist(lengths, bins=40, color=IDENTIFIED)
     scale = "log" if len(lengths) > 100 else "linear"
     axis.set(title=f"Gaps: {len(lengths)}", xlabel="length (ms)", ylabel="count", yscale=scale)
 
 
-def _noise(axis: Axes, qualities: list[Quality]) -> None:
-    segments = qualities[0].take.segments
+def _noise(axis: Axes, qualities: dict[int, Quality]) -> None:
+    segments = next(iter(qualities.values())).take.segments
     axis.boxplot(
-        [[1e3 * quality.position_noise[i] for quality in qualities] for i in range(len(segments))],
+        [[1e3 * quality.position_noise[i] for quality in qualities.values()] for i in range(len(segments))],
         tick_labels=[segment.removeprefix("unit_") for segment in segments],
         showfliers=False,
     )
-    axis.set(title="Noise per segment", xlabel="segment", ylabel="position (mm)", ylim=(0, None))
+    axis.set(title="Noise per segment", xlabel="segment", ylabel="position (mm)", ylim=(0, 1.1 * axis.get_ylim()[1]))
 
 
-def _stamps(axis: Axes, qualities: list[Quality]) -> None:
+def _stamps(axis: Axes, qualities: dict[int, Quality]) -> None:
     """Jitter of the stamps over frame numbers; where there is none, how many frames lack."""
-    rates, dropped = [1 / quality.interval for quality in qualities], [quality.dropped for quality in qualities]
-    jitters = [np.nan if q.findings.frames is None else 1e3 * q.findings.frames.jitter for q in qualities]
+    rates, dropped = zip(*[(1 / quality.interval, quality.dropped) for quality in qualities.values()], strict=True)
+    frames = [quality.findings.frames for quality in qualities.values()]
+    jitters = [np.nan if found is None else 1e3 * found.jitter for found in frames]
     uneven = np.nanmax([0, *jitters]) > LEAST_JITTER / 100
     _bars(axis, qualities, jitters if uneven else dropped, LEAST_JITTER if uneven else 1)
     axis.set_title(f"Frame stamps: {np.median(rates):.1f} Hz, {sum(dropped)} frames dropped")
     axis.set_ylabel("jitter (ms)" if uneven else "frames dropped")
 
 
-def _poses(axis: Axes, qualities: list[Quality]) -> None:
-    counts = [len(quality.take.time) for quality in qualities]
+def _poses(axis: Axes, qualities: dict[int, Quality]) -> None:
+    counts = [len(quality.take.time) for quality in qualities.values()]
     _bars(axis, qualities, counts, 1)
     axis.set(title=f"At rest in steps: {sum(counts)} poses", ylabel="poses")
 
 
-def _bars(axis: Axes, qualities: list[Quality], values: Sequence[float], least: float) -> None:
-    """A bar a trial, coloured by its kind; the axis ends above `least`."""
-    kinds = [quality.take.experiment for quality in qualities]
-    axis.bar(np.arange(len(kinds)), values, color=[COLORS[kind] for kind in kinds])
-    axis.set(xlim=(-1, len(kinds)), ylim=(0, max(1.4 * np.nanmax([0, *values]), least)), xlabel="trial")
+def _bars(axis: Axes, qualities: dict[int, Quality], values: Sequence[float], least: float) -> None:
+    """A bar a trial at its number, coloured by its kind; the axis ends above `least`."""
+    kinds = [quality.take.experiment for quality in qualities.values()]
+    axis.bar(list(qualities), values, color=[COLORS[kind] for kind in kinds])
+    axis.set(xlim=(min(qualities) - 1, max(qualities) + 1), ylim=(0, max(1.4 * np.nanmax([0, *values]), least)))
+    axis.set_xlabel("trial")
     axis.xaxis.set_major_locator(MaxNLocator(integer=True))
     axis.yaxis.set_major_locator(MaxNLocator(5, integer=least >= 1))
     axis.legend(handles=[Patch(color=COLORS[name], label=name) for name in COLORS if name in kinds], ncols=3)
