@@ -1,20 +1,24 @@
 """Pictures of the data: the quality page of a session, and what the filter did to it."""
 
 import textwrap
+from collections.abc import Sequence
 from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
+from matplotlib.ticker import MaxNLocator
 
 from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, PARTLY, SEEN, UNSEEN, VALIDATE
 from trunkline.signals.base_frame import average_base, to_base_frame
 from trunkline.signals.runs import stretches
+from trunkline.takes.agreement import MotorClock
 from trunkline.takes.gathering import Gathered
 from trunkline.takes.quality import Quality, by_sentence
-from trunkline.trials.experiments import EXPERIMENTS
+from trunkline.trials.experiments import EXPERIMENTS, is_stepwise
 from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
 
@@ -24,86 +28,124 @@ COLORS = dict(zip(EXPERIMENTS, cycle((MEASURED, IDENTIFIED, VALIDATE, INITIAL)),
 
 
 def quality_figure(qualities: list[Quality], gathered: Gathered) -> Figure:
-    """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals."""
-    refused, agreed = gathered.refused, gathered.clock
+    """The quality page: coverage over time, gaps, noise, rates, clock fit, repairs and refusals; panels with something
+    to show. Of poses in steps, the time between them says nothing: they are counted."""
+    numbered = dict(enumerate(qualities))
+    stepwise = {number: one for number, one in numbered.items() if is_stepwise(one.take.experiment)}
+    timed = {number: one for number, one in numbered.items() if number not in stepwise}
+    fits = [fit for q in qualities for fit in (q.findings.by_motion, q.findings.by_log_times) if fit is not None]
+    panels = [_gaps, _noise, _stamps] * bool(timed)
     figure = plt.figure(figsize=(14, 13))
     left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(3, 2))[0]
     _coverage(left.subplots(), qualities)
-    gaps, noise, jitter, clock, words = right.subplots(5, 1, height_ratios=(1, 1, 1, 1, 1.4))
+    count = len(panels) + bool(stepwise) + bool(fits)
+    *axes, words = right.subplots(count + 1, 1, height_ratios=[1] * count + [max(1.4, 5.4 - count)])
+    for panel in panels:
+        panel(axes.pop(0), timed)
+    if stepwise:
+        _poses(axes.pop(0), stepwise)
+    if fits:
+        _clock(axes.pop(0), qualities, gathered.clock)
+    _words(words, qualities, gathered.refused)
+    return figure
 
-    lengths = 1e3 * np.concatenate([quality.gaps for quality in qualities])
+
+def _gaps(axis: Axes, qualities: dict[int, Quality]) -> None:
+    lengths = 1e3 * np.concatenate([quality.gaps for quality in qualities.values()])
     if len(lengths):
-        gaps.hist(lengths, bins=40, color=IDENTIFIED)
-    gaps.set(
-        title=f"Gaps: {len(lengths)}",
-        xlabel="length (ms)",
-        ylabel="count",
-        yscale="log" if len(lengths) > 100 else "linear",
-    )
+        axis.hist(lengths, bins=40, color=IDENTIFIED)
+    scale = "log" if len(lengths) > 100 else "linear"
+    axis.set(title=f"Gaps: {len(lengths)}", xlabel="length (ms)", ylabel="count", yscale=scale)
 
-    segments = qualities[0].take.segments
-    noise.boxplot(
-        [[1e3 * quality.position_noise[i] for quality in qualities] for i in range(len(segments))],
+
+def _noise(axis: Axes, qualities: dict[int, Quality]) -> None:
+    segments = next(iter(qualities.values())).take.segments
+    axis.boxplot(
+        [[1e3 * quality.position_noise[i] for quality in qualities.values()] for i in range(len(segments))],
         tick_labels=[segment.removeprefix("unit_") for segment in segments],
         showfliers=False,
     )
-    noise.set(title="Noise per segment", xlabel="segment", ylabel="position (mm)", ylim=(0, None))
+    axis.set(title="Noise per segment", xlabel="segment", ylabel="position (mm)", ylim=(0, 1.1 * axis.get_ylim()[1]))
 
-    numbers = np.arange(len(qualities))
-    colors = [COLORS[quality.take.experiment] for quality in qualities]
-    jitters = [np.nan if q.findings.frames is None else 1e3 * q.findings.frames.jitter for q in qualities]
-    jitter.bar(numbers, jitters, color=colors)
-    rates = [1 / quality.interval for quality in qualities]
-    title = f"Frame stamps: {np.median(rates):.1f} Hz, {sum(q.dropped for q in qualities)} frames dropped"
-    jitter.set(title=title, xlabel="trial", ylabel="jitter (ms)")
-    jitter.set_ylim(0, max(1.4 * np.nanmax([0, *jitters]), LEAST_JITTER))
 
-    clock.axhline(1e3 * agreed.offset, color=MEASURED, lw=1)
-    clock.set_visible(any(len(quality.take.tendons) for quality in qualities))
+def _stamps(axis: Axes, qualities: dict[int, Quality]) -> None:
+    """Jitter of the stamps over frame numbers; where there is none, how many frames lack."""
+    rates, dropped = zip(*[(1 / quality.interval, quality.dropped) for quality in qualities.values()], strict=True)
+    frames = [quality.findings.frames for quality in qualities.values()]
+    jitters = [np.nan if found is None else 1e3 * found.jitter for found in frames]
+    uneven = np.nanmax([0, *jitters]) > LEAST_JITTER / 100
+    _bars(axis, qualities, jitters if uneven else dropped, LEAST_JITTER if uneven else 1)
+    axis.set_title(f"Frame stamps: {np.median(rates):.1f} Hz, {sum(dropped)} frames dropped")
+    axis.set_ylabel("jitter (ms)" if uneven else "frames dropped")
+
+
+def _poses(axis: Axes, qualities: dict[int, Quality]) -> None:
+    counts = [len(quality.take.time) for quality in qualities.values()]
+    _bars(axis, qualities, counts, 1)
+    axis.set(title=f"At rest in steps: {sum(counts)} poses", ylabel="poses")
+
+
+def _bars(axis: Axes, qualities: dict[int, Quality], values: Sequence[float], least: float) -> None:
+    """A bar a trial at its number, coloured by its kind; the axis ends above `least`."""
+    kinds = [quality.take.experiment for quality in qualities.values()]
+    axis.bar(list(qualities), values, color=[COLORS[kind] for kind in kinds])
+    axis.set(xlim=(min(qualities) - 1, max(qualities) + 1), ylim=(0, max(1.4 * np.nanmax([0, *values]), least)))
+    axis.set_xlabel("trial")
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+    axis.yaxis.set_major_locator(MaxNLocator(5, integer=least >= 1))
+    axis.legend(handles=[Patch(color=COLORS[name], label=name) for name in COLORS if name in kinds], ncols=3)
+
+
+def _clock(axis: Axes, qualities: list[Quality], agreed: MotorClock) -> None:
+    axis.axhline(1e3 * agreed.offset, color=MEASURED, lw=1)
     for label, fill, fits in (
         ("by motion, the arm's lag in it", "none", [q.findings.by_motion for q in qualities]),
         ("by log times", VALIDATE, [q.findings.by_log_times for q in qualities]),
     ):
-        offsets = [np.nan if fit is None else 1e3 * fit.offset for fit in fits]
-        clock.scatter(numbers, offsets, s=18, facecolor=fill, edgecolor=VALIDATE, label=label)
-    clock.legend()
+        if any(fit is not None for fit in fits):
+            offsets = [np.nan if fit is None else 1e3 * fit.offset for fit in fits]
+            axis.scatter(np.arange(len(fits)), offsets, s=18, facecolor=fill, edgecolor=VALIDATE, label=label)
+    axis.legend()
     uncertain = "" if agreed.uncertainty is None else f" ± {1e3 * agreed.uncertainty:.1f}"
     found = "no trial tells" if agreed.by is None else f"{1e3 * agreed.offset:.1f}{uncertain} ms, by {agreed.by}"
-    clock.set(title=f"Cameras' clock − motors' clock: {found}", xlabel="trial", ylabel="offset (ms)")
+    title = f"Cameras' clock − motors' clock:\n{found}"
+    axis.set(title=title, xlabel="trial", ylabel="offset (ms)", xlim=(-1, len(qualities)))
+    axis.xaxis.set_major_locator(MaxNLocator(integer=True))
 
-    words.axis("off")
+
+def _words(axis: Axes, qualities: list[Quality], refused: dict[str, str]) -> None:
+    axis.axis("off")
     lines = [f"refused {name}: {reason}" for name, reason in refused.items()]
     lines += by_sentence(qualities, lambda found: [f"check {said}" for said in found.warnings] + found.repairs)
     wrapped = [part for line in lines for part in textwrap.wrap(line, 78)] or ["nothing"]
     more = [f"… and {len(wrapped) - 14} lines more in quality.json"] if len(wrapped) > 14 else []
-    words.set_title("Refused, repaired, and to be checked")
-    words.text(0, 1, "\n".join(wrapped[:14] + more), va="top", fontsize=8, transform=words.transAxes)
-    for panel in (jitter, clock):
-        panel.set_xlim(-1, len(qualities))
-        panel.xaxis.get_major_locator().set_params(integer=True)
-    kinds = {quality.take.experiment for quality in qualities}
-    jitter.legend(handles=[Patch(color=COLORS[name], label=name) for name in COLORS if name in kinds], ncols=3)
-    return figure
+    axis.set_title("Refused, repaired, and to be checked")
+    axis.text(0, 1, "\n".join(wrapped[:14] + more), va="top", fontsize=8, transform=axis.transAxes)
 
 
-def _coverage(axes, qualities: list[Quality]) -> None:
-    """A band a trial, in it a row a segment: what was seen when."""
+def _coverage(axes: Axes, qualities: list[Quality]) -> None:
+    """A band a trial, in it a row a segment: what was seen when. Of poses in steps each stands until the next."""
     bins = int(max(quality.take.time[-1] for quality in qualities) / BIN) + 1
     bands, ticks, row = [], [], 0
     for quality in qualities:
         take = quality.take
         place = (take.time / BIN).astype(int)
         frames = np.bincount(place, minlength=bins)
+        pose = np.searchsorted(place, np.arange(bins), side="right") - 1
+        tall = 1 + 4 // len(take.segments)  # rows a segment
         apart = 1 + len(take.segments) // 10  # empty rows to the next band
-        band = np.full((len(take.segments) + apart, bins), np.nan)
+        band = np.full((tall * len(take.segments) + apart, bins), np.nan)
         for index in range(len(take.segments)):
             good = np.isfinite(take.positions[:, index, 0])
-            share = np.bincount(place, weights=good, minlength=bins) / np.maximum(frames, 1)
+            if is_stepwise(take.experiment):
+                share = good[pose]
+            else:
+                share = np.bincount(place, weights=good, minlength=bins) / np.maximum(frames, 1)
             level = np.where(share == 0, 0, np.where(share < 1, 1, 2)).astype(float)
             level[place[-1] + 1 :] = np.nan
-            band[index] = level
+            band[tall * index : tall * (index + 1)] = level
         bands.append(band)
-        ticks.append(row + len(take.segments) / 2)
+        ticks.append(row + tall * len(take.segments) / 2)
         row += len(band)
     extent = (0, bins * BIN, row, 0)
     colors = ListedColormap([UNSEEN, PARTLY, SEEN])
@@ -137,11 +179,8 @@ def filter_figure(take: Take, trial: Trial) -> Figure:
         panel.axvline(trial.start, color=INITIAL, lw=1)
         for begin, end in stretches(~trial.measured[:, last]):
             panel.axvspan(trial.time[begin], trial.time[end], color=INITIAL, alpha=0.15, lw=0)
-    axes[0].set(
-        title=f"{trial.name}, {trial.segments[last]}: measured and filtered", ylabel="position (mm)"
-    )
-    axes[0].legend(ncols=3)
-    axes[1].set(
-        xlabel="time (s), line: detected start, shaded: not measured", ylabel="removed (mm)", ylim=(-2, 2)
-    )
+    title = f"{trial.name}, segment {trial.segments[last]}: measured and filtered"
+    axes[0].set(title=title, ylabel="position (mm)")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    axes[1].set(xlabel="time (s), line: detected start, shaded: not measured", ylabel="removed (mm)", ylim=(-2, 2))
     return figure

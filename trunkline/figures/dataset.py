@@ -10,6 +10,7 @@ from trunkline.frames import in_plane_of_tilt
 
 SLICE = 0.008  # m, half thickness of the slices shown
 FEW = 2000  # tips under one gravity, up to which the slices are four times as thick
+LEAST_MM = 1e-9  # drawn: less is none
 GOAL_MM = 0.02  # median distance of the statics from MuJoCo at rest
 
 
@@ -40,7 +41,8 @@ def density_figure(densities: list[Density]) -> Figure:
             ax.set_title(f"{under}, {label}\n{len(tips)} tips", fontsize=9)
         for tips, color, label in ((density.before, INITIAL, "before"), (density.after, IDENTIFIED, "after")):
             counts = np.sort(_per_cell(tips))
-            column[2].plot(np.linspace(0, 100, len(counts)), counts / counts.mean(), color=color, label=label)
+            width = 3.0 if label == "before" else 1.2  # where nothing was thinned, both are seen
+            column[2].plot(np.linspace(0, 100, len(counts)), counts / counts.mean(), color=color, label=label, lw=width)
         column[2].set(yscale="log", xlabel="cells of 2 cm, emptiest first (%)", ylim=(0.02, 30))
     axes[0, 0].set_ylabel("z (mm), base at the triangle")
     axes[1, 0].set_ylabel("z (mm)")
@@ -72,20 +74,26 @@ def _per_cell(tips: np.ndarray, edge: float = 0.02) -> np.ndarray:
 
 
 def deviation_figure(deviation: pd.DataFrame) -> Figure:
-    """Distance between each sample's tip and MuJoCo's at rest without friction, and the band that friction opens."""
-    figure, axes = plt.subplots(1, 2, figsize=(9, 4.2), sharey=True)
-    floor = np.maximum(deviation["deviation_mm"], 1e-9)
-    angle, tension = np.degrees(deviation["theta_g"]), deviation["largest_tension"]
-    for ax, x, label in zip(axes, (angle, tension), ("gravity angle θ_G (°)", "largest tension (N)"), strict=True):
+    """Distance between each sample's tip and MuJoCo's at rest without friction, and the band that friction opens; over
+    gravity's angle, where there are several, and over tension."""
+    values, band = deviation["deviation_mm"], deviation["friction_band_mm"]
+    floor = np.maximum(values, LEAST_MM)
+    shown = {"largest tension (N)": deviation["largest_tension"]}
+    if deviation["theta_g"].nunique() > 1:
+        shown = {"gravity angle θ_G (°)": np.degrees(deviation["theta_g"])} | shown
+    size = max(4.5 * len(shown), LEAST_WIDTH + 1), 4.2
+    figure, axes = plt.subplots(1, len(shown), figsize=size, sharey=True, squeeze=False)
+    for ax, (label, x) in zip(axes[0], shown.items(), strict=True):
         ax.scatter(x, floor, s=9, color=IDENTIFIED, linewidths=0, label="FK to MuJoCo at rest, friction off")
-        ax.scatter(x, deviation["friction_band_mm"], s=9, color=INITIAL, linewidths=0, label="band of dry friction")
+        if band.any():
+            ax.scatter(x, band, s=9, color=INITIAL, linewidths=0, label="band of dry friction")
         ax.axhline(GOAL_MM, color=VALIDATE, linestyle="--", label=f"goal for the median, {GOAL_MM:g} mm")
         ax.set(yscale="log", xlabel=label)
-    axes[0].set_ylabel("distance of tips (mm)")
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, markerscale=2)
-    values, band = deviation["deviation_mm"], deviation["friction_band_mm"]
+    axes[0, 0].set_ylabel("distance of tips (mm)")
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, markerscale=2)
+    rubs = f"friction: median {band.median():.2g} mm, max {band.max():.2g} mm" if band.any() else "no dry friction"
     figure.suptitle(
         f"Statics against MuJoCo, {len(deviation)} samples: median {values.median():.2g} mm, "
-        f"max {values.max():.2g} mm\nfriction: median {band.median():.2g} mm, max {band.max():.2g} mm"
+        f"max {values.max():.2g} mm\n{rubs}"
     )
     return figure

@@ -4,29 +4,39 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from trunkline.figures.scoring import MODELS
-from trunkline.figures.style import DOUBTFUL, IDENTIFIED, MEASURED
+from trunkline.figures.style import DOUBTFUL, IDENTIFIED, LEAST_WIDTH, MEASURED
 from trunkline.identification.error_tables import LABELS
 from trunkline.identification.evaluation import Prediction
 from trunkline.identification.identify import Identification
 from trunkline.identification.parameters import parameter_named
 
+LEAST_FALL = 4.0  # highest over lowest value of an axis of losses, at least
 NARROWEST = 60.0  # mm, of an axis: noise shall not look like motion
 COLORS = {label: color for label, (color, *_) in MODELS.items()}
 
 
 def convergence_figure(identification: Identification) -> Figure:
-    """Best and mean loss of every phase."""
+    """Best and mean loss of every phase, which each have a loss of their own: of other trials, or frames."""
     phases = identification.convergence
-    figure, axes = plt.subplots(1, len(phases), figsize=(3.4 * len(phases), 3.4), squeeze=False)
+    figure, axes = plt.subplots(1, len(phases), figsize=(max(3.4 * len(phases), LEAST_WIDTH), 3.6), squeeze=False)
     for axis, (phase, history) in zip(axes[0], phases.items(), strict=True):
         axis.semilogy(history.best, color=IDENTIFIED, marker="o", markersize=3, label="best")
         if history.mean != history.best:
-            axis.semilogy(history.mean, color=DOUBTFUL, label="mean of a generation's trials")
-            axis.legend()
-        axis.set(title=phase.replace("_", " "), xlabel="generation" if history.mean != history.best else "iteration")
+            axis.semilogy(history.mean, color=DOUBTFUL, label="mean of a generation's trials", zorder=1)
+        fallen = 100 * (1 - history.best[-1] / history.best[0])
+        axis.set_title(f"{phase.replace('_', ' ')}: loss {fallen:.2g} % less")
+        axis.set_xlabel("generation" if history.mean != history.best else "iteration")
+        axis.xaxis.set_major_locator(MaxNLocator(integer=True))
+        low, high = axis.get_ylim()
+        spare = max(1.0, np.sqrt(LEAST_FALL * low / high))  # ticks of a flat curve would all be the same
+        axis.set_ylim(low / spare, high * spare)
     axes[0, 0].set_ylabel("loss")
+    entries = {name: line for axis in axes[0] for line, name in zip(*axis.get_legend_handles_labels(), strict=True)}
+    if len(entries) > 1:
+        figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=2)
     return figure
 
 
@@ -44,7 +54,7 @@ def error_figure(curves: pd.DataFrame, floor: dict[str, float]) -> Figure:
     figure, axes = plt.subplots(1, len(panels), figsize=(4.5 * len(panels), 3.4))
     for axis, (column, (label, title, least)) in zip(axes, panels.items(), strict=True):
         for model, rows in curves.groupby("model", sort=False):
-            color, line, _ = MODELS[model]
+            color, line, *_ = MODELS[model]
             axis.semilogy(rows.time_s, rows[column], line, color=color, label=model)
         if least is not None:
             axis.axhline(least, color=MEASURED, linestyle=":", label=LABELS["noise_floor"])
@@ -58,8 +68,10 @@ def distance_figure(table: pd.DataFrame, trial: str) -> Figure:
     figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
     models = [name for name in table.source.unique() if name != "measured"]
     for axis, model in zip(axes, models, strict=True):
-        for source, style in (("measured", {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45}),
-                              (model, {"color": COLORS[model], "linewidth": 1.2})):
+        for source, style in (
+            ("measured", {"color": MEASURED, "linewidth": 2.2, "alpha": 0.45}),
+            (model, {"color": COLORS[model], "linewidth": 1.2}),
+        ):
             for number, (_, rows) in enumerate(table[table.source == source].groupby("segment", sort=False)):
                 axis.plot(rows.time_s, rows.distance_mm, label=source if number == 0 else None, **style)
         axis.set(xlabel="time (s)", title=f"{trial}: {model} model", ylim=0)
@@ -86,45 +98,59 @@ def path_figure(predictions: dict[str, Prediction]) -> Figure:
         spare = max(0.0, NARROWEST - (high - low)) / 2
         axis.set_ylim(low - spare, high + spare)
     axes[0].set_title(f"Last tracked segment in the base frame, {experiment.name}")
-    axes[0].legend(ncols=3, loc="upper right")
     axes[-1].set_xlabel("time (s)")
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
 
 def shape_figure(table: pd.DataFrame) -> Figure:
-    """Measured and simulated shape of each trial, side view in the base frame."""
+    """Measured and simulated shape of each trial, side view in the base frame; a number is the mount's tilt, where
+    trials differ in it."""
     figure, axis = plt.subplots(figsize=(6.5, 6))
+    several = table.tilt_deg.round().nunique() > 1
     for (_, source), rows in table.groupby(["trial", "source"], sort=False):
-        x, z = np.append(0, rows.x_mm), np.append(0, rows.z_mm)
+        x, z, tilt = np.append(0, rows.x_mm), np.append(0, rows.z_mm), rows.tilt_deg.iloc[0].round()
         if source == "measured":
             axis.plot(x, z, "o", color=MEASURED, markersize=4, alpha=0.6)
-            axis.annotate(f"{rows.tilt_deg.iloc[0]:.0f}°", (x[-1], z[-1]), xytext=(6, 0), textcoords="offset points")
+            if several and tilt:
+                axis.annotate(f"{tilt:.0f}°", (x[-1], z[-1]), xytext=(6, 0), textcoords="offset points")
         else:
             axis.plot(x, z, color=COLORS[source], linewidth=1.6 if source == "identified" else 1.1)
     for source in table.source.unique():
         axis.plot([], [], "o" if source == "measured" else "-", color=COLORS.get(source, MEASURED), label=source)
-    axis.legend(loc="upper right")
-    axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title="Shapes, validate split")
+    figure.legend(loc="outside lower center", ncols=3)
+    title = "Shapes, validate split" + ("; numbers: the mount's tilt, where it is tilted" if several else "")
+    axis.set(aspect="equal", xlabel="x (mm)", ylabel="z (mm)", title=title)
     return figure
 
 
-def parameter_figure(
-    identification: Identification, bounds, units: dict[str, str], undetermined: list[str]
-) -> Figure:
+def parameter_figure(identification: Identification, bounds, units: dict[str, str], undetermined: list[str]) -> Figure:
     """Each scalar with its 95 % interval within its range, grey if that is open or a bound, and per-joint factors."""
-    panels = 1 + bool(identification.factors)
-    figure, axes = plt.subplots(1, panels, figsize=(5.5 * panels, 3.2), squeeze=False)
+    panels, count = 1 + bool(identification.factors), len(identification.values)
+    figure, axes = plt.subplots(1, panels, figsize=(6.5 * panels, max(1.4 + 0.42 * count, 2.4)), squeeze=False)
     for row, (name, value) in enumerate(identification.values.items()):
         low, high, place = parameter_named(name).coordinate([bounds[name].low, bounds[name].high, value])
         place = (place - low) / (high - low)
         width = identification.certainty.half_width[row] / (high - low)
         doubt = "not determined" if name in undetermined else "on a bound" if name in identification.at_bound else ""
         axes[0, 0].errorbar(place, row, xerr=width, fmt="o", color=DOUBTFUL if doubt else IDENTIFIED, capsize=4)
-        axes[0, 0].annotate(f"{value:.4g} {units[name]} {doubt}".strip(), (place, row), xytext=(0, 8),
-                            textcoords="offset points", ha="center", fontsize=9)
-    axes[0, 0].set(xlim=(0, 1), ylim=(-0.6, len(identification.values) - 0.2), xlabel="place in the range searched",
-                   yticks=range(len(identification.values)), yticklabels=list(identification.values),
-                   title="Parameters, 95 % intervals given the model")
+        side = "left" if place < 0.2 else "right" if place > 0.8 else "center"
+        axes[0, 0].annotate(
+            f"{value:.4g} {units[name]} {doubt}".strip(),
+            (place, row),
+            xytext=(0, 7),
+            textcoords="offset points",
+            ha=side,
+            fontsize=9,
+        )
+    axes[0, 0].set(
+        xlim=(0, 1),
+        ylim=(count - 0.6, -0.8),
+        xlabel="place in the range searched",
+        yticks=range(count),
+        yticklabels=list(identification.values),
+        title="Parameters, 95 % intervals given the model",
+    )
     for name, factors in identification.factors.items():
         axes[0, 1].bar(np.arange(1, len(factors) + 1), (factors - 1) * 100, color=IDENTIFIED)
         axes[0, 1].set(xlabel="unit, from the base", ylabel="%", title=f"Per-joint factors of {name}, minus 1")

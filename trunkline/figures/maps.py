@@ -54,7 +54,8 @@ def maps_figure(maps: Maps, tips: list[np.ndarray]) -> Figure:
     add_line(b, np.array([[0, 0, 0], [0, 0, -length]]), MEASURED, 4)
     frame(b, [maps.soft.meshes[nearest[0]].vertices, np.zeros((1, 3))])
 
-    c = space(figure, 223, "(c) Soft arm" + _under(maps, sorted(set(nearest))))
+    under = _under(maps, sorted(set(nearest)))
+    c = space(figure, 223, "(c) Soft arm" + (under or ", seen from the front"))
     c.view_init(elev=12, azim=-80)
     c.yaxis.set_major_locator(MaxNLocator(2))
     for index, color in zip(sorted(set(nearest)), (SOFT, VALIDATE, IDENTIFIED), strict=False):
@@ -83,8 +84,15 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
         for reached, color in ((True, IDENTIFIED), (False, DOUBTFUL)):
             rows = (check.reachable == reached) & ((check.claimed == check.reachable) == right)
             name = ("reached" if reached else "not reached") + ("" if right else ", map wrong")
-            rigid.scatter(radius[rows], check.points[rows, 2], s=size, marker=mark, zorder=3,
-                          color=color if right else INITIAL, label=f"{name} ({rows.sum()})")
+            rigid.scatter(
+                radius[rows],
+                check.points[rows, 2],
+                s=size,
+                marker=mark,
+                zorder=3,
+                color=color if right else INITIAL,
+                label=f"{name} ({rows.sum()})",
+            )
     rigid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8, markerscale=1.5)
     rigid.set(title=f"Rigid: {100 * check.rigid.accuracy:.1f} % of labels agree", xlabel="±radius (m)", ylabel="z (m)")
 
@@ -99,8 +107,14 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
         told = f"{np.degrees(angle):.0f}°" if len(shown) > 1 else "no gravity"
         soft.scatter(near[:, 0], near[:, 2], s=2, color=color, label=told)
     soft.plot(0, 0, "^", color=BASE, markersize=8)
-    soft.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=5, fontsize=8, markerscale=4,
-                title="lines: maps, dots: tips" + (", at gravity angle" if len(shown) > 1 else ""))
+    soft.legend(
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.16),
+        ncols=5,
+        fontsize=8,
+        markerscale=4,
+        title="lines: maps, dots: tips" + (", at gravity angle" if len(shown) > 1 else ""),
+    )
     soft.set(title="Soft: the shell of its tips", xlabel="x (m)", ylabel="z (m)")
 
     _fill_slice(hybrid, maps.hybrid, HYBRID)
@@ -126,24 +140,31 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
 
 
 def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
-    """The soft maps under gravities without one.
+    """The soft maps under gravities without one; without gravity, the map against tips that it was not made of.
 
     Args:
         heldout: columns `angle_deg`, `iou`, `reachable`, `beyond`.
         beyond: m, how far from every tip the points beyond reach are.
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.6))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
+    several = len(heldout) > 1
     left.plot(heldout["angle_deg"], heldout["iou"], "o-", color=IDENTIFIED, markersize=4)
-    left.axhline(GOAL_IOU, color=VALIDATE, linestyle="--", label=f"goal, {GOAL_IOU:g}")
-    left.set(ylim=(0.93, 1), ylabel="IoU", title="Map in between against gravity's own")
+    if several:  # otherwise the other tips are fewer, so their map is smaller
+        left.axhline(GOAL_IOU, color=VALIDATE, linestyle="--", label=f"goal, {GOAL_IOU:g}")
+        left.legend(loc="lower right")
+    title = "Map in between against gravity's own" if several else "Map against that of other tips"
+    left.set(ylim=(min(0.93, heldout["iou"].min() - 0.01), 1), ylabel="IoU", title=title)
     for name, color, label in (
         ("reachable", IDENTIFIED, "tips"), ("beyond", INITIAL, f"points {1e3 * beyond:.0f} mm from every tip")
-    ):
+    ):  # fmt: skip
         right.plot(heldout["angle_deg"], 100 * heldout[name], "o-", color=color, markersize=4, label=label)
     right.set(ylim=(-3, 103), ylabel="called reachable (%)", title="The signal that a headset shows")
-    for ax, place in ((left, "lower right"), (right, "center right")):
-        ax.set_xlabel("gravity angle, between the maps (°)")
-        ax.legend(loc=place)
+    right.legend(loc="center right")
+    for ax in (left, right):
+        if several:
+            ax.set_xlabel("gravity angle, between the maps (°)")
+        else:
+            ax.set_xticks([0], ["no gravity"])
     return figure
 
 

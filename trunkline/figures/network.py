@@ -28,19 +28,30 @@ def tip_error_figure(errors: dict[str, np.ndarray], length: float) -> Figure:
         errors: name of a set of targets to tip errors, m.
         length: of the arm, m.
     """
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.0))
     bins = np.geomspace(1e-2, 1e2, 70)
     for (name, values), color in zip(errors.items(), (IDENTIFIED, VALIDATE, INITIAL, MEASURED), strict=False):
         millimetres = np.sort(values) * 1e3
-        left.hist(np.clip(millimetres, bins[0], bins[-1]), bins=bins, histtype="step", density=False, color=color,
-                  weights=np.full(len(millimetres), 100 / len(millimetres)), linewidth=1.5)
-        right.plot(millimetres, np.linspace(0, 100, len(millimetres)), color=color,
-                   label=f"{name}: median {np.median(millimetres):.2f} mm")
+        left.hist(
+            np.clip(millimetres, bins[0], bins[-1]),
+            bins=bins,
+            histtype="step",
+            density=False,
+            color=color,
+            weights=np.full(len(millimetres), 100 / len(millimetres)),
+            linewidth=1.5,
+        )
+        right.plot(
+            millimetres,
+            np.linspace(0, 100, len(millimetres)),
+            color=color,
+            label=f"{name}: median {np.median(millimetres):.2f} mm",
+        )
     left.set(xscale="log", xlabel="tip position error after FK (mm)", ylabel="targets (% a bin)")
     right.set(xscale="log", xlim=(1e-2, 1e2), xlabel="tip position error after FK (mm)", ylabel="targets below (%)")
     right.axvline(0.01 * length * 1e3, color=MEASURED, linestyle="--", linewidth=1)
     right.text(0.0105 * length * 1e3, 5, "1 % of length", fontsize=8)
-    right.legend(loc="center left")
+    figure.legend(*right.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     figure.suptitle("Tip error of the network: its lengths fed back through the statics")
     return figure
 
@@ -63,8 +74,9 @@ def error_map_figure(targets: pd.DataFrame) -> Figure:
         near = (targets["theta_g"] - angle).abs() < BAND
         rows = targets[near & (targets["y"].abs() < SLICE)]
         rows = rows.sort_values("error_mm")
-        dots = ax.scatter(rows["x"] * 1e3, rows["z"] * 1e3, c=np.log10(rows["error_mm"] + 1e-3), s=6, linewidths=0,
-                          vmin=-1.5, vmax=1)
+        dots = ax.scatter(
+            rows["x"] * 1e3, rows["z"] * 1e3, c=np.log10(rows["error_mm"] + 1e-3), s=6, linewidths=0, vmin=-1.5, vmax=1
+        )
         ax.plot(0, 0, "^", color=BASE, markersize=5)
         ax.set(aspect="equal", xlim=extent["x"], ylim=extent["z"])
         ax.set_xlabel("towards gravity (mm)" if several else "x (mm)")
