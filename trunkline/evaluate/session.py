@@ -18,12 +18,13 @@ from trunkline.trials.splits import SPLITS
 from trunkline.trials.trial import Trial, read_trials
 
 
-def trials_of(folder: Path, root: Path) -> list[Trial]:
+def trials_of(folder: Path, root: Path, caller: str) -> list[Trial]:
     """Every trial of a session, of all splits, filtered; what is refused or doubtful is said on stderr.
 
     Args:
         folder: logs and session.yaml, several such folders of one arm, or what the stage `filter` writes.
         root: holds the params.yaml that says how to take logs in and to filter them.
+        caller: the command, which begins what is said.
 
     Raises:
         InputError: it is no such folder, or no trial of it can be used.
