@@ -152,7 +152,8 @@ def test_logs_give_the_trials_that_the_stages_make_of_them(tmp_path, monkeypatch
     monkeypatch.chdir(workbench(tmp_path))
     run_stage("ingest", ingest.Config, ingest.main)
     run_stage("filter", filter_stage.Config, filter_stage.main)
-    expected, found = read_trials(filter_stage.PROCESSED, SPLITS), trials_of(tmp_path / "data/raw/demo", tmp_path, "evaluate")
+    expected = read_trials(filter_stage.PROCESSED, SPLITS)
+    found = trials_of(tmp_path / "data/raw/demo", tmp_path, "evaluate")
     assert len(expected) == len(found) == 4
     for one, other in zip(expected, found, strict=True):
         assert one.name == other.name

@@ -58,8 +58,8 @@ def load_of(model: mujoco.MjModel) -> float:
 
 
 def unit_lines(model: mujoco.MjModel) -> list[str]:
-    """Size and masses, then runs of units that are alike, a line each; of an arm of which each is another, the first and
-    the last."""
+    """Size and masses, then runs of units that are alike, a line each; where each is another, the first and the last.
+    """
     units = units_of(model)
     length, mass, load = sum(unit.length for unit in units), sum(unit.mass for unit in units), load_of(model)
     lines = [f"{len(units)} units, {length:.4g} mm, {mass:.4g} g"]

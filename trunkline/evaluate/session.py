@@ -56,7 +56,8 @@ def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], 
 
 def _from_logs(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[Take]]:
     ingest, settings = settings_of("ingest", root), settings_of("filter", root)
-    found = gather_each(session_folders(folder), partial(_gathered, ingest=ingest, caller=caller), ingest.plausible.distance)
+    take = partial(_gathered, ingest=ingest, caller=caller)
+    found = gather_each(session_folders(folder), take, ingest.plausible.distance)
     gathered = together(list(found.values()))
     for name, reason in gathered.refused.items():
         print(f"{caller}: left out {name}: {reason}", file=sys.stderr)
