@@ -30,6 +30,7 @@ NUMBERS = 3  # that a trial tells
 FRAMES = 180  # of a moving trial that are looked at
 TWO_SIDED = 1.96
 Z = np.array([0.0, 0.0, 1.0])
+TRIED = 6  # trials, at most, with other axes up
 BETTER = 2.0  # times that the described arm must fit with another axis up before that is said
 ALIKE = 0.95  # correlation of two estimates, from which on trials tell hardly more than one of them
 
@@ -106,7 +107,7 @@ def described_lines(
         mine, its = (one.of(lambda e: not EXPERIMENTS[e.kind].hangs) for one in (described, plain))
         if mine.overall()["e_position_mm"] >= its.overall()["e_position_mm"]:
             lines.append(f"no nearer than a straight arm: look at {_doubtful(model, bent)}")
-    return lines + _up_lines(model, experiments, fit.segments, ups or {}, off["e_position_mm"], still["e_position_mm"])
+    return lines + _up_lines(model, fit.segments, ups or {}, described, plain)
 
 
 def _doubtful(model: mujoco.MjModel, bent: list[Experiment]) -> str:
@@ -133,13 +134,20 @@ def other_ups(takes: list[Take]) -> dict[str, np.ndarray]:
 
 
 def _up_lines(
-    model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], ups: dict[str, np.ndarray],
-    off: float, still: float,
-) -> list[str]:  # fmt: skip
-    """Whether the described model fits much better with another axis up, to within `off` and `still`, mm: how far it
-    is with the one that is declared, and how far a straight arm is."""
-    if not ups or any(e.name not in ups for e in experiments):
+    model: mujoco.MjModel,
+    segments: tuple[str, ...],
+    ups: dict[str, np.ndarray],
+    described: Prediction,
+    plain: Prediction,
+) -> list[str]:
+    """Whether the described model fits some of the trials much better with another axis up, than with the one that is
+    declared, `described`, and than the straight arm, `plain`."""
+    experiments = [e for e in described.experiments if e.name in ups]
+    experiments = experiments[:: -(-len(experiments) // TRIED) or 1]
+    if not experiments:
         return []
+    names = {e.name for e in experiments}
+    off, still = (one.of(lambda e: e.name in names).overall()["e_position_mm"] for one in (described, plain))
     errors = []
     for number in range(len(AXES)):
         turned = [replace(e, gravity=ups[e.name][number]) for e in experiments]
@@ -147,8 +155,9 @@ def _up_lines(
     best = int(np.argmin(errors))
     if errors[best] > min(off, still) / BETTER:
         return []
-    axis = ", ".join(f"{value:g}" for value in AXES[best])
-    return [f"`frame.up` in session.yaml: [{axis}] would fit better: {errors[best]:.3g} mm for {off:.3g} mm"]
+    axis = ", ".join(f"{value + 0.0:g}" for value in AXES[best])
+    found = f"{errors[best]:.3g} mm for {off:.3g} mm, of {len(experiments)} trials"
+    return [f"`frame.up` in session.yaml: [{axis}] would fit better: {found}"]
 
 
 def to_identify_from(
