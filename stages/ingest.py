@@ -51,6 +51,8 @@ def main(config: Config) -> None:
         save_figure(quality_figure(qualities, gathered), artifacts / "quality.png")
     for reason in gathered.refused.values():
         print(f"ingest: warning: left out: {reason}", file=sys.stderr)
+    for line in by_sentence(qualities, lambda found: found.repairs):
+        print(f"ingest: repaired: {line}", file=sys.stderr)
     for line in by_sentence(qualities, lambda found: found.warnings):
         print(f"ingest: warning: {line}", file=sys.stderr)
 

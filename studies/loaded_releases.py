@@ -29,7 +29,7 @@ def measured(source: Path, load: float) -> dict:
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         session = Path(folder) / "session"
         make_loaded_session(source, load, session)
-        trials = trials_of(session, HERE)
+        trials = trials_of(session, HERE, "loaded_releases")
     written = written_beside(MODEL, HERE)
     return evaluate({"model": read_arm(MODEL)}, trials, written.frames, written.command_delay)[0]
 

@@ -71,7 +71,7 @@ def show(source: Path) -> None:
     own = read_trials(HERE / "data" / "processed" / "filter", DECIDING)
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         make_loaded_session(source, 0.1, Path(folder) / "session")
-        loaded = trials_of(Path(folder) / "session", HERE)
+        loaded = trials_of(Path(folder) / "session", HERE, "repeatability")
     columns = [told(own), told(loaded)]
     print(f"| tip at rest told by | {len(own)} releases with 200 g, mm | {len(loaded)} with 300 g, mm |")
     print("|---|---:|---:|")

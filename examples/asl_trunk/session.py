@@ -43,7 +43,8 @@ def read_table(path: Path, columns: tuple[str, ...]) -> list[list[float]]:
         with open(path, encoding="utf-8", newline="") as file:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: {error}, expected a CSV file of the recordings") from error
+        found = (getattr(error, "strerror", None) or str(error)).lower()
+        raise InputError(f"{path}: {found}, expected a CSV file of the recordings") from error
     if not rows or tuple(rows[0]) != columns:
         found = ", ".join(rows[0]) if rows else "nothing"
         raise InputError(f"{path}: row 1: found {found}, expected {', '.join(columns)}")

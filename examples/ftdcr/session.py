@@ -43,7 +43,8 @@ def read_csv(path: Path) -> list[Pose]:
         with open(path, encoding="utf-8", newline="") as file:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"{path}: {error}, expected train.csv or val.csv of the FTDCR's recordings") from error
+        found = (getattr(error, "strerror", None) or str(error)).lower()
+        raise InputError(f"{path}: {found}, expected train.csv or val.csv of the FTDCR's recordings") from error
     if not rows or tuple(rows[0]) != COLUMNS:
         found = ", ".join(rows[0]) if rows else "nothing"
         raise InputError(f"{path}: row 1: found {found}, expected {', '.join(COLUMNS)}")
@@ -90,6 +91,8 @@ def trials_of(file: str, poses: list[Pose], split: str) -> list[dict]:
 
 def make_session(source: Path, session: Path = SESSION) -> int:
     """Fill the folder `session` from `source`; the number of trials. Raises InputError where a file is not right."""
+    if not source.is_dir():
+        raise InputError(f"{source}: no such folder, expected one with train.csv and val.csv")
     with output_folder(session) as folder:
         entries = []
         for stem, split in (("train", IDENTIFY), ("val", TEST)):

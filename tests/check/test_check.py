@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 from tests.identification.test_stage import settings
 from tests.support.matched_plant import curl, motion, release, small_model, static_pull, tilt
@@ -13,9 +15,11 @@ from tests.support.small_arm import small_spec
 from tests.support.workbench import ROOT, workbench
 from trunkline.check.__main__ import main
 from trunkline.check.recorded import missing_lines, recorded_lines
-from trunkline.check.told import described_lines, to_identify_from, told_by, untold
+from trunkline.check.told import described_lines, other_ups, to_identify_from, told_by, untold
+from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.identification.search import search
 from trunkline.identification.setup import set_up
+from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial, write_trials
 
 
@@ -39,6 +43,7 @@ def test_what_was_recorded_is_counted_by_kind_and_split(model):
         "releases: 1 identify, 0 validate, 0 test; loads of 50 g",
         "curls: 1 identify, 0 validate, 0 test; pulls of up to 40 mm",
     ]
+    assert recorded_lines([tilt(model, 85), tilt(model, 85.2)])[0].endswith("; tilted by 85°")
 
 
 def test_sides_that_no_trial_shows_are_named(model):
@@ -87,7 +92,66 @@ def test_a_session_that_says_down_for_up_is_seen(model):
     assert off < 0.01 * still, "the arm that made them"
     wrong = [replace(trial, gravity=-trial.gravity) for trial in trials]
     line, doubt = described_lines(*to_identify_from(config, model, wrong))
-    assert doubt.startswith("no nearer than a straight arm: look at `up`")
+    assert doubt == "no nearer than a straight arm: look at `up` and the masses"
+
+
+def test_only_what_can_be_wrong_of_arm_and_trials_is_named(model):
+    def said(trials, kind):
+        lines = described_lines(*to_identify_from(settings([kind], [kind], {"stiffness": (0.1, 10.0)}), model, trials))
+        return [line.removeprefix("no nearer than a straight arm: look at ") for line in lines[1:]]
+
+    pulled = static_pull(model, (20, 0, 0))
+    away = replace(pulled, commands=pulled.commands[:, [1, 2, 0]])
+    assert said([pulled], "static_pull") == []
+    assert said([away], "static_pull") == ["`up`, the masses and which motor pulls which tendon"]
+    assert said([replace(away, gravity=np.zeros(3))], "static_pull") == ["which motor pulls which tendon"]
+    swung = release(model, 0.2)
+    wrong = replace(swung, gravity=-swung.gravity)
+    off, still = (float(part.split(" mm")[0].split(" ")[-1]) for part in first(model, wrong).split(", a straight arm"))
+    assert off > still, "or the next line shows nothing"
+    assert said([wrong], "release") == [], "a straight arm is where a swing ends, however the arm is described"
+
+
+def first(model, trial: Trial) -> str:
+    config = settings([trial.experiment], [trial.experiment], {"stiffness": (0.1, 10.0)})
+    return described_lines(*to_identify_from(config, model, [trial]))[0]
+
+
+def test_another_up_that_fits_better_is_named(model):
+    """Where a body marks the mount, a wrong `up` turns gravity alone."""
+    config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.1, 10.0)})
+    base = Rotation.from_matrix([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    trial = tilt(model, 90)
+
+    def said(of: list[Trial], up: tuple[float, ...]) -> list[str]:
+        takes = [mounted(trial, base, up, 1e-6) for trial in of]
+        return described_lines(*to_identify_from(config, model, of), other_ups(takes))[1:]
+
+    right = tuple(np.round(base.apply(-trial.gravity / STANDARD_GRAVITY)) + 0.0)
+    assert said([trial], right) == []
+    for wrong in (np.eye(3)[k] * sign for k in range(3) for sign in (1, -1)):
+        if wrong @ right > 0.5:
+            continue
+        turned = replace(trial, gravity=base.inv().apply(-STANDARD_GRAVITY * wrong))
+        (line,) = [line for line in said([turned], tuple(wrong)) if "would fit better" in line]
+        assert line.startswith(f"`frame.up` in session.yaml: [{', '.join(f'{value:g}' for value in right)}] would fit")
+
+
+def test_no_other_up_is_looked_for_where_none_can_be_right(model):
+    one = tilt(model, 90)
+    weightless = mounted(one, Rotation.identity(), (0, 0, 0))
+    by_declaration = mounted(one, Rotation.identity(), (0, 0, 1))
+    assert other_ups([weightless]) == other_ups([by_declaration]) == other_ups([]) == {}
+    assert other_ups([mounted(one, Rotation.identity(), up) for up in ((0, 1, 0), (1, 0, 0))]) == {}
+
+
+def mounted(trial: Trial, base: Rotation, up: tuple[float, ...], noise: float = 0.0) -> Take:
+    """As much of the take of a trial as tells its base: turned by `base`, as cameras see it with noise, in a frame of
+    which `up` is up."""
+    ones = np.ones((4, 1))
+    told = {"name": trial.name, "up": np.array(up, float), "base_positions": 0 * ones * np.ones(3),
+            "base_quaternions": ones * wxyz_from_rotation(base) + noise * np.eye(4)}  # fmt: skip
+    return cast(Take, SimpleNamespace(**told))
 
 
 def test_the_expected_width_is_that_of_fits_to_trials_that_are_off_so(model):
@@ -123,13 +187,22 @@ def test_the_command_reads_logs_and_writes_nothing(tmp_path, monkeypatch, capsys
     workbench(tmp_path)
     monkeypatch.chdir(tmp_path)
     assert main(["data/raw/demo"]) == 0
-    told = capsys.readouterr().out
+    told, warned = capsys.readouterr()
+    assert "check: 4/4 trials" in told
+    assert "check: warning: " in warned
+    assert "evaluate" not in told + warned
     assert "static tilts: 1 identify" in told
     assert "identify_stiffness, from 1 trials:\n  no static_pull of the split identify" in told
     assert "identify_damping, from" in told
     assert sorted(path.name for path in tmp_path.iterdir()) == ["conf", "data", "params.yaml"]
     assert main(["data/raw/nowhere"]) == 1
     assert "no such folder" in capsys.readouterr().err
+    params = tmp_path / "params.yaml"
+    params.write_text(params.read_text().replace("arm: spiral", "arm: spirol"))
+    assert main(["data/raw/demo"]) == 1
+    told, error = capsys.readouterr()
+    assert "build_mjcf.arm: found 'spirol', expected one of" in error
+    assert told == "", "no trial is read before the settings are"
 
 
 def test_of_several_sessions_each_is_told_and_what_it_has_for_itself(model, tmp_path, monkeypatch, capsys):

@@ -1,5 +1,6 @@
 """`python -m trunkline.describe`: an arm in words, before anything is recorded."""
 
+import subprocess
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,6 +26,11 @@ def test_units_that_are_alike_share_a_line(model):
         "  units 1 to 2: 50 mm long, 30 mm wide, 100 g, 10 N m/rad, bends by 40° to each side",
         "  units 3 to 5: 20 mm long, 20 mm wide, 20 g, 4 N m/rad, bends by 40° to each side",
     ]
+
+
+def test_a_load_at_the_tip_is_told_beside_the_arm_s_own_mass():
+    loaded = arm(tip_load=0.12).build(ACTUATION, SOLVER, ROOT).spec.compile()
+    assert unit_lines(loaded)[0] == "5 units, 160 mm, 260 g of their own and a load of 120 g at the tip: 380 g in all"
 
 
 def test_tendons_are_told_with_their_moment_arms(model):
@@ -69,7 +75,13 @@ def test_the_command_describes_a_file_and_draws_it(tmp_path, monkeypatch, capsys
     told = capsys.readouterr().out
     assert "15 units, 186.5 mm" in told
     assert "tendon_9: at -122.5°" in told
-    assert (tmp_path / "ftdcr.png").stat().st_size > 10_000
+    assert "drawn in artifacts/describe/ftdcr.png" in told
+    assert (tmp_path / "artifacts/describe/ftdcr.png").stat().st_size > 10_000
+    ignored = ["git", "check-ignore", "-q"]
+    for folder in (".", "examples/pairs"):
+        assert subprocess.run([*ignored, f"{folder}/artifacts/describe/ftdcr.png"], cwd=ROOT).returncode == 0
+    assert main([str(ROOT / "conf/build_mjcf/arm/ftdcr.yaml"), "--out", "mine.png"]) == 0
+    assert (tmp_path / "mine.png").is_file()
 
 
 @pytest.mark.parametrize(

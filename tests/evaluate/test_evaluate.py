@@ -10,8 +10,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from demo.recorder import write_log
 from tests.identification.test_stage import settings
 from tests.support.matched_plant import curl, release, small_model, tilt
+from tests.support.sessions import SEGMENTS, all_truths, instruments, record
 from tests.support.small_arm import small_spec
 from tests.support.workbench import workbench
 from trunkline.errors import InputError
@@ -152,12 +154,28 @@ def test_logs_give_the_trials_that_the_stages_make_of_them(tmp_path, monkeypatch
     monkeypatch.chdir(workbench(tmp_path))
     run_stage("ingest", ingest.Config, ingest.main)
     run_stage("filter", filter_stage.Config, filter_stage.main)
-    expected, found = read_trials(filter_stage.PROCESSED, SPLITS), trials_of(tmp_path / "data/raw/demo", tmp_path)
+    expected = read_trials(filter_stage.PROCESSED, SPLITS)
+    found = trials_of(tmp_path / "data/raw/demo", tmp_path, "evaluate")
     assert len(expected) == len(found) == 4
     for one, other in zip(expected, found, strict=True):
         assert one.name == other.name
         assert one.positions.tobytes() == other.positions.tobytes()
     capsys.readouterr()
+
+
+def test_what_is_said_of_logs_begins_with_who_asked_and_names_repairs(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(workbench(tmp_path))
+    folder = tmp_path / "data/raw/demo"
+    measured = next(m for m in record(folder, all_truths(), instruments()) if m.name == "release_a")
+    for values in (measured.positions, measured.quaternions):
+        values[60:110, [1, 2]] = values[60:110, [2, 1]]
+    write_log(folder / "release_a.mcap", measured)
+    trials_of(folder, tmp_path, "ask")
+    told, said = capsys.readouterr()
+    assert all(line.startswith("ask: ") for line in (told + said).splitlines())
+    (line,) = [line for line in said.splitlines() if "taken for each other" in line]
+    first, second = SEGMENTS[:2]
+    assert line.startswith(f"ask: repaired: release_a: {first!r} and {second!r} were taken for each other in ")
 
 
 @pytest.mark.parametrize(

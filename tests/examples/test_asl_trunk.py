@@ -83,7 +83,7 @@ def test_another_csv_is_refused(public, tmp_path, change, message):
 def test_a_source_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"found no release_200g_\*.mcap"):
         make_session(tmp_path, tmp_path / "session")
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match=r"nothing\.csv: no such file or directory, expected a CSV file"):
         make_session(tmp_path / "nothing.csv", tmp_path / "session")
 
 

@@ -72,6 +72,15 @@ def test_a_wrong_row_is_named(public, change, message):
     assert not (public / "session").exists()
 
 
+def test_what_is_not_there_is_told_in_words(public):
+    (public / "val.csv").unlink()
+    with pytest.raises(InputError, match=r"val\.csv: no such file or directory, expected train\.csv or val\.csv of"):
+        make_session(public, public / "session")
+    with pytest.raises(InputError, match=r"nowhere: no such folder, expected one with train\.csv and val\.csv"):
+        make_session(public / "nowhere", public / "session")
+    assert not (public / "session").exists()
+
+
 def test_tendons_end_where_the_description_says(monkeypatch):
     monkeypatch.chdir(ROOT / "examples/ftdcr")
     model = cad_arm(load_config(Config, "build_mjcf")).spec.compile()

@@ -199,5 +199,9 @@ def test_a_part_of_the_tendons_is_refused(model, curls):
     said = "session.yaml: tendons: trial curl_40_0_identify: found tendon_1 alone, expected all of the model: tendon_1,"
     with pytest.raises(InputError, match=re.escape(said)):
         check_trials([some], model)
+    named = replace(curls[0], tendons=("m1", "m2", "m3"))
+    said = r"found 'm1', expected names of the model: .*; under `tendons` or `motors`, what moves which"
+    with pytest.raises(InputError, match=said):
+        check_trials([named], model)
     none = replace(some, tendons=(), commands=np.empty((FRAMES, 0)), tendon_positions=np.empty((FRAMES, 0)))
     check_trials([none], model)

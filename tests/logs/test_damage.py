@@ -83,7 +83,12 @@ def test_bodies_taken_for_each_other_are_put_right(tmp_path, right, frames, bodi
 
     takes, findings = session(tmp_path / "wrong", swap)
     names = " and ".join(repr(("base", *SEGMENTS)[body]) for body in bodies)
-    assert f"{names} were taken for each other in" in " ".join(findings[0].repairs)
+    (told,) = [line for line in findings[0].repairs if "taken for each other" in line]
+    assert told.startswith(f"{names} were taken for each other in ")
+    begin, end = map(float, told.partition(" between ")[2].removesuffix(" s, put right").split(" and "))
+    times = takes[0].time[frames]
+    assert begin == pytest.approx(times[0], abs=0.02)
+    assert end == pytest.approx(times[-1], abs=0.02)
     assert findings[1].repairs == findings[2].repairs == []
     # a body beside a hidden one may lack the neighbours that would tell
     same = np.isclose(takes[0].positions, right[0].positions, equal_nan=True).all(axis=(1, 2))

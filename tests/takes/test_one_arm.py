@@ -56,7 +56,7 @@ def test_each_session_has_its_names_and_its_clock(two):
     filtering.main(load_config(filtering.Config, "filter", two))
     trials = read_trials(two / "data/processed/filter", SPLITS)
     assert [trial.session for trial in trials] == [take.session for take in takes]
-    seen = {trial.name: trial.positions.tobytes() for trial in trials_of(two / "data/raw/arm_7", two)}
+    seen = {trial.name: trial.positions.tobytes() for trial in trials_of(two / "data/raw/arm_7", two, "evaluate")}
     assert seen == {trial.name: trial.positions.tobytes() for trial in trials}  # as `check` and `evaluate` read them
 
 

@@ -10,10 +10,11 @@ import sys
 from pathlib import Path
 
 from trunkline.arm.kinds import described_arm
+from trunkline.called import called
 from trunkline.check.recorded import missing_lines, recorded_of_each
-from trunkline.check.told import described_lines, to_identify_from, told_by, untold
+from trunkline.check.told import described_lines, other_ups, to_identify_from, told_by, untold
 from trunkline.errors import in_one_line
-from trunkline.evaluate.session import trials_of
+from trunkline.evaluate.session import read_trials_of
 from trunkline.identification.checks import check_trials
 from trunkline.identification.per_session import make_room, names_apart, other_sessions, untold_apart
 from trunkline.identification.setup import check_parameters
@@ -27,7 +28,7 @@ STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog="python -m trunkline.check", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=called("trunkline.check"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("session", type=Path, metavar="SESSION",
                         help="folder of logs and session.yaml, or of several such, or of filtered trials")  # fmt: skip
@@ -36,17 +37,17 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
                         help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
     told = parser.parse_args(arguments)
-    trials = trials_of(told.session, told.settings)
     description = settings_of("build_mjcf", told.settings)
     spec = described_arm(description, own_or_project(told.settings, "conf")).spec
     model = spec.compile()
+    given = read_yaml(told.settings / "params.yaml")
+    configs = {stage: settings_of(stage, told.settings) for stage in STAGES if stage in given}
+    trials, takes = read_trials_of(told.session, told.settings, "check")
     check_trials([trial for trial in trials if trial.split in DECIDING], model)
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))
     if missing := missing_lines(trials):
         print("\n".join(["missing:", *(f"  {line}" for line in missing)]))
-    given = read_yaml(told.settings / "params.yaml")
-    for stage in (stage for stage in STAGES if stage in given):
-        config = settings_of(stage, told.settings)
+    for stage, config in configs.items():
         check_parameters(stage, config, model)
         names = names_apart(list(config.parameters), config.per_session, other_sessions(trials))
         make_room(spec, names)
@@ -59,7 +60,7 @@ def main(arguments: list[str] | None = None) -> int:
         if lacking:
             continue
         prepared = to_identify_from(config, model, trials)
-        print("\n".join(f"  {line}" for line in described_lines(*prepared)), flush=True)
+        print("\n".join(f"  {line}" for line in described_lines(*prepared, other_ups(takes))), flush=True)
         found, pairs = told_by(*prepared, told.error / 100)
         for one in sorted(found, key=lambda one: -one.share):
             print(f"  {one.words()}")

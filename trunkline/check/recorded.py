@@ -44,7 +44,8 @@ def _range(own: list[Trial]) -> str:
     said = ""
     tilts = [np.degrees(tilt_of_gravity(trial.gravity)) for trial in own if trial.gravity.any()]
     if tilts and max(tilts) > np.degrees(UPRIGHT):
-        said += f"; tilted by {min(tilts):.0f} to {max(tilts):.0f}°"
+        found = dict.fromkeys(f"{tilt:.0f}" for tilt in (min(tilts), max(tilts)))
+        said += f"; tilted by {' to '.join(found)}°"
     pulls = [float(_drawn(trial).max(initial=0)) for trial in own]
     if max(pulls) > PULLED:
         said += f"; pulls of up to {1e3 * max(pulls):.0f} mm"

@@ -17,6 +17,8 @@ from trunkline.figures.style import save_figure
 from trunkline.sessions.session import read_session
 from trunkline.statics.chain import read_chain
 
+DRAWINGS = Path("artifacts/describe")  # below the current folder; Git ignores pictures there
+
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
@@ -25,7 +27,8 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("arm", type=Path, metavar="ARM", help="an arm's YAML, or a model in MJCF")
     parser.add_argument("--session", type=Path, metavar="FOLDER", help="of logs and session.yaml")
-    parser.add_argument("--out", type=Path, metavar="PNG", help="the drawing; default: <ARM's name>.png here")
+    parser.add_argument("--out", type=Path, metavar="PNG",
+                        help=f"the drawing; default: {DRAWINGS}/<ARM's name>.png")  # fmt: skip
     told = parser.parse_args(arguments)
     model = read_drawing(told.arm, Path("."))
     if model.nu:
@@ -38,7 +41,9 @@ def main(arguments: list[str] | None = None) -> int:
     for lines in (unit_lines(model), tendon_lines(model), marker_lines(model)):
         print("\n".join(lines))
     print("\n".join(f"note: {line}" for line in doubt_lines(model, kinds, points, weightless)))
-    out = told.out or Path(f"{told.arm.stem}.png")
+    out = told.out or DRAWINGS / f"{told.arm.stem}.png"
+    if told.out is None:
+        DRAWINGS.mkdir(parents=True, exist_ok=True)
     save_figure(arm_figure(model), out)
     print(f"drawn in {out}")
     return 0

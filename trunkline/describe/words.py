@@ -11,6 +11,7 @@ from trunkline.trials.experiments import EXPERIMENTS
 
 WIDEST = 180.0  # deg between neighbouring tendons, from which on they cannot bend the arm to every side
 DENSEST = 11_340.0  # kg/m³, lead
+LOAD = "tip_load"  # the body that an arm's description hangs at the tip
 ALIKE = 1e-3  # share by which neighbouring units may differ and stand in one line
 
 
@@ -50,11 +51,20 @@ def units_of(model: mujoco.MjModel) -> list[Unit]:
     return found
 
 
+def load_of(model: mujoco.MjModel) -> float:
+    """What hangs at the tip by the description, g; 0 without a load."""
+    names = [model.body(index).name for index in range(model.nbody)]
+    return 1e3 * float(model.body(LOAD).mass[0]) if LOAD in names else 0.0
+
+
 def unit_lines(model: mujoco.MjModel) -> list[str]:
-    """Runs of units that are alike, a line each; of an arm of which each is another, the first and the last."""
+    """Size and masses, then runs of units that are alike, a line each; where each is another, the first and the last.
+    """
     units = units_of(model)
-    length, mass = sum(unit.length for unit in units), sum(unit.mass for unit in units)
+    length, mass, load = sum(unit.length for unit in units), sum(unit.mass for unit in units), load_of(model)
     lines = [f"{len(units)} units, {length:.4g} mm, {mass:.4g} g"]
+    if load:
+        lines[0] += f" of their own and a load of {load:.4g} g at the tip: {mass + load:.4g} g in all"
     starts = [0, *(k for k in range(1, len(units)) if not units[k].like(units[k - 1])), len(units)]
     runs = list(zip(starts[:-1], starts[1:], strict=True))
     if len(runs) > 8:

@@ -56,7 +56,7 @@ def _run(told: argparse.Namespace) -> int:
         raise InputError(f"--out: {out}: found the reference there, expected another folder: it would be written over")
     models = {"model": read_arm(told.model)} | ({} if told.cad is None else {"cad": read_arm(told.cad)})
     written = written_beside(told.model, told.settings)
-    trials = trials_of(told.session, told.settings)
+    trials = trials_of(told.session, told.settings, "evaluate")
     if len(sessions_of(trials)) == 1 and (session := written.session_of(trials)):
         print(f"evaluate: the session {session} of those that the model was fitted to")
         trials = [replace(trial, session=session, name=f"{session}/{trial.name}") for trial in trials]

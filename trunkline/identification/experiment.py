@@ -237,6 +237,8 @@ def check_names(trial: Trial, model: mujoco.MjModel) -> None:
         unknown = [name for name in found if name not in names]
         if unknown:
             valid = f"names of the model: {', '.join(names)}" if names else "none, as the arm has none"
+            if key == "tendons" and names:
+                valid += "; under `tendons` or `motors`, what moves which"
             raise InputError(f"session.yaml: {key}: trial {trial.name}: found {unknown[0]!r}, expected {valid}")
     if trial.tendons and len(trial.tendons) < len(tendons):
         expected = f"expected all of the model: {', '.join(tendons)}; slack ones as let out"

@@ -66,7 +66,7 @@ def main(arguments: list[str] | None = None) -> int:
     _check(told)
     grid = load_folder(Recordable, own_or_project(told.settings, "conf") / "suggest")
     model, source = twin(told.model, told.settings)
-    trials = trials_of(told.session, told.settings)
+    trials = trials_of(told.session, told.settings, "suggest")
     print(f"twin: {source}", flush=True)
     stages, offered = told_of(model, trials, grid, told.settings, told.only, told.error / 100)
     weights = weights_for(told.goal, stages, model, grid)

@@ -85,7 +85,7 @@ def _take(
     base_positions, base_quaternions, positions, quaternions = split_base(
         session, positions, quaternions, f"{where}: {source.pose_topic}"
     )
-    untangle((base_positions, base_quaternions), positions, quaternions, reference, findings)
+    untangle((base_positions, base_quaternions), positions, quaternions, stretch.time, reference, findings)
     if not is_stepwise(trial.experiment):  # there the arm jumps from frame to frame
         stretch.time = with_lost_time(stretch.time, positions, bool(source.joint_topics), findings)
         if not source.joint_topics:

@@ -67,10 +67,12 @@ def untangle(
     base: tuple[np.ndarray, np.ndarray],
     positions: np.ndarray,
     quaternions: np.ndarray | None,
+    time: np.ndarray,
     reference: Reference,
     findings: Findings,
 ) -> None:
-    """Give labels that changed places back, in the poses of the base (where a body marks it) and of the segments."""
+    """Give labels that changed places back, in the poses of the base (where a body marks it) and of the segments, at
+    times (T,) s."""
     if reference.distances is None:
         return
     names = [reference.base or "base", *reference.segments]
@@ -82,7 +84,9 @@ def untangle(
             if values is not None:
                 values[np.ix_(swap.frames, right)] = values[np.ix_(swap.frames, wrong)]
         count, who = int(swap.frames.sum()), " and ".join(repr(names[body]) for body in swap.bodies)
-        findings.repairs.append(f"{who} were taken for each other in {count} frames, put right")
+        begin, end = time[np.flatnonzero(swap.frames)[[0, -1]]]
+        when = f"between {begin:.2f} and {end:.2f} s"
+        findings.repairs.append(f"{who} were taken for each other in {count} frames {when}, put right")
     base[0][:], positions[:] = bodies[:, 0], bodies[:, 1:]
     if turns is not None and quaternions is not None:
         base[1][:], quaternions[:] = turns[:, 0], turns[:, 1:]

@@ -216,7 +216,7 @@ def reference_scores(
     ledger = Ledger.opened(out / "reference.jsonl", made_of | {"reference": marks}, kept=True)
     if ledger.rows and ledger.rows[-1].get("last"):
         return [read_score(row) for row in ledger.rows], False
-    trials = [trial for trial in trials_of(reference, settings) if trial.split in DECIDING]
+    trials = [trial for trial in trials_of(reference, settings, "watch") if trial.split in DECIDING]
     check_trials(trials, scorer.model)
     with progress(len(trials), "watch: reference", "trials") as bar:
         for number, trial in enumerate(trials, 1):
