@@ -1,13 +1,17 @@
 """Arms of several sections, tendons described one by one, markers beside the axis."""
 
+from pathlib import Path
+
 import mujoco
 import numpy as np
 import pytest
 
+from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.mjcf import Actuation, Marker, Solver
 from trunkline.arm.sections import Section, Sections
 from trunkline.arm.tendons import Tendon
-from trunkline.elements import PRELOAD, SECTIONS, WINDING, cables, numbers_place, numeric
+from trunkline.elements import PRELOAD, SECTIONS, WINDING, cables, holes, numbers_place, numeric
+from trunkline.errors import InputError
 
 SOLVER = Solver(0.002, 1e-5, [0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0], [0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0])
 ACTUATION = Actuation(friction=0.0, kp=2000.0, max_force=50.0, time_constant=0.02)
@@ -44,6 +48,15 @@ def test_each_section_has_units_of_its_own(model):
     heights = [data.body(f"unit_{k:02d}").xpos[2] for k in range(1, 6)]
     np.testing.assert_allclose(heights, [0, -0.05, -0.1, -0.12, -0.14], atol=1e-12)
     assert model.numeric_data[numbers_place(model, SECTIONS)].tolist() == [2, 3]
+
+
+def test_cables_that_end_on_the_way_cannot_rub():
+    spec = arm().build(ACTUATION, SOLVER, Path()).spec
+    with pytest.raises(InputError, match="build_mjcf.holes: found .* 'tendon_1', which ends at unit 2 of 5, expected"):
+        add_holes(spec, Holes(0.1, 2))
+    whole = arm(tendons=TENDONS[1:]).build(ACTUATION, SOLVER, Path()).spec
+    add_holes(whole, Holes(0.1, 2))
+    assert holes(whole.compile()).shape == (2, 2)
 
 
 def test_tendons_run_where_they_are_described(model):

@@ -64,7 +64,9 @@ def test_tendons_that_never_pull_are_named(model):
         "only one tendon is pulled at a time: how several share the load is not seen",
     ]
     assert missing_lines([static_pull(model, (30, 30, 0)), static_pull(model, (0, 0, 20))]) == []
-    assert missing_lines([replace(curl(model, 40), commands=np.full((150, 3), -0.3))]) == ["no tendon is pulled"]
+    assert missing_lines([replace(curl(model, 40), commands=np.full((150, 3), -0.3))]) == [
+        "no tendon is pulled (0 mm at most): is the `unit` under `motors` in session.yaml right?"
+    ]
 
 
 def test_what_shows_in_no_trial_and_what_shows_as_one_is_told(model):

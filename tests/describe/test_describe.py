@@ -10,9 +10,18 @@ import yaml
 from tests.arm.test_sections import ACTUATION, SOLVER, TWO, arm
 from trunkline.arm.tendons import Tendon
 from trunkline.describe.__main__ import main
+from trunkline.describe.drawing import read_drawing
 from trunkline.describe.words import doubt_lines, marker_lines, tendon_lines, unit_lines
+from trunkline.errors import InputError
+from trunkline.sessions.session import Session
 
 ROOT = Path(__file__).parents[2]
+
+
+def session(kinds: list[str], **changes) -> Session:
+    trials = [{"file": f"{kind}.mcap", "experiment": kind, "split": "identify"} for kind in kinds]
+    trials = [trial | ({"level": 30} if trial["experiment"] == "static_tilt" else {}) for trial in trials]
+    return Session.model_validate({"frame": {"up": [0, 0, 1]}, "base": "base", "trials": trials} | changes)
 
 
 @pytest.fixture(scope="module")
@@ -47,23 +56,31 @@ def test_markers_beside_the_axis_are_told(model):
 
 def test_what_no_log_will_tell_is_said():
     one_side = arm(tendons=[Tendon(0.0), Tendon(40.0), Tendon(-40.0)]).build(ACTUATION, SOLVER, ROOT).spec.compile()
-    said = doubt_lines(one_side, None, None, False)
+    said = doubt_lines(one_side, None)
     assert said[0].startswith("masses are as described")
     assert said[1] == "no tendon bends the arm towards -180°: neighbours are 280° apart"
-    said = "\n".join(doubt_lines(one_side, {"static_path"}, 1, True))
+    still = session(["static_path"], frame={"up": [0, 0, 1], "gravity": "none"}, segments={"marker": "unit_05"})
+    said = "\n".join(doubt_lines(one_side, still))
     assert "tells joint_friction, damping, tendon_friction, friction_time, kv, time_constant" in said
     assert "stiffness and kp show in their ratio alone" in said
     assert "one tracked point" in said
-    whole = doubt_lines(one_side, {"static_tilt", "release", "motion"}, None, False)
+    whole = doubt_lines(one_side, session(["static_tilt", "release", "motion"]))
     assert not any("tells" in line and "no trial" in line for line in whole)
+
+
+def test_names_that_the_arm_has_not_are_noted(model):
+    named = {"motors": {"m1": {"unit": "m", "tendons": {"tendon_1": 1, "tendon2": -1}}}, "segments": {"a": "middle"}}
+    said = doubt_lines(model, session(["motion"], **named))
+    assert "session.yaml: motors: found 'tendon2', the arm has tendon_1, tendon_2, tendon_3" in said
+    assert any(line.startswith("session.yaml: segments: found 'middle', the arm has base, unit_01,") for line in said)
 
 
 def test_what_is_hardly_meant_is_noted():
     heavy = replace(TWO[1], mass=60.0)
     tendons = [Tendon(0.0, 0.012), Tendon(120.0, pretension=80.0), Tendon(-120.0)]
     model = arm(sections=[TWO[0], heavy], tendons=tendons).build(ACTUATION, SOLVER, ROOT).spec.compile()
-    assert doubt_lines(model, None, None, False)[:5] == [
-        *(f"unit {n} has 3.18e+06 kg/m³, more than lead: is its mass in kg, its width in m?" for n in (3, 4, 5)),
+    assert doubt_lines(model, None)[:3] == [
+        "unit 3 (and 2 more) has 3.18e+06 kg/m³, more than lead: is its mass in kg, its width in m?",
         "tendon_1 runs outside unit 3, 20 mm wide: 12 mm from the axis",
         "tendon_2 is to hold 80 N at command 0, its motor holds 50 N at most",
     ]
@@ -106,3 +123,14 @@ def test_a_mistake_in_a_description_is_one_line(tmp_path, capsys, change, messag
 def test_another_file_is_refused(tmp_path, capsys):
     assert main([str(tmp_path / "arm.stl")]) == 1
     assert "expected an arm's description, .yaml, or a model in MJCF, .xml" in capsys.readouterr().err
+
+
+def test_keys_that_an_arm_lacks_are_told_at_once(tmp_path):
+    lacking = tmp_path / "mine.yaml"
+    lacking.write_text("kind: sections\nsections: [{length: 0.1, units: 2, width: 0.04, bending_stiffness: 0.05}]\n")
+    with pytest.raises(InputError) as caught:
+        read_drawing(lacking, ROOT)
+    said = str(caught.value)
+    assert "missing, expected a value; also missing: " in said
+    for key in ("joint_range_deg", "damping_ratio", "tendons", "hole_ratio", "tip_load", "segments", "mass"):
+        assert key in said

@@ -17,7 +17,8 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.elements import CAPSTAN_FRICTION, hole_name, stretch_edges
+from trunkline.elements import CAPSTAN_FRICTION, arm_hinges, hole_name, stretch_edges
+from trunkline.errors import InputError
 
 RIGID_TIME, RIGID = 0.004, 0.999  # s and impedance of the friction: nearer to rigid than MuJoCo's own 0.02 and 0.95
 
@@ -32,7 +33,11 @@ class Holes:
 
 
 def add_holes(spec: mujoco.MjSpec, holes: Holes) -> None:
-    """Let the cables of an arm rub, in place."""
+    """Let the cables of an arm rub, in place.
+
+    Raises:
+        InputError: a cable ends before the last unit: how those rub is not modelled.
+    """
     cables = [tendon for tendon in spec.tendons if tendon.path[0].type == mujoco.mjtWrap.mjWRAP_SITE]
     if not holes.stretches or not cables:
         return
@@ -40,8 +45,12 @@ def add_holes(spec: mujoco.MjSpec, holes: Holes) -> None:
     straight = spec.compile()
     data = mujoco.MjData(straight)
     mujoco.mj_forward(straight, data)
+    units = len(np.unique(straight.jnt_bodyid[: arm_hinges(straight)]))
     for cable in cables:
         arms = _moment_arms(straight, data, straight.tendon(cable.name).id)
+        if len(arms) < units:
+            found = f"found holes in which cables rub, and {cable.name!r}, which ends at unit {len(arms)} of {units}"
+            raise InputError(f"build_mjcf.holes: {found}, expected cables to the last unit, or `smooth`")
         edges = stretch_edges(len(arms), holes.stretches)
         for number, (begin, end) in enumerate(pairwise(edges), start=1):
             rubbing = spec.add_tendon(

@@ -33,14 +33,10 @@ def main(arguments: list[str] | None = None) -> int:
     model = read_drawing(told.arm, Path("."))
     if model.nu:
         read_chain(model)  # what the statics cannot solve is told here
-    kinds, points, weightless = None, None, False
-    if told.session is not None:
-        session = read_session(told.session)
-        kinds = {trial.experiment for trial in session.trials}
-        points, weightless = len(session.segments or {}) or None, session.frame.gravity == "none"
+    session = None if told.session is None else read_session(told.session)
     for lines in (unit_lines(model), tendon_lines(model), marker_lines(model)):
         print("\n".join(lines))
-    print("\n".join(f"note: {line}" for line in doubt_lines(model, kinds, points, weightless)))
+    print("\n".join(f"note: {line}" for line in doubt_lines(model, session)))
     out = told.out or DRAWINGS / f"{told.arm.stem}.png"
     if told.out is None:
         DRAWINGS.mkdir(parents=True, exist_ok=True)

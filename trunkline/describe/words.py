@@ -7,6 +7,7 @@ import numpy as np
 
 from trunkline.elements import BACKLASH, PRELOAD, RATE_LIMIT, actuators, arm_hinges, cables, numbers_place, numeric
 from trunkline.identification.parameters import PARAMETERS
+from trunkline.sessions.session import Session
 from trunkline.trials.experiments import EXPERIMENTS
 
 WIDEST = 180.0  # deg between neighbouring tendons, from which on they cannot bend the arm to every side
@@ -120,13 +121,8 @@ def marker_lines(model: mujoco.MjModel) -> list[str]:
     return ["tracked points, beside the units' centres:", *lines] if lines else ["tracked points: the units' centres"]
 
 
-def doubt_lines(model: mujoco.MjModel, kinds: set[str] | None, points: int | None, weightless: bool) -> list[str]:
-    """What to know before any log is recorded, or of a session with trials of these kinds.
-
-    Args:
-        kinds: of the session's experiments, None without a session. points: that it tracks, None if not said.
-        weightless: whether the session's arm does not feel gravity.
-    """
+def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
+    """What to know before any log is recorded, or of a session."""
     lines = [*_hardly_meant(model), "masses are as described: no log tells them; weigh the arm"]
     angles = np.sort([_angle(model, cable) for cable in cables(model)])
     if len(angles):
@@ -134,15 +130,17 @@ def doubt_lines(model: mujoco.MjModel, kinds: set[str] | None, points: int | Non
         if gaps.max() >= WIDEST:
             towards = (angles[np.argmax(gaps)] + gaps.max() / 2 + 180) % 360 - 180
             lines.append(f"no tendon bends the arm towards {towards:.0f}°: neighbours are {gaps.max():.0f}° apart")
-    if kinds is None:
+    if session is None:
         return lines
+    lines += _unknown(model, session)
+    kinds, weightless = {trial.experiment for trial in session.trials}, session.frame.gravity == "none"
     own = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(model)]
     untold = [name for name in own if not any(PARAMETERS[name].told_by(EXPERIMENTS[kind]) for kind in kinds)]
     if untold:
         lines.append(f"no trial of the session ({', '.join(sorted(kinds))}) tells {', '.join(untold)}")
     if weightless and model.nu and all(EXPERIMENTS[kind].static for kind in kinds):
         lines.append("without gravity and motion, stiffness and kp show in their ratio alone: identify one of them")
-    if points == 1:
+    if len(session.segments or {}) == 1:
         lines.append("one tracked point does not tell in which shape the arm is, nor exchanged names of tendons")
     if not weightless and not kinds & {"static_tilt", "static_pull"} and model.nu:
         lines.append("nothing is tilted or held: stiffness comes with the masses and the motors' gain, as a ratio")
@@ -151,14 +149,35 @@ def doubt_lines(model: mujoco.MjModel, kinds: set[str] | None, points: int | Non
     return lines
 
 
+def _unknown(model: mujoco.MjModel, session: Session) -> list[str]:
+    """Names that a session gives to what this arm has not, a line a key."""
+    sites = [model.site(index).name for index in range(model.nsite)]
+    known = {
+        "segments": [name.removesuffix("_center") for name in sites if name.endswith("_center")],
+        "tendons": [model.tendon(cable).name for cable in cables(model)],
+    }
+    known["motors"] = known["tendons"]
+    given = {
+        "segments": (session.segments or {}).values(),
+        "tendons": (session.tendons or {}).values(),
+        "motors": session.coupling()[0],
+    }
+    lines = []
+    for key, names in given.items():
+        if unknown := [name for name in names if name not in known[key]]:
+            lines.append(f"session.yaml: {key}: found {unknown[0]!r}, the arm has {', '.join(known[key]) or 'none'}")
+    return lines
+
+
 def _hardly_meant(model: mujoco.MjModel) -> list[str]:
     """Masses, places and forces that look like another unit or a slip."""
     units, lines = units_of(model), []
     bodies = _bodies(model)
-    for number, unit in enumerate(units, start=1):
-        density = unit.mass / (np.pi / 4 * unit.width**2 * unit.length) * 1e6  # kg/m³
-        if density > DENSEST:
-            lines.append(f"unit {number} has {density:.3g} kg/m³, more than lead: is its mass in kg, its width in m?")
+    densities = [unit.mass / (np.pi / 4 * unit.width**2 * unit.length) * 1e6 for unit in units]  # kg/m³
+    if dense := [number for number, density in enumerate(densities, start=1) if density > DENSEST]:
+        more = f" (and {len(dense) - 1} more)" if len(dense) > 1 else ""
+        has = f"has {densities[dense[0] - 1]:.3g} kg/m³, more than lead"
+        lines.append(f"unit {dense[0]}{more} {has}: is its mass in kg, its width in m?")
     preload = model.numeric_data[numbers_place(model, PRELOAD)]
     for index, (cable, motor) in enumerate(zip(cables(model), actuators(model), strict=True)):
         name = model.tendon(cable).name

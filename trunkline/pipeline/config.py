@@ -19,7 +19,7 @@ from pydantic import TypeAdapter, ValidationError
 from yaml import YAMLError
 
 from trunkline.errors import InputError, nearest
-from trunkline.pipeline.mistakes import describe, in_order, path_of
+from trunkline.pipeline.mistakes import describe, in_order, others_missing, path_of
 from trunkline.settings import read_yaml
 
 Schema = TypeVar("Schema")
@@ -80,9 +80,10 @@ def validated(schema: type[Schema], values: dict, source: Path) -> Schema:
     try:
         return adapter.validate_json(json.dumps(values), strict=True)
     except ValidationError as error:
-        first = in_order(error.errors(), values)[0]
-        where = ".".join(map(str, path_of(first, values)))
-        raise InputError(f"{source}: {where}: {describe(first, adapter)}") from error
+        problems = in_order(error.errors(), values)
+        where = ".".join(map(str, path_of(problems[0], values)))
+        said = describe(problems[0], adapter) + others_missing(problems, values)
+        raise InputError(f"{source}: {where}: {said}") from error
 
 
 def check_settings(root: str | Path = ".") -> list[str]:

@@ -55,6 +55,14 @@ def in_order(problems: list[Any], composed: dict[str, Any]) -> list[Any]:
     return sorted(left, key=lambda problem: {UNKNOWN_KEY: 0, "missing": 1}.get(problem["type"], 2))
 
 
+def others_missing(problems: list[Any], composed: dict[str, Any]) -> str:
+    """Of problems `in_order`, where the first is a missing key: the others that are missing, behind a comma."""
+    names = [".".join(path_of(problem, composed)) for problem in problems if problem["type"] == "missing"]
+    if problems[0]["type"] != "missing" or len(names) == 1:
+        return ""
+    return f"; also missing: {', '.join(names[1:])}"
+
+
 def describe(problem: Any, adapter: TypeAdapter) -> str:
     if problem["type"] == UNKNOWN_KEY:
         schema = adapter.json_schema()
