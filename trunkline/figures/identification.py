@@ -47,8 +47,8 @@ def error_figure(curves: pd.DataFrame, floor: dict[str, float]) -> Figure:
         floor: errors that noise alone leaves, as `scores` gives them for a split.
     """
     panels = {
-        "position_error_mm": ("error of distances (mm)", "Position error", floor["e_internal_mm"]),
-        "velocity_error_mm_s": ("error of their rate (mm/s)", "Velocity error", None),
+        "position_error_mm": ("error of distances (mm)", "Shape error, by distances", floor["e_internal_mm"]),
+        "velocity_error_mm_s": ("error of their rate (mm/s)", "Velocity error, by distances", None),
         "tip_error_mm": ("distance of the tip (mm)", "Tip error", floor.get("e_tip_mm")),
     }
     figure, axes = plt.subplots(1, len(panels), figsize=(4.5 * len(panels), 3.4))
