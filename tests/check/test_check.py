@@ -15,7 +15,8 @@ from tests.support.small_arm import small_spec
 from tests.support.workbench import ROOT, workbench
 from trunkline.check.__main__ import main
 from trunkline.check.recorded import missing_lines, recorded_lines
-from trunkline.check.told import described_lines, other_ups, to_identify_from, told_by, untold
+from trunkline.check.told import described_lines, to_identify_from, told_by, untold
+from trunkline.check.up import other_ups, up_lines
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.identification.search import search
 from trunkline.identification.setup import set_up
@@ -127,7 +128,8 @@ def test_another_up_that_fits_better_is_named(model):
 
     def said(of: list[Trial], up: tuple[float, ...]) -> list[str]:
         takes = [mounted(trial, base, up, 1e-6) for trial in of]
-        return described_lines(*to_identify_from(config, model, of), other_ups(takes))[1:]
+        arm, experiments, fit = to_identify_from(config, model, of)
+        return up_lines(arm, experiments, fit.segments, other_ups(takes))
 
     right = tuple(np.round(base.apply(-trial.gravity / STANDARD_GRAVITY)) + 0.0)
     assert said([trial], right) == []
@@ -135,7 +137,7 @@ def test_another_up_that_fits_better_is_named(model):
         if wrong @ right > 0.5:
             continue
         turned = replace(trial, gravity=base.inv().apply(-STANDARD_GRAVITY * wrong))
-        (line,) = [line for line in said([turned], tuple(wrong)) if "would fit better" in line]
+        (line,) = said([turned], tuple(wrong))
         assert line.startswith(f"`frame.up` in session.yaml: [{', '.join(f'{value:g}' for value in right)}] would fit")
 
 

@@ -53,7 +53,7 @@ def test_files_that_do_not_belong_together_are_refused(source, tmp_path):
     with pytest.raises(InputError, match=r"200g.csv: found 99 rows, expected the 15000 of .*control_inputs"):
         make_session(tmp_path, tmp_path / "session")
     assert not (tmp_path / "session").exists()
-    with pytest.raises(InputError, match="No such file"):
+    with pytest.raises(InputError, match="no such file or directory, expected"):
         make_session(tmp_path / "nowhere", tmp_path / "session")
 
 

@@ -35,6 +35,7 @@ EXAMPLES = sorted(
 # What surrounds every stage (load, show, refuse, write) and never changes a number: no reason to run again.
 INERT = ("trunkline/arithmetic.py", "trunkline/errors.py", "trunkline/loading.py", "trunkline/progress.py")
 INERT += ("trunkline/settings.py", "trunkline/threads.py", "demo/__init__.py", "rehearsal/__init__.py")
+INERT += ("trunkline/cluster.py", "trunkline/likeness.py", "trunkline/scheduler.py")  # where it runs: the same bits
 INERT += ("trunkline/figures/", "trunkline/pipeline/", "rehearsal/report.py")
 ACTIVE = ("trunkline/pipeline/identify.py",)
 

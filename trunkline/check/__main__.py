@@ -12,7 +12,8 @@ from pathlib import Path
 from trunkline.arm.kinds import described_arm
 from trunkline.called import called
 from trunkline.check.recorded import missing_lines, recorded_of_each
-from trunkline.check.told import described_lines, other_ups, to_identify_from, told_by, untold
+from trunkline.check.told import described_lines, to_identify_from, told_by, untold
+from trunkline.check.up import other_ups, up_lines
 from trunkline.errors import in_one_line
 from trunkline.evaluate.session import read_trials_of
 from trunkline.identification.checks import check_trials
@@ -48,6 +49,7 @@ def main(arguments: list[str] | None = None) -> int:
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))
     if missing := missing_lines(trials):
         print("\n".join(["missing:", *(f"  {line}" for line in missing)]))
+    ups = other_ups(takes)
     for stage, config in configs.items():
         check_parameters(stage, config, model)
         names = names_apart(list(config.parameters), config.per_session, other_sessions(trials))
@@ -60,9 +62,10 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"  {line}")
         if lacking:
             continue
-        prepared = to_identify_from(config, model, trials)
-        print("\n".join(f"  {line}" for line in described_lines(*prepared, other_ups(takes))), flush=True)
-        found, pairs = told_by(*prepared, told.error / 100)
+        arm, experiments, fit = to_identify_from(config, model, trials)
+        lines = described_lines(arm, experiments, fit) + up_lines(arm, experiments, fit.segments, ups)
+        print("\n".join(f"  {line}" for line in lines), flush=True)
+        found, pairs = told_by(arm, experiments, fit, told.error / 100)
         for one in sorted(found, key=lambda one: -one.share):
             print(f"  {one.words()}")
         for pair in pairs:

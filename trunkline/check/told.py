@@ -6,7 +6,7 @@ Jacobian of the loss' residuals, whose squares sum to a mean over trials. That i
 left open; after a fit, the jackknife of `identification.certainty` says it from what is left of the trials.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import mujoco
 import numpy as np
@@ -19,19 +19,13 @@ from trunkline.identification.null_model import straight
 from trunkline.identification.parameters import parameter_named
 from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import set_up, with_every
-from trunkline.signals.base_frame import average_base, gravity_from_up
-from trunkline.takes.vertical import AXES
 from trunkline.trials.experiments import EXPERIMENTS, is_static
 from trunkline.trials.splits import IDENTIFY
-from trunkline.trials.take import Take
 from trunkline.trials.trial import Trial
 
 NUMBERS = 3  # that a trial tells
 FRAMES = 180  # of a moving trial that are looked at
 TWO_SIDED = 1.96
-Z = np.array([0.0, 0.0, 1.0])
-TRIED = 6  # trials, at most, with other axes up
-BETTER = 2.0  # times that the described arm must fit with another axis up before that is said
 ALIKE = 0.95  # correlation of two estimates, from which on trials tell hardly more than one of them
 
 
@@ -85,17 +79,12 @@ def told_by(
     return told, pairs
 
 
-def described_lines(
-    model: mujoco.MjModel, experiments: list[Experiment], fit: Fit, ups: dict[str, np.ndarray] | None = None
-) -> list[str]:
-    """How far the model to begin with is from a stage's trials, beside a straight arm; what to look at where it is no
-    nearer; and which other `up` would fit much better.
+def described_lines(model: mujoco.MjModel, experiments: list[Experiment], fit: Fit) -> list[str]:
+    """How far the model to begin with is from a stage's trials, beside a straight arm; and what to look at where it is
+    no nearer.
 
     A released arm swings about its straight shape, and the described one with a guess of damping: it says nothing of
     what is described wrongly that the straight one is nearer.
-
-    Args:
-        ups: gravity in the base frame by trial with each of `AXES` up, as `other_ups` gives it.
     """
     found = replay(model, experiments, fit.segments)
     described, plain = (Prediction(one, experiments) for one in (found, straight(experiments, found)))
@@ -107,7 +96,7 @@ def described_lines(
         mine, its = (one.of(lambda e: not EXPERIMENTS[e.kind].hangs) for one in (described, plain))
         if mine.overall()["e_position_mm"] >= its.overall()["e_position_mm"]:
             lines.append(f"no nearer than a straight arm: look at {_doubtful(model, bent)}")
-    return lines + _up_lines(model, fit.segments, ups or {}, described, plain)
+    return lines
 
 
 def _doubtful(model: mujoco.MjModel, bent: list[Experiment]) -> str:
@@ -117,47 +106,6 @@ def _doubtful(model: mujoco.MjModel, bent: list[Experiment]) -> str:
         parts.append("which motor pulls which tendon")
     parts = parts or ["the pose of the base"]
     return ", ".join(parts[:-1]) + (" and " if len(parts) > 1 else "") + parts[-1]
-
-
-def other_ups(takes: list[Take]) -> dict[str, np.ndarray]:
-    """Gravity in the base frame (6, 3), m/s², by trial, as it is with each of `AXES` up; none of trials that have no
-    gravity, or whose base is upright by its very declaration, and none where sessions differ in `up`."""
-    if any(not np.array_equal(take.up, takes[0].up) for take in takes):
-        return {}
-    found = {}
-    for take in takes:
-        base = average_base(take.base_positions, take.base_quaternions)
-        declared = not np.ptp(take.base_quaternions, axis=0).any() and np.allclose(base.rotation.apply(Z), take.up)
-        if take.up.any() and not declared:
-            found[take.name] = np.array([gravity_from_up(base, axis) for axis in AXES])
-    return found
-
-
-def _up_lines(
-    model: mujoco.MjModel,
-    segments: tuple[str, ...],
-    ups: dict[str, np.ndarray],
-    described: Prediction,
-    plain: Prediction,
-) -> list[str]:
-    """Whether the described model fits some of the trials much better with another axis up, than with the one that is
-    declared, `described`, and than the straight arm, `plain`."""
-    experiments = [e for e in described.experiments if e.name in ups]
-    experiments = experiments[:: -(-len(experiments) // TRIED) or 1]
-    if not experiments:
-        return []
-    names = {e.name for e in experiments}
-    off, still = (one.of(lambda e: e.name in names).overall()["e_position_mm"] for one in (described, plain))
-    errors = []
-    for number in range(len(AXES)):
-        turned = [replace(e, gravity=ups[e.name][number]) for e in experiments]
-        errors.append(Prediction(replay(model, turned, segments), turned).overall()["e_position_mm"])
-    best = int(np.argmin(errors))
-    if errors[best] > min(off, still) / BETTER:
-        return []
-    axis = ", ".join(f"{value + 0.0:g}" for value in AXES[best])
-    found = f"{errors[best]:.3g} mm for {off:.3g} mm, of {len(experiments)} trials"
-    return [f"`frame.up` in session.yaml: [{axis}] would fit better: {found}"]
 
 
 def to_identify_from(
