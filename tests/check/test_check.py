@@ -65,8 +65,10 @@ def test_tendons_that_never_pull_are_named(model):
         "only one tendon is pulled at a time: how several share the load is not seen",
     ]
     assert missing_lines([static_pull(model, (30, 30, 0)), static_pull(model, (0, 0, 20))]) == []
-    assert missing_lines([replace(curl(model, 40), commands=np.full((150, 3), -0.3))]) == [
-        "no tendon is pulled (0 mm at most): is the `unit` under `motors` in session.yaml right?"
+    slack, small = (replace(curl(model, 40), commands=np.full((150, 3), pull)) for pull in (-0.3, 5e-5))
+    assert missing_lines([slack]) == ["no tendon is pulled; if some were, their sign in session.yaml is wrong"]
+    assert missing_lines([small]) == [
+        "no tendon is pulled by more than 0.05 mm: is the unit in session.yaml right?"
     ]
 
 
@@ -146,14 +148,16 @@ def test_no_other_up_is_looked_for_where_none_can_be_right(model):
     weightless = mounted(one, Rotation.identity(), (0, 0, 0))
     by_declaration = mounted(one, Rotation.identity(), (0, 0, 1))
     assert other_ups([weightless]) == other_ups([by_declaration]) == other_ups([]) == {}
-    assert other_ups([mounted(one, Rotation.identity(), up) for up in ((0, 1, 0), (1, 0, 0))]) == {}
+    monday, friday = (mounted(one, Rotation.identity(), (0, 1, 0), 1e-6, session) for session in ("monday", "friday"))
+    assert other_ups([monday]) != {}
+    assert other_ups([monday, friday]) == {}
 
 
-def mounted(trial: Trial, base: Rotation, up: tuple[float, ...], noise: float = 0.0) -> Take:
+def mounted(trial: Trial, base: Rotation, up: tuple[float, ...], noise: float = 0.0, session: str = "") -> Take:
     """As much of the take of a trial as tells its base: turned by `base`, as cameras see it with noise, in a frame of
     which `up` is up."""
     ones = np.ones((4, 1))
-    told = {"name": trial.name, "up": np.array(up, float), "base_positions": 0 * ones * np.ones(3),
+    told = {"name": trial.name, "session": session, "up": np.array(up, float), "base_positions": 0 * ones * np.ones(3),
             "base_quaternions": ones * wxyz_from_rotation(base) + noise * np.eye(4)}  # fmt: skip
     return cast(Take, SimpleNamespace(**told))
 

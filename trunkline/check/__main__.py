@@ -43,7 +43,8 @@ def main(arguments: list[str] | None = None) -> int:
     model = spec.compile()
     given = read_yaml(told.settings / "params.yaml")
     configs = {stage: settings_of(stage, told.settings) for stage in STAGES if stage in given}
-    print(f"arm: {given.build_mjcf.arm}, as {told.settings / 'params.yaml'} has it", flush=True)
+    if arm := (given.get("build_mjcf") or {}).get("arm"):
+        print(f"arm: {arm}, as {told.settings / 'params.yaml'} has it", flush=True)
     trials, takes = read_trials_of(told.session, told.settings, "check")
     check_trials([trial for trial in trials if trial.split in DECIDING], model)
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))

@@ -102,8 +102,9 @@ def _pulls(own: list[Trial]) -> list[str]:
     lines, most = [], np.max([_drawn(trial) for trial in own], axis=0)
     idle = [name for name, pull in zip(own[0].tendons, most, strict=True) if pull < PULLED]
     if len(idle) == len(most):
-        at_most = f"{1e3 * most.max(initial=0):.2g} mm at most"
-        return [f"no tendon is pulled ({at_most}): is the `unit` under `motors` in session.yaml right?"]
+        if not (pull := most.max(initial=0)):
+            return ["no tendon is pulled; if some were, their sign in session.yaml is wrong"]
+        return [f"no tendon is pulled by more than {1e3 * pull:.2g} mm: is the unit in session.yaml right?"]
     if idle:
         lines.append(f"never pulled: {', '.join(idle)}")
     at_once = max(int((np.maximum(trial.commands, 0) > SEVERAL * most.max()).sum(axis=1).max()) for trial in own)

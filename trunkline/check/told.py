@@ -83,20 +83,24 @@ def described_lines(model: mujoco.MjModel, experiments: list[Experiment], fit: F
     """How far the model to begin with is from a stage's trials, beside a straight arm; and what to look at where it is
     no nearer.
 
-    A released arm swings about its straight shape, and the described one with a guess of damping: it says nothing of
-    what is described wrongly that the straight one is nearer.
+    A released arm swings about its straight shape, and the described one with a guess of damping: that a straight arm
+    is nearer to a release does not mean that anything is described wrongly.
     """
     found = replay(model, experiments, fit.segments)
     described, plain = (Prediction(one, experiments) for one in (found, straight(experiments, found)))
     off, still = described.overall(), plain.overall()
     told = f"as described, it is {off['e_position_mm']:.3g} mm off ({off['e_position_pct']:.2g} % of length)"
     lines = [f"{told}, a straight arm {still['e_position_mm']:.3g} mm"]
-    bent = [e for e in experiments if not EXPERIMENTS[e.kind].hangs]
+    bent = [e for e in experiments if _stays_bent(e)]
     if bent:
-        mine, its = (one.of(lambda e: not EXPERIMENTS[e.kind].hangs) for one in (described, plain))
+        mine, its = (one.of(_stays_bent) for one in (described, plain))
         if mine.overall()["e_position_mm"] >= its.overall()["e_position_mm"]:
             lines.append(f"no nearer than a straight arm: look at {_doubtful(model, bent)}")
     return lines
+
+
+def _stays_bent(experiment: Experiment) -> bool:
+    return not EXPERIMENTS[experiment.kind].hangs
 
 
 def _doubtful(model: mujoco.MjModel, bent: list[Experiment]) -> str:

@@ -19,8 +19,8 @@ BETTER = 2.0  # times that the described arm must fit with another axis up befor
 
 def other_ups(takes: list[Take]) -> dict[str, np.ndarray]:
     """Gravity in the base frame (6, 3), m/s², by trial, as it is with each of `AXES` up; none of trials that have no
-    gravity, or whose base is upright by its very declaration, and none where sessions differ in `up`."""
-    if any(not np.array_equal(take.up, takes[0].up) for take in takes):
+    gravity, or whose base is upright by its very declaration, and none of several sessions, which each have an `up`."""
+    if len({take.session for take in takes}) > 1:
         return {}
     found = {}
     for take in takes:
@@ -58,5 +58,5 @@ def up_lines(
     if errors[best] > min(off, still) / BETTER:
         return []
     axis = ", ".join(f"{value + 0.0:g}" for value in AXES[best])
-    found = f"{errors[best]:.3g} mm for {off:.3g} mm, of {len(tried)} trials"
+    found = f"{errors[best]:.3g} mm off in place of {off:.3g} mm, over {len(tried)} of the trials"
     return [f"`frame.up` in session.yaml: [{axis}] would fit better: {found}"]

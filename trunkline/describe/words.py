@@ -153,7 +153,8 @@ def _unknown(model: mujoco.MjModel, session: Session) -> list[str]:
     """Names that a session gives to what this arm has not, a line a key."""
     sites = [model.site(index).name for index in range(model.nsite)]
     known = {
-        "segments": [name.removesuffix("_center") for name in sites if name.endswith("_center")],
+        "segments": [name.removesuffix("_center") for name in sites
+                     if name.endswith("_center") and name != "base_center"],
         "tendons": [model.tendon(cable).name for cable in cables(model)],
     }
     known["motors"] = known["tendons"]

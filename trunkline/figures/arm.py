@@ -34,7 +34,7 @@ def arm_figure(model: mujoco.MjModel) -> Figure:
         if np.max(values) > 10 * np.min(values) > 0:
             panel.set_yscale("log")
         else:
-            panel.set_ylim(0, 1.15 * np.max(values))
+            panel.set_ylim(0, 1.15 * np.max(values) or 1)
         panel.xaxis.set_major_locator(MaxNLocator(integer=True))
     return figure
 
@@ -66,7 +66,7 @@ def _side_view(side: Axes, model: mujoco.MjModel, data: mujoco.MjData) -> None:
 
 
 def tracked_points(model: mujoco.MjModel) -> list[int]:
-    """Numbers of the sites that a session may track: those that the description names, or else the units' centres."""
+    """Numbers of the sites to draw as tracked: those that the description names, or else the units' centres."""
     names = {site: model.site(site).name for site in range(model.nsite)}
     centres = [site for site, name in names.items() if name.endswith("_center") and name != "base_center"]
     return [site for site in centres if not names[site].startswith("unit_")] or centres

@@ -69,7 +69,7 @@ def _noise(axis: Axes, qualities: dict[int, Quality]) -> None:
 
 
 def _stamps(axis: Axes, qualities: dict[int, Quality]) -> None:
-    """Jitter of the stamps over frame numbers; where there is none, how many frames lack."""
+    """Jitter of the stamps over frame numbers; where there is none, how many frames are missing."""
     rates, dropped = zip(*[(1 / quality.interval, quality.dropped) for quality in qualities.values()], strict=True)
     frames = [quality.findings.frames for quality in qualities.values()]
     jitters = [np.nan if found is None else 1e3 * found.jitter for found in frames]

@@ -26,8 +26,7 @@ def convergence_figure(identification: Identification) -> Figure:
         axis.semilogy(history.best, color=IDENTIFIED, marker="o", markersize=3, label="best")
         if history.mean != history.best:
             axis.semilogy(history.mean, color=DOUBTFUL, label="mean of a generation's trials", zorder=1)
-        fallen = 100 * (1 - history.best[-1] / history.best[0])
-        axis.set_title(f"{phase.replace('_', ' ')}: loss {fallen:.2g} % less")
+        axis.set_title(f"{phase.replace('_', ' ')}: {history.best[0]:.4g} to {history.best[-1]:.4g}")
         axis.set_xlabel("generation" if history.mean != history.best else "iteration")
         axis.xaxis.set_major_locator(MaxNLocator(integer=True))
         low, high = axis.get_ylim()

@@ -143,16 +143,16 @@ def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
     """The soft maps under gravities without one; without gravity, the map against tips that it was not made of.
 
     Args:
-        heldout: columns `angle_deg`, `iou`, `reachable`, `beyond`.
+        heldout: columns `angle_deg`, all 0 without gravity, `iou`, `reachable`, `beyond`.
         beyond: m, how far from every tip the points beyond reach are.
     """
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 3.8))
-    several = len(heldout) > 1
+    tilted = bool(heldout["angle_deg"].any())
     left.plot(heldout["angle_deg"], heldout["iou"], "o-", color=IDENTIFIED, markersize=4)
-    if several:  # otherwise the other tips are fewer, so their map is smaller
+    if tilted:  # otherwise the other tips are fewer, so their map is smaller
         left.axhline(GOAL_IOU, color=VALIDATE, linestyle="--", label=f"goal, {GOAL_IOU:g}")
         left.legend(loc="lower right")
-    title = "Map in between against gravity's own" if several else "Map against that of other tips"
+    title = "Map in between against gravity's own" if tilted else "Map against that of other tips"
     left.set(ylim=(min(0.93, heldout["iou"].min() - 0.01), 1), ylabel="IoU", title=title)
     for name, color, label in (
         ("reachable", IDENTIFIED, "tips"), ("beyond", INITIAL, f"points {1e3 * beyond:.0f} mm from every tip")
@@ -161,7 +161,7 @@ def heldout_figure(heldout: pd.DataFrame, beyond: float) -> Figure:
     right.set(ylim=(-3, 103), ylabel="called reachable (%)", title="The signal that a headset shows")
     right.legend(loc="center right")
     for ax in (left, right):
-        if several:
+        if tilted:
             ax.set_xlabel("gravity angle, between the maps (°)")
         else:
             ax.set_xticks([0], ["no gravity"])

@@ -58,7 +58,8 @@ def load_config(schema: type[Schema], stage: str, root: str | Path = ".") -> Sch
         if len(path) > 1 and path[1] in chosen:  # a group's values are in the file that params.yaml names
             file = group_options(folder)[path[1]][chosen[path[1]]]
         where = f"{file}: {'.'.join(path)}"
-        raise InputError(f"{where}: {described}" + (f" (and {more} more)" if more else "")) from error
+        others = others_missing(problems, composed) or (f" (and {more} more)" if more else "")
+        raise InputError(f"{where}: {described}{others}") from error
 
 
 def load_folder(schema: type[Schema], folder: Path) -> Schema:

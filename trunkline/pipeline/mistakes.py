@@ -56,7 +56,7 @@ def in_order(problems: list[Any], composed: dict[str, Any]) -> list[Any]:
 
 
 def others_missing(problems: list[Any], composed: dict[str, Any]) -> str:
-    """Of problems `in_order`, where the first is a missing key: the others that are missing, behind a comma."""
+    """Of problems `in_order`, where the first is a missing key: what tells the others that are missing."""
     names = [".".join(path_of(problem, composed)) for problem in problems if problem["type"] == "missing"]
     if problems[0]["type"] != "missing" or len(names) == 1:
         return ""
