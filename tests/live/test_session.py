@@ -1,6 +1,7 @@
 """A session over real sockets: from two hands to a robot that has arrived, and every way out."""
 
 import asyncio
+import gc
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from tests.support.live import Hands, binary, controlling, hand, laid
 from tests.teleop.test_plan import MOUNT, OFFSET, TIP
 from trunkline.live import wire
+from trunkline.live.garbage import NEVER
 from trunkline.panda.kinematics import mount_pose
 
 UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
@@ -45,12 +47,14 @@ def test_from_hands_to_a_robot_that_has_arrived():
     async def session():
         async with laid() as here:
             guest = await controlling(here)
-            before = here.robot.robot.joints.copy()
+            before, usual = here.robot.robot.joints.copy(), gc.get_threshold()
             state = await executing(here, guest)
             assert state["execute"] == here.planning.plans[0].digest()
+            assert gc.get_threshold()[2] == NEVER, "a whole collection would take longer than a permit lasts"
             assert any(frame[0] == 2 for frame in guest.frames)
             assert (await guest.hears("foreseen"))["digest"] == state["execute"]
             await guest.hears("state", 20.0, mode="aim", robot="done")
+            assert gc.get_threshold() == usual
             np.testing.assert_allclose(here.robot.robot.joints, here.planning.plans[0].joints[-1], atol=1e-9)
             assert np.abs(here.robot.robot.joints - before).max() > 0.05
 

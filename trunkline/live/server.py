@@ -22,6 +22,7 @@ from trunkline.live.anchors import Anchor, Anchors
 from trunkline.live.client import PER_SECOND, Client, end
 from trunkline.live.controllers import held
 from trunkline.live.desk import Desk
+from trunkline.live.garbage import Garbage
 from trunkline.live.lease import Control
 from trunkline.live.scene import Shells
 from trunkline.live.settings import Alignment
@@ -65,7 +66,7 @@ class Server:
         self._aligners: dict[str, Aligner] = {}  # of clients that may come again
         self.showing = Showing(house.desk, house.shells)
         self._site = Site(house.origins, house.token, house.scene, house.page, house.log)
-        self._world, self._unwritten = None, ""
+        self._world, self._unwritten, self._garbage = None, "", Garbage()
 
     # --- routes
 
@@ -357,6 +358,7 @@ class Server:
         task = asyncio.create_task(self._run())
         yield
         task.cancel()
+        self._garbage.tell(moving=False)
         for client in list(self.clients.values()):
             await client.socket.close(code=WSCloseCode.GOING_AWAY)
 
@@ -381,7 +383,7 @@ class Server:
             self.house.log(f"{before} was silent")
             self._passed(before)
             self._tell_lease()
-        self.desk.tick(dt)
+        self._garbage.tell(moving=self.desk.tick(dt).motion != "hold")
         if self.desk.journal.fault != self._unwritten:
             self._unwritten = self.desk.journal.fault
             self.house.log(self._unwritten)
