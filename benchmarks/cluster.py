@@ -1,4 +1,4 @@
-"""`python -m benchmarks.cluster [--turns 20] [--processes 1 2 4]`: identification on the workers of a scheduler.
+"""`python -m benchmarks.cluster [--turns 20] [--processes 1 2 3 4]`: identification on the workers of a scheduler.
 
 One evaluation, candidates times trials of a small arm, on clusters of so many processes of this machine. All of them
 are started first and take turns, so that who else uses the machine slows all alike; of each, the median counts. A turn
@@ -38,7 +38,7 @@ from trunkline.threads import thread_count
 CANDIDATES, FRAMES, EMPTY = 16, 120, 200
 BENDS, PULLS, REACH = (0.3, -0.25, 0.2), (30, 40, 50), 30  # rad, mm, mm
 TRIALS = len(BENDS) + len(PULLS) + 1
-TURNS, PROCESSES, ARMS = 20, [1, 2, 4], 1000
+TURNS, PROCESSES, ARMS = 20, [1, 2, 3, 4], 1000
 
 
 @in_one_line
@@ -48,7 +48,7 @@ def main() -> int:
     parser.add_argument("--processes", type=int, nargs="+", default=PROCESSES)
     given = parser.parse_args()
     cores, kept = min(thread_count(), len(os.sched_getaffinity(0))), given.processes == PROCESSES
-    rows = Rows("cluster", digest((CANDIDATES, FRAMES, EMPTY, BENDS, PULLS, REACH, cores)), "turn")
+    rows = Rows("cluster", digest((CANDIDATES, FRAMES, EMPTY, BENDS, PULLS, REACH, cores, PROCESSES)), "turn")
     with recorded("cluster", kept and given.turns == TURNS):
         turns = list(rows.read().values()) if kept else []
         for turn in measured(given.processes, given.turns - len(turns)):
@@ -127,7 +127,7 @@ def tell(turns: list[dict], processes: list[int], cores: int) -> None:
         name = n or "none, one thread"
         print(f"| {name} | {middle[n]:.3f} s | {min(values):.3f} to {max(values):.3f} s | {of} |")
     a, b, c, off = law(middle, processes, cores)
-    print(f"T(n) = {a:.3f} s + {b:.3f} s / min(n, {cores}) + {c:.4f} s n; off by {off:.3f} s RMS")
+    print(f"T(n) = {a:.3f} s + {b:.3f} s / min(n, {cores}) + {c:.4f} s n; off by {1e3 * off:.0f} ms RMS at {len(processes)} medians")
     print(f"an empty piece takes {1e3 * piece:.1f} ms, an evaluation brings back {size / 1e6:.1f} MB")
     print("one arm's fit (Amdahl; a core for each worker, a network as fast as here, a, b and c as here):")
     for n in (2, 8, 32):

