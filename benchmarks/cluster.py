@@ -127,7 +127,8 @@ def tell(turns: list[dict], processes: list[int], cores: int) -> None:
         name = n or "none, one thread"
         print(f"| {name} | {middle[n]:.3f} s | {min(values):.3f} to {max(values):.3f} s | {of} |")
     a, b, c, off = law(middle, processes, cores)
-    print(f"T(n) = {a:.3f} s + {b:.3f} s / min(n, {cores}) + {c:.4f} s n; off by {1e3 * off:.0f} ms RMS at {len(processes)} medians")
+    fit = f"off by {1e3 * off:.0f} ms RMS at {len(processes)} medians"
+    print(f"T(n) = {a:.3f} s + {b:.3f} s / min(n, {cores}) + {c:.4f} s n; {fit}")
     print(f"an empty piece takes {1e3 * piece:.1f} ms, an evaluation brings back {size / 1e6:.1f} MB")
     print("one arm's fit (Amdahl; a core for each worker, a network as fast as here, a, b and c as here):")
     for n in (2, 8, 32):
