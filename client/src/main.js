@@ -192,7 +192,10 @@ class Page {
     });
     find("recording").addEventListener("change", async ({ target }) => {
       const [file] = target.files;
-      this.recording = file ? new Recording(await file.arrayBuffer()) : null;
+      const found = file && new Recording(await file.arrayBuffer());
+      const fits = found?.playback?.width === (this.drawn.count + MARKERS.length) * STRIDE;
+      this.recording = fits ? found : null;
+      if (found && !fits) this.warn("That file is no recording of this robot.");
       find("playing").hidden = !this.playing;
     });
     find("immerse").addEventListener("click", () => this.enterHeadset());

@@ -5,6 +5,7 @@ import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";
 import { after, before, test } from "node:test";
 import { inMode, launch, open, passed, picture, serve, until } from "./harness.mjs";
+import { FROM_SERVER, HEAD, HEAD_BYTES } from "../src/wire_table.js";
 
 const AXE = readFileSync(createRequire(import.meta.url).resolve("axe-core/axe.min.js"), "utf8");
 let browser, server;
@@ -197,6 +198,28 @@ test("without its token the page asks for the six digits, and a wrong token is s
   assert.ok(await page.evaluate(() => document.querySelector("#pairing").hidden));
   const wrong = await open(t, browser, server, { url: `${server.origin}/#token=${"0".repeat(32)}` });
   await until(wrong.page, () => /token/.test(document.querySelector("#why").textContent));
+});
+
+test("a recording is played by the ghost, and a file that is none is said", async (t) => {
+  const { page, wrongs } = await open(t, browser, server);
+  await loaded(page);
+  const rows = await page.evaluate(() => [...globalThis.trunkline.frame.rows].map((value) => (Number.isFinite(value) ? value : null)));
+  const messages = [0, 0.5, 1].map((time) => {
+    const view = new DataView(new ArrayBuffer(4 + HEAD_BYTES + 4 * rows.length));
+    view.setUint32(0, view.byteLength - 4, true);
+    view.setUint8(4, FROM_SERVER.robot.type);
+    view.setFloat64(4 + HEAD.time.offset, time, true);
+    rows.forEach((value, place) => view.setFloat32(4 + HEAD_BYTES + 4 * place, place === 0 ? time : (value ?? NaN), true));
+    return Buffer.from(view.buffer);
+  });
+  const give = (buffer) => page.setInputFiles("#recording", { name: "run.bin", mimeType: "application/octet-stream", buffer });
+  await give(Buffer.from("no recording"));
+  await until(page, () => /no recording of this robot/.test(document.querySelector("#notice").textContent));
+  assert.equal(await page.evaluate(() => globalThis.trunkline.recording), null);
+  await give(Buffer.concat(messages));
+  await until(page, () => document.querySelector("#foreseen").textContent === "A recording." && globalThis.trunkline.drawn.ghost.visible);
+  await until(page, () => globalThis.trunkline.playing.rows[globalThis.trunkline.playing.index * globalThis.trunkline.playing.width] === 1);
+  assert.deepEqual(wrongs, []);
 });
 
 test("axe finds nothing against the page", async (t) => {
