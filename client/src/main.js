@@ -339,7 +339,7 @@ class Page {
     const age = this.frame && wire ? wire.age(this.frame.time) : null;
     const stale = !wire?.up || (this.frame?.flags.has("stale") ?? false) || (age ?? 0) > 1;
     this.drawn.fade(stale);
-    const spoken = words({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, stale });
+    const spoken = words({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, stale, immersed });
     if (this.warning && this.warning.until > clock()) spoken.notice ||= this.warning.text;
     if (immersed) {
       const { aligning } = this.immersive;

@@ -12,9 +12,9 @@ const COLOURS = {
 };
 const OLD = 0.25; // s beyond which a pose of the robot is called old
 
-/** What there is to say of `page`: `mode`, `title`, `next`, `notice`, and facts by name. */
+/** What there is to say of `page`: `mode`, `title`, `next`, `notice`, and facts by name. `immersed`: by controllers. */
 export function words(page) {
-  const { state, lease, id, age, up, reason, stale } = page;
+  const { state, lease, id, age, up, reason, stale, immersed } = page;
   const mode = !up ? (reason === null ? "connecting" : "lost") : (state?.mode ?? "connecting");
   const mine = lease?.holder === id && id !== "";
   const holder = lease?.clients?.find((one) => one.id === lease.holder);
@@ -25,7 +25,7 @@ export function words(page) {
   if (state?.fault) facts.Fault = state.fault;
   let title = TITLES[mode];
   if (mode === "delay" && Number.isFinite(state.countdown)) title = `Moves in ${state.countdown.toFixed(1)} s`;
-  let next = mine || !lease?.holder ? sentence(state?.next ?? "") : "You watch. Ask for control to aim.";
+  let next = mine || !lease?.holder ? sentence((immersed ? state?.next : state?.keys) ?? "") : "You watch. Ask for control to aim.";
   if (!up) next = reason === null ? "Waiting for the server." : `The connection is lost${reason ? `: ${reason}` : ""}. Trying again.`;
   return { mode, title, next, notice: (up && state?.notice) || "", facts };
 }
@@ -39,8 +39,8 @@ export function foreseenWords(told) {
   const parts = [];
   if (told.probability !== null)
     parts.push(`Grasp holds in ${percent(told.probability)} of ${told.futures} futures (${percent(told.low)} to ${percent(told.high)})`);
-  if (spread !== null) parts.push(`the tip ends within ${spread} mm in ${percent(told.within)} of them`);
-  return parts.length ? `${parts.join("; ")}.` : "";
+  if (spread !== null) parts.push(`the tip ends within ${spread} mm in ${percent(told.within)} of ${parts.length ? "them" : `${told.futures} futures`}`);
+  return sentence(parts.join("; "));
 }
 
 const percent = (share) => `${Math.round(100 * share)} %`;

@@ -205,6 +205,7 @@ export const ANSWERS = {
     "motion": "required",
     "notice": "required",
     "next": "required",
+    "keys": "required",
     "countdown": "required",
     "preview": "required",
     "execute": "required",

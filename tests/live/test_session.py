@@ -2,14 +2,18 @@
 
 import asyncio
 import gc
+import socket
+from contextlib import closing
 
 import numpy as np
 import pytest
 
 from tests.support.live import Hands, binary, controlling, hand, laid
 from tests.teleop.test_plan import MOUNT, OFFSET, TIP
+from trunkline.errors import InputError
 from trunkline.live import wire
 from trunkline.live.garbage import NEVER
+from trunkline.live.session import Address, expect_free
 from trunkline.panda.kinematics import mount_pose
 
 UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
@@ -244,3 +248,13 @@ def test_a_stop_is_heard_beyond_the_rate_limit_too():
             assert here.robot.stops
 
     asyncio.run(session())
+
+
+def test_an_address_that_is_taken_is_refused_before_anything_is_loaded():
+    with closing(socket.socket()) as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        port = other.getsockname()[1]
+        with pytest.raises(InputError, match=rf"--port {port}: Address already in use; does a session run there"):
+            expect_free(Address(port))
+    expect_free(Address(port))

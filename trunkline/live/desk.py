@@ -18,7 +18,7 @@ from trunkline.live.journal import Journal
 from trunkline.live.robot import Standing
 from trunkline.live.seeking import Seeking
 from trunkline.live.wire import MARKERS, Received
-from trunkline.live.words import next_action
+from trunkline.live.words import next_action, next_key
 from trunkline.teleop.alignment import base_quaternion
 from trunkline.teleop.core import Teleoperation
 from trunkline.teleop.executor import FOLLOWS
@@ -335,9 +335,10 @@ class Desk:
         hands = self.state.hands
         touched = hands[self._rigid].target is not None, hands[1 - self._rigid].target is not None
         words = next_action(intent.mode, intent.targets, holder, self.alignment is not None, touched)
+        keys = next_key(intent.mode, intent.targets, holder, touched)
         notice = intent.notice or self._seeking.refused if holder else ""
         return talk.State(
-            intent.mode, intent.motion, _joined(notice, self.blocked), words,
+            intent.mode, intent.motion, _joined(notice, self.blocked), words, keys,
             round(intent.countdown, 2), intent.preview, intent.execute, _rounded(intent.targets),
             robot.mode, robot.fault,
         )  # fmt: skip

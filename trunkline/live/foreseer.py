@@ -8,6 +8,7 @@ One order at a time; a newer one ends the one before within a quarter of a simul
 import itertools
 import multiprocessing
 import os
+import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -307,6 +308,7 @@ class ForeseerProcess:
 
 def run(answers, orders, newest, path: Path, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> None:
     """The process: until its parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
     os.environ["TRUNKLINE_THREADS"] = str(max(thread_count() - 1, 1))  # the rest is the server's and the robot's
     with suppress(OSError):
         os.nice(NICE)

@@ -182,6 +182,7 @@ def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
     """The twin's process: it follows what the machine's axes are sent, DELAY s later, as a robot follows targets: this
     process hears of them unevenly, and a jump from one to the next would throw the twin about. Once it rests where they
     rest, it is left alone: a preview needs the processor more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
     os.environ["TRUNKLINE_THREADS"] = "1"
     os.nice(NICE)
     threadpool_limits(1)

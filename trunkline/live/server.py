@@ -5,6 +5,7 @@ before anything else of a message is looked at.
 """
 
 import asyncio
+import contextlib
 import secrets
 import time
 from collections.abc import Callable
@@ -34,6 +35,7 @@ LARGEST = 64 * 1024  # bytes of a message
 FLOOD = 4000.0  # messages of a client beyond its rate that end it
 MOST_CLIENTS = 64
 HEARTBEAT = 20.0  # s
+PARTING = 1.0  # s that a client has to say that it goes, as the session ends
 TOUCHING = "right"  # the hand whose controller touches
 PREVIEWED = ("plan", "preview", "ready", "delay")  # modes in which who comes is shown the preview from its beginning
 
@@ -75,6 +77,7 @@ class Server:
         app.router.add_get("/ws", self._socket)
         self._site.add_routes(app)
         app.cleanup_ctx.append(self._clockwork)
+        app.on_shutdown.append(self._part)
         return app
 
     async def _socket(self, request: web.Request) -> web.StreamResponse:
@@ -359,8 +362,12 @@ class Server:
         yield
         task.cancel()
         self._garbage.tell(moving=False)
-        for client in list(self.clients.values()):
-            await client.socket.close(code=WSCloseCode.GOING_AWAY)
+
+    async def _part(self, app: web.Application) -> None:
+        """All clients are told that it ends; one that does not answer is not waited for."""
+        ends = [client.socket.close(code=WSCloseCode.GOING_AWAY) for client in self.clients.values()]
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(asyncio.gather(*ends), PARTING)
 
     async def _run(self) -> None:
         """Ticks at the house's rate; one that is late is not made up for."""

@@ -5,6 +5,7 @@ import asyncio
 import contextlib
 import functools
 import gc
+import socket
 import ssl
 import sys
 from collections.abc import AsyncIterator, Callable
@@ -20,7 +21,7 @@ from trunkline.live.anchors import Anchors
 from trunkline.live.foreseer import Answer
 from trunkline.live.hardware import Hardware, hardware_of
 from trunkline.live.house import Made, make
-from trunkline.live.server import House, Server
+from trunkline.live.server import PARTING, House, Server
 from trunkline.live.settings import Alignment, Config
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.teleop.config import Config as Teleop
@@ -57,16 +58,34 @@ async def listening(server: Server, address: Address) -> AsyncIterator[None]:
     Raises:
         InputError: the address cannot be had.
     """
-    runner = web.AppRunner(server.app(), access_log=None, handle_signals=False)
+    runner = web.AppRunner(server.app(), access_log=None, handle_signals=False, shutdown_timeout=PARTING)
     await runner.setup()
     try:
         try:
             await web.TCPSite(runner, address.host, address.port, ssl_context=address.context).start()
         except OSError as error:
-            raise InputError(f"--host {address.host} --port {address.port}: {error.strerror}") from error
+            raise refused(address, error) from error
         yield
     finally:
         await runner.cleanup()
+
+
+def refused(address: Address, error: OSError) -> InputError:
+    return InputError(f"--host {address.host} --port {address.port}: {error.strerror}; does a session run there?")
+
+
+def expect_free(address: Address) -> None:
+    """
+    Raises:
+        InputError: the address cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+    with contextlib.closing(socket.socket(family)) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((address.host, address.port))
+        except OSError as error:
+            raise refused(address, error) from error
 
 
 @contextlib.asynccontextmanager
@@ -128,6 +147,7 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
     if hardware is not None and hardware.real:
         log(f"REAL: {hardware.words()}. Nobody has tried this on real ones yet (docs/execution.md).")
     address = Address(options.port, options.host, tuple(names), context)
+    expect_free(address)  # what a session needs takes long to load
     async with opened(options.package, address, log, hardware) as (server, made):
         log(f"log: {made.journal.path}")
         log(f"{address.url}/#token={server.house.token}")

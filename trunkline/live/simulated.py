@@ -6,6 +6,7 @@ that bear the arm. So what was previewed is what happens.
 
 import copy
 import os
+import signal
 import time
 from contextlib import suppress
 from dataclasses import dataclass
@@ -223,6 +224,7 @@ def drive(loop: Loop, parent: int) -> None:
 
 def run(channel: Channel, simulation: Simulation) -> None:
     """The process: until its parent is gone."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
     os.environ["TRUNKLINE_THREADS"] = "1"
     with suppress(OSError):
         os.nice(NICE)

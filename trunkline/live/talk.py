@@ -197,15 +197,16 @@ class Aligning:
 class State:
     """What the core wants and the robot does; sent when it changes, at most ten times a second but for its `mode`.
 
-    notice: one line for the user, "" for none. next: the one next action in words, for whom controls. countdown: s to
-    the execution, when this was sent. preview, execute: digests. targets: as the core has them; where they are now,
-    the markers of the robot's frames say. robot: what it does; fault: in words.
+    notice: one line for the user, "" for none. next: the one next action in words, for whom controls; keys: the same at
+    mouse and keyboard. countdown: s to the execution, when this was sent. preview, execute: digests. targets: as the
+    core has them; where they are now, the markers of the robot's frames say. robot: what it does; fault: in words.
     """
 
     mode: Mode
     motion: Motion
     notice: str
     next: str
+    keys: str
     countdown: float
     preview: str
     execute: str
