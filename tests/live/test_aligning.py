@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tests.live.test_session import asked, grips
 from tests.support.live import Hands, controlling, hand, laid, live
+from tests.support.touches import PLACES, TRUE, UP, at_reach, directions, seen
 from tests.teleop.test_plan import START
 from tests.teleop.test_plan import TIP as TARGET
 from trunkline.errors import InputError
@@ -36,22 +37,8 @@ from trunkline.live.desk import HERE
 from trunkline.panda.kinematics import Q_MAX, Q_MIN
 from trunkline.teleop.messages import Pose
 
-UP = Rotation.from_euler("x", 90, degrees=True)  # of a reference frame whose y is up
-TRUE = pose_of(np.array([0.4, -0.2, -0.9]), Rotation.from_euler("z", 35, degrees=True) * UP)  # reference in the base
-PLACES = np.array(
-    [[0.6, 0.3, 0.2], [0.6, -0.3, 0.7], [0.1, -0.6, 0.3], [0.1, 0.6, 0.7], [0.35, 0.0, 0.9], [0.5, 0.0, 0.1]]
-)  # m, to which the flange reaches
 TIP = np.array([0.01, -0.03, -0.05])
 MARK = live().alignment.mark
-
-
-def seen(places, rng, sigma):
-    return in_base(inverse(TRUE), places) + rng.normal(scale=sigma, size=places.shape)
-
-
-def directions(count, rng):
-    found = rng.normal(size=(count, 3))
-    return found / np.linalg.norm(found, axis=1)[:, None]
 
 
 def test_exact_touches_give_the_pose_back():
@@ -70,9 +57,7 @@ def test_six_places_of_a_millimetre_are_within_three_at_reach_and_told_so():
     for _ in range(400):
         touched = seen(PLACES, rng, 1e-3)
         found = fit(touched, PLACES)
-        about, height = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, 0.6)
-        away = np.sqrt(0.9**2 - height**2)
-        point = np.array([away * np.cos(about), away * np.sin(about), height])
+        point = at_reach(rng)
         off.append(np.linalg.norm(in_base(found, in_base(inverse(TRUE), point)) - point))
         told.append(expected_error(found, touched, PLACES, point))
     assert np.quantile(off, 0.95) < 3e-3

@@ -73,7 +73,7 @@ def make(
     setup = path.resolve(), teleop, config.preview, simulation.bodies
     planning = ForeseerProcess(foreseer.run, setup, heard)  # first: it takes longest until it is ready
     drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
-    world = make_world(_solids(config), () if config.thing is None else (config.thing,))
+    world = make_world(solids(config), () if config.thing is None else (config.thing,))
     journal = JournalProcess(new_path(Path(config.journal.folder)), subject_of(simulation), config.journal.period)
     robot = robot_of(simulation, hardware)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
@@ -105,13 +105,14 @@ def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
 def simulation_of(package: Package, teleop: Teleop, config: Config, joints: np.ndarray) -> Simulation:
     """The simulated robot, at rest at `joints` (7,), rad, with its arm straight."""
     known = believed(config.preview, package.files)
-    world = make_world(_solids(config))
+    world = make_world(solids(config))
     twin = compose_twin(known, world, config.thing, joints, package.straight, config.preview)
     limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
     bodies, offset = drawn(twin.model), teleop.mount_offset
     return Simulation(twin, joints, package.straight, bodies, limits, package.digest, offset)
 
 
-def _solids(config: Config) -> tuple[Box, ...]:
+def solids(config: Config) -> tuple[Box, ...]:
+    """What stands around the robot: the floor, and the boxes."""
     floor = Box("the floor", (-AROUND, -AROUND, config.floor - BELOW), (AROUND, AROUND, config.floor))
     return floor, *config.boxes
