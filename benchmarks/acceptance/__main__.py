@@ -9,7 +9,7 @@ simulated, as the files of this folder say. Times are by the wall, of a machine 
 import argparse
 from pathlib import Path
 
-from benchmarks.acceptance import pressing, previewing, rules
+from benchmarks.acceptance import pressing, previewing, records, rules
 from trunkline.errors import in_one_line
 from trunkline.foresight.package import only_package
 from trunkline.pipeline.results import recorded
@@ -22,7 +22,7 @@ def run() -> int:
     package = parser.parse_args().package or only_package()
     with recorded("acceptance"):
         print("| what | found | goal |\n|---|---:|---:|", flush=True)
-        for row in (*pressing.rows(), *previewing.rows(package), *rules.rows()):
+        for row in (*pressing.rows(), *previewing.rows(package), *rules.rows(), *records.rows()):
             print(f"| {row.what} | {row.found} | {row.goal} |", flush=True)
     return 0
 

@@ -20,6 +20,7 @@ from tests.support.disks import filling, full, stuck
 from tests.support.live import BODIES, RATE, controlling, hand, laid, patient
 from tests.support.operator import PACKAGE, Everywhere, Operator
 from tests.support.sessions import motion_truth
+from tests.support.ticking import fed, ticks
 from tests.support.workbench import ROOT
 from tests.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
 from trunkline.errors import InputError
@@ -29,7 +30,6 @@ from trunkline.live.journal import Journal, JournalProcess, new_path
 from trunkline.live.logbook import read_logbook
 from trunkline.live.robot import Standing
 from trunkline.live.wire import HANDS
-from trunkline.logs.log import read_log
 from trunkline.preparation.inspect import main as inspect
 from trunkline.sessions.session import read_session
 from trunkline.takes.checks import Limits
@@ -237,23 +237,6 @@ def test_what_is_sent_and_what_is_measured_are_told_apart_and_what_is_not_measur
 
 
 # --- the process
-
-
-def fed(journal, seconds, pace=0.01):
-    """Times at which something was told, of the journal's clock."""
-    told, end = [], time.monotonic() + seconds
-    while time.monotonic() < end:
-        told.append(time.monotonic())
-        journal.event("tick", number=len(told))
-        time.sleep(pace)
-    return told
-
-
-def ticks(path):
-    """What is in the file, whatever has become of it: numbers, and what is damaged."""
-    found = read_log(path)
-    texts = found.topics[EVENTS].messages if EVENTS in found.topics else []
-    return [int(text.partition(b'"number":')[2].rstrip(b"}\0")) for text in texts], found.damage
 
 
 def until(happens, seconds=20.0):

@@ -1,0 +1,23 @@
+"""A log that is told numbers, so that it shows which of them it has."""
+
+import time
+
+from trunkline.live.book import EVENTS
+from trunkline.logs.log import read_log
+
+
+def fed(journal, seconds, pace=0.01):
+    """Times at which something was told, of the journal's clock."""
+    told, end = [], time.monotonic() + seconds
+    while time.monotonic() < end:
+        told.append(time.monotonic())
+        journal.event("tick", number=len(told))
+        time.sleep(pace)
+    return told
+
+
+def ticks(path):
+    """What is in the file, whatever has become of it: numbers, and what is damaged."""
+    found = read_log(path)
+    texts = found.topics[EVENTS].messages if EVENTS in found.topics else []
+    return [int(text.partition(b'"number":')[2].rstrip(b"}\0")) for text in texts], found.damage
