@@ -30,7 +30,8 @@ from trunkline.teleop.vectors import DOWN
 
 PLANS, MOST = 12, 100  # that are previewed, and places that are tried for them
 ENOUGH = 3.6  # s of a preview
-AROUND, PULLS, HEADING = (0.15, 0.3, 0.1), (0.03, 0.1), 0.5  # m of mounts about the first, m of the first cable, rad
+AROUND, HEADING = (0.15, 0.3, 0.1), 0.5  # m of mounts about the first, rad
+PULLS, LOOSE = (0.03, 0.12), 0.2  # m by which the first cable is pulled, and the others paid out
 COMES = 600.0  # s that the process may take
 
 
@@ -107,11 +108,11 @@ def previews(
 
 
 def _targets(rng: np.random.Generator, package: Package, ready: Vector) -> Targets:
-    """The mount near where it is `ready`, the tip where a pull of the first cable leads it."""
+    """The mount near where it is `ready`, the tip where the first cable leads it."""
     x, y, z = (float(value) for value in np.array(ready) + rng.uniform(-1, 1, 3) * AROUND)
     mount, straight = Target((x, y, z)), package.straight
     targets = Targets(mount, mount, DOWN, float(rng.uniform(-HEADING, HEADING)), 0, 0.0)
-    pulled = straight - rng.uniform(*PULLS) * np.eye(len(straight))[0]
+    pulled = straight + np.where(np.arange(len(straight)) == 0, -rng.uniform(*PULLS), LOOSE)
     a, b, c = (float(value) for value in package.tip((x, y, z), targets, pulled))
     return Targets(mount, Target((a, b, c)), DOWN, targets.heading, 0, 0.0)
 
