@@ -1,5 +1,6 @@
 """How soon a preview is there, and whether the simulated robot does what it shows: on a package, by the process that
-plans in a live session. Each plan begins at rest; the robot is the live session's, stepped without waiting."""
+plans in a live session. Each plan begins at rest; the robot is the live session's, stepped without waiting. The thing
+of a live session's settings is there, and the arm may touch it on its way."""
 
 import queue
 import time

@@ -5,6 +5,7 @@ import signal
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rosbags.typesys import Stores, get_typestore
@@ -55,7 +56,7 @@ def sent() -> Row:
     rng, names = np.random.default_rng(0), load_folder(Execution, PROJECT / "conf/execution").ros.names
     positions, times = rng.normal(size=(POINTS, len(names))), 0.002 * np.arange(1, POINTS + 1)
     data = trajectory(names, list(zip(times.tolist(), positions.tolist(), strict=True))).serialize()
-    read = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, "trajectory_msgs/msg/JointTrajectory")
+    read: Any = get_typestore(Stores.ROS2_JAZZY).deserialize_cdr(data, "trajectory_msgs/msg/JointTrajectory")
     if read.joint_names != list(names) or len(read.points) != POINTS:
         raise InputError(f"trajectory: found {len(read.points)} points of {read.joint_names}, expected {POINTS}")
     apart = np.abs(np.array([point.positions for point in read.points]) - positions).max()
