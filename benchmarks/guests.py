@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from aiohttp import ClientSession, WSMsgType
+from aiohttp import ClientSession, WSMessage, WSMsgType
 
 from trunkline.live import wire
 
@@ -21,11 +21,13 @@ WATCHED = 0.2  # s after a preview's end, at which it is said to have been shown
 
 
 class Guest:
-    """A client that acknowledges everything and keeps what it was told last. `now`: its clock, s."""
+    """A client that acknowledges everything and keeps what it was told last. `now`: its clock, s. sees: is called with
+    each message before it is answered."""
 
     def __init__(self, socket, now: Callable[[], float] = time.monotonic) -> None:
         self.socket, self.now, self.told, self.received = socket, now, {}, 0
         self.knows = asyncio.Event()  # its clock
+        self.sees: Callable[[WSMessage], None] = lambda message: None
         self.task = asyncio.create_task(self._read())
 
     async def _read(self) -> None:
@@ -34,6 +36,7 @@ class Guest:
 
     async def _listen(self) -> None:
         async for message in self.socket:
+            self.sees(message)
             if message.type is WSMsgType.BINARY:
                 self.received += 1
                 await self.send("ack")

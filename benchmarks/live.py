@@ -1,123 +1,157 @@
-"""A live session's edge: from a stop until the robot is commanded to hold, bytes of a frame, the server's processor.
+"""A live session's edge: frames that come and their age, from a press to what shows it, the server's processor, a
+client that does not read, and from a stop until the robot is commanded to hold.
 
     python -m benchmarks.live [PACKAGE] [--watchers 20] [--stops 200]
 
-A client that controls asks for plans all the time, so that previews and their batches run; `watchers` look on and
-acknowledge; one of them stops the robot, again and again. A stop is timed from before it is sent until the robot's own
-process has obeyed it, on one clock. Clients are in a process of their own, so that the server's processor is its own.
+Clients are in a process of their own, so that the server's processor is its own, and draw nothing. A frame's age is
+from the time at which the robot was so until the frame has come. Where others watch, one client controls and asks for
+plans all the time, so that previews and their batches run. One of `watchers` stops the robot, again and again: a stop
+is timed from before it is sent until the robot's own process has obeyed it. All is on one clock.
 """
 
 import argparse
 import asyncio
 import contextlib
-import multiprocessing
 import time
+from collections.abc import AsyncIterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from aiohttp import ClientSession
 
-from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, hands_at, knock
+from benchmarks.watching import Door, Span, alone, attended, crowd, pressed, stopping
 from trunkline.errors import in_one_line
 from trunkline.foresight.package import only_package
 from trunkline.live import wire
+from trunkline.live.certificate import make_certificate, tls_context
 from trunkline.live.house import Made
 from trunkline.live.server import Server
 from trunkline.live.session import Address, opened
 from trunkline.pipeline.results import recorded
 
 ADDRESS = Address(18444)
-BETWEEN = (1.5, 3.0)  # s between stops: in aim, planning, preview or its batch
-QUIET = 5.0  # s in which frames and processor are counted
+CROWD = 10  # watchers, of whom one does not read in the end
+PRESSES = 100
+LOOKED, CLOSELY = 0.05, 0.002  # s between two looks at the server's processor, and at the robot
+
+Row = tuple[str, str, str]  # what, found, goal
 
 
-def main(package: Path, watchers: int, stops: int) -> None:
-    found = asyncio.run(serve(package, watchers, stops))
-    bytes_a_frame, cpu, rate, held, plans = found
-    told = 1e3 * np.quantile(held, (0.5, 0.95, 0.99, 1.0))
-    print(
-        f"{watchers} watchers, {rate:.1f} frames a second to each: {bytes_a_frame} bytes a frame, "
-        f"{1e3 * cpu:.2f} ms of the server's processor a frame"
-    )
-    print(
-        f"stop sent to robot commanded to hold, {len(held)} stops while {plans} plans were previewed: "
+@dataclass
+class Looks:
+    """At a server, from within: of each when, its processor's time, s, and how many frames are on their way to whom."""
+
+    server: Server
+    rows: list[tuple[float, float, dict[str, int]]] = field(default_factory=list)
+
+    def look(self) -> None:
+        boxes = {client.id: client.outbox for client in self.server.clients.values()}
+        held = {id: box.sent - box.received for id, box in boxes.items()}
+        self.rows.append((time.monotonic(), time.process_time(), held))
+
+    def share(self, span: Span) -> float:
+        """Of one core, in `span`."""
+        when, cpu = np.array([row[:2] for row in self.rows]).T
+        return float(np.diff(np.interp([span.began, span.ended], when, cpu))[0] / (span.ended - span.began))
+
+    def most(self, span: Span, client: str) -> int:
+        """Frames that were held for `client` in `span`."""
+        return max(held[client] for when, _, held in self.rows if span.began <= when <= span.ended)
+
+
+@dataclass
+class Holds:
+    """When the robot was commanded to hold, s."""
+
+    made: Made
+    times: list[float]
+
+    def look(self) -> None:
+        now = self.made.robot.standing().held
+        if now != self.times[-1]:
+            self.times.append(now)
+
+    def after(self, sent: np.ndarray) -> np.ndarray:
+        """s from each that was `sent` to the hold after it; who saw none is left out."""
+        held = np.array(self.times)
+        first = np.searchsorted(held, sent)
+        kept = first < len(held)
+        return held[first[kept]] - sent[kept]
+
+
+@contextlib.asynccontextmanager
+async def held_open(package: Path, address: Address, pem: bytes | None = None) -> AsyncIterator[tuple]:
+    """A session and its door."""
+    async with opened(package, address, lambda line: None) as (server, made):
+        yield server, made, Door(address.url, server.house.token, pem)
+
+
+def halves(found: np.ndarray) -> str:
+    """ms, the median and the 95th percentile."""
+    middle, late = 1e3 * np.quantile(found, (0.5, 0.95))
+    return f"{middle:.1f} / {late:.1f}"
+
+
+def received(span: Span, how: str) -> list[Row]:
+    return [
+        (f"frames a second that one client receives{how}", f"{span.rate:.1f}", "≥ 71.5"),
+        (f"age of a frame that comes{how}, ms, median / 95th percentile", halves(span.ages), "2 / 5"),
+    ]
+
+
+def nothing() -> None:
+    pass
+
+
+async def by_tls(package: Path) -> list[Row]:
+    """Of a session with a certificate."""
+    pem, key = make_certificate(list(ADDRESS.names))
+    async with held_open(package, replace(ADDRESS, context=tls_context(pem, key)), pem) as (_, _, door):
+        return received(await attended(nothing, LOOKED, door, alone), " by TLS")
+
+
+async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], str]:
+    """Of a session without; and a line on stops."""
+    async with held_open(package, ADDRESS) as (server, made, door):
+        rows = received(await attended(nothing, LOOKED, door, alone), "")
+        took = await attended(nothing, LOOKED, door, pressed, PRESSES)
+        rows.append((f"{len(took)} presses to the state that shows them, ms, median / 95th", halves(took), "3 / 10"))
+        looks = Looks(server)
+        reading, rest, deaf = await attended(looks.look, LOOKED, door, crowd, CROWD)
+        rows += [
+            (f"the server's processor, 1 controls, {CROWD} watch", f"{looks.share(reading):.1%} of a core", "10 %"),
+            (f"frames a second that each of {CROWD} receives", f"{reading.rate:.1f}", ""),
+            ("age of their frames, ms, median / 95th", halves(reading.ages), ""),
+            ("the same while one more reads nothing", halves(rest.ages), "95th: 5"),
+            ("frames that are held for it", str(looks.most(rest, deaf)), "3"),
+        ]
+        holds, looks, asked = Holds(made, [made.robot.standing().held]), Looks(server), made.desk.state.serial
+
+        def look() -> None:
+            holds.look()
+            if not looks.rows or time.monotonic() - looks.rows[-1][0] > LOOKED:
+                looks.look()
+
+        span, sent = await attended(look, CLOSELY, door, stopping, watchers, stops)
+        plans, took = made.desk.state.serial - asked, holds.after(sent)
+        size = wire.HEAD_BYTES + 28 * (len(made.scene["bodies"]) + len(wire.MARKERS))
+    told = 1e3 * np.quantile(took, (0.5, 0.95, 0.99, 1.0))
+    rows += [
+        (f"frames a second that each of {watchers} receives", f"{span.rate:.1f}", ""),
+        ("bytes a frame", str(size), ""),
+    ]
+    return rows, (
+        f"stop sent to robot commanded to hold, {len(took)} stops while {plans} plans were previewed: "
         f"{told[0]:.1f} ms median, {told[1]:.1f} ms 95th percentile, {told[2]:.1f} ms 99th, {told[3]:.1f} ms most"
     )
 
 
-async def serve(package: Path, watchers: int, stops: int) -> tuple[int, float, float, np.ndarray, int]:
-    """Bytes and s of processor a frame, frames a second, s from each stop to its hold, and how many plans were made."""
-    async with opened(package, ADDRESS, lambda line: None) as (server, made):
-        context = multiprocessing.get_context("spawn")
-        ours, theirs = context.Pipe()
-        attending = theirs, server.house.token, watchers, stops
-        clients = context.Process(target=attend, args=attending, daemon=True)
-        clients.start()
-        try:
-            return await watched(server, made, ours)
-        finally:
-            clients.terminate()
-
-
-async def watched(server: Server, made: Made, ours) -> tuple[int, float, float, np.ndarray, int]:
-    """Of a server whose clients have come."""
-    while not ours.poll():
-        await asyncio.sleep(0.05)
-    assert ours.recv() == "here"
-    frames, cpu, began = server.showing.frames, time.process_time(), time.monotonic()
-    await asyncio.sleep(QUIET)
-    frames, cpu, lasted = server.showing.frames - frames, time.process_time() - cpu, time.monotonic() - began
-    bytes_a_frame = wire.HEAD_BYTES + 28 * (len(made.scene["bodies"]) + len(wire.MARKERS))
-    held, seen, asked = [], made.robot.standing().held, made.desk.state.serial
-    ours.send("stop")
-    while not ours.poll():
-        await asyncio.sleep(0.002)
-        now = made.robot.standing().held
-        if now != seen:
-            held, seen = [*held, now], now
-    sent = np.array(ours.recv())
-    after = np.searchsorted(held, sent)
-    kept = after < len(held)
-    plans = made.desk.state.serial - asked
-    return bytes_a_frame, cpu / frames, frames / lasted, np.array(held)[after[kept]] - sent[kept], plans
-
-
-def attend(pipe, token: str, watchers: int, stops: int) -> None:
-    """The process of the clients."""
-    asyncio.run(clients(pipe, token, watchers, stops))
-
-
-async def clients(pipe, token: str, watchers: int, stops: int) -> None:
-    async with ClientSession() as session:
-        guests = [await knock(session, ADDRESS.url) for _ in range(watchers + 1)]
-        await asyncio.gather(*(guest.greet(token) for guest in guests))
-        await guests[0].say(type="lease", action="ask")
-        pointing = asyncio.create_task(point(guests[0]))
-        pipe.send("here")
-        while not pipe.poll():
-            await asyncio.sleep(0.01)
-        sent, rng = [], np.random.default_rng(0)
-        for _ in range(stops):
-            await asyncio.sleep(rng.uniform(*BETWEEN))
-            sent.append(time.monotonic())
-            await guests[1].send("stop")
-        await asyncio.sleep(0.5)
-        pipe.send(sent)
-        await asyncio.sleep(5.0)
-        pointing.cancel()
-
-
-async def point(guest: Guest) -> None:
-    """Both grips held at two targets, the trigger pulled, all let go, primary pressed: over and over, as fast as a
-    stop and a plan allow."""
-    with contextlib.suppress(ConnectionError):
-        while True:
-            for seconds, held in ((0.4, {"primary": 1.0}), (0.4, {}), (0.3, {"grip": 1.0}),
-                                  (0.5, {"grip": 1.0, "trigger": 1.0})):  # fmt: skip
-                end = time.monotonic() + seconds
-                while time.monotonic() < end:
-                    await guest.send("input", hands_at(RIGID, TIP, held), SEEN, 2)
-                    await asyncio.sleep(1 / HZ)
+async def main(package: Path, watchers: int, stops: int) -> None:
+    rows, line = await plainly(package, watchers, stops)
+    rows[2:2] = await by_tls(package)
+    for cells in (("what", "found", "goal"), ("---", "---:", "---:"), *rows):
+        print(f"| {' | '.join(cells)} |")
+    print(line)
 
 
 @in_one_line
@@ -129,7 +163,7 @@ def run() -> int:
     options = parser.parse_args()
     package = options.package or only_package()
     with recorded("live", options.watchers >= 20 and options.stops >= 200):
-        main(package, options.watchers, options.stops)
+        asyncio.run(main(package, options.watchers, options.stops))
     return 0
 
 
