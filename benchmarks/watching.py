@@ -17,13 +17,16 @@ import numpy as np
 from aiohttp import ClientSession, TCPConnector, WSMessage, WSMsgType
 
 from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, hands_at, knock
+from trunkline.errors import InputError
 from trunkline.live import wire
 
 QUIET = 5.0  # s in which frames and processor are counted
 SETTLED = 1.0  # s before it: who has come is told much at first
 BETWEEN = (1.5, 3.0)  # s between stops: in aim, planning, preview or its batch
 MOVED = (TIP[0], TIP[1] + 0.1, TIP[2])  # a tip's target that drops a plan for TIP
-LOST = 5.0  # s without an answer to a press, after which it is said to be lost
+AIMED = 0.4  # s in which both targets are held before a press
+PATIENCE = 1.0  # s without an answer to a press, after which it is lost
+MOST_LOST = 10
 
 
 @dataclass(frozen=True)
@@ -112,11 +115,12 @@ async def pressed(session: ClientSession, door: Door, presses: int) -> np.ndarra
 
 
 class Asker:
-    """Whose hands ask for a plan, and drop it by another target as soon as it is asked for."""
+    """Whose hands ask for a plan, and drop it by another target as soon as it is asked for. took: s of each press;
+    lost: presses after which nothing was asked for, which are made anew."""
 
     def __init__(self, guest: Guest, rng: np.random.Generator) -> None:
-        self.guest, self.took, self._rng = guest, [], rng
-        self._mode, self._since, self._pressed, self._shown = "", time.monotonic(), 0.0, 0.0
+        self.guest, self.took, self.lost, self._rng = guest, [], 0, rng
+        self._mode, self._since, self._pressed = "", time.monotonic(), 0.0
         guest.sees = self._see
 
     def _see(self, message: WSMessage) -> None:
@@ -124,30 +128,37 @@ class Asker:
             now = time.monotonic()
             if self._pressed and told["mode"] == "plan":
                 self.took.append(now - self._pressed)
-                self._pressed = 0.0
             if told["mode"] != self._mode:
-                self._mode, self._since = told["mode"], now
+                self._mode, self._since, self._pressed = told["mode"], now, 0.0
 
     async def go_on(self) -> None:
         """One input.
 
         Raises:
-            TimeoutError: a press has shown nothing.
+            InputError: presses show nothing.
         """
-        for_so_long, held, tip = time.monotonic() - self._since, {}, TIP
+        since, held, tip = time.monotonic() - self._since, {}, TIP
         if self._mode == "aim":
-            held = {"grip": 1.0}
-            if for_so_long > 0.3:
-                held["trigger"] = 1.0
-                if not self._pressed:
-                    await asyncio.sleep(self._rng.uniform(0, 1 / HZ))  # at any time of the server's tick
-                    self._pressed = time.monotonic()
-                if time.monotonic() - self._pressed > LOST:
-                    raise TimeoutError(f"trigger: found no plan asked for within {LOST:g} s")
-        elif self._mode in ("plan", "preview", "ready") and for_so_long > 0.1:
-            held, tip = {"grip": 1.0}, TIP if for_so_long < 0.2 else MOVED
+            held = {"grip": 1.0, "trigger": float(since > AIMED)}
+            if since > AIMED and not self._pressed:
+                await asyncio.sleep(self._rng.uniform(0, 1 / HZ))  # at any time of the server's tick
+                self._pressed = time.monotonic()
+            elif self._pressed and time.monotonic() - self._pressed > PATIENCE:
+                self._lose()
+        elif self._mode in ("plan", "preview", "ready") and since % 1 > 0.1:
+            held, tip = {"grip": 1.0}, TIP if since % 1 < 0.2 else MOVED
+        elif self._mode == "stopped":
+            held = {"primary": float(since % 0.5 < 0.2)}
         await self.guest.send("input", hands_at(RIGID, tip, held), SEEN, 2)
         await asyncio.sleep(1 / HZ)
+
+    def _lose(self) -> None:
+        self.lost += 1
+        if self.lost > max(len(self.took), MOST_LOST):
+            raise InputError(
+                f"trigger: found {self.lost} presses for which no plan is asked: {self.guest.told['state']}"
+            )
+        self._pressed, self._since = 0.0, time.monotonic()
 
 
 async def crowd(session: ClientSession, door: Door, watchers: int) -> tuple[Span, Span, str]:
