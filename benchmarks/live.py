@@ -31,7 +31,6 @@ from trunkline.pipeline.results import recorded
 
 ADDRESS = Address(18444)
 CROWD = 10  # watchers, of whom one does not read in the end
-PRESSES = 100
 LOOKED, CLOSELY = 0.05, 0.002  # s between two looks at the server's processor, and at the robot
 
 Row = tuple[str, str, str]  # what, found, goal
@@ -114,7 +113,7 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
     """Of a session without; and a line on stops."""
     async with held_open(package, ADDRESS) as (server, made, door):
         rows = received(await attended(nothing, LOOKED, door, alone), "")
-        took = await attended(nothing, LOOKED, door, pressed, PRESSES)
+        took = await attended(nothing, LOOKED, door, pressed, stops)
         rows.append((f"{len(took)} presses to the state that shows them, ms, median / 95th", halves(took), "3 / 10"))
         looks = Looks(server)
         reading, rest, deaf = await attended(looks.look, LOOKED, door, crowd, CROWD)
