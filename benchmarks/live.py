@@ -55,7 +55,8 @@ class Looks:
 
     def most(self, span: Span, client: str) -> int:
         """Frames that were held for `client` in `span`."""
-        return max(held[client] for when, _, held in self.rows if span.began <= when <= span.ended)
+        at = [held for when, _, held in self.rows if span.began <= when <= span.ended]
+        return max(held[client] for held in at if client in held)
 
 
 @dataclass
@@ -113,8 +114,10 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
     """Of a session without; and a line on stops."""
     async with held_open(package, ADDRESS) as (server, made, door):
         rows = received(await attended(nothing, LOOKED, door, alone), "")
-        took = await attended(nothing, LOOKED, door, pressed, stops)
-        rows.append((f"{len(took)} presses to the state that shows them, ms, median / 95th", halves(took), "3 / 10"))
+        took, lost = await attended(nothing, LOOKED, door, pressed, stops)
+        others = f" ({lost} more showed nothing)" if lost else ""
+        what = f"{len(took)} presses to the state that shows them{others}, ms, median / 95th"
+        rows.append((what, halves(took), "3 / 10"))
         looks = Looks(server)
         reading, rest, deaf = await attended(looks.look, LOOKED, door, crowd, CROWD)
         rows += [

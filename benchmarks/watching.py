@@ -104,14 +104,15 @@ async def alone(session: ClientSession, door: Door) -> Span:
     return await spent(guests)
 
 
-async def pressed(session: ClientSession, door: Door, presses: int) -> np.ndarray:
-    """One that controls, and asks for plans by its trigger: s from each press until the state says so. Shape (P,)."""
+async def pressed(session: ClientSession, door: Door, presses: int) -> tuple[np.ndarray, int]:
+    """One that controls, and asks for plans by its trigger: s from each press until the state says so, shape (P,), and
+    how many more were made anew as no state did within PATIENCE."""
     (guest,) = await came(session, door, 1)
     await guest.say(type="lease", action="ask")
     asker = Asker(guest, np.random.default_rng(0))
     while len(asker.took) < presses:
         await asker.go_on()
-    return np.array(asker.took)
+    return np.array(asker.took), asker.lost
 
 
 class Asker:
