@@ -43,8 +43,8 @@ export async function serve() {
 
 export const launch = () => chromium.launch({ executablePath: BROWSER, args: FLAGS, timeout: LONGEST });
 
-/** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. */
-export async function open(t, browser, server, { url = server.url, headset = false, width = PICTURES ? 1280 : 720, height = PICTURES ? 720 : 480 } = {}) {
+/** A page at `url` of `server`, closed with the test; `wrongs` collects console errors, exceptions and requests elsewhere. Unless it is `drawn`, it does all but fill pixels. */
+export async function open(t, browser, server, { url = server.url, headset = false, drawn = true, width = PICTURES ? 1280 : 720, height = PICTURES ? 720 : 480 } = {}) {
   const context = await browser.newContext({ viewport: { width, height } });
   t.after(() => context.close());
   const page = await context.newPage();
@@ -55,7 +55,8 @@ export async function open(t, browser, server, { url = server.url, headset = fal
     const { origin, protocol } = new URL(request.url());
     if (protocol !== "data:" && protocol !== "blob:" && origin !== server.origin) wrongs.push(`request: ${request.url()}`);
   });
-  await page.addInitScript(calmly, DRAWN);
+  if (drawn) await page.addInitScript(calmly, DRAWN);
+  else await page.addInitScript(blindly);
   if (headset) await page.addInitScript({ content: await emulator() });
   page.setDefaultTimeout(LONGEST);
   await page.goto(url);
@@ -74,6 +75,13 @@ function calmly(rate) {
     }), wait);
   };
   globalThis.cancelAnimationFrame = (handle) => clearTimeout(handle);
+}
+
+/** In the page: nothing is drawn, so that frames come as fast as a headset's. */
+function blindly() {
+  for (const { prototype } of [globalThis.WebGLRenderingContext, globalThis.WebGL2RenderingContext])
+    for (const name of Object.getOwnPropertyNames(prototype).filter((name) => name.startsWith("draw") && !name.startsWith("drawing")))
+      prototype[name] = () => {};
 }
 
 /** What software drawing says of itself, which is no fault of the page. */
@@ -122,6 +130,35 @@ export async function passed(page, server, modes) {
     if (Date.now() > end) assert.deepEqual(found, modes);
     await page.waitForTimeout(100);
   }
+}
+
+/** A button of the emulated controller of a `side`. */
+export const set = (page, side, button, value) =>
+  page.evaluate(([hand, name, amount]) => globalThis.headset.controllers[hand].updateButtonValue(name, amount), [side, button, value]);
+
+/** Waits until the page has drawn `count` frames, so that it has heard of what was done. */
+export async function frames(page, count = 3) {
+  const first = await page.evaluate(() => globalThis.trunkline.renderer.info.render.frame);
+  await until(page, (least) => globalThis.trunkline.renderer.info.render.frame >= least, first + count);
+}
+
+export async function press(page, side, button) {
+  await set(page, side, button, 1);
+  await frames(page);
+  await set(page, side, button, 0);
+  await frames(page);
+}
+
+/** Puts a controller so that its ray, straight down and `length` m long, ends at a point of the base frame. */
+export async function point(page, side, place, length = 0.6) {
+  await page.evaluate(([hand, [x, y, z], up]) => {
+    const { drawn } = globalThis.trunkline;
+    const end = drawn.base.localToWorld(drawn.base.position.clone().set(x, y, z));
+    const controller = globalThis.headset.controllers[hand];
+    controller.position.set(end.x, end.y + up, end.z);
+    controller.quaternion.set(-Math.SQRT1_2, 0, 0, Math.SQRT1_2); // its -z looks down
+  }, [side, place, length]);
+  await frames(page);
 }
 
 /** A picture for whoever looks, where TRUNKLINE_PICTURES names a folder. */

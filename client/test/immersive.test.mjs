@@ -2,7 +2,7 @@
 
 import assert from "node:assert/strict";
 import { after, before, test } from "node:test";
-import { inMode, launch, open, passed, picture, serve, until } from "./harness.mjs";
+import { frames, inMode, launch, open, passed, picture, point, press, serve, set, until } from "./harness.mjs";
 
 let browser, server;
 
@@ -28,34 +28,6 @@ async function aligned(t) {
   await until(page, () => globalThis.trunkline.immersive.aligning.done);
   await inMode(page, "aim");
   return opened;
-}
-
-const set = (page, side, button, value) =>
-  page.evaluate(([hand, name, amount]) => globalThis.headset.controllers[hand].updateButtonValue(name, amount), [side, button, value]);
-
-/** Waits until the page has drawn `count` frames, so that it has heard of what was done. */
-async function frames(page, count = 3) {
-  const first = await page.evaluate(() => globalThis.trunkline.renderer.info.render.frame);
-  await until(page, (least) => globalThis.trunkline.renderer.info.render.frame >= least, first + count);
-}
-
-async function press(page, side, button) {
-  await set(page, side, button, 1);
-  await frames(page);
-  await set(page, side, button, 0);
-  await frames(page);
-}
-
-/** Puts a controller so that its ray, straight down and `length` m long, ends at a point of the base frame. */
-async function point(page, side, place, length = 0.6) {
-  await page.evaluate(([hand, [x, y, z], up]) => {
-    const { drawn } = globalThis.trunkline;
-    const end = drawn.base.localToWorld(drawn.base.position.clone().set(x, y, z));
-    const controller = globalThis.headset.controllers[hand];
-    controller.position.set(end.x, end.y + up, end.z);
-    controller.quaternion.set(-Math.SQRT1_2, 0, 0, Math.SQRT1_2); // its -z looks down
-  }, [side, place, length]);
-  await frames(page);
 }
 
 /** Both targets set with their grips, as a user does. */
