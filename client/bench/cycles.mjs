@@ -114,7 +114,7 @@ try {
     const closing = [], counted = { presses: 0 };
     let found = {}, why = "";
     try {
-      const { page, wrongs } = await open({ after: (work) => closing.push(work) }, browser, { url, origin: new URL(url).origin }, { headset: true, drawn: false });
+      const { page, wrongs } = await open({ after: (work) => closing.push(work) }, browser, { url, origin: new URL(url).origin }, { headset: true, drawn: false, width: 320, height: 240 });
       const yaw = Math.PI * (2 * Math.random() - 1), [c, s] = [Math.cos(yaw / 2), Math.sin(yaw / 2)], h = Math.SQRT1_2;
       const quaternion = { x: -h * c, y: h * s, z: h * s, w: h * c }; // z up as y up, then turned about it
       const base = { position: [0.4 * Math.random() - 0.2, 0.7 + 0.2 * Math.random(), -0.8 - 0.4 * Math.random()], quaternion };

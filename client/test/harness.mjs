@@ -18,6 +18,7 @@ const BROWSER = process.env.TRUNKLINE_BROWSER ?? "/usr/bin/chromium";
 const PICTURES = process.env.TRUNKLINE_PICTURES ?? "";
 const LONGEST = 120_000; // ms that anything may take; drawing by software on a shared core is slow
 const DRAWN = 10; // Hz at most at which tests draw, so that they also pass beside other work
+const BLIND = 36; // Hz at most without drawing
 const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-background-networking"];
 
 /** The server, round a plain robot: `url`, `tell(word)` which gives its log. */
@@ -55,8 +56,8 @@ export async function open(t, browser, server, { url = server.url, headset = fal
     const { origin, protocol } = new URL(request.url());
     if (protocol !== "data:" && protocol !== "blob:" && origin !== server.origin) wrongs.push(`request: ${request.url()}`);
   });
-  if (drawn) await page.addInitScript(calmly, DRAWN);
-  else await page.addInitScript(blindly);
+  await page.addInitScript(calmly, drawn ? DRAWN : BLIND);
+  if (!drawn) await page.addInitScript(blindly);
   if (headset) await page.addInitScript({ content: await emulator() });
   page.setDefaultTimeout(LONGEST);
   await page.goto(url);
@@ -77,10 +78,10 @@ function calmly(rate) {
   globalThis.cancelAnimationFrame = (handle) => clearTimeout(handle);
 }
 
-/** In the page: nothing is drawn, so that frames come as fast as a headset's. */
+/** In the page: nothing is drawn, so that frames come fast. */
 function blindly() {
   for (const { prototype } of [globalThis.WebGLRenderingContext, globalThis.WebGL2RenderingContext])
-    for (const name of Object.getOwnPropertyNames(prototype).filter((name) => name.startsWith("draw") && !name.startsWith("drawing")))
+    for (const name of Object.getOwnPropertyNames(prototype).filter((name) => /^(draw(?!ing)|clear$)/.test(name)))
       prototype[name] = () => {};
 }
 
