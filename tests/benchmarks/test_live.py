@@ -40,7 +40,7 @@ def test_frames_of_the_robot_alone_are_kept_with_the_time_they_tell():
 
 
 def test_a_share_of_the_processor_is_of_the_span_alone():
-    looks = Looks(SimpleNamespace())  # type: ignore[arg-type]
+    looks = Looks(SimpleNamespace())
     looks.rows = [(9.0, 5.0, {"a": 9}), (10.0, 6.0, {"a": 1}), (11.0, 6.1, {"a": 3}), (13.0, 6.5, {})]
     assert looks.share(span([])) == pytest.approx(0.15)
     assert looks.most(span([]), "a") == 3
@@ -48,13 +48,13 @@ def test_a_share_of_the_processor_is_of_the_span_alone():
 
 def test_frames_that_are_held_are_those_not_acknowledged():
     box = SimpleNamespace(sent=7, received=4)
-    looks = Looks(SimpleNamespace(clients={"x": SimpleNamespace(id="a", outbox=box)}))  # type: ignore[arg-type]
+    looks = Looks(SimpleNamespace(clients={"x": SimpleNamespace(id="a", outbox=box)}))
     looks.look()
     assert looks.rows[0][2] == {"a": 3}
 
 
 def test_a_stop_is_timed_to_the_hold_after_it():
-    holds = Holds(SimpleNamespace(), [0.0, 1.2, 2.5])  # type: ignore[arg-type]
+    holds = Holds(SimpleNamespace(), [0.0, 1.2, 2.5])
     np.testing.assert_allclose(holds.after(np.array([1.0, 2.1, 3.0])), [0.2, 0.4])
 
 
