@@ -1,17 +1,16 @@
 // Full cycles in an emulated Quest 3 against a server that runs: benchmarks/headset_cycles.py starts this and answers.
 //
-//   node cycles.mjs URL RUNS
+//   node cycles.mjs URL RUNS AT
 //
 // A line of JSON each way: {lead: k} asks for the robot to be led to its place number k, and is answered by {mark}, where
-// the flange's mark is in the base then, m. {run, presses, off, expected, why} ends a run, answered by {}; why: "" where
-// all went well, off: m, of the base as it was found, where the arm works.
+// the flange's mark is in the base then, m. {run, presses, touches, off, expected, why} ends a run, answered by {}; why:
+// "" where all went well, off: m, of the point AT of the base, JSON, where it was found.
 
 import { createInterface } from "node:readline";
 import { frames, inMode, launch, open, point, press, set, until } from "../test/harness.mjs";
 
 const TIP = [0.01, -0.03, -0.05]; // m, of the controller's tip, which nobody is told
 const TREMOR = 2e-4, TOUCH = 1e-3; // m along each axis: of a hand that is kept still, and of a touch
-const AT = [0.9, 0, 0.3]; // m, where the error is told: `alignment.at` of conf/live/config.yaml
 const RIGID = [0.5, 0, 0.55], SOFT = [0.62, 0, 0.2], ASIDE = 0.15; // m, of the targets; to both sides, in turns
 const MOST_TOUCHES = 12, TOUCHED = 20_000; // ms that a touch may take
 
@@ -49,7 +48,7 @@ const aligning = (page) => page.evaluate(() => ({ step: globalThis.trunkline.imm
 const gauss = () => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
 
 /** Six touches and what goes before, as the board says: the tip in a dent, then the mark wherever the robot holds it. */
-async function align(page) {
+async function align(page, where) {
   await press(page, "right", "thumbstick");
   await until(page, () => globalThis.trunkline.immersive.aligning.step === "tip");
   await hold(page, [0.3, 1, -0.4], true);
@@ -73,7 +72,7 @@ async function align(page) {
     const { place, told } = globalThis.trunkline.immersive.aligning;
     const seen = place.position.clone().set(...at).applyQuaternion(place.quaternion).add(place.position).toArray();
     return { off: Math.hypot(...globalThis.room(at).map((value, axis) => value - seen[axis])), expected: told.expected };
-  }, AT);
+  }, where);
   return { ...found, touches };
 }
 
@@ -107,7 +106,7 @@ async function cycle(page, run, counted) {
   await set(page, "left", "squeeze", 0);
 }
 
-const [url, runs] = process.argv.slice(2);
+const [url, runs, at] = process.argv.slice(2);
 const browser = await launch();
 try {
   for (let run = 0; run < Number(runs); run++) {
@@ -124,7 +123,7 @@ try {
       await page.click("#immerse");
       await until(page, () => globalThis.trunkline.immersive.session && globalThis.trunkline.wire.controls);
       await until(page, () => globalThis.trunkline.immersive.aligning.place && true);
-      found = await align(page);
+      found = await align(page, JSON.parse(at));
       await cycle(page, run, counted);
       if (wrongs.length) throw new Error(wrongs[0]);
     } catch (error) {
