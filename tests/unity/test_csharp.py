@@ -17,23 +17,23 @@ from tests.unity.mono import compiled
 from tests.unity.test_shared_vectors import CASES
 from tests.unity.test_twin import network
 from trunkline.errors import InputError
+from trunkline.foresight.package import read_package
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.hybrid.basket import Basket
-from trunkline.ik.inputs import TILT
+from trunkline.ik.inputs import DIRECTION, TILT
 from trunkline.live.aligning import after, expected_error, fit, inverse, pose_of, residuals, tilt
 from trunkline.teleop.alignment import Aligned, wrist_of
 from trunkline.teleop.messages import Box, Thing, World
 from trunkline.teleop.reach import MapReach
 from trunkline.teleop.targets import bring, place
-from trunkline.teleop.tendons import Network, bend, network_of
+from trunkline.teleop.tendons import Network, bend
 from trunkline.teleop.vectors import add
 from trunkline.unity.answers import TARGETS, answers_of
 from trunkline.unity.frame import unity_position, unity_quaternion
-from trunkline.unity.network import describe_network
-from trunkline.unity.package import MANIFEST, NETWORK
+from trunkline.unity.package import MANIFEST, NETWORK, write_tarball
 from trunkline.unity.shared_vectors import with_shared_vectors
 from trunkline.unity.twin import CSHARP
-from trunkline.unity.unpacked import maps_of, package_digest, robot_of
+from trunkline.unity.unpacked import maps_of, network_of, package_digest, robot_of
 
 TESTS = Path(__file__).parent / "csharp"
 CORE = sorted((CSHARP / "Core").glob("*.cs"))
@@ -119,6 +119,8 @@ def damaged(files: dict[str, bytes], name: str) -> dict[str, bytes]:
         return {path: data for path, data in files.items() if path != grid["file"]}
     if name == "no manifest":
         return {path: data for path, data in files.items() if path != MANIFEST}
+    if name in NO_MANIFESTS:
+        return files | {MANIFEST: NO_MANIFESTS[name](files[MANIFEST])}
     if name == "a short grid":
         return rehashed(files | {grid["file"]: files[grid["file"]][:-2]})
     key, change = name.split()
@@ -126,8 +128,17 @@ def damaged(files: dict[str, bytes], name: str) -> dict[str, bytes]:
     return files | {MANIFEST: json.dumps(manifest).encode()}
 
 
+NO_MANIFESTS = {
+    "no JSON": lambda text: b"not JSON",
+    "no text": lambda text: b"\xff" + text,
+    "an empty file": lambda text: b"",
+    "a manifest that ends too early": lambda text: text.rstrip()[:-1],
+    "a manifest that ends in a word": lambda text: text.rpartition(b'"')[0],
+    "a manifest and more": lambda text: text + b"}",
+    "a list": lambda text: b"[]",
+}
 BAD = ["another byte", "no grid", "no manifest", "a short grid", "origin [0.1,0.1,0.1]", "spacing [0.2,0.2,0.2]",
-       "shape [5,9,8]"]  # fmt: skip
+       "shape [5,9,8]", *NO_MANIFESTS]  # fmt: skip
 
 
 @pytest.mark.parametrize("name", BAD)
@@ -153,6 +164,12 @@ def test_sheets_that_are_not_sound_are_refused_in_the_same_words(program, plain,
     steps = with_shared_vectors(plain, config().core)["Tests/Vectors/steps.json"]
     done = run(program, rehashed(files | {"Tests/Vectors/steps.json": steps}), tmp_path)
     assert (done.returncode, done.stdout) == (1, f"error: {refused}\n")
+
+
+def test_a_client_refuses_a_package_of_another_network(plain, tmp_path):
+    write_tarball(tmp_path / "twin.tgz", rehashed(plain | {NETWORK: network(inputs=10)}))
+    with pytest.raises(InputError, match=r"^network: found inputs of width \[10\] .*, expected one input \(theta_g, "):
+        read_package(tmp_path / "twin.tgz")
 
 
 # --- what the shared vectors leave out
@@ -209,7 +226,7 @@ def a_fit(rng: np.random.Generator, count: int) -> dict:
 
 def bends(files: dict[str, bytes], rng: np.random.Generator) -> list[dict]:
     """Calls of `bend`, with what the network was asked and answered."""
-    known, found, asked = network_of(files[NETWORK]), [], []
+    known, found, asked = network_of(files), [], []
     described = json.loads(files[MANIFEST])
     lengths = [described["model"]["rest_lengths"][tendon] for tendon in described["network"]["output_order"]]
 
@@ -268,7 +285,7 @@ def of_things(core, files: dict[str, bytes], rng: np.random.Generator, held: boo
 
 def refusals(files: dict[str, bytes]) -> list[dict]:
     """What is no question, and what Python says to it."""
-    reach, known = MapReach.from_arrays(maps_of(files)), network_of(files[NETWORK])
+    reach, known = MapReach.from_arrays(maps_of(files)), network_of(files)
     flat = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.3, 0.3, 0.01], [0.1, 0.2, 0.0]]
     told = [0.0] if known.inputs == len(TILT) else [0.0, 0.0, -1.0]
     pose, down = [*told, 0.1, 0.0, -0.3, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0]
@@ -289,10 +306,9 @@ def refusals(files: dict[str, bytes]) -> list[dict]:
         for name, asked in calls.items()
         for ask, question in asked
     ]
-    if known.inputs == len(TILT):
-        tendons = ["tendon_1", "tendon_2", "tendon_3"]
-        describe = partial(describe_network, network(inputs=7), NETWORK, tendons, "network")
-        found.append(case({"of": "other network"}, {"says": said_by(describe)}))
+    for inputs in {7, len(TILT), len(DIRECTION)} - {known.inputs}:
+        says = said_by(partial(network_of, files | {NETWORK: network(inputs=inputs)}))
+        found.append(case({"of": "other network", "inputs": inputs}, {"says": says}))
     tip, gravity = (NAN, 0.0, -0.3), (0.0, 0.0, -1.0)
     found.append(case({"of": "bend", "tip": tip, "gravity": gravity, "tolerance": 1.0, "poses": [], "network": SILENT},
                       {"says": said_by(lambda: bend(known, tip, gravity, 1.0))}))  # fmt: skip

@@ -23,7 +23,7 @@ from trunkline.teleop.planner import Planner
 from trunkline.teleop.reach import MapReach
 from trunkline.teleop.rigid_ik import RigidIK
 from trunkline.teleop.swing import shaper_for, slowest, swings
-from trunkline.teleop.tendons import Network, network_of
+from trunkline.teleop.tendons import Network
 from trunkline.teleop.trajectory import limits_of
 from trunkline.teleop.vectors import DOWN, Vector, conjugate, rotate
 from trunkline.unity import unpacked
@@ -92,7 +92,7 @@ def read_package(path: Path) -> Package:
     """From a package's folder, or its .tgz.
 
     Raises:
-        InputError: there is none, or a file of it is not what its manifest says.
+        InputError: there is none, or a file of it, its network too, is not what its manifest says.
     """
     files = unpacked.read_package(path)
     digest = unpacked.package_digest(files)
@@ -102,7 +102,7 @@ def read_package(path: Path) -> Package:
     return Package(
         digest,
         MapReach.from_arrays(unpacked.maps_of(files)),
-        network_of(files[network["file"]]),
+        unpacked.network_of(files),
         compiled,
         read_chain(compiled).smooth,
         read_geometry(mujoco.MjSpec.from_string(files[MODEL].decode())),

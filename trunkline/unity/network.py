@@ -23,19 +23,11 @@ def describe_network(
     Raises:
         InputError: no ONNX file, or one that does not say what its inputs and outputs are, or other tendons.
     """
-    try:
-        model = onnx.load_model_from_string(data)
-    except DecodeError as error:
-        raise InputError(f"{source}: found {error}, expected an ONNX file") from error
+    model = read_network(data, source)
     inputs, outputs = _names(model, "inputs", source), _names(model, "outputs", source)
     if outputs != tendons:
         raise InputError(f"{source}: found outputs {outputs}, expected those of the model's actuators, {tendons}")
-    widths = [_widths(values) for values in (model.graph.input, model.graph.output)]
-    if widths != [[len(inputs)], [len(outputs), len(outputs), 3]]:
-        raise InputError(
-            f"{source}: found inputs of width {widths[0]} and outputs of width {widths[1]}, expected one"
-            f" input ({', '.join(inputs)}) and commands and lengths of {', '.join(outputs)}, and a tip"
-        )
+    require_widths(model, inputs, outputs, source)
     opset = max(entry.version for entry in model.opset_import)
     block = Network(
         file=file,
@@ -49,6 +41,32 @@ def describe_network(
     )
     external = any(uses_external_data(tensor) for tensor in model.graph.initializer)
     return block, lint_network(opset, external)
+
+
+def read_network(data: bytes, source: str) -> onnx.ModelProto:
+    """The contents of an ONNX file; `source`: where it is from, for messages.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        return onnx.load_model_from_string(data)
+    except DecodeError as error:
+        raise InputError(f"{source}: found {error}, expected an ONNX file") from error
+
+
+def require_widths(model: onnx.ModelProto, inputs: list[str], outputs: list[str], source: str) -> None:
+    """That a network takes `inputs` and gives commands and lengths of `outputs`, and a tip.
+
+    Raises:
+        InputError: it takes or gives another number of them.
+    """
+    widths = [_widths(values) for values in (model.graph.input, model.graph.output)]
+    if widths != [[len(inputs)], [len(outputs), len(outputs), 3]]:
+        raise InputError(
+            f"{source}: found inputs of width {widths[0]} and outputs of width {widths[1]}, expected one"
+            f" input ({', '.join(inputs)}) and commands and lengths of {', '.join(outputs)}, and a tip"
+        )
 
 
 def _names(model: onnx.ModelProto, key: str, source: str) -> list[str]:

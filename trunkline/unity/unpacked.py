@@ -1,5 +1,6 @@
-"""A finished package, read back: its digest, its maps in the base frames, as the stage `reachability` wrote them, the
-calibrated model, and what a preview needs: the arm whole, what holds it, and how sure its parameters are."""
+"""A finished package, read back: its digest, its maps in the base frames, as the stage `reachability` wrote them, its
+network, the calibrated model, and what a preview needs: the arm whole, what holds it, and how sure its parameters
+are."""
 
 import hashlib
 import json
@@ -13,7 +14,9 @@ from pydantic import TypeAdapter
 from trunkline.errors import InputError
 from trunkline.hybrid import doubts
 from trunkline.hybrid.robots import Robot
+from trunkline.teleop import tendons
 from trunkline.unity.frame import unity_position
+from trunkline.unity.network import read_network, require_widths
 from trunkline.unity.package import MANIFEST, read_tarball
 from trunkline.unity.unsupported import without_unsupported
 
@@ -82,6 +85,18 @@ def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
     return arrays
 
 
+def network_of(files: dict[str, bytes]) -> tendons.Network:
+    """The network, to be asked.
+
+    Raises:
+        InputError: its file is no network, or one of other inputs or outputs than the manifest says.
+    """
+    block = _manifest(files)["network"]
+    data = files[block["file"]]
+    require_widths(read_network(data, "network"), block["input_order"], block["output_order"], "network")
+    return tendons.network_of(data)
+
+
 def model_of(files: dict[str, bytes]) -> mujoco.MjModel:
     """The calibrated model as plain MuJoCo steps it: without the motors' dead time and winches, and cables that rub.
     Its controls are commands, those of the file that Unity imports are pulls."""
@@ -133,4 +148,10 @@ def _numbers(files: dict[str, bytes], path: str, kind: str, shape: tuple[int, ..
 def _manifest(files: dict[str, bytes]) -> dict:
     if MANIFEST not in files:
         raise InputError(f"package: found no {MANIFEST}, expected one of the stage package_unity")
-    return json.loads(files[MANIFEST])
+    try:
+        found = json.loads(files[MANIFEST].decode(errors="replace"))
+    except json.JSONDecodeError as error:
+        raise InputError(f"{MANIFEST}: found no JSON at character {error.pos}, expected some") from None
+    if not isinstance(found, dict):
+        raise InputError(f"{MANIFEST}: found no block, expected one")
+    return found

@@ -76,7 +76,9 @@ internal sealed class More {
         case "network": _shared.Kinematics.Ask(Numbers(asked["pose"])); break;
         case "bend": AnswerBend(asked, null); break;
         default:
-          Unpacked.KinematicsOf(Unpacked.ManifestOf(_files), new Recorded { Inputs = 7, Outputs = new[] { 3, 3, 3 } });
+          Unpacked.KinematicsOf(Unpacked.ManifestOf(_files), new Recorded {
+            Inputs = (int)Number(asked["inputs"]), Outputs = new[] { 3, 3, 3 },
+          });
           break;
       }
     } catch (InputError error) {

@@ -118,9 +118,11 @@ public sealed class Json {
 
   private string String() {
     Expect('"');
+    int first = _at - 1;
     var found = new StringBuilder();
     while (true) {
       if (_at >= _text.Length) {
+        _at = first;
         throw Error();
       }
       char letter = _text[_at++];
