@@ -85,6 +85,10 @@ def test_too_few_touches_and_those_in_a_plane_are_refused_by_name():
     with pytest.raises(InputError, match="found all within 0 mm of a plane"):
         fit(seen(flat, np.random.default_rng(4), 1e-3), flat)
     assert suspect(touched[:3], PLACES[:3]) is None
+    nowhere = np.array([*PLACES[:-1], [0.1, np.nan, np.inf]])
+    for reference, base in ((touched, nowhere), (nowhere, PLACES)):
+        with pytest.raises(InputError, match=rf"touch {len(PLACES)}: found \(0.1, nan, inf\), expected finite numbers"):
+            fit(reference, base)
 
 
 def turned(count, degrees, rng, axis=None, sigma=3e-4, tip=TIP):

@@ -16,6 +16,7 @@ from tests.unity.mono import compiled
 from tests.unity.test_csharp import CORE, SHARED
 from tests.unity.test_start import STEP
 from tests.unity.test_start import files as arm_files
+from trunkline.unity.pace import steps_per_frame
 from trunkline.unity.package import MANIFEST
 from trunkline.unity.plugin import Scene
 from trunkline.unity.proof import DOWN, PREFIX, manifest_of, scene_of, turns
@@ -191,6 +192,27 @@ def test_a_scene_that_is_only_written_is_left_alone(program, files, tmp_path):
     ((angles, _, _, told),) = run(program, files, tmp_path, happens)
     assert np.abs(angles).max() > 1e-4
     assert told == []
+
+
+SLOW, FAST, STEPS = 1 / 50, 1 / RATE, steps_per_frame(RATE)  # s, of a frame that simulates one of the display
+
+
+def test_a_device_that_falls_behind_is_told_before_the_camera_until_it_keeps_up(program, files, tmp_path):
+    begin = [["arm", PREFIX, "one"], ["compile", "one"], ["camera"]]
+    first = [["frames", 60, SLOW, STEPS], ["look"], ["tell"]]  # a second and more: it may be a hitch
+    then = [["frames", 60, SLOW, STEPS], ["look"], ["frames", 60, SLOW, STEPS], ["look"], ["tell"]]
+    again = [["frames", 140, FAST, STEPS], ["look"], ["tell"]]  # a whole second at the display's rate, too
+    found = run(program, files, tmp_path, begin + first + then + again)
+    said = "found 56 % of real time simulated in steps of 3.7 ms, expected 100 %"
+    shown = f"shown: Trunkline: / {said}: / this device does not keep up, the arm moves too slowly at 1 m"
+    warned = f"warning: Trunkline: {said}: this device does not keep up, the arm moves too slowly"
+    assert [told for *_, told in found] == [["shown: "], [warned, shown, shown], ["shown: "]]
+
+
+def test_a_component_that_is_switched_off_takes_its_warning_along(program, files, tmp_path):
+    begin = [["arm", PREFIX, "one"], ["compile", "one"], ["camera"], ["frames", 120, SLOW, STEPS], ["look"]]
+    ((*_, told),) = run(program, files, tmp_path, [*begin, ["disable", PREFIX], ["look"], ["tell"]])
+    assert [len(line) > len("shown: ") for line in told] == [True, True, False]
 
 
 def test_another_libmujoco_than_the_plug_in_s_is_one_line(program, files, tmp_path):

@@ -287,6 +287,7 @@ def refusals(files: dict[str, bytes]) -> list[dict]:
     """What is no question, and what Python says to it."""
     reach, known = MapReach.from_arrays(maps_of(files)), network_of(files)
     flat = [[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.3, 0.0], [0.3, 0.3, 0.01], [0.1, 0.2, 0.0]]
+    spread = [*flat[:3], [0.0, 0.0, 0.3], [0.2, 0.1, 0.2]]
     told = [0.0] if known.inputs == len(TILT) else [0.0, 0.0, -1.0]
     pose, down = [*told, 0.1, 0.0, -0.3, 1.0, 0.0, 0.0, 0.0], [0.0, 0.0, -1.0]
     wrong = [pose[:-1], [*pose[:-1], NAN], [NAN, *pose[1:]], [*pose[:-4], 2.0, 0.0, 0.0, 0.0], [1e39, *pose[1:]]]
@@ -297,8 +298,10 @@ def refusals(files: dict[str, bytes]) -> list[dict]:
             (reach.soft, {"tip": [0.0, -1.5, NAN], "gravity": down}),
             (reach.soft, {"tip": [0.0, 0.0, 0.0], "gravity": [NAN] * 3}),
         ],
-        "fit": [(lambda reference, base, at: fit(np.array(reference), np.array(base)),
-                 {"reference": flat, "base": flat, "at": [0.0, 0.0, 0.0]})],
+        "fit": [
+            (lambda reference, base: fit(np.array(reference), np.array(base)), {"reference": one, "base": other})
+            for one, other in ((flat, flat), (spread, without(spread, 2)), (without(spread, 3), spread))
+        ],
         "network": [(lambda pose: known.ask(np.array([pose])), {"pose": one}) for one in wrong],
     }  # fmt: skip
     found = [
@@ -306,6 +309,8 @@ def refusals(files: dict[str, bytes]) -> list[dict]:
         for name, asked in calls.items()
         for ask, question in asked
     ]
+    for touches, says in of_three(spread[:3]):
+        found.append(case({"of": "fit", "reference": spread[:3], "base": touches}, {"says": says}))
     for inputs in {7, len(TILT), len(DIRECTION)} - {known.inputs}:
         says = said_by(partial(network_of, files | {NETWORK: network(inputs=inputs)}))
         found.append(case({"of": "other network", "inputs": inputs}, {"says": says}))
@@ -323,6 +328,23 @@ def refusals(files: dict[str, bytes]) -> list[dict]:
         says = said_by(lambda: bend(known, tip, aside, 1.0))
         found.append(case({"of": "bend"} | question, {"says": says}))
     return found
+
+
+def without(touches: list[list[float]], index: int) -> list[list[float]]:
+    """Touches of which one is at no place."""
+    return [*touches[:index], [touches[index][0], NAN, 0.0], *touches[index + 1 :]]
+
+
+def of_three(touches: list[list[float]]) -> list[tuple[list[list[float]], str]]:
+    """What no three touches are, and what is said to it; Python fits no three."""
+    line = [[0.0, 0.0, 0.0], [0.3, 0.01, 0.0], [0.6, 0.0, 0.0]]
+    _, off, _ = 1e3 * np.linalg.svd(line - np.mean(line, axis=0), compute_uv=False) / math.sqrt(3)
+    assert 1 < off < 30
+    return [
+        (touches[:2], "touches: found 2, expected at least 3"),
+        (line, f"touches: found all within {off:.0f} mm of a line, expected 30 mm: touch one further beside it"),
+        (without(touches, 1), "touch 2: found (0.3, nan, 0), expected finite numbers"),
+    ]
 
 
 def said_by(call) -> str:

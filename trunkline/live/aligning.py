@@ -97,10 +97,14 @@ def fit(reference: np.ndarray, base: np.ndarray) -> Pose:
     for the best rotation to relate two sets of vectors", Acta Cryst. A32 (1976).
 
     Raises:
-        InputError: there are too few, or they lie in a plane.
+        InputError: there are too few, one is no place, or they lie in a plane.
     """
     if len(base) < FEWEST:
         raise InputError(f"touches: found {len(base)}, expected at least {FEWEST}")
+    for number, places in enumerate(zip(reference, base, strict=True), 1):
+        for x, y, z in places:
+            if not np.isfinite([x, y, z]).all():
+                raise InputError(f"touch {number}: found ({x:g}, {y:g}, {z:g}), expected finite numbers")
     off_plane = np.linalg.svd(base - base.mean(axis=0), compute_uv=False)[-1] / np.sqrt(len(base))
     if off_plane < FLAT:
         found = f"found all within {1e3 * off_plane:.0f} mm of a plane"

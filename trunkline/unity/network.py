@@ -11,9 +11,7 @@ from trunkline.unity.manifest import Network
 from trunkline.unity.rules import Violation, lint_network
 
 
-def describe_network(
-    data: bytes, file: str, tendons: list[str], source: str
-) -> tuple[Network, list[Violation]]:
+def describe_network(data: bytes, file: str, tendons: list[str], source: str) -> tuple[Network, list[Violation]]:
     """The manifest's block on the network, and what Unity could not read of it.
 
     Args:

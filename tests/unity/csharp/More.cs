@@ -44,7 +44,7 @@ internal sealed class More {
 
   private static object AnswerFit(Dictionary<string, object> asked, Dictionary<string, object> expected) {
     List<Vector> reference = Messages.Vectors(asked["reference"]), robotBase = Messages.Vectors(asked["base"]);
-    var pose = robotBase.Count > 3 ? Aligning.Fit(reference, robotBase) : Aligning.FitThree(reference, robotBase);
+    var pose = Fitted(reference, robotBase);
     return new Dictionary<string, object> {
       ["pose"] = Json(pose),
       ["inverse"] = Json(Aligning.Inverse(pose)),
@@ -54,6 +54,9 @@ internal sealed class More {
       ["tilt"] = Aligning.Tilt(pose),
     };
   }
+
+  private static Pose Fitted(List<Vector> reference, List<Vector> robotBase) =>
+      robotBase.Count > 3 ? Aligning.Fit(reference, robotBase) : Aligning.FitThree(reference, robotBase);
 
   private object AnswerBend(Dictionary<string, object> asked, Dictionary<string, object> expected) {
     _shared.Record(Block(asked["network"]));
@@ -72,7 +75,7 @@ internal sealed class More {
       switch ((string)asked["of"]) {
         case "rigid_reach": _shared.AnswerRigid(asked); break;
         case "soft_reach": _shared.AnswerSoft(asked); break;
-        case "fit": AnswerFit(asked, null); break;
+        case "fit": Fitted(Messages.Vectors(asked["reference"]), Messages.Vectors(asked["base"])); break;
         case "network": _shared.Kinematics.Ask(Numbers(asked["pose"])); break;
         case "bend": AnswerBend(asked, null); break;
         default:

@@ -67,11 +67,46 @@ internal static unsafe class Program {
           scene.FixedUpdate();
         }
         break;
+      case "camera":
+        Camera.main = new GameObject("camera").AddComponent<Camera>();
+        break;
+      case "frames":
+        for (int i = 0; i < Number(what[1]); i++) {
+          Frame(scene, Number(what[2]), Number(what[3]));
+        }
+        break;
+      case "disable":
+        Call(_roots[(string)what[1]].GetComponent<Twin>(), "OnDisable");
+        break;
+      case "look":
+        Look();
+        break;
       case "tell":
         Tell(scene);
         break;
     }
   }
+
+  // One of the display, which took so many seconds of real time and as many steps.
+  private static void Frame(MjScene scene, double real, double steps) {
+    for (int i = 0; i < steps; i++) {
+      scene.FixedUpdate();
+    }
+    Time.unscaledDeltaTime = (float)real;
+    foreach (var root in _roots.Values) {
+      Call(root.GetComponent<Twin>(), "Update");
+    }
+  }
+
+  // What stands before the camera, among what the console was told.
+  private static void Look() {
+    var texts = Camera.main.GetComponentsInChildren<TextMesh>();
+    Debug.Told.Add("shown: " + string.Join(" and ", texts.Select(
+        one => $"{one.text.Replace("\n", " / ")} at {one.transform.localPosition.z} m")));
+  }
+
+  private static void Call(Twin twin, string name) =>
+      typeof(Twin).GetMethod(name, BindingFlags.Instance | BindingFlags.NonPublic).Invoke(twin, null);
 
   // An arm's root with objects for all that a model has of it, and the component.
   private static void Add(string prefix, string model) {
@@ -88,7 +123,7 @@ internal static unsafe class Program {
     var twin = root.AddComponent<Twin>();
     twin.DisplayRate = (float)Number(_scene["display_rate"]);
     twin.ManifestFile = new TextAsset(File.ReadAllBytes((string)_scene["manifest"]));
-    typeof(Twin).GetMethod("OnEnable", BindingFlags.Instance | BindingFlags.NonPublic).Invoke(twin, null);
+    Call(twin, "OnEnable");
   }
 
   private static string Full(MjComponent component) => component.transform.parent.name + component.name;

@@ -32,7 +32,12 @@ public class Object {
 
   public static implicit operator bool(Object exists) => exists != null;
 
-  public static void Destroy(Object obj) {}
+  /// <summary>At once: below its parent an object is found no more.</summary>
+  public static void Destroy(Object obj) {
+    if (obj is GameObject gone) {
+      gone.transform.parent = null;
+    }
+  }
 
   public static void DestroyImmediate(Object obj) {}
 }
@@ -74,6 +79,9 @@ public class GameObject : Object {
     var added = (T)Activator.CreateInstance(typeof(T), true);
     added.gameObject = this;
     _components.Add(added);
+    if (added is TextMesh && GetComponent<MeshRenderer>() == null) {  // which it requires
+      AddComponent<MeshRenderer>();
+    }
     return added;
   }
 
@@ -354,7 +362,8 @@ public class LineRenderer : Renderer {
 }
 
 public class Camera : Behaviour {
-  public static Camera main => null;
+  /// <summary>In Unity the first that is tagged so; here what a test sets.</summary>
+  public static Camera main { get; set; }
 }
 
 public enum TextAnchor { UpperLeft, UpperCenter, UpperRight, MiddleLeft, MiddleCenter }

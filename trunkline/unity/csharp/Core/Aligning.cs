@@ -14,11 +14,12 @@ public static class Aligning {
 
   /// <summary>The pose of the reference frame in the base for which touches in both are nearest (Kabsch, 1976; the
   /// rotation by Horn, 1987).</summary>
-  /// <exception cref="InputError">There are too few, or they lie in a plane.</exception>
+  /// <exception cref="InputError">There are too few, one is no place, or they lie in a plane.</exception>
   public static Pose Fit(IReadOnlyList<Vector> reference, IReadOnlyList<Vector> robotBase) {
     if (robotBase.Count < _fewest) {
       throw new InputError($"touches: found {robotBase.Count}, expected at least {_fewest}");
     }
+    RequireFinite(reference, robotBase);
     double offPlane = Spread(robotBase, 2);
     if (offPlane < _flat) {
       throw new InputError($"touches: found all within {Formats.Fixed(1e3 * offPlane, 0)} mm of a plane, expected "
@@ -28,17 +29,25 @@ public static class Aligning {
   }
 
   /// <summary>The same of three touches. None is left over then to tell that one of them is wrong.</summary>
-  /// <exception cref="InputError">There are fewer, or they lie on a line.</exception>
+  /// <exception cref="InputError">There are fewer, one is no place, or they lie on a line.</exception>
   public static Pose FitThree(IReadOnlyList<Vector> reference, IReadOnlyList<Vector> robotBase) {
     if (robotBase.Count < 3) {
       throw new InputError($"touches: found {robotBase.Count}, expected at least 3");
     }
+    RequireFinite(reference, robotBase);
     double offLine = Spread(robotBase, 1);
     if (offLine < _flat) {
       throw new InputError($"touches: found all within {Formats.Fixed(1e3 * offLine, 0)} mm of a line, expected "
           + $"{Formats.Fixed(1e3 * _flat, 0)} mm: touch one further beside it");
     }
     return Nearest(reference, robotBase);
+  }
+
+  private static void RequireFinite(IReadOnlyList<Vector> reference, IReadOnlyList<Vector> robotBase) {
+    for (int i = 0; i < robotBase.Count; i++) {
+      MapReach.Require($"touch {i + 1}", reference[i]);
+      MapReach.Require($"touch {i + 1}", robotBase[i]);
+    }
   }
 
   /// <summary>A point of the reference frame in the base, m.</summary>

@@ -127,8 +127,8 @@ public class Pointing : MonoBehaviour {
 
   /// <summary>Moves `RobotBase` to where touches say that the base stands: three or more places in the scene, and the
   /// same in the robot's base, m.</summary>
-  /// <exception cref="InputError">They are too few, or lie on a line, or four or more in a plane; or there is no
-  /// `RobotBase`.</exception>
+  /// <exception cref="InputError">They are too few, or one is no place, or they lie on a line, or four or more in a
+  /// plane; or there is no `RobotBase`. It then stays where it is.</exception>
   public void AlignBase(IReadOnlyList<Vector3> touched, IReadOnlyList<Vector> robotBase) {
     if (RobotBase == null) {
       throw new InputError("Robot Base: found none, expected the object that shall stand where the robot's base does");
