@@ -53,6 +53,12 @@ def program(tmp_path_factory):
     return compiled(folder / "vectors.exe", [*SHARED, *sorted(TESTS.glob("*.cs"))], [core])
 
 
+def test_all_that_the_core_shows_has_a_comment(tmp_path):
+    """Where something has none, or one that names what is not there, the compiler refuses."""
+    compiled(tmp_path / "core.dll", CORE, [], "-noconfig", f"-doc:{tmp_path / 'core.xml'}")
+    assert "Trunkline.Where.Blocked" in (tmp_path / "core.xml").read_text()
+
+
 def run(program: Path, files: dict[str, bytes], folder: Path, *options: str) -> subprocess.CompletedProcess:
     """The program's answer to a package of these `files`."""
     for path, data in files.items():

@@ -10,6 +10,7 @@ import onnx
 import pytest
 import torch
 
+from tests.unity.mono import compiled
 from tests.unity.test_twin import files, sources  # noqa: F401
 from trunkline.ik.network import InverseKinematics
 from trunkline.ik.onnx import to_onnx
@@ -19,6 +20,7 @@ from trunkline.unity.readers import ENGINES, refusals
 
 BUILT = sorted((Path(__file__).parents[2] / "artifacts/package_unity").glob("*.tgz"))
 OBJ = "Runtime/Reachability/soft_030.obj"
+CORE = "Runtime/Core/"
 GRID = "Runtime/Reachability/soft_030.bytes"
 
 
@@ -47,6 +49,17 @@ def built():
 
 def test_no_reader_refuses_a_file_of_the_package_that_was_built(built):
     assert refusals(built) == {}
+
+
+@pytest.mark.parametrize("package", ["files", "built"])
+def test_a_compiler_reads_the_core_in_the_package(package, request, tmp_path):
+    write_tarball(tmp_path / "twin.tgz", request.getfixturevalue(package))
+    scripts = {path: data for path, data in read_tarball(tmp_path / "twin.tgz").items() if path.startswith(CORE)}
+    written = [tmp_path / path.removeprefix(CORE) for path in scripts if path.endswith(".cs")]
+    for path in written:
+        path.write_bytes(scripts[CORE + path.name])
+    assert {path.name for path in written} >= {"Teleoperation.cs", "Aligning.cs"}
+    compiled(tmp_path / "core.dll", written, [], "-noconfig")
 
 
 def poses(count, inputs):

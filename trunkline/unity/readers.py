@@ -3,7 +3,7 @@
 Meshes: trimesh, and MuJoCo's reader of OBJ files. Models: MuJoCo. The network: ONNX's checker, and three engines that
 share no code: onnxruntime (C++), ONNX's reference implementation (numpy) and tract (Rust). Grids: numpy, by the
 manifest's words alone, beside the meshes of the same name. The rest: JSON, YAML, text. Of C# only its brackets are
-counted: no compiler reads it here.
+counted: no compiler reads it here, but a test has Mono compile a package's core.
 """
 
 import io

@@ -7,11 +7,16 @@ namespace Trunkline {
 /// <summary>The mount as the joints hold it: position (m) and pointing in the base frame, heading and angle of joint 7
 /// (rad).</summary>
 public readonly struct Wrist {
-  /// <summary>Rigid base frame: m, and unit length.</summary>
-  public readonly Vector Position, Pointing;
-  /// <summary>rad: of the soft arm's tendon 1 about its axis, and of joint 7.</summary>
-  public readonly double Heading, Angle;
+  /// <summary>Rigid base frame, m.</summary>
+  public readonly Vector Position;
+  /// <summary>Direction in the rigid base frame, unit length.</summary>
+  public readonly Vector Pointing;
+  /// <summary>rad, of the soft arm's tendon 1 about its axis.</summary>
+  public readonly double Heading;
+  /// <summary>rad, of joint 7.</summary>
+  public readonly double Angle;
 
+  /// <summary>As the fields of the same names.</summary>
   public Wrist(Vector position, Vector pointing, double heading, double angle) {
     Position = position;
     Pointing = pointing;
@@ -30,6 +35,7 @@ public readonly struct Aligned {
   /// <summary>rad, from where the wrist is; null where no half-plane is within its limits.</summary>
   public readonly double? Turned;
 
+  /// <summary>As the fields of the same names.</summary>
   public Aligned(double heading, int halfPlane, double? turned) {
     Heading = heading;
     HalfPlane = halfPlane;

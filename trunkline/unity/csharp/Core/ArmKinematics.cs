@@ -21,14 +21,16 @@ public interface INetwork {
 /// of network.output_order, where the tip will come to rest, m, base frame, and whether that is so far from its target
 /// that the arm cannot take the pose.</summary>
 public sealed class Answer {
-  /// <summary>m, one a tendon. Commands are no pulls: <see cref="ArmKinematics.PullsOf"/> makes these of
-  /// them.</summary>
-  public readonly double[] Commands, Lengths;
+  /// <summary>m, one a tendon. They are no pulls: <see cref="ArmKinematics.PullsOf"/> makes these of them.</summary>
+  public readonly double[] Commands;
+  /// <summary>Path lengths at rest, m, one a tendon.</summary>
+  public readonly double[] Lengths;
   /// <summary>Soft arm's base frame, m.</summary>
   public readonly Vector Tip;
   /// <summary>The tip is further from its target than the manifest's network.doubt_beyond.</summary>
   public readonly bool Doubtful;
 
+  /// <summary>As the fields of the same names.</summary>
   public Answer(double[] commands, double[] lengths, Vector tip, bool doubtful) {
     Commands = commands;
     Lengths = lengths;

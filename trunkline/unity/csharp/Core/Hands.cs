@@ -5,7 +5,20 @@ namespace Trunkline {
 
 /// <summary>Of one controller, one bit each: what several say together is their sum.</summary>
 [Flags]
-public enum Buttons { None = 0, Trigger = 1, Grip = 2, StickPressed = 4, Primary = 8, Secondary = 16 }
+public enum Buttons {
+  /// <summary>Nothing is held.</summary>
+  None = 0,
+  /// <summary>Asks for a plan and confirms it.</summary>
+  Trigger = 1,
+  /// <summary>Moves its hand's target, and lets the robot move.</summary>
+  Grip = 2,
+  /// <summary>Begins and ends following.</summary>
+  StickPressed = 4,
+  /// <summary>A or X: takes an offer, with the grip tilts the end effector, and ends a stop.</summary>
+  Primary = 8,
+  /// <summary>B or Y: stops.</summary>
+  Secondary = 16,
+}
 
 /// <summary>What a hand was at the step before. It never changes; the core makes another.</summary>
 public sealed class Hand {
@@ -21,6 +34,7 @@ public sealed class Hand {
   public Vector? Target { get; internal set; }
   /// <summary>End of the ray when the grip was pressed, base frame, m, of a press since a plan was asked for.</summary>
   public Vector? GrippedAt { get; internal set; }
+  /// <summary>Buttons that are held at this step.</summary>
   public Buttons Held { get; internal set; }
   /// <summary>Buttons that went down at this step.</summary>
   public Buttons Pressed { get; internal set; }
@@ -30,6 +44,7 @@ public sealed class Hand {
     Length = length;
   }
 
+  /// <summary>Whether its grip is held.</summary>
   public bool Grips => Holds(Buttons.Grip);
 
   internal bool Holds(Buttons one) => (Held & one) != 0;

@@ -170,20 +170,25 @@ public readonly struct JsonBlock {
     _values = value as Dictionary<string, object> ?? throw new InputError($"{source}: found no block, expected one");
   }
 
+  /// <summary>Of all that is in it.</summary>
   public IEnumerable<string> Names => _values.Keys;
 
   /// <summary>Whether there is one that is not null.</summary>
   public bool Has(string name) => _values.TryGetValue(name, out object value) && value != null;
 
+  /// <summary>An object in it.</summary>
   public JsonBlock Block(string name) => new JsonBlock(Raw(name), $"{_source}: {name}");
 
+  /// <summary>A number in it.</summary>
   public double Number(string name) => Raw(name) is double value ? value : throw Missing(name, "a number");
 
   /// <summary>A number without what is behind its point.</summary>
   public int Integer(string name) => (int)Number(name);
 
+  /// <summary>A text in it.</summary>
   public string Text(string name) => Raw(name) as string ?? throw Missing(name, "a text");
 
+  /// <summary>A list of numbers in it.</summary>
   public double[] Numbers(string name) {
     var found = new List<double>();
     foreach (object value in List(name)) {
@@ -192,6 +197,7 @@ public readonly struct JsonBlock {
     return found.ToArray();
   }
 
+  /// <summary>A list of texts in it.</summary>
   public string[] Texts(string name) {
     var found = new List<string>();
     foreach (object value in List(name)) {

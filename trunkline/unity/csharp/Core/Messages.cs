@@ -8,27 +8,85 @@ namespace Trunkline {
 // controller's pose is that of its ray: origin at the device, the ray along -z, y up from the back of the hand.
 // Positions in m, quaternions (w, x, y, z), stamps in s of the client's clock. `Frames` converts from Unity's.
 
-/// <summary>What the session is at. Hold: the robot stands still until all is sound. Aim: the user sets targets. Plan:
-/// one is awaited. Preview: it is being shown. Ready: it was shown and can be confirmed. Delay: it was confirmed and
-/// begins soon. Execute: the robot runs it. Follow: the robot follows the targets. Stopped: until a primary button goes
-/// down.</summary>
-public enum Mode { Hold, Aim, Plan, Preview, Ready, Delay, Execute, Follow, Stopped }
+/// <summary>What the session is at.</summary>
+public enum Mode {
+  /// <summary>The robot stands still until all is sound.</summary>
+  Hold,
+  /// <summary>The user sets targets.</summary>
+  Aim,
+  /// <summary>A plan is awaited.</summary>
+  Plan,
+  /// <summary>It is being shown.</summary>
+  Preview,
+  /// <summary>It was shown and can be confirmed.</summary>
+  Ready,
+  /// <summary>It was confirmed and begins soon.</summary>
+  Delay,
+  /// <summary>The robot runs it.</summary>
+  Execute,
+  /// <summary>The robot follows the targets.</summary>
+  Follow,
+  /// <summary>The robot stands still until a primary button goes down.</summary>
+  Stopped,
+}
 
-/// <summary>What the robot may do now: stand still, run the plan, follow the targets.</summary>
-public enum Motion { Hold, Execute, Follow }
+/// <summary>What the robot may do now.</summary>
+public enum Motion {
+  /// <summary>Stand still.</summary>
+  Hold,
+  /// <summary>Run the plan.</summary>
+  Execute,
+  /// <summary>Follow the targets.</summary>
+  Follow,
+}
 
-/// <summary>Where a point is. Unknown: no map tells. Blocked: in a solid of the world.</summary>
-public enum Where { Inside, Outside, Unknown, Blocked }
+/// <summary>Where a point is.</summary>
+public enum Where {
+  /// <summary>Within reach.</summary>
+  Inside,
+  /// <summary>Out of reach.</summary>
+  Outside,
+  /// <summary>No map tells.</summary>
+  Unknown,
+  /// <summary>In a solid of the world.</summary>
+  Blocked,
+}
 
-/// <summary>Of a thing. Toy: a soft box with round edges. Basket: a box with a bar above it, which the arm
-/// grips.</summary>
-public enum Shape { Cylinder, Box, Sphere, Toy, Basket }
+/// <summary>Of a thing.</summary>
+public enum Shape {
+  /// <summary>Its axis is z.</summary>
+  Cylinder,
+  /// <summary>As wide along x as along y.</summary>
+  Box,
+  /// <summary>Of one diameter.</summary>
+  Sphere,
+  /// <summary>A soft box with round edges.</summary>
+  Toy,
+  /// <summary>A box with a bar above it, which the arm grips.</summary>
+  Basket,
+}
 
-/// <summary>What bears a thing: a hook, a surface, or the arm.</summary>
-public enum Support { Hanging, Standing, Held }
+/// <summary>What bears a thing.</summary>
+public enum Support {
+  /// <summary>A hook.</summary>
+  Hanging,
+  /// <summary>A surface.</summary>
+  Standing,
+  /// <summary>The arm.</summary>
+  Held,
+}
 
 /// <summary>What the robot does with the plan whose digest its report has.</summary>
-public enum ExecutorMode { Idle, Running, Done, Fault }
+public enum ExecutorMode {
+  /// <summary>Nothing: it has none.</summary>
+  Idle,
+  /// <summary>Runs it.</summary>
+  Running,
+  /// <summary>Has run it to its end.</summary>
+  Done,
+  /// <summary>Stands still; its report says why.</summary>
+  Fault,
+}
 
 /// <summary>One tracked controller: its pose in the reference frame, its stick and what is held.</summary>
 public sealed class Controller {
@@ -39,14 +97,21 @@ public sealed class Controller {
   /// <summary>Whether its pose is measured now; where it is not, pose and buttons count for nothing, but for
   /// <see cref="Secondary"/>.</summary>
   public readonly bool Tracked;
-  /// <summary>Held now: a press is what goes down from one input to the next. Trigger asks for a plan and confirms it,
-  /// a grip moves its hand's target and lets the robot move, the stick pressed begins and ends following.</summary>
-  public readonly bool Trigger, Grip, StickPressed;
-  /// <summary>Held now. Primary (A or X) takes an offer, with the grip tilts the end effector, and ends a stop;
-  /// secondary (B or Y) stops.</summary>
-  public readonly bool Primary, Secondary;
-  /// <summary>-1 to 1, x right, y forward; forward lengthens the ray.</summary>
-  public readonly double StickX, StickY;
+  /// <summary>Held now, as all buttons below: a press is what goes down from one input to the next. It asks for a plan
+  /// and confirms it.</summary>
+  public readonly bool Trigger;
+  /// <summary>Moves its hand's target, and lets the robot move.</summary>
+  public readonly bool Grip;
+  /// <summary>Begins and ends following.</summary>
+  public readonly bool StickPressed;
+  /// <summary>A or X: takes an offer, with the grip tilts the end effector, and ends a stop.</summary>
+  public readonly bool Primary;
+  /// <summary>B or Y: stops.</summary>
+  public readonly bool Secondary;
+  /// <summary>-1 to 1, to the right.</summary>
+  public readonly double StickX;
+  /// <summary>-1 to 1, forward, which lengthens the ray.</summary>
+  public readonly double StickY;
 
   /// <summary>As the fields of the same names.</summary>
   public Controller(Vector position, Quaternion quaternion, bool tracked = true, bool trigger = false,
@@ -72,6 +137,7 @@ public sealed class Pose {
   /// <summary>Unit length, from the reference frame's axes to the base frame's.</summary>
   public readonly Quaternion Quaternion;
 
+  /// <summary>As the fields of the same names.</summary>
   public Pose(Vector position, Quaternion quaternion) {
     Position = position;
     Quaternion = quaternion;
@@ -85,9 +151,12 @@ public sealed class Pose {
 public sealed class Box {
   /// <summary>As the user reads it where a target is in it.</summary>
   public readonly string Name;
-  /// <summary>Opposite corners, base frame, m: none of Low's coordinates is above High's.</summary>
-  public readonly Vector Low, High;
+  /// <summary>Corner, base frame, m: none of its coordinates is above High's.</summary>
+  public readonly Vector Low;
+  /// <summary>The opposite corner, base frame, m.</summary>
+  public readonly Vector High;
 
+  /// <summary>As the fields of the same names.</summary>
   public Box(string name, Vector low, Vector high) {
     Name = name;
     Low = low;
@@ -104,8 +173,14 @@ public sealed class Box {
 /// <summary>Sizes of a basket, m: its box's width along x and length along y, and the rise of the bar above
 /// it.</summary>
 public readonly struct Basket {
-  public readonly double Width, Length, Rise;
+  /// <summary>Of its box along x, m.</summary>
+  public readonly double Width;
+  /// <summary>Of its box along y, m.</summary>
+  public readonly double Length;
+  /// <summary>Of the bar above the box, m.</summary>
+  public readonly double Rise;
 
+  /// <summary>As the fields of the same names.</summary>
   public Basket(double width, double length, double rise) {
     Width = width;
     Length = length;
@@ -123,6 +198,7 @@ public readonly struct Basket {
 public sealed class Thing {
   /// <summary>Of no other thing of the world.</summary>
   public readonly string Name;
+  /// <summary>Which sizes count, and how it is grasped.</summary>
   public readonly Shape Shape;
   /// <summary>m, of a box its width along x and y, of a basket its bar's.</summary>
   public readonly double Diameter;
@@ -134,6 +210,7 @@ public sealed class Thing {
   public readonly Vector Position;
   /// <summary>Unit length, from its own axes to the base frame's.</summary>
   public readonly Quaternion Quaternion;
+  /// <summary>What bears it.</summary>
   public readonly Support Support;
   /// <summary>Counts where <see cref="Shape"/> is a basket.</summary>
   public readonly Basket Basket;
@@ -163,9 +240,12 @@ public sealed class Thing {
 public sealed class World {
   /// <summary>Any text that differs whenever boxes or things do. A plan is void in a world of another.</summary>
   public readonly string Digest;
+  /// <summary>Solids that no target may be in; never null.</summary>
   public readonly IReadOnlyList<Box> Boxes;
+  /// <summary>What can be grasped; never null.</summary>
   public readonly IReadOnlyList<Thing> Things;
 
+  /// <summary>As the fields of the same names; null for no boxes or things.</summary>
   public World(string digest, IReadOnlyList<Box> boxes = null, IReadOnlyList<Thing> things = null) {
     Digest = digest;
     Boxes = boxes ?? new Box[0];
@@ -217,6 +297,7 @@ public sealed class Offer {
   /// <summary>0 to 1.</summary>
   public readonly double Probability;
 
+  /// <summary>As the fields of the same names.</summary>
   public Offer(string thing, Vector rigid, Vector pointing, double probability) {
     Thing = thing;
     Rigid = rigid;
@@ -234,9 +315,12 @@ public sealed class PlanReport {
   public readonly string Digest;
   /// <summary>Why there is no plan, one line; "" where there is one.</summary>
   public readonly string Refused;
-  /// <summary>Digests, as the request had them; a plan for others is refused.</summary>
-  public readonly string Package, World;
+  /// <summary>Its digest, as the request had it; a plan for another is refused.</summary>
+  public readonly string Package;
+  /// <summary>Its digest, as the request had it; a plan for another is refused.</summary>
+  public readonly string World;
 
+  /// <summary>As the fields of the same names.</summary>
   public PlanReport(int serial, string digest = "", string refused = "", string package = "", string world = "") {
     Serial = serial;
     Digest = digest;
@@ -249,12 +333,14 @@ public sealed class PlanReport {
 /// <summary>What the robot does: <see cref="Fault"/> in words where it has one, digest of the plan that it runs or has
 /// run.</summary>
 public sealed class ExecutorReport {
+  /// <summary>What it does now.</summary>
   public readonly ExecutorMode Mode;
   /// <summary>Of the plan that it runs or has run; "" for none.</summary>
   public readonly string Digest;
   /// <summary>One line; counts where <see cref="Mode"/> is a fault.</summary>
   public readonly string Fault;
 
+  /// <summary>As the fields of the same names.</summary>
   public ExecutorReport(ExecutorMode mode = ExecutorMode.Idle, string digest = "", string fault = "") {
     Mode = mode;
     Digest = digest;
@@ -267,11 +353,14 @@ public sealed class Input {
   /// <summary>s, of the client's clock.</summary>
   public readonly double Stamp;
   /// <summary>Never null: a controller that is not there is one that is not tracked.</summary>
-  public readonly Controller Left, Right;
+  public readonly Controller Left;
+  /// <summary>Never null either.</summary>
+  public readonly Controller Right;
   /// <summary>Null until the base is aligned.</summary>
   public readonly Pose Alignment;
   /// <summary>Of the rigid robot, rad, seven.</summary>
   public readonly IReadOnlyList<double> Joints;
+  /// <summary>What stands around the robot.</summary>
   public readonly World World;
   /// <summary>Digest of the package in use.</summary>
   public readonly string Package;
@@ -284,6 +373,7 @@ public sealed class Input {
   /// <summary>A place of the mount that the assistant has found better than that of the newest plan, or null.</summary>
   public readonly Offer Offer;
 
+  /// <summary>As the fields of the same names; null for an executor that is idle.</summary>
   public Input(double stamp, Controller left, Controller right, Pose alignment, IReadOnlyList<double> joints,
                World world, string package, PlanReport plan = null, string shown = "",
                ExecutorReport executor = null, Offer offer = null) {
@@ -305,6 +395,7 @@ public sealed class Input {
 public sealed class Target {
   /// <summary>Base frame, m.</summary>
   public readonly Vector Position;
+  /// <summary>Whether it is within reach, and in no solid.</summary>
   public readonly Where Reach;
   /// <summary>How far it is from the nearest place within reach, m; 0 unless outside.</summary>
   public readonly double OutsideBy;
@@ -314,6 +405,7 @@ public sealed class Target {
   /// <summary>Name of the solid that it is in, "" for none.</summary>
   public readonly string Solid;
 
+  /// <summary>As the fields of the same names.</summary>
   public Target(Vector position, Where reach = Where.Unknown, double outsideBy = 0, Vector? offer = null,
                 string solid = "") {
     Position = position;
@@ -326,7 +418,10 @@ public sealed class Target {
 
 /// <summary>Rigid target (the mount) and soft tip target, and how the mount shall be turned.</summary>
 public sealed class Targets {
-  public readonly Target Rigid, Tip;
+  /// <summary>Of the mount.</summary>
+  public readonly Target Rigid;
+  /// <summary>Of the soft arm's tip.</summary>
+  public readonly Target Tip;
   /// <summary>Direction in which the end effector points, base frame, unit length.</summary>
   public readonly Vector Pointing;
   /// <summary>Angle of the soft arm's tendon 1 about the arm's axis, rad (<see cref="Alignment"/>).</summary>
@@ -343,6 +438,7 @@ public sealed class Targets {
   /// <summary>The assistant's offer, or null.</summary>
   public readonly Offer Better;
 
+  /// <summary>As the fields of the same names.</summary>
   public Targets(Target rigid, Target tip, Vector pointing, double heading, int halfPlane, double? turned,
                  bool tiltLimited = false, string thing = "", Offer better = null) {
     Rigid = rigid;
@@ -364,10 +460,14 @@ public sealed class Targets {
 public sealed class Request {
   /// <summary>From 1 on, one more at each request.</summary>
   public readonly int Serial;
+  /// <summary>Where the plan shall lead.</summary>
   public readonly Targets Targets;
-  /// <summary>Digests of the world and the package that the plan shall be for.</summary>
-  public readonly string World, Package;
+  /// <summary>Digest of the world that the plan shall be for.</summary>
+  public readonly string World;
+  /// <summary>Digest of the package that the plan shall be for.</summary>
+  public readonly string Package;
 
+  /// <summary>As the fields of the same names.</summary>
   public Request(int serial, Targets targets, string world, string package) {
     Serial = serial;
     Targets = targets;
@@ -378,6 +478,7 @@ public sealed class Request {
 
 /// <summary>What the core wants at one step.</summary>
 public sealed class Intent {
+  /// <summary>What the session is at.</summary>
   public readonly Mode Mode;
   /// <summary>The only thing that lets the robot move: <see cref="Motion.Hold"/> stops it.</summary>
   public readonly Motion Motion;
@@ -385,8 +486,10 @@ public sealed class Intent {
   public readonly string Notice;
   /// <summary>Null where one of both is not set.</summary>
   public readonly Targets Targets;
-  /// <summary>Ends of the rays, base frame, m, or null.</summary>
-  public readonly Vector? LeftRay, RightRay;
+  /// <summary>End of the left hand's ray, base frame, m, or null.</summary>
+  public readonly Vector? LeftRay;
+  /// <summary>End of the right hand's ray, base frame, m, or null.</summary>
+  public readonly Vector? RightRay;
   /// <summary>Null but in the mode plan.</summary>
   public readonly Request Request;
   /// <summary>Digest of the plan to show, "" for none.</summary>
@@ -398,6 +501,7 @@ public sealed class Intent {
   /// <summary>Where the robot shall be now, with motion <see cref="Motion.Follow"/>, else null.</summary>
   public readonly Targets Follow;
 
+  /// <summary>As the fields of the same names.</summary>
   public Intent(Mode mode, Motion motion, string notice, Targets targets, Vector? leftRay, Vector? rightRay,
                 Request request, string preview, string execute, double countdown, Targets follow) {
     Mode = mode;

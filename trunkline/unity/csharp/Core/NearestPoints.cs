@@ -23,6 +23,7 @@ public sealed class NearestPoints {
     Build(0, _order.Length);
   }
 
+  /// <summary>How many points there are.</summary>
   public int Count => _order.Length;
 
   /// <summary>m, in the order in which they were given.</summary>

@@ -6,9 +6,14 @@ namespace Trunkline {
 /// <summary>The One-Euro filter, a low-pass whose cutoff grows with speed: trunkline/teleop/one_euro.py, which has the
 /// equations and their source.</summary>
 public sealed class OneEuro {
-  /// <summary>Hz, Hz per m/s (of orientations per rad/s), and Hz: the paper's f_min, β and f_d.</summary>
-  public readonly double MinCutoff, Beta, DerivativeCutoff;
+  /// <summary>Hz: the paper's f_min.</summary>
+  public readonly double MinCutoff;
+  /// <summary>Hz per m/s, of orientations per rad/s: the paper's β.</summary>
+  public readonly double Beta;
+  /// <summary>Hz: the paper's f_d.</summary>
+  public readonly double DerivativeCutoff;
 
+  /// <summary>As the fields of the same names.</summary>
   public OneEuro(double minCutoff, double beta, double derivativeCutoff) {
     MinCutoff = minCutoff;
     Beta = beta;
@@ -40,12 +45,16 @@ public sealed class OneEuro {
 /// <summary>A pose as filtered: position (m) and quaternion, their low-passed velocity (m/s) and spin
 /// (rad/s).</summary>
 public sealed class Smoothed {
-  /// <summary>Reference frame: m, m/s.</summary>
-  public readonly Vector Position, Velocity;
+  /// <summary>Reference frame, m.</summary>
+  public readonly Vector Position;
+  /// <summary>Reference frame, m/s.</summary>
+  public readonly Vector Velocity;
+  /// <summary>Unit length, from the controller's axes to the reference frame's.</summary>
   public readonly Quaternion Quaternion;
   /// <summary>rad/s, not negative: how fast it turns, about whatever axis.</summary>
   public readonly double Spin;
 
+  /// <summary>As the fields of the same names.</summary>
   public Smoothed(Vector position, Quaternion quaternion, Vector velocity, double spin) {
     Position = position;
     Quaternion = quaternion;

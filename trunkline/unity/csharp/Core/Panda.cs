@@ -14,7 +14,10 @@ public static class Panda {
   /// <summary>m, from frame 7 to the flange along z.</summary>
   public const double Flange = 0.107;
 
-  /// <summary>Limits of joint 7, rad.</summary>
-  public const double WristLeast = -2.8973, WristMost = 2.8973;
+  /// <summary>Lower limit of joint 7, rad.</summary>
+  public const double WristLeast = -2.8973;
+
+  /// <summary>Upper limit of joint 7, rad.</summary>
+  public const double WristMost = 2.8973;
 }
 }

@@ -8,13 +8,19 @@ namespace Trunkline {
 /// <summary>Length of the rays, m, and its rate at full deflection, m/s; dead zone of the stick, share of its
 /// way.</summary>
 public sealed class Rays {
-  /// <summary>m.</summary>
-  public readonly double Start, Shortest, Longest;
+  /// <summary>Length of a ray at the start, m.</summary>
+  public readonly double Start;
+  /// <summary>The least length, m.</summary>
+  public readonly double Shortest;
+  /// <summary>The greatest length, m.</summary>
+  public readonly double Longest;
   /// <summary>m/s.</summary>
   public readonly double Rate;
   /// <summary>0 to 1.</summary>
   public readonly double DeadZone;
 
+  /// <summary>As the fields of the same names.</summary>
+  /// <exception cref="InputError">The length at the start is not between the others.</exception>
   public Rays(double start, double shortest, double longest, double rate, double deadZone) {
     if (!(shortest <= start && start <= longest)) {
       throw new InputError($"rays.start: found {Formats.General(start)}, expected from shortest "
@@ -31,8 +37,10 @@ public sealed class Rays {
 /// <summary>How far the end effector may be off straight down, rad, and how fast it follows the tilted controller,
 /// rad/s.</summary>
 public sealed class Orientation {
-  /// <summary>rad, rad/s.</summary>
-  public readonly double MostTilt, Rate;
+  /// <summary>rad, off straight down.</summary>
+  public readonly double MostTilt;
+  /// <summary>rad/s, at which the end effector follows.</summary>
+  public readonly double Rate;
 
   /// <param name="mostTiltDeg">°.</param>
   /// <param name="rateDeg">°/s.</param>
@@ -69,8 +77,18 @@ public sealed class BendingPlane {
 
 /// <summary>When the robot holds; s, and <see cref="Swap"/> in m.</summary>
 public sealed class Safety {
-  /// <summary>s; m of <see cref="Swap"/>; what each means, at the constructor.</summary>
-  public readonly double Grace, Silence, Settle, Swap, PlanWait, StartWait;
+  /// <summary>s, for which a controller may be lost.</summary>
+  public readonly double Grace;
+  /// <summary>s, for which a client may be silent.</summary>
+  public readonly double Silence;
+  /// <summary>s, for which all must be sound before aiming begins.</summary>
+  public readonly double Settle;
+  /// <summary>m, how near each controller must appear to where the other was to count as swapped.</summary>
+  public readonly double Swap;
+  /// <summary>s, for a plan.</summary>
+  public readonly double PlanWait;
+  /// <summary>s, for the robot to start.</summary>
+  public readonly double StartWait;
 
   /// <param name="grace">A controller may be lost so long, s.</param>
   /// <param name="silence">A client may be silent so long, s.</param>
@@ -92,11 +110,16 @@ public sealed class Safety {
 public sealed class Teleop {
   /// <summary>Whose ray holds the rigid target: 0 the left hand's, 1 the right's.</summary>
   public readonly int RigidHand;
+  /// <summary>How long the rays are.</summary>
   public readonly Rays Rays;
+  /// <summary>How the end effector is tilted.</summary>
   public readonly Orientation Orientation;
+  /// <summary>In which the arm bends, and when it is taken.</summary>
   public readonly BendingPlane BendingPlane;
-  /// <summary>Of the controllers' poses.</summary>
-  public readonly OneEuro PositionFilter, OrientationFilter;
+  /// <summary>Of the controllers' positions.</summary>
+  public readonly OneEuro PositionFilter;
+  /// <summary>Of the controllers' orientations.</summary>
+  public readonly OneEuro OrientationFilter;
   /// <summary>s before a press from which the targets are taken.</summary>
   public readonly double LookBack;
   /// <summary>s from a confirmation to its execution.</summary>
@@ -107,8 +130,10 @@ public sealed class Teleop {
   public readonly double Moved;
   /// <summary>m from a thing's centre within which the tip target marks it.</summary>
   public readonly double Mark;
+  /// <summary>When the robot holds.</summary>
   public readonly Safety Safety;
 
+  /// <summary>As the fields of the same names.</summary>
   public Teleop(int rigidHand, Rays rays, Orientation orientation, BendingPlane bendingPlane,
                 OneEuro positionFilter, OneEuro orientationFilter, double lookBack, double delay, double followDelay,
                 double moved, double mark, Safety safety) {

@@ -48,6 +48,9 @@ internal sealed class SheetPatch {
   /// <summary>The whole sheet, in tiles of <paramref name="side"/> cells at most along each side.</summary>
   /// <param name="points">m: x, y, z of a point under each direction, then of the next point.</param>
   /// <param name="count">Of directions.</param>
+  /// <param name="around">Ways around the arm.</param>
+  /// <param name="along">Points of each.</param>
+  /// <param name="side">Cells.</param>
   public static SheetPatch Whole(float[] points, int count, int around, int along, int side) =>
       new SheetPatch(Tiles(new Lattice(points, count, around, along), 0, around, 0, along - 1, side, side));
 

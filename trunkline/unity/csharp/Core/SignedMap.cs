@@ -23,8 +23,12 @@ public sealed class SignedMap {
   public readonly Vector Origin;
   /// <summary>Between points, m.</summary>
   public readonly double Spacing;
-  /// <summary>Points along the base frame's axes.</summary>
-  public readonly int CountX, CountY, CountZ;
+  /// <summary>Points along the base frame's x.</summary>
+  public readonly int CountX;
+  /// <summary>Points along the base frame's y.</summary>
+  public readonly int CountY;
+  /// <summary>Points along the base frame's z.</summary>
+  public readonly int CountZ;
 
   private readonly float[] _values;
 

@@ -5,11 +5,14 @@ namespace Trunkline {
 
 /// <summary>What a plan was asked for: any change of it voids the plan.</summary>
 public sealed class Pinned {
+  /// <summary>What was asked for, or is followed.</summary>
   public readonly Request Request;
   /// <summary>Of the reference frame in the base frame, m.</summary>
   public readonly Pose Alignment;
+  /// <summary>As it was then.</summary>
   public readonly World World;
 
+  /// <summary>As the fields of the same names.</summary>
   public Pinned(Request request, Pose alignment, World world) {
     Request = request;
     Alignment = alignment;
@@ -19,9 +22,12 @@ public sealed class Pinned {
 
 /// <summary>The targets at a stamp, s, of the client's clock.</summary>
 public readonly struct Remembered {
+  /// <summary>s, of the client's clock.</summary>
   public readonly double Stamp;
+  /// <summary>As they were then.</summary>
   public readonly Targets Targets;
 
+  /// <summary>As the fields of the same names.</summary>
   public Remembered(double stamp, Targets targets) {
     Stamp = stamp;
     Targets = targets;
@@ -33,8 +39,11 @@ public readonly struct Remembered {
 public sealed class State {
   internal static readonly IReadOnlyList<Remembered> Nothing = new Remembered[0];
 
+  /// <summary>As it was at the step before.</summary>
   public Hand Left { get; internal set; }
+  /// <summary>As it was at the step before.</summary>
   public Hand Right { get; internal set; }
+  /// <summary>What the session is at.</summary>
   public Mode Mode { get; internal set; } = Mode.Hold;
   /// <summary>The last, s, of the client's clock; null before the first.</summary>
   public double? Stamp { get; internal set; }
@@ -69,6 +78,7 @@ public sealed class State {
   /// <summary>One line for the user, "" for none.</summary>
   public string Notice { get; internal set; } = "";
 
+  /// <summary>At the start, the hands as yet unseen.</summary>
   public State(Hand left, Hand right) {
     Left = left;
     Right = right;

@@ -9,7 +9,9 @@ namespace Trunkline {
 /// <see cref="Step"/> has no clock, threads or sockets; the same inputs give the same intents. It decides; it does not
 /// move anything: planning, preview and motion are done outside and reported in the next input.</summary>
 public sealed class Teleoperation {
+  /// <summary>What it is set by.</summary>
   public readonly Teleop Settings;
+  /// <summary>What can be reached.</summary>
   public readonly IReach Reach;
   /// <summary>Digest: an input that names another makes the robot hold.</summary>
   public readonly string Package;

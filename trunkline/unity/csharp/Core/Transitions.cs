@@ -5,7 +5,37 @@ namespace Trunkline {
 /// <summary>What happens at a step, in the order in which they count where several come at once: what stops the robot
 /// comes first.</summary>
 public enum Event {
-  Stop, Fault, Lost, Void, Released, Refused, Settled, Reset, Ask, Planned, Shown, Confirm, Elapsed, Done, Follow,
+  /// <summary>Secondary button.</summary>
+  Stop,
+  /// <summary>The robot reports a fault, or does not start.</summary>
+  Fault,
+  /// <summary>Tracking, clock, client, alignment or package is not sound.</summary>
+  Lost,
+  /// <summary>Target, world or alignment changed.</summary>
+  Void,
+  /// <summary>Both grips let go.</summary>
+  Released,
+  /// <summary>No plan, with the reason.</summary>
+  Refused,
+  /// <summary>All sound for a while, grips and triggers let go.</summary>
+  Settled,
+  /// <summary>Primary button.</summary>
+  Reset,
+  /// <summary>Trigger, both targets within reach.</summary>
+  Ask,
+  /// <summary>The plan is there.</summary>
+  Planned,
+  /// <summary>Its preview has been shown to its end.</summary>
+  Shown,
+  /// <summary>Trigger pressed afresh, a grip held.</summary>
+  Confirm,
+  /// <summary>The delay is over.</summary>
+  Elapsed,
+  /// <summary>The robot has arrived.</summary>
+  Done,
+  /// <summary>Stick pressed, a grip held.</summary>
+  Follow,
+  /// <summary>Stick pressed.</summary>
   Unfollow,
 }
 

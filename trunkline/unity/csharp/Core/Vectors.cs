@@ -4,30 +4,49 @@ namespace Trunkline {
 
 /// <summary>Three numbers along the axes of a right-handed frame; in m where it is a place.</summary>
 public readonly struct Vector : IEquatable<Vector> {
-  public readonly double X, Y, Z;
+  /// <summary>Along x.</summary>
+  public readonly double X;
+  /// <summary>Along y.</summary>
+  public readonly double Y;
+  /// <summary>Along z.</summary>
+  public readonly double Z;
 
+  /// <summary>As the fields of the same names.</summary>
   public Vector(double x, double y, double z) {
     X = x;
     Y = y;
     Z = z;
   }
 
+  /// <summary>The same numbers.</summary>
   public static bool operator ==(Vector a, Vector b) => a.X == b.X && a.Y == b.Y && a.Z == b.Z;
 
+  /// <summary>Another number.</summary>
   public static bool operator !=(Vector a, Vector b) => !(a == b);
 
+  /// <summary>The same numbers.</summary>
   public bool Equals(Vector other) => this == other;
 
+  /// <inheritdoc/>
   public override bool Equals(object other) => other is Vector vector && this == vector;
 
+  /// <inheritdoc/>
   public override int GetHashCode() => X.GetHashCode() ^ (397 * Y.GetHashCode()) ^ (7919 * Z.GetHashCode());
 }
 
 /// <summary>A rotation as a unit quaternion (w, x, y, z); the constructor takes w first and does not scale it, and
 /// q and -q are the same rotation but not equal.</summary>
 public readonly struct Quaternion : IEquatable<Quaternion> {
-  public readonly double W, X, Y, Z;
+  /// <summary>Cosine of half the angle.</summary>
+  public readonly double W;
+  /// <summary>Sine of half the angle, times the axis along x.</summary>
+  public readonly double X;
+  /// <summary>The same along y.</summary>
+  public readonly double Y;
+  /// <summary>The same along z.</summary>
+  public readonly double Z;
 
+  /// <summary>As the fields of the same names.</summary>
   public Quaternion(double w, double x, double y, double z) {
     W = w;
     X = x;
@@ -35,14 +54,19 @@ public readonly struct Quaternion : IEquatable<Quaternion> {
     Z = z;
   }
 
+  /// <summary>The same numbers.</summary>
   public static bool operator ==(Quaternion a, Quaternion b) => a.W == b.W && a.X == b.X && a.Y == b.Y && a.Z == b.Z;
 
+  /// <summary>Another number.</summary>
   public static bool operator !=(Quaternion a, Quaternion b) => !(a == b);
 
+  /// <summary>The same numbers.</summary>
   public bool Equals(Quaternion other) => this == other;
 
+  /// <inheritdoc/>
   public override bool Equals(object other) => other is Quaternion quaternion && this == quaternion;
 
+  /// <inheritdoc/>
   public override int GetHashCode() =>
       W.GetHashCode() ^ (31 * X.GetHashCode()) ^ (397 * Y.GetHashCode()) ^ (7919 * Z.GetHashCode());
 }
@@ -54,19 +78,26 @@ public static class Vectors {
   /// <summary>Along -z, unit length: gravity's direction in the rigid robot's base frame.</summary>
   public static readonly Vector Down = new Vector(0, 0, -1);
 
+  /// <summary>a + b.</summary>
   public static Vector Add(Vector a, Vector b) => new Vector(a.X + b.X, a.Y + b.Y, a.Z + b.Z);
 
+  /// <summary>a - b.</summary>
   public static Vector Subtract(Vector a, Vector b) => new Vector(a.X - b.X, a.Y - b.Y, a.Z - b.Z);
 
+  /// <summary>A vector times a factor.</summary>
   public static Vector Scale(Vector a, double factor) => new Vector(factor * a.X, factor * a.Y, factor * a.Z);
 
+  /// <summary>a · b.</summary>
   public static double Dot(Vector a, Vector b) => a.X * b.X + a.Y * b.Y + a.Z * b.Z;
 
+  /// <summary>a × b, right-handed.</summary>
   public static Vector Cross(Vector a, Vector b) =>
       new Vector(a.Y * b.Z - a.Z * b.Y, a.Z * b.X - a.X * b.Z, a.X * b.Y - a.Y * b.X);
 
+  /// <summary>Its length.</summary>
   public static double Norm(Vector a) => Math.Sqrt(Dot(a, a));
 
+  /// <summary>From a to b.</summary>
   public static double Distance(Vector a, Vector b) => Norm(Subtract(a, b));
 
   /// <summary><paramref name="angle"/> from -π to less than π, rad.</summary>
