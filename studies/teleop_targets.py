@@ -23,10 +23,9 @@ from trunkline.statics.chain import Chain, read_chain
 from trunkline.teleop.alignment import least_turn, wrist_of
 from trunkline.teleop.reach import MapReach
 from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.tendons import Network, bend, network_of
+from trunkline.teleop.tendons import Network, bend
 from trunkline.teleop.vectors import DOWN
-from trunkline.unity.package import NETWORK
-from trunkline.unity.unpacked import maps_of, model_of, read_package
+from trunkline.unity.unpacked import maps_of, model_of, network_of, read_package
 
 ARTIFACTS = Path("artifacts")
 TILTS_DEG, TOLERANCE, OFFSET = (0.0, 30.0, 60.0), 0.02, 0.05
@@ -37,7 +36,7 @@ START = (0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785)
 def main(count: int) -> None:
     (path,) = (ARTIFACTS / "package_unity").glob("*.tgz")
     files = read_package(path)
-    network, chain = network_of(files[NETWORK]), read_chain(model_of(files))
+    network, chain = network_of(files), read_chain(model_of(files))
     reach = MapReach.from_arrays(maps_of(files))
     model = read_model(ARTIFACTS / "identify_control/arm.xml")
     print("| gravity | answer | tip targets | refused | tip foreseen from target | settled from foreseen | each |")

@@ -13,6 +13,7 @@ from functools import partial
 
 import numpy as np
 import onnxruntime
+from onnxruntime.capi.onnxruntime_pybind11_state import Fail, InvalidGraph, InvalidProtobuf
 
 from trunkline.errors import InputError
 from trunkline.ik.ask import ask
@@ -22,6 +23,7 @@ from trunkline.teleop.correction import Bent, corrected
 from trunkline.teleop.tilt_reach import AZIMUTH, STRAIGHT_DOWN, SYMMETRY
 from trunkline.teleop.vectors import Vector
 
+NO_NETWORK = Fail, InvalidGraph, InvalidProtobuf  # what a file that is none ends with
 BENDS = np.radians(np.arange(-330.0, 331.0, 2.0))  # of the tip in its plane; a spiral curls further than a turn
 
 
@@ -34,9 +36,12 @@ class Network:
     inputs: int
 
 
-def network_of(file: str | bytes) -> Network:
+def session_of(file: str | bytes) -> onnxruntime.InferenceSession:
     """Of an ONNX file of `train_ik`: its path, or its contents."""
-    session = onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
+    return onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
+
+
+def network_of(session: onnxruntime.InferenceSession) -> Network:
     return Network(partial(ask, session), session.get_inputs()[0].shape[1])
 
 

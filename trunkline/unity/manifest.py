@@ -7,6 +7,7 @@ import mujoco
 from pydantic import BaseModel, ConfigDict, Field
 
 from trunkline.elements import BRANCH, all_elements, cables
+from trunkline.errors import InputError
 from trunkline.hybrid.robots import Robot
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw, TendonLaw
@@ -259,3 +260,17 @@ def describe_model(model: mujoco.MjModel, file: str, **measured) -> Model:
 def hashes(files: dict[str, bytes]) -> dict[str, str]:
     """SHA-256 of each file, in hexadecimal digits."""
     return {path: hashlib.sha256(data).hexdigest() for path, data in sorted(files.items())}
+
+
+def require_widths(took: list[int], gave: list[int], inputs: list[str], outputs: list[str], source: str) -> None:
+    """That a network whose inputs and outputs are of widths `took` and `gave` takes `inputs`, and gives commands and
+    lengths of `outputs`, and a tip.
+
+    Raises:
+        InputError: it takes or gives another number of them.
+    """
+    if (took, gave) != ([len(inputs)], [len(outputs), len(outputs), 3]):
+        raise InputError(
+            f"{source}: found inputs of width {took} and outputs of width {gave}, expected one"
+            f" input ({', '.join(inputs)}) and commands and lengths of {', '.join(outputs)}, and a tip"
+        )

@@ -7,7 +7,7 @@ from google.protobuf.message import DecodeError
 from onnx.external_data_helper import uses_external_data
 
 from trunkline.errors import InputError
-from trunkline.unity.manifest import Network
+from trunkline.unity.manifest import Network, require_widths
 from trunkline.unity.rules import Violation, lint_network
 
 
@@ -21,11 +21,14 @@ def describe_network(data: bytes, file: str, tendons: list[str], source: str) ->
     Raises:
         InputError: no ONNX file, or one that does not say what its inputs and outputs are, or other tendons.
     """
-    model = read_network(data, source)
+    try:
+        model = onnx.load_model_from_string(data)
+    except DecodeError as error:
+        raise InputError(f"{source}: found {error}, expected an ONNX file") from error
     inputs, outputs = _names(model, "inputs", source), _names(model, "outputs", source)
     if outputs != tendons:
         raise InputError(f"{source}: found outputs {outputs}, expected those of the model's actuators, {tendons}")
-    require_widths(model, inputs, outputs, source)
+    require_widths(*(_widths(values) for values in (model.graph.input, model.graph.output)), inputs, outputs, source)
     opset = max(entry.version for entry in model.opset_import)
     block = Network(
         file=file,
@@ -39,32 +42,6 @@ def describe_network(data: bytes, file: str, tendons: list[str], source: str) ->
     )
     external = any(uses_external_data(tensor) for tensor in model.graph.initializer)
     return block, lint_network(opset, external)
-
-
-def read_network(data: bytes, source: str) -> onnx.ModelProto:
-    """The contents of an ONNX file; `source`: where it is from, for messages.
-
-    Raises:
-        InputError: it is none.
-    """
-    try:
-        return onnx.load_model_from_string(data)
-    except DecodeError as error:
-        raise InputError(f"{source}: found {error}, expected an ONNX file") from error
-
-
-def require_widths(model: onnx.ModelProto, inputs: list[str], outputs: list[str], source: str) -> None:
-    """That a network takes `inputs` and gives commands and lengths of `outputs`, and a tip.
-
-    Raises:
-        InputError: it takes or gives another number of them.
-    """
-    widths = [_widths(values) for values in (model.graph.input, model.graph.output)]
-    if widths != [[len(inputs)], [len(outputs), len(outputs), 3]]:
-        raise InputError(
-            f"{source}: found inputs of width {widths[0]} and outputs of width {widths[1]}, expected one"
-            f" input ({', '.join(inputs)}) and commands and lengths of {', '.join(outputs)}, and a tip"
-        )
 
 
 def _names(model: onnx.ModelProto, key: str, source: str) -> list[str]:

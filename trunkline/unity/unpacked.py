@@ -16,7 +16,7 @@ from trunkline.hybrid import doubts
 from trunkline.hybrid.robots import Robot
 from trunkline.teleop import tendons
 from trunkline.unity.frame import unity_position
-from trunkline.unity.network import read_network, require_widths
+from trunkline.unity.manifest import require_widths
 from trunkline.unity.package import MANIFEST, read_tarball
 from trunkline.unity.unsupported import without_unsupported
 
@@ -92,9 +92,13 @@ def network_of(files: dict[str, bytes]) -> tendons.Network:
         InputError: its file is no network, or one of other inputs or outputs than the manifest says.
     """
     block = _manifest(files)["network"]
-    data = files[block["file"]]
-    require_widths(read_network(data, "network"), block["input_order"], block["output_order"], "network")
-    return tendons.network_of(data)
+    try:
+        session = tendons.session_of(files[block["file"]])
+    except tendons.NO_NETWORK as error:
+        raise InputError(f"network: found {str(error).splitlines()[0]}, expected an ONNX file") from None
+    took, gave = ([one.shape[-1] for one in ends] for ends in (session.get_inputs(), session.get_outputs()))
+    require_widths(took, gave, block["input_order"], block["output_order"], "network")
+    return tendons.network_of(session)
 
 
 def model_of(files: dict[str, bytes]) -> mujoco.MjModel:
