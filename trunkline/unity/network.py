@@ -28,7 +28,7 @@ def describe_network(data: bytes, file: str, tendons: list[str], source: str) ->
     inputs, outputs = _names(model, "inputs", source), _names(model, "outputs", source)
     if outputs != tendons:
         raise InputError(f"{source}: found outputs {outputs}, expected those of the model's actuators, {tendons}")
-    require_widths(*(_widths(values) for values in (model.graph.input, model.graph.output)), inputs, outputs, source)
+    require_widths(_widths(model.graph.input), _widths(model.graph.output), inputs, outputs, source)
     opset = max(entry.version for entry in model.opset_import)
     block = Network(
         file=file,
