@@ -1,5 +1,7 @@
 """The one next action, in words, for whom controls and for whom watches: by controllers, and by mouse and keyboard."""
 
+from dataclasses import dataclass
+
 from trunkline.teleop.messages import Mode, Targets
 
 NEXT: dict[Mode, str] = {
@@ -13,7 +15,6 @@ NEXT: dict[Mode, str] = {
     "follow": "move the rays; let go of both grips to hold",
     "stopped": "press primary to go on",
 }
-NAMES = "mount", "tip"  # of the targets, as the page has them
 BY_KEYS: dict[Mode, str] = {
     **NEXT,
     "hold": "let go of all keys for a moment",
@@ -26,39 +27,54 @@ BY_KEYS: dict[Mode, str] = {
 }
 
 
+@dataclass(frozen=True)
+class Device:
+    """What a user has in hand, in words. modes: what is next. go_on: ends a stop; offered: takes the point that is.
+    names: of the rigid and of the tip target; sets: how one is set, its name left open; asks: for a plan."""
+
+    modes: dict[Mode, str]
+    go_on: str
+    offered: str
+    names: tuple[str, str]
+    sets: str
+    asks: str
+
+
+CONTROLLERS = Device(
+    NEXT, "primary", "primary, the grip let go,", ("rigid", "tip"), "hold a grip to set the {} target",
+    "pull the trigger",
+)  # fmt: skip
+KEYBOARD = Device(
+    BY_KEYS, "R", "R", ("the mount’s", "the tip’s"), "drag {} marker, or move it by arrows (1: mount, 2: tip)",
+    "press Enter",
+)  # fmt: skip
+
+
 def next_action(mode: Mode, targets: Targets | None, holder: str, aligned: bool, touched: tuple[bool, bool]) -> str:
     """By controllers. touched: whether the rigid and the tip target have been set."""
-    if not holder:
-        return "take control" + (", then press primary" if mode == "stopped" else "; anybody may stop the robot")
-    if not aligned:
+    if holder and not aligned:
         return "align the base"
-    if mode != "aim":
-        return NEXT[mode]
-    if targets is None:
-        missing = " and ".join(name for name, there in zip(("rigid", "tip"), touched, strict=True) if not there)
-        return f"hold a grip to set the {missing or 'tip'} target"
-    if targets.rigid.reach == "outside" or targets.tip.reach == "outside":
-        return "bring the target within reach, or press primary, the grip let go, for the point that is offered"
-    if targets.rigid.reach == "blocked" or targets.tip.reach == "blocked":
-        return "bring the target out of the solid"
-    if targets.thing:
-        return f"pull the trigger to ask for a plan for {targets.thing}"
-    return NEXT[mode]
+    return _next(CONTROLLERS, mode, targets, holder, touched)
 
 
 def next_key(mode: Mode, targets: Targets | None, holder: str, touched: tuple[bool, bool]) -> str:
     """By mouse and keyboard, where the base is where it is; as `next_action`."""
+    return _next(KEYBOARD, mode, targets, holder, touched)
+
+
+def _next(device: Device, mode: Mode, targets: Targets | None, holder: str, touched: tuple[bool, bool]) -> str:
     if not holder:
-        return "take control" + (", then press R" if mode == "stopped" else "; anybody may stop the robot")
+        then = f", then press {device.go_on}" if mode == "stopped" else "; anybody may stop the robot"
+        return f"take control{then}"
     if mode != "aim":
-        return BY_KEYS[mode]
+        return device.modes[mode]
     if targets is None:
-        missing = " and ".join(f"the {name}’s" for name, there in zip(NAMES, touched, strict=True) if not there)
-        return f"drag {missing or 'the tip’s'} marker, or move it by arrows (1: mount, 2: tip)"
+        missing = " and ".join(name for name, there in zip(device.names, touched, strict=True) if not there)
+        return device.sets.format(missing or device.names[1])
     if targets.rigid.reach == "outside" or targets.tip.reach == "outside":
-        return "bring the target within reach, or press R for the point that is offered"
+        return f"bring the target within reach, or press {device.offered} for the point that is offered"
     if targets.rigid.reach == "blocked" or targets.tip.reach == "blocked":
         return "bring the target out of the solid"
     if targets.thing:
-        return f"press Enter to ask for a plan for {targets.thing}"
-    return BY_KEYS[mode]
+        return f"{device.asks} to ask for a plan for {targets.thing}"
+    return device.modes[mode]
