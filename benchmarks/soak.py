@@ -163,7 +163,7 @@ async def session(package: Package, hours: float) -> None:
             held, before = await hands.move(guest, now), server.inputs
             await guest.send("input", hands_at(RIGID, TIP, held), SEEN, 2)
             await until(lambda before=before: server.inputs > before)
-            server.tick(now, 1 / HZ)
+            server.step()
             if tick % round(VISIT * HZ) == 0:
                 visitors.append((now, await come()))
                 found["visits"] += 1

@@ -95,10 +95,23 @@ def test_nobody_is_told_that_nobody_who_controls_is_silent():
         async with laid() as here:
             guest = await here.come()
             await asyncio.sleep(1.0)
-            assert here.desk.intent.notice.startswith("client silent")
+            assert here.desk.intent.notice == "base is not aligned; holding"
             assert {told["notice"] for told in guest.said if told["type"] == "state"} == {""}
 
     asyncio.run(session())
+
+
+def test_a_button_is_not_left_to_wait_for_the_next_tick():
+    async def press():
+        async with laid(rate=0.02) as here:  # a tick in 50 s
+            guest = await here.come()
+            await guest.say(type="lease", action="ask")
+            await guest.hears("lease", holder=guest.id)
+            await guest.hears("clock")
+            await guest.input(hand((0.5, 0.1, 1.1), secondary=1.0), hand((0.5, 0.1, 1.1)))
+            await guest.hears("state", mode="stopped")
+
+    asyncio.run(press())
 
 
 def test_frames_tell_bodies_and_both_targets():

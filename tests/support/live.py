@@ -112,15 +112,15 @@ def patient(**seconds):
 class Laid:
     """A server, its parts, and its log."""
 
-    def __init__(self, port, page=Path("nowhere"), journal=None, anchors=None, settings=None):
+    def __init__(self, port, page=Path("nowhere"), journal=None, anchors=None, settings=None, rate=RATE):
         self.robot, self.planning, self.log = PlainRobot(), PlainPlanning(), []
         core = Teleoperation(settings or patient(), Everywhere(), PACKAGE, OFFSET)
         self.desk = Desk(core, self.robot, self.planning, make_world(()), 0.1, journal)
-        self.desk.begin(RATE)
+        self.desk.begin(rate)
         scene = {"bodies": ["a", "b", "c"]}
         origins = Origins.of(["127.0.0.1"], port, tls=False)
         self.server = Server(House(
-            self.desk, TOKEN, origins, PACKAGE, scene, None, RATE, page, self.log.append, live().alignment, anchors
+            self.desk, TOKEN, origins, PACKAGE, scene, None, rate, page, self.log.append, live().alignment, anchors
         ))  # fmt: skip
         self.planning.heard = self.server.foreseen
         self.url, self.origin = f"http://127.0.0.1:{port}", f"http://127.0.0.1:{port}"
@@ -210,10 +210,10 @@ def hand(place, **buttons):
 
 
 @asynccontextmanager
-async def laid(page=Path("nowhere"), journal=None, anchors=None, settings=None):
+async def laid(page=Path("nowhere"), journal=None, anchors=None, settings=None, rate=RATE):
     """A server that runs, and how to come to it."""
     port = unused_port()
-    here = Laid(port, page, journal, anchors, settings)
+    here = Laid(port, page, journal, anchors, settings, rate)
     served = TestServer(here.server.app(), host="127.0.0.1", port=port)
     async with served, ClientSession() as session:
 

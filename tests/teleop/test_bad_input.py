@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from tests.support.operator import TABLE, Operator
+from trunkline.teleop.core import WATCHING
 from trunkline.teleop.messages import Box, World
 from trunkline.teleop.recorder import FAULTS
 from trunkline.teleop.transitions import MODES
@@ -35,6 +36,12 @@ def test_every_fault_has_its_line():
     assert set(LINES) == set(FAULTS)
 
 
+# what does not void a plan where nothing moves: who watches need not be heard
+UNHEARD = {
+    "nan position", "infinite quaternion", "nan stick", "quaternion of length 2", "controller gone", "gap", "silent",
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("bad", FAULTS)
 @pytest.mark.parametrize("mode", MODES)
 def test_robot_holds_and_says_why(mode, bad):
@@ -45,7 +52,8 @@ def test_robot_holds_and_says_why(mode, bad):
     start = len(operator.intents)
     intent = FAULTS[bad](operator)
     assert intent.motion == "hold"
-    assert intent.mode == ("stopped" if mode == "stopped" else "hold")
+    kept = mode == "stopped" or (mode in WATCHING and bad in UNHEARD)
+    assert intent.mode == (mode if kept else "hold")
     if bad == "silent":  # said as soon as it is known
         intent = next(intent for intent in operator.intents[start:] if intent.notice.startswith("client"))
     later = {("hold", "silent"): "client silent for 0.20 s; holding"}  # another line comes before it
@@ -63,6 +71,39 @@ def test_robot_may_be_moved_again_only_by_a_new_plan_and_a_new_confirmation(bad)
     for _ in range(120):
         assert operator.step().motion == "hold"
     assert operator.wait(1.0, left={"grip": False}, right={"grip": False}).mode == "aim"
+
+
+@pytest.mark.parametrize("bad", sorted(UNHEARD))
+@pytest.mark.parametrize("mode", WATCHING)
+def test_a_plan_outlives_that_its_user_is_not_heard_and_is_confirmed_by_a_fresh_press_alone(mode, bad):
+    operator = Operator()
+    operator.to(mode)
+    good, hand = operator.given, "left" if bad == "nan position" else "right"
+    FAULTS[bad](operator)
+    operator.given = replace(good, stamp=operator.given.stamp)
+    heard = operator.step(**{hand: {"trigger": True, "grip": True}})  # held when it appears: no press
+    assert (heard.mode, heard.notice) == (mode, "")
+    if mode == "plan":
+        operator.cause("planned")
+    if mode != "ready":
+        operator.cause("shown")
+    assert operator.wait(0.5).mode == "ready"
+    operator.step(**{hand: {"trigger": False}})
+    assert operator.step(**{hand: {"trigger": True}}).mode == "delay"
+
+
+def test_nothing_is_confirmed_by_one_hand_as_the_other_is_not_heard():
+    operator = Operator()
+    operator.to("ready")
+    operator.wait(0.2, left={"tracked": False})
+    intent = operator.step(right={"trigger": True, "grip": True})
+    assert (intent.mode, intent.notice) == ("ready", "left controller: not tracked; holding")
+
+
+def test_a_plan_does_not_outlive_a_silence_in_the_delay_before_it_runs():
+    operator = Operator()
+    operator.to("delay")
+    assert FAULTS["silent"](operator).mode == "hold"
 
 
 def test_a_controller_lost_for_a_moment_changes_nothing():

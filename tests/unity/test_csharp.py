@@ -142,6 +142,9 @@ NO_MANIFESTS = {
     "a manifest that ends in a word": lambda text: text.rpartition(b'"')[0],
     "a manifest and more": lambda text: text + b"}",
     "a list": lambda text: b"[]",
+    "an empty block": lambda text: b"{}",
+    "no grids": lambda text: text.replace(b'"grids": {', b'"others": {'),
+    "a grid without a shape": lambda text: text.replace(b'"shape"', b'"size"'),
 }
 BAD = ["another byte", "no grid", "no manifest", "a short grid", "origin [0.1,0.1,0.1]", "spacing [0.2,0.2,0.2]",
        "shape [5,9,8]", *NO_MANIFESTS]  # fmt: skip

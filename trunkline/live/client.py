@@ -20,7 +20,7 @@ PING_GAP = 0.03  # s
 
 @dataclass
 class Client:
-    """`left`: of its rate, below 0 beyond it. `stopping`: its stop button is held."""
+    """`left`: of its rate, below 0 beyond it. `stopping`: its stop button is held. `buttons`: those that it holds."""
 
     id: str
     name: str
@@ -33,6 +33,7 @@ class Client:
     counted: float = 0.0
     refused: dict[str, float] = field(default_factory=dict)
     stopping: bool = False
+    buttons: bytes = b""
 
     @property
     def alignment(self) -> Pose | None:

@@ -29,6 +29,11 @@ def stops(received: Received) -> bool:
     return bool((received.hands[:, _AT["secondary"]] >= PRESSED).any())
 
 
+def buttons(received: Received) -> bytes:
+    """Which are held on either hand: other buttons, other bytes."""
+    return (received.hands[:, [_AT[name] for name in BUTTONS]] >= PRESSED).tobytes()
+
+
 def held(received: Received, side: str) -> Held | None:
     """The pose of a hand's controller, None where it is not tracked or is no pose."""
     if not {f"{side}_tracked", "visible"} <= received.flags:

@@ -329,7 +329,7 @@ class Desk:
         return found
 
     def told(self, holder: str) -> talk.State:
-        """The state for clients, `holder` controlling; where nobody does, the core's notice is left out: of silence."""
+        """The state for clients, `holder` controlling; where nobody does, the core's notice is left out: of nobody."""
         intent, robot = self.intent, self.robot.state()
         assert intent is not None
         hands = self.state.hands

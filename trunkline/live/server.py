@@ -69,6 +69,7 @@ class Server:
         self.showing = Showing(house.desk, house.shells)
         self._site = Site(house.origins, house.token, house.scene, house.page, house.log)
         self._world, self._unwritten, self._garbage = None, "", Garbage()
+        self._ticked = now()
 
     # --- routes
 
@@ -230,6 +231,10 @@ class Server:
             self.control.hear(client.id, now)
             self._keep_hands(client, received)
             self._touch(client, received)
+            pressed = controllers.buttons(received)
+            if pressed != client.buttons:  # what a button does is not left to wait for the next tick
+                client.buttons = pressed
+                self.step()
 
     def _keep_hands(self, client: Client, received: wire.Received) -> None:
         assert client.clock.offset is not None
@@ -371,17 +376,25 @@ class Server:
 
     async def _run(self) -> None:
         """Ticks at the house's rate; one that is late is not made up for."""
-        period, last = 1 / self.house.rate, self.now()
-        due = last + period
+        period = 1 / self.house.rate
+        self._ticked = self.now()
+        due = self._ticked + period
         while True:
             await asyncio.sleep(max(due - self.now(), 0.0))
-            now = self.now()
-            try:
-                self.tick(now, now - last)
-            except Exception as error:  # a session that goes on blindly could move the robot
-                self.desk.stop()
-                self.house.log(f"error: {type(error).__name__}: {error}; the robot holds")
-            last, due = now, max(due + period, now)
+            self.step()
+            due = max(due + period, self._ticked)
+
+    def step(self) -> None:
+        """A tick, now; what fails in it stops the robot."""
+        now = self.now()
+        if now <= self._ticked:
+            return
+        try:
+            self.tick(now, now - self._ticked)
+        except Exception as error:  # a session that goes on blindly could move the robot
+            self.desk.stop()
+            self.house.log(f"error: {type(error).__name__}: {error}; the robot holds")
+        self._ticked = now
 
     def tick(self, now: float, dt: float) -> None:
         """A step of the core, and what all see of it."""

@@ -14,12 +14,13 @@ from trunkline.teleop.hands import Hand, below, hear, missed, ray_end
 from trunkline.teleop.messages import Input, Intent, Motion, Pose, Request, Targets
 from trunkline.teleop.reach import Reach
 from trunkline.teleop.settings import Teleop
-from trunkline.teleop.soundness import clock_fault, fault_of, setting_fault, swapped
+from trunkline.teleop.soundness import clock_fault, fault_of, setting_fault, silence_fault, swapped
 from trunkline.teleop.state import Pinned, State
 from trunkline.teleop.targets import bring, offered, place, tilted, why_not
 from trunkline.teleop.transitions import TRANSITIONS, Event, first_event
 
 AIMING = ("aim", "follow")
+WATCHING = ("plan", "preview", "ready")  # nothing moves: a plan outlives that its user is not heard for a while
 PLANNED = ("plan", "preview", "ready", "delay", "execute", "follow")  # modes that a change of the world concerns
 
 
@@ -44,8 +45,10 @@ class Teleoperation:
         Args:
             dt: s since the step before, of the caller's clock; stamps are of the client's.
         """
-        state, lost = self._heard(state, given, dt)
+        state, lost, unheard = self._heard(state, given, dt)
         alignment = given.alignment
+        if unheard and state.mode not in WATCHING:
+            lost = lost or unheard
         if lost or alignment is None:
             found: dict[Event, bool] = {"lost": True, "stop": stopped_by(given)}
             return self._after(state, given, found, lost, None, dt, (None, None))
@@ -60,22 +63,27 @@ class Teleoperation:
         if targets is not None:
             state = self._remembered(state, targets)
         found, notice = happened(state, given, targets, ends, self.settings)
-        return self._after(state, given, found, notice, targets, dt, ends)
+        found["confirm"] = found["confirm"] and not unheard
+        state, intent = self._after(state, given, found, notice, targets, dt, ends)
+        return state, replace(intent, notice=unheard or intent.notice)
 
-    def _heard(self, state: State, given: Input, dt: float) -> tuple[State, str]:
-        """Both hands after this input, and why the robot must hold, "" where it need not."""
+    def _heard(self, state: State, given: Input, dt: float) -> tuple[State, str, str]:
+        """Both hands after this input; why nothing of it can be trusted; and who is not heard. Either is "" where
+        nothing is wrong, and else the robot must hold."""
         same = given.stamp == state.stamp
         silent = state.silent + dt if same and math.isfinite(dt) else 0.0
-        fault = clock_fault(state.stamp, given, dt, silent, self.settings.safety)
-        if fault:
+        fault = clock_fault(state.stamp, given, dt)
+        quiet = "" if fault else silence_fault(state.stamp, given.stamp, silent, self.settings.safety)
+        if fault or quiet:
             left, right = (missed(hand, math.inf, 0.0) for hand in state.hands)
             stamp = given.stamp if math.isfinite(given.stamp) else state.stamp  # from which time counts anew
-            return replace(state, left=left, right=right, stamp=stamp, silent=silent, history=()), fault
+            state = replace(state, left=left, right=right, stamp=stamp, silent=silent, history=())
+            return state, fault or setting_fault(given, self.package), quiet
         if same:
             left, right = (replace(hand, pressed=()) for hand in state.hands)
-            return replace(state, left=left, right=right, silent=silent), setting_fault(given, self.package)
+            return replace(state, left=left, right=right, silent=silent), setting_fault(given, self.package), ""
         sample = dt if state.stamp is None else given.stamp - state.stamp
-        hands, faults = [], []
+        hands, unseen = [], []
         for name, hand, controller in (("left", state.left, given.left), ("right", state.right, given.right)):
             wrong = fault_of(controller)
             if not wrong:
@@ -83,14 +91,14 @@ class Teleoperation:
                 continue
             hands.append(missed(hand, sample, self.settings.safety.grace))
             if hands[-1].seen is None:
-                faults.append(f"{name} controller: {wrong}; holding")
+                unseen.append(f"{name} controller: {wrong}; holding")
         sound = not fault_of(given.left) and not fault_of(given.right)
         if sound and swapped(state.left, state.right, given, self.settings.safety.swap):
             hands = [missed(hand, math.inf, 0.0) for hand in hands]
-            faults.append("controllers have changed places; holding until both grips are let go")
+            fault = "controllers have changed places; holding until both grips are let go"
         left, right = hands
         state = replace(state, left=left, right=right, stamp=given.stamp, silent=0.0)
-        return state, setting_fault(given, self.package) or (faults[0] if faults else "")
+        return state, setting_fault(given, self.package) or fault, unseen[0] if unseen else ""
 
     def _parked(self, state: State, ends: Ends, alignment: Pose, dt: float) -> State:
         """Targets that are held by their grips moved to the ends of their rays; the others stay where they are."""

@@ -110,7 +110,7 @@ class Recorder:
         if event == "fault":
             return self.step(executor=ExecutorReport("fault", PLAN, "joint 3 reflex"))
         if event == "lost":
-            return self.step(seconds=0.2, left={"tracked": False})
+            return self.step(alignment=None)
         if event == "void":
             return self.step(world=replace(given.world, digest="another"))
         if event == "released":

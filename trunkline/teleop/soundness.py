@@ -22,17 +22,18 @@ def fault_of(controller: Controller) -> str:
     return ""
 
 
-def clock_fault(last: float | None, given: Input, dt: float, silent: float, safety: Safety) -> str:
-    """Why time cannot be trusted; `silent` s is how long no new stamp has come."""
+def clock_fault(last: float | None, given: Input, dt: float) -> str:
+    """Why time cannot be trusted, "" where it can."""
     if not math.isfinite(dt) or dt <= 0:
         return f"step of {dt:g} s: expected a positive time; holding"
     if not math.isfinite(given.stamp):
         return "stamp is not a number; holding"
-    if last is None:
-        return ""
-    if given.stamp < last:
-        return f"clock went back by {last - given.stamp:.3g} s; holding"
-    gap = max(silent, given.stamp - last)
+    return f"clock went back by {last - given.stamp:.3g} s; holding" if last is not None and given.stamp < last else ""
+
+
+def silence_fault(last: float | None, stamp: float, silent: float, safety: Safety) -> str:
+    """Why the client counts as silent, "" where it does not; `silent` s is how long no new stamp has come."""
+    gap = silent if last is None else max(silent, stamp - last)
     return f"client silent for {gap:.2f} s; holding" if gap > safety.silence else ""
 
 

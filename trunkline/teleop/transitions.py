@@ -18,7 +18,7 @@ MODES: tuple[Mode, ...] = get_args(Mode)
 MEANING: dict[Event, str] = {
     "stop": "secondary button",
     "fault": "the robot reports a fault, or does not start",
-    "lost": "tracking, clock, client, alignment or package is not sound",
+    "lost": "clock, alignment or package is not sound; but in plan, preview, ready also: a controller, the client",
     "void": "target, world or alignment changed",
     "released": "both grips let go",
     "refused": "no plan, with the reason",

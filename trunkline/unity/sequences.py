@@ -17,6 +17,7 @@ DT = 0.09  # s a step: few of them, and none of the settings' times is a multipl
 ALIGNMENT = Pose((1.3, 0.0, 0.6), (0.5, 0.5, 0.5, 0.5))  # the reference's y is up, its -z the base's -x
 AHEAD: Vector = (0.0, 0.0, -1.0)  # of a controller
 EXECUTING = ("nan position", "time goes back", "swapped")  # faults, as examples
+WATCHING = ("controller gone", "silent")  # likewise, of a user who watches a preview
 TREMBLING = 24  # steps
 
 
@@ -30,6 +31,7 @@ def sequences(core: Teleoperation, joints: Joints, rigid: Vector, tip: Vector) -
     scripts |= {
         f"{name} while executing": lambda one, name=name: (one.to("execute"), FAULTS[name](one)) for name in EXECUTING
     }
+    scripts |= {f"{name} while watching": lambda one, name=name: _unheard(one, FAULTS[name]) for name in WATCHING}
     scripts |= {"faults while aiming": _faults, "reach": _reach, "follow a hand": _follow, "tremble": _tremble}
     found = {}
     for name, script in scripts.items():
@@ -68,6 +70,16 @@ def _faults(recorder: Recorder) -> None:
     for fault in FAULTS.values():
         fault(recorder)
         recorder.recover()
+
+
+def _unheard(recorder: Recorder, fault: Callable[[Recorder], object]) -> None:
+    """The plan is kept meanwhile, and confirmed by a user who is heard again."""
+    recorder.to("preview")
+    fault(recorder)
+    recorder.cause("shown")
+    recorder.cause("confirm")
+    recorder.step(left={"tracked": True}, right={"tracked": True})
+    recorder.cause("confirm")
 
 
 def _reach(recorder: Recorder) -> None:

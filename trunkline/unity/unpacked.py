@@ -128,6 +128,20 @@ def robot_of(files: dict[str, bytes]) -> Robot:
     return TypeAdapter(Robot).validate_python(_hybrid(files)["robot"])
 
 
+class _Block(dict):
+    """A block of a JSON file, and where it is, so that what is missing is named."""
+
+    def __init__(self, values: dict, source: str) -> None:
+        super().__init__(
+            (name, _Block(value, f"{source}: {name}") if isinstance(value, dict) else value)
+            for name, value in values.items()
+        )
+        self._source = source
+
+    def __missing__(self, name: str):
+        raise InputError(f"{self._source}: found no {name}, expected one")
+
+
 def _file(files: dict[str, bytes], name: str) -> bytes:
     """The file that the manifest's block `hybrid` calls `name`."""
     return files[_hybrid(files)[name]]
@@ -149,7 +163,7 @@ def _numbers(files: dict[str, bytes], path: str, kind: str, shape: tuple[int, ..
     return np.frombuffer(files[path], dtype=kind).reshape(shape)
 
 
-def _manifest(files: dict[str, bytes]) -> dict:
+def _manifest(files: dict[str, bytes]) -> _Block:
     if MANIFEST not in files:
         raise InputError(f"package: found no {MANIFEST}, expected one of the stage package_unity")
     try:
@@ -158,4 +172,4 @@ def _manifest(files: dict[str, bytes]) -> dict:
         raise InputError(f"{MANIFEST}: found no JSON at character {error.pos}, expected some") from None
     if not isinstance(found, dict):
         raise InputError(f"{MANIFEST}: found no block, expected one")
-    return found
+    return _Block(found, MANIFEST)

@@ -516,5 +516,8 @@ public sealed class Intent {
     Countdown = countdown;
     Follow = follow;
   }
+
+  internal Intent WithNotice(string notice) => new Intent(
+      Mode, Motion, notice, Targets, LeftRay, RightRay, Request, Preview, Execute, Countdown, Follow);
 }
 }

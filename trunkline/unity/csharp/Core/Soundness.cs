@@ -20,22 +20,21 @@ public static class Soundness {
     return Math.Abs(Length(controller.Quaternion) - 1) > _unit ? "quaternion is not of unit length" : "";
   }
 
-  /// <summary>Why time cannot be trusted, "" where it can; <paramref name="silent"/> s is how long no new stamp has
-  /// come.</summary>
-  public static string ClockFault(double? last, Input given, double dt, double silent, Safety safety) {
+  /// <summary>Why time cannot be trusted, "" where it can.</summary>
+  public static string ClockFault(double? last, Input given, double dt) {
     if (!IsFinite(dt) || dt <= 0) {
       return $"step of {Formats.General(dt)} s: expected a positive time; holding";
     }
     if (!IsFinite(given.Stamp)) {
       return "stamp is not a number; holding";
     }
-    if (last == null) {
-      return "";
-    }
-    if (given.Stamp < last) {
-      return $"clock went back by {Formats.General(last.Value - given.Stamp, 3)} s; holding";
-    }
-    double gap = Math.Max(silent, given.Stamp - last.Value);
+    return given.Stamp < last ? $"clock went back by {Formats.General(last.Value - given.Stamp, 3)} s; holding" : "";
+  }
+
+  /// <summary>Why the client counts as silent, "" where it does not; <paramref name="silent"/> s is how long no new
+  /// stamp has come.</summary>
+  public static string SilenceFault(double? last, double stamp, double silent, Safety safety) {
+    double gap = last == null ? silent : Math.Max(silent, stamp - last.Value);
     return gap > safety.Silence ? $"client silent for {Formats.Fixed(gap, 2)} s; holding" : "";
   }
 

@@ -38,8 +38,11 @@ public sealed class Teleoperation {
   /// <param name="dt">s since the step before, of the caller's clock; stamps are of the client's.</param>
   public (State State, Intent Intent) Step(State state, Input given, double dt) {
     var next = state.Copy();
-    string lost = Hear(next, given, dt);
+    var (lost, unheard) = Hear(next, given, dt);
     var alignment = given.Alignment;
+    if (lost == "" && !IsWatching(next.Mode)) {
+      lost = unheard;
+    }
     if (lost != "" || alignment == null) {
       var nothing = new bool[Transitions.Events];
       nothing[(int)Event.Lost] = true;
@@ -66,23 +69,27 @@ public sealed class Teleoperation {
       Remember(next, targets);
     }
     var (found, notice) = Events.Happened(next, given, targets, leftEnd, rightEnd, Settings);
-    return After(next, given, found, notice, targets, dt, leftEnd, rightEnd);
+    found[(int)Event.Confirm] &= unheard == "";
+    var (after, intent) = After(next, given, found, notice, targets, dt, leftEnd, rightEnd);
+    return (after, unheard == "" ? intent : intent.WithNotice(unheard));
   }
 
   // The functions below change `state`, which is the copy that `Step` has made and nobody else has seen.
 
-  // Both hands after this input, and why the robot must hold, "" where it need not.
-  private string Hear(State state, Input given, double dt) {
+  // Both hands after this input; why nothing of it can be trusted; and who is not heard. Either is "" where nothing is
+  // wrong, and else the robot must hold.
+  private (string Lost, string Unheard) Hear(State state, Input given, double dt) {
     bool same = given.Stamp == state.Stamp;
     double silent = same && IsFinite(dt) ? state.Silent + dt : 0;
-    string fault = Soundness.ClockFault(state.Stamp, given, dt, silent, Settings.Safety);
-    if (fault != "") {
+    string fault = Soundness.ClockFault(state.Stamp, given, dt);
+    string quiet = fault != "" ? "" : Soundness.SilenceFault(state.Stamp, given.Stamp, silent, Settings.Safety);
+    if (fault != "" || quiet != "") {
       state.Left = Hands.Missed(state.Left, double.PositiveInfinity, 0);
       state.Right = Hands.Missed(state.Right, double.PositiveInfinity, 0);
       state.Stamp = IsFinite(given.Stamp) ? given.Stamp : state.Stamp;  // from which time counts anew
       state.Silent = silent;
       state.History = State.Nothing;
-      return fault;
+      return (fault != "" ? fault : Soundness.SettingFault(given, Package), quiet);
     }
     if (same) {
       for (int i = 0; i < 2; i++) {
@@ -91,17 +98,18 @@ public sealed class Teleoperation {
         state.SetHand(i, hand);
       }
       state.Silent = silent;
-      return Soundness.SettingFault(given, Package);
+      return (Soundness.SettingFault(given, Package), "");
     }
     double sample = state.Stamp == null ? dt : given.Stamp - state.Stamp.Value;
     Hand left = state.Left, right = state.Right;
     string wrongLeft = Soundness.FaultOf(given.Left), wrongRight = Soundness.FaultOf(given.Right);
     state.Left = HearOne(left, given.Left, wrongLeft, sample);
     state.Right = HearOne(right, given.Right, wrongRight, sample);
+    string unseen = "";
     if (wrongLeft != "" && state.Left.Seen == null) {
-      fault = $"left controller: {wrongLeft}; holding";
+      unseen = $"left controller: {wrongLeft}; holding";
     } else if (wrongRight != "" && state.Right.Seen == null) {
-      fault = $"right controller: {wrongRight}; holding";
+      unseen = $"right controller: {wrongRight}; holding";
     }
     bool sound = wrongLeft == "" && wrongRight == "";
     if (sound && Soundness.Swapped(left, right, given, Settings.Safety.Swap)) {
@@ -112,7 +120,7 @@ public sealed class Teleoperation {
     state.Stamp = given.Stamp;
     state.Silent = 0;
     string setting = Soundness.SettingFault(given, Package);
-    return setting != "" ? setting : fault;
+    return (setting != "" ? setting : fault, unseen);
   }
 
   private Hand HearOne(Hand hand, Controller given, string wrong, double sample) =>
@@ -140,6 +148,9 @@ public sealed class Teleoperation {
   }
 
   private static bool IsAiming(Mode mode) => mode == Mode.Aim || mode == Mode.Follow;
+
+  // Where nothing moves: a plan outlives that its user is not heard for a while.
+  private static bool IsWatching(Mode mode) => mode == Mode.Plan || mode == Mode.Preview || mode == Mode.Ready;
 
   // Modes that a change of the world concerns.
   private static bool IsPlanned(Mode mode) => mode >= Mode.Plan && mode <= Mode.Follow;

@@ -9,7 +9,8 @@ public enum Event {
   Stop,
   /// <summary>The robot reports a fault, or does not start.</summary>
   Fault,
-  /// <summary>Tracking, clock, client, alignment or package is not sound.</summary>
+  /// <summary>Clock, alignment or package is not sound; but in plan, preview, ready also: a controller, the
+  /// client.</summary>
   Lost,
   /// <summary>Target, world or alignment changed.</summary>
   Void,
