@@ -40,6 +40,7 @@ class Kept(Journal):
         self.book.write(record)
 
     def close(self) -> None:
+        self.settle()
         self.book.finish()
         self.file.close()
 

@@ -56,6 +56,7 @@ class Session(Journal):
         self.book.write(record)
 
     def close(self):
+        self.settle()
         self.book.finish()
         self.file.close()
 

@@ -69,6 +69,7 @@ def recorded(path, probability=0.8, held=True, end=None, spread=0.01):
             if held:
                 thing = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.4), support="held")
                 journal.event("world", world=make_world((), (thing,)))
+        journal.settle()
         journal.book.finish()
     return path
 

@@ -58,6 +58,7 @@ class Written(Journal):
         self.book.write(record)
 
     def close(self):
+        self.settle()
         self.book.finish()
         self.file.close()
 

@@ -38,6 +38,7 @@ from trunkline.live.book import (
     new_file,
     run,
 )
+from trunkline.live.resting import Resting
 from trunkline.live.robot import Standing
 from trunkline.teleop import messages
 from trunkline.teleop.messages import Input, Intent, Pose
@@ -55,6 +56,7 @@ class Journal:
 
     def __init__(self, subject: Subject = NOTHING, now: Callable[[], float] = time.monotonic) -> None:
         self.subject, self.now = subject, now
+        self._resting = Resting()
 
     def keep(self, record: Record) -> None:
         """Take a record, without waiting."""
@@ -67,8 +69,16 @@ class Journal:
         self.keep(Record(INTENT, now, now, messages.to_json(intent)))
 
     def standing(self, robot: Standing) -> None:
-        """What the robot does; of what is measured, what is."""
-        now = self.now()
+        """What the robot does; of what is measured, what is. While it rests, a few are kept, somewhat later."""
+        for kept, now in self._resting.take(robot, self.now()):
+            self._stand(kept, now)
+
+    def settle(self) -> None:
+        """Keep what a robot at rest was told of last."""
+        for kept, now in self._resting.rest():
+            self._stand(kept, now)
+
+    def _stand(self, robot: Standing, now: float) -> None:
         for topic, axes in (
             (JOINTS_SENT, robot.joints), (JOINTS, robot.measured), (TENDONS_SENT, robot.commands),
             (TENDONS, robot.lengths),
@@ -141,6 +151,7 @@ class JournalProcess(Journal):
 
     def close(self) -> None:
         """Write what waits, and end the file."""
+        self.settle()
         with suppress(queue.Full):
             self._waiting.put(None, timeout=PATIENCE)
         self._process.join(PATIENCE)
