@@ -7,7 +7,7 @@ import { BACK } from "./colours.js";
 import { DesktopHands } from "./desktop.js";
 import { Immersive, canImmerse } from "./immersive.js";
 import { Marks } from "./rays.js";
-import { PagePanel, RoomPanel, foreseenWords, words } from "./panel.js";
+import { PagePanel, RoomPanel, foreseenWords, remedy, words } from "./panel.js";
 import { Playback } from "./playback.js";
 import { Recording } from "./recording.js";
 import { RobotScene } from "./scene.js";
@@ -80,13 +80,13 @@ class Page {
     return {
       welcome: (message) => this.welcome(message),
       closed: (reason, final) => {
-        this.reason = reason;
+        [this.reason, this.ended] = [reason, final];
         this.wire.controls = false;
         this.state = this.lease = null;
         this.show(null);
         if (!final) return;
         sessionStorage.removeItem(KEPT);
-        this.pair(reason);
+        this.pair(remedy(reason));
       },
       lease: (message) => {
         this.lease = message;
@@ -339,7 +339,7 @@ class Page {
     const age = this.frame && wire ? wire.age(this.frame.time) : null;
     const stale = !wire?.up || (this.frame?.flags.has("stale") ?? false) || (age ?? 0) > 1;
     this.drawn.fade(stale);
-    const spoken = words({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, stale, immersed });
+    const spoken = words({ state, lease, id: wire?.id ?? "", age: this.rounded(age), up: Boolean(wire?.up && wire.id), reason, ended: this.ended, stale, immersed });
     if (this.warning && this.warning.until > clock()) spoken.notice ||= this.warning.text;
     if (immersed) {
       const { aligning } = this.immersive;

@@ -12,22 +12,31 @@ const COLOURS = {
 };
 const OLD = 0.25; // s beyond which a pose of the robot is called old
 
-/** What there is to say of `page`: `mode`, `title`, `next`, `notice`, and facts by name. `immersed`: by controllers. */
+const PLANNED = new Set(["plan", "preview", "ready", "delay"]); // what the robot did before is past
+const DO = { "token: wrong": "This address is not of the session that runs now. Open the address anew that the session has printed" };
+
+/** What to do about the `reason` for which the server has ended a connection. */
+export const remedy = (reason) => (reason in DO ? `${DO[reason]} (${reason}).` : reason);
+
+/** What there is to say of `page`: `mode`, `title`, `next`, `notice`, whether the robot has `arrived`, and facts by name. `ended`: it will not connect again by itself. `immersed`: by controllers. */
 export function words(page) {
-  const { state, lease, id, age, up, reason, stale, immersed } = page;
+  const { state, lease, id, age, up, reason, ended, stale, immersed } = page;
   const mode = !up ? (reason === null ? "connecting" : "lost") : (state?.mode ?? "connecting");
   const mine = lease?.holder === id && id !== "";
   const holder = lease?.clients?.find((one) => one.id === lease.holder);
   const facts = {};
   if (up && lease) facts.Control = mine ? "you" : holder ? holder.name || "somebody else" : "nobody";
   if (up && lease?.asking?.length && mine) facts.Asked = `${lease.asking.length} would like to take over`;
-  if (age !== null) facts.Robot = `seen ${age < 0.001 ? "now" : `${Math.round(1000 * age)} ms ago`}${stale || age > OLD ? ", OLD" : ""}`;
+  const arrived = up && state?.robot === "done" && !PLANNED.has(mode);
+  const seen = age === null ? "" : `seen ${age < 0.001 ? "now" : `${Math.round(1000 * age)} ms ago`}${stale || age > OLD ? ", OLD" : ""}`;
+  if (arrived || seen) facts.Robot = [arrived && "arrived", seen].filter(Boolean).join(", ");
   if (state?.fault) facts.Fault = state.fault;
   let title = TITLES[mode];
   if (mode === "delay" && Number.isFinite(state.countdown)) title = `Moves in ${state.countdown.toFixed(1)} s`;
   let next = mine || !lease?.holder ? sentence((immersed ? state?.next : state?.keys) ?? "") : "You watch. Ask for control to aim.";
   if (!up) next = reason === null ? "Waiting for the server." : `The connection is lost${reason ? `: ${reason}` : ""}. Trying again.`;
-  return { mode, title, next, notice: (up && state?.notice) || "", facts };
+  if (!up && ended) next = `The server has ended the connection: ${reason}.`;
+  return { mode, title, next, notice: (up && state?.notice) || "", arrived, facts };
 }
 
 const sentence = (text) => (text ? `${text[0].toUpperCase()}${text.slice(1)}.` : "");
@@ -99,10 +108,11 @@ export class RoomPanel {
   }
 
   /** `eye`: the viewer's camera. Every word is drawn again when one changes. */
-  show({ mode, title, next, notice, facts }, extra, eye, dt) {
+  show({ mode, title, next, notice, arrived, facts: { Robot, ...facts } }, extra, eye, dt) {
     this.board.visible = true;
     this.comeAlong(eye, dt);
-    const key = JSON.stringify([mode, title, next, notice, facts.Control, facts.Fault, extra]);
+    if (arrived) facts.Robot = "arrived"; // without its age, which changes all the time
+    const key = JSON.stringify([mode, title, next, notice, facts, extra]);
     if (key === this.drawn) return;
     this.drawn = key;
     const pen = this.canvas.getContext("2d");
@@ -118,7 +128,7 @@ export class RoomPanel {
     write(next, "46px system-ui, sans-serif", "#ffffff", 56, 3);
     write(notice === next ? "" : notice, "38px system-ui, sans-serif", css(GHOST), 48, 2);
     write(extra, "34px system-ui, sans-serif", "#c4ccd4", 42, 2);
-    write(Object.entries(facts).filter(([name]) => name !== "Robot").map(([name, value]) => `${name}: ${value}`).join("   "),
+    write(Object.entries(facts).map(([name, value]) => `${name}: ${value}`).join("   "),
       "34px system-ui, sans-serif", "#c4ccd4", 42, 1);
     this.texture.needsUpdate = true;
   }

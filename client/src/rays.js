@@ -2,7 +2,7 @@
 
 import {
   BoxGeometry, BufferGeometry, CylinderGeometry, EdgesGeometry, Float32BufferAttribute, Group, LineBasicMaterial,
-  LineSegments, Mesh, MeshBasicMaterial, SphereGeometry, TorusGeometry, Vector3,
+  LineSegments, Mesh, MeshBasicMaterial, RingGeometry, SphereGeometry, TorusGeometry, Vector3,
 } from "three";
 import { HANDS, MARKERS } from "./wire_table.js";
 import { MOUNT, OFFER, TIP, WRONG } from "./colours.js";
@@ -32,7 +32,10 @@ export class Marks {
       this.ends[index].fromArray(rows, at(`${side}_ray`));
       this.rays[index].update(starts[index], this.ends[index]);
     });
-    for (const kind of ["rigid", "tip"]) this.targets[kind].update(rows, at(`${kind}_target`), targets?.[kind] ?? null);
+    for (const kind of ["rigid", "tip"]) {
+      const end = this.ends[this.names.indexOf(kind === "rigid" ? "mount" : "tip")];
+      this.targets[kind].update(rows, at(`${kind}_target`), targets?.[kind] ?? null, end);
+    }
   }
 
   hide() {
@@ -85,6 +88,11 @@ class Target {
   constructor(colour, shape) {
     this.group = new Group();
     this.solid = new Mesh(shape, new MeshBasicMaterial({ color: colour, transparent: true, opacity: 0.75 }));
+    // Seen through the robot, in which a target begins: a ring, and the solid once more, faintly.
+    const through = { color: colour, transparent: true, depthTest: false, depthWrite: false };
+    this.faint = new Mesh(shape, new MeshBasicMaterial({ ...through, opacity: 0.35 }));
+    this.halo = new Mesh(new RingGeometry(0.04, 0.045, 40), new MeshBasicMaterial({ ...through, opacity: 0.9 }));
+    this.faint.renderOrder = this.halo.renderOrder = 5;
     this.edges = new LineSegments(new EdgesGeometry(shape, 30), new LineBasicMaterial({ color: 0xffffff }));
     this.ring = new Mesh(new TorusGeometry(0.05, 0.006, 8, 32), new MeshBasicMaterial({ color: WRONG }));
     this.cross = [1, -1].map((way) => {
@@ -98,16 +106,20 @@ class Target {
     this.way = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: OFFER }));
     this.way.geometry.setAttribute("position", new Float32BufferAttribute(new Float32Array(6), 3));
     this.way.frustumCulled = false;
-    this.group.add(this.solid, this.edges, this.ring, this.label.sprite, this.offer, this.way);
+    this.group.add(this.solid, this.faint, this.halo, this.edges, this.ring, this.label.sprite, this.offer, this.way);
     this.label.sprite.position.set(0.04, 0, 0.035);
     this.colour = colour;
     this.group.visible = false;
   }
 
-  update(rows, at, told) {
-    this.group.visible = Number.isFinite(rows[at]);
+  /** Where a target has not been set yet, what is seen through the robot is at the `end` of its ray. */
+  update(rows, at, told, end) {
+    const there = Number.isFinite(rows[at]);
+    this.group.visible = there || Number.isFinite(end.x);
     if (!this.group.visible) return;
-    this.group.position.fromArray(rows, at);
+    this.solid.visible = this.edges.visible = there;
+    if (there) this.group.position.fromArray(rows, at);
+    else this.group.position.copy(end);
     const outside = told?.reach === "outside", blocked = told?.reach === "blocked";
     this.ring.visible = outside || blocked;
     this.label.set(wordsOf(told), outside || blocked ? 0xffb08a : 0xffffff);
@@ -124,6 +136,7 @@ class Target {
   /** Rings face the viewer, who is at `eye` in the room. */
   face(eye) {
     this.ring.lookAt(eye);
+    this.halo.lookAt(eye);
     this.offer.lookAt(eye);
   }
 }

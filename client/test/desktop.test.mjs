@@ -48,6 +48,13 @@ async function drag(page, kind, dx, dy) {
   await page.waitForTimeout(1200);
 }
 
+/** Of both targets: whether its solid is drawn, and what is drawn of it on top of the robot. */
+const seenThrough = (page) => until(page, () => {
+  const { targets } = globalThis.trunkline.marks;
+  return Object.values(targets).every(({ group }) => group.visible) && Object.values(targets).map(({ solid, faint, halo }) =>
+    [solid.visible, ...[faint, halo].map(({ visible, material }) => visible && !material.depthTest)].join());
+});
+
 const target = (page, kind) => page.evaluate((name) => globalThis.trunkline.state?.targets?.[name]?.position ?? null, kind);
 
 test("the page loads with no error and asks nothing of other hosts", async (t) => {
@@ -67,9 +74,11 @@ test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done"
   const { page, wrongs } = await open(t, browser, server);
   await loaded(page);
   await takeControl(page);
+  assert.deepEqual(await seenThrough(page), ["false,true,true", "false,true,true"]); // they begin inside the robot
   await drag(page, "rigid", 16, -12);
   await drag(page, "tip", -30, -45);
   await until(page, () => globalThis.trunkline.state.targets && true);
+  assert.deepEqual(await seenThrough(page), ["true,true,true", "true,true,true"]);
   await picture(page, "1-aim");
   await page.keyboard.press("Enter");
   await inMode(page, "preview");
@@ -89,6 +98,7 @@ test("a cycle by mouse and keyboard: aim, plan, preview, confirm, execute, done"
   await picture(page, "3-execute");
   await passed(page, server, ["preview", "ready", "delay", "execute", "aim"]);
   await page.keyboard.up("KeyG");
+  await until(page, () => /Robotarrived, seen/.test(document.querySelector("#facts").textContent));
   assert.deepEqual(wrongs, []);
 });
 
@@ -197,7 +207,20 @@ test("without its token the page asks for the six digits, and a wrong token is s
   await loaded(page);
   assert.ok(await page.evaluate(() => document.querySelector("#pairing").hidden));
   const wrong = await open(t, browser, server, { url: `${server.origin}/#token=${"0".repeat(32)}` });
-  await until(wrong.page, () => /token/.test(document.querySelector("#why").textContent));
+  await until(wrong.page, () => /Open the address anew.*token: wrong/.test(document.querySelector("#why").textContent));
+  assert.doesNotMatch(await wrong.page.textContent("#next"), /Trying again/);
+});
+
+test("on a small page the list of keys hides neither the state nor the next action", async (t) => {
+  const { page } = await open(t, browser, server, { width: 800, height: 500 });
+  await loaded(page);
+  await page.click("#help summary");
+  for (const width of [800, 640, 961]) {
+    await page.setViewportSize({ width, height: 500 });
+    const [status, keys, acts] = await page.evaluate(() => ["#status", "#help[open]", "#acts"].map((id) => document.querySelector(id).getBoundingClientRect().toJSON()));
+    assert.ok(status.right <= keys.left, `${width}: the state ends at ${status.right}, the keys begin at ${keys.left}`);
+    assert.ok(keys.bottom <= acts.top, `${width}: the keys end at ${keys.bottom}, the actions begin at ${acts.top}`);
+  }
 });
 
 test("a recording is played by the ghost, and a file that is none is said", async (t) => {

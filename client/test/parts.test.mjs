@@ -6,6 +6,7 @@ import { Playback } from "../src/playback.js";
 import { Recording } from "../src/recording.js";
 import { decode, encode, noHand } from "../src/wire.js";
 import { FROM_CLIENT, FROM_SERVER, HAND, HEAD_BYTES, INPUT_BYTES } from "../src/wire_table.js";
+import { remedy, words } from "../src/panel.js";
 
 /** A message `robot` of one row. */
 function robot(sequence, time, x) {
@@ -74,4 +75,16 @@ test("a recording is replayed at its own times, without a last message that is n
   const at = (time) => playback.rows[Math.floor(time * 72) * playback.width];
   assert.deepEqual([at(0.25), at(0.75), at(1)], [0, 1, 2]);
   assert.equal(new Recording(new ArrayBuffer(3)).playback, null);
+});
+
+test("a robot that has arrived is said to have, until the next plan is asked for", () => {
+  const page = { lease: null, id: "", age: 0.02, up: true, reason: null, stale: false, immersed: false };
+  const robot = (mode, does) => words({ ...page, state: { mode, robot: does } }).facts.Robot;
+  assert.equal(robot("aim", "done"), "arrived, seen 20 ms ago");
+  for (const [mode, does] of [["aim", "idle"], ["execute", "running"], ["plan", "done"], ["ready", "done"]]) assert.equal(robot(mode, does), "seen 20 ms ago");
+});
+
+test("what to do about a wrong token is said, and any other reason as it is", () => {
+  assert.match(remedy("token: wrong"), /Open the address anew that the session has printed/);
+  assert.equal(remedy("version: found 1"), "version: found 1");
 });
