@@ -87,7 +87,7 @@ def joined(monkeypatch):
     monkeypatch.setenv("CYCLONEDDS_URI", f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>")
     controller, arm = Controller(), RosArm(SETTINGS)
     until(lambda: not np.isnan(arm.joints).any(), lambda: (controller.turn(), arm.turn(time.monotonic())))
-    until(lambda: bool(arm._writer.get_matched_subscriptions()), controller.turn)
+    until(lambda: arm.link.listeners > 0, controller.turn)
     arm.begin()
     arm.fault = ""  # of a busy machine, until both knew each other
     yield arm, controller

@@ -1,25 +1,59 @@
-"""The Panda behind a controller of ROS 2, a `joint_trajectory_controller`: by DDS, without ROS on this side.
+"""The Panda behind a controller of ROS 2, a `joint_trajectory_controller`.
 
 Every PERIOD s the controller is sent one point, where the joints shall be when it is due; the next takes its place.
 Where no more come, it stands at the last: that is its dead man. No real controller was tried.
 """
 
 import time
+from typing import Protocol
 
 import numpy as np
-from cyclonedds.core import DDSException, Policy, Qos
-from cyclonedds.domain import DomainParticipant
-from cyclonedds.pub import DataWriter
-from cyclonedds.sub import DataReader
-from cyclonedds.topic import Topic
 
 from trunkline.errors import InputError
-from trunkline.execution.ros_messages import JointState, JointTrajectory, trajectory
-from trunkline.execution.ros_settings import RosSettings
+from trunkline.execution.ros_settings import RosSettings, Said
 
 PERIOD = 0.01  # s between points
 CONNECTING = 20.0  # s
 SILENT = 0.2  # s without the joints' state
+
+
+class Link(Protocol):
+    """How messages go to ROS 2 and come from it. Nothing waits but `close`."""
+
+    @property
+    def listeners(self) -> int:
+        """How many controllers hear what is sent."""
+        ...
+
+    def send(self, seconds: float, joints: list[float]) -> None:
+        """A trajectory of one point: the joints, rad, so many s from when it is received.
+
+        Raises:
+            InputError: it cannot be sent.
+        """
+        ...
+
+    def states(self) -> list[Said]:
+        """What was said since the last call, the newest last."""
+        ...
+
+    def close(self) -> None: ...
+
+
+def link_of(settings: RosSettings) -> Link:
+    """
+    Raises:
+        InputError: what the link needs is not there.
+    """
+    if settings.link == "dds":
+        from trunkline.execution.ros_dds import DdsLink  # with what it needs installed
+
+        return DdsLink(settings)
+    try:
+        from trunkline.execution.ros_node import NodeLink
+    except ImportError as error:
+        raise InputError(f"ros.link: found no rclpy ({error}), expected ROS 2 to be sourced, or dds") from error
+    return NodeLink(settings)
 
 
 class RosArm:
@@ -29,18 +63,7 @@ class RosArm:
         self._settings, self.fault = settings, ""
         self.measured, self._sent = np.full(len(settings.names), np.nan), np.full(len(settings.names), np.nan)
         self._heard, self._told = time.monotonic(), 0.0
-        try:
-            participant = DomainParticipant(settings.domain)
-            orders = Topic(participant, f"rt{settings.trajectory}", JointTrajectory)
-            states = Topic(participant, f"rt{settings.states}", JointState)
-            self._writer = DataWriter(
-                participant, orders, Qos(Policy.Reliability.Reliable(0), Policy.History.KeepLast(1))
-            )
-            self._reader = DataReader(
-                participant, states, Qos(Policy.Reliability.BestEffort, Policy.History.KeepLast(10))
-            )
-        except DDSException as error:
-            raise InputError(f"ros.domain: found no DDS in domain {settings.domain} ({error})") from error
+        self.link = link_of(settings)
 
     @property
     def joints(self) -> np.ndarray:
@@ -54,7 +77,7 @@ class RosArm:
             InputError: either is not there.
         """
         end = time.monotonic() + CONNECTING
-        while np.isnan(self.measured).any() or not self._writer.get_matched_subscriptions():
+        while np.isnan(self.measured).any() or not self.link.listeners:
             if time.monotonic() > end:
                 known = not np.isnan(self.measured).any()
                 missing = self._settings.trajectory if known else self._settings.states
@@ -72,9 +95,9 @@ class RosArm:
             return
         self._told, self._sent = now, np.array(joints)
         try:
-            self._writer.write(trajectory(self._settings.names, [(max(due - now, 0.0), joints.tolist())]))
-        except DDSException as error:
-            self._fail(f"{self._settings.trajectory}: {error}")
+            self.link.send(max(due - now, 0.0), joints.tolist())
+        except InputError as error:
+            self._fail(str(error))
 
     def turn(self, now: float) -> None:
         """Hear the joints' state."""
@@ -87,13 +110,12 @@ class RosArm:
             self._fail(f"{name}: found {off.max():.3g} rad from where it is sent, expected at most {most:g}")
 
     def close(self) -> None:
-        """Nothing: the controller is sent no more, and stands at the last point."""
+        """The controller is sent no more, and stands at the last point."""
+        self.link.close()
 
     def _hear(self, now: float) -> None:
-        for state in self._reader.take(10):
-            where: dict[str, float] = dict(
-                zip(getattr(state, "name", ()), getattr(state, "position", ()), strict=False)
-            )
+        for names, positions in self.link.states():
+            where = dict(zip(names, positions, strict=False))
             if all(name in where for name in self._settings.names):
                 self.measured, self._heard = np.array([where[name] for name in self._settings.names]), now
 

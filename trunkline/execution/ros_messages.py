@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from cyclonedds.idl import IdlStruct
 from cyclonedds.idl.types import float64, int32, sequence, uint32
 
-NANO = 1_000_000_000
+from trunkline.execution.ros_settings import NANO
 
 
 @dataclass
