@@ -1,5 +1,7 @@
 """The simulated robot: what was previewed is what it does, and it holds whenever nobody says that it may go on."""
 
+import multiprocessing
+import queue
 import time
 from dataclasses import replace
 from functools import cache
@@ -20,10 +22,11 @@ from trunkline.live import simulated
 from trunkline.live.bodies import Poses, drawn
 from trunkline.live.house import SEARCH, subject_of
 from trunkline.live.logbook import tip_path
-from trunkline.live.robot import DEAD_MAN, RobotProcess
+from trunkline.live.robot import DEAD_MAN, PERMIT, PERMITTED, POSE, STOPS, Channel, RobotProcess
 from trunkline.live.settings import Config
-from trunkline.live.simulated import Plant, Simulation
+from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.teleop.executor import SimulatedRobot
 from trunkline.teleop.following import Following
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import gentle, limits_of, point_to_point
@@ -210,3 +213,40 @@ def test_a_process_that_ends_is_a_fault():
     until(lambda: found.state().mode == "fault")
     assert found.state().fault == "its process has ended"
     found.close()
+
+
+class Still:
+    """A plant without physics."""
+
+    tick, fault = 0.002, ""
+
+    def poses(self):
+        return np.empty((0, POSE))
+
+    def thing(self):
+        return np.full(POSE, np.nan)
+
+    def measured(self):
+        return np.zeros(7)
+
+    def lengths(self):
+        return np.zeros(3)
+
+
+def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
+    s, gone = simulation(), -1
+    channel = Channel(multiprocessing.get_context("spawn"), 3, 0)
+    channel.plans = queue.Queue()
+    robot = SimulatedRobot(s.joints, s.commands, s.limits, PACKAGE, lambda joints, commands, dt: None)
+    loop = Loop(channel, robot, Still())
+    drive(loop, gone)  # at rest, it ends at once
+    channel.plans.put((1, plan().digest(), plan(), channel.asked[STOPS]))
+    channel.asked[PERMIT], channel.asked[PERMITTED] = time.monotonic(), 1
+    loop.turn(time.monotonic())
+    assert robot.state().mode == "running"
+    began = time.monotonic()
+    drive(loop, gone)
+    assert robot.state().mode == "idle"
+    assert DEAD_MAN < loop.held - began < DEAD_MAN + LATE
+    assert np.abs(plan().joints - robot.joints).max(axis=1).min() < 1e-3
+    assert DEAD_MAN < time.monotonic() - began < 2.0

@@ -5,6 +5,7 @@ that bear the arm. So what was previewed is what happens.
 """
 
 import copy
+import math
 import os
 import signal
 import time
@@ -33,6 +34,7 @@ from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import Limits
 
 LISTENS = 0.2  # s from being woken within which a plan comes: a thread of the server's sends it
+SETTLES = 0.1  # s for which it goes on after a motion whose server is gone: a machine is that far behind, and less
 TELLS = 0.004  # s between two tellings of a robot that is moved more often
 BEHIND = 0.25  # s that real time may run ahead of the simulation before it is let go
 NICE = -5  # asked for; without the right to it, none
@@ -150,12 +152,17 @@ class Loop:
         self.serial, self.fault, self.held = 0, "", 0.0
         self._stops, self._holds, self._listens = channel.asked[STOPS], False, 0.0
 
+    @property
+    def moves(self) -> bool:
+        """Whether a motion goes on."""
+        return self.robot.state().mode == "running"
+
     def turn(self, now: float, woken: bool = True) -> None:
         """Obey what was asked since; plans are looked for where it was `woken` of late."""
         asked = self.channel.asked
         stopped = asked[STOPS] != self._stops
         permitted = asked[PERMITTED] == self.serial and now - asked[PERMIT] <= DEAD_MAN
-        holds = stopped or (self.robot.state().mode == "running" and not permitted)
+        holds = stopped or (self.moves and not permitted)
         if holds:
             self._stops = asked[STOPS]
             self.robot.stop()
@@ -206,11 +213,13 @@ class Loop:
 
 
 def drive(loop: Loop, parent: int) -> None:
-    """Turn by turn, in real time, until the process `parent` is gone."""
-    due = told = time.monotonic()
-    while os.getppid() == parent:
+    """Turn by turn, in real time, until the process `parent` is gone, and a motion that went on has come to rest."""
+    now = due = told = time.monotonic()
+    moved = now if loop.moves else -math.inf
+    while os.getppid() == parent or now - moved < SETTLES:
         woken = loop.channel.wake.acquire(timeout=max(due - time.monotonic(), 0.0))
         now = time.monotonic()
+        moved = now if loop.moves else moved
         loop.turn(now, woken)
         if now >= due:
             loop.advance()
