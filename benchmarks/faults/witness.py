@@ -1,0 +1,90 @@
+"""What the robot's own process notes of its motion, where the benchmark sees it, whoever else has ended."""
+
+import ctypes
+import time
+from multiprocessing.context import SpawnContext
+
+import numpy as np
+
+from trunkline.execution import on_bus
+from trunkline.live import real
+from trunkline.live.robot import HELD, MODE, MODES, SERIAL, Channel
+from trunkline.teleop.trajectory import JOINTS
+
+LEAST = 1e-9  # rad or m between two tellings: it moves
+HEAD = 5  # numbers that a robot tells before its axes
+
+
+class Witness:
+    """Each number is written whole, by one process; times are s of the clock that all processes of a machine share.
+
+    The robot's: held, when it was last commanded to hold; moved, when its axes, as they are sent, last moved; begun,
+    how many motions it began; running, whether one goes on. The benchmark's: silent, until when the first motor is.
+    """
+
+    def __init__(self, context: SpawnContext) -> None:
+        self._held, self._moved, self._begun, self._running, self._silent = (
+            context.RawValue(ctypes.c_double, 0.0) for _ in range(5)
+        )
+
+    @property
+    def held(self) -> float:
+        return self._held.value
+
+    @property
+    def moved(self) -> float:
+        return self._moved.value
+
+    @property
+    def begun(self) -> int:
+        return int(self._begun.value)
+
+    @property
+    def running(self) -> bool:
+        return bool(self._running.value)
+
+    @property
+    def silent(self) -> float:
+        return self._silent.value
+
+    def hush(self, seconds: float) -> None:
+        """The first motor gives no feedback for so many s."""
+        self._silent.value = time.monotonic() + seconds
+
+    def note(self, numbers: np.ndarray, moved: bool) -> None:
+        """Of the robot's process: what it tells the server."""
+        if moved:
+            self._moved.value = time.monotonic()
+        self._held.value, self._begun.value = numbers[HELD], numbers[SERIAL]
+        self._running.value = MODES[int(numbers[MODE])] == "running"
+
+
+class Watched(Channel):
+    """A channel whose robot tells a `witness` too."""
+
+    def __init__(self, context: SpawnContext, tendons: int, bodies: int, witness: Witness) -> None:
+        super().__init__(context, tendons, bodies)
+        self.witness, self._axes = witness, np.zeros(JOINTS + tendons)
+
+    def tell(self, numbers: np.ndarray, fault: str) -> None:
+        super().tell(numbers, fault)
+        axes = numbers[HEAD : HEAD + JOINTS + self.tendons]
+        self.witness.note(numbers, bool(np.abs(axes - self._axes).max() > LEAST))
+        self._axes = axes.copy()
+
+
+class Hushed(on_bus.BankOnBus):
+    """A bank whose first motor is silent as long as the `witness` has it."""
+
+    witness: Witness
+
+    def turn(self) -> None:
+        self.bank.motors[0].silent = time.monotonic() < self.witness.silent
+        super().turn()
+
+
+def machine(channel: Watched, *setup) -> None:
+    """The process of a machine with such a bank."""
+    Hushed.witness = channel.witness
+    real.BankOnBus = Hushed
+    real.run(channel, *setup)
