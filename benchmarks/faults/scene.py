@@ -53,7 +53,7 @@ class Scene:
 
     def listen(self) -> None:
         """Take in what the server said since."""
-        with contextlib.suppress(EOFError):  # it was killed
+        with contextlib.suppress(EOFError, OSError):  # it was killed
             while self.pipe.poll():
                 self.lines.append(self.pipe.recv())
 
@@ -105,14 +105,15 @@ def serve(pipe: Connection, witness: Witness, package: Path, motors: bool) -> No
     """The process of a session: until the other end of `pipe` is closed. All in it is as it is served, but that the
     robot's process tells the witness too, and that its bank, if it has one, has a motor that can be silent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    robot.Channel = functools.partial(Watched, witness=witness)
-    real.run = machine
+    robot.Channel, real.run = functools.partial(Watched, witness=witness), machine
+    real.Channel = functools.partial(Watched, witness=None)  # the twin's: the class itself is not found by its name now
     asyncio.run(_serve(pipe, package, motors))
 
 
 async def _serve(pipe: Connection, package: Path, motors: bool) -> None:
     def say(line: str) -> None:
-        pipe.send((time.monotonic(), line))
+        with contextlib.suppress(OSError):  # it says how its end goes to nobody
+            pipe.send((time.monotonic(), line))
 
     execution = load_folder(Config, PROJECT / "conf/execution")
     hardware = hardware_of("simulated", "gm6020", SIMULATED, "", execution) if motors else None
@@ -120,5 +121,5 @@ async def _serve(pipe: Connection, package: Path, motors: bool) -> None:
         assert made.robot.pid is not None
         assert made.journal.pid is not None
         pipe.send(Told(server.house.token, made.robot.pid, made.journal.pid, made.journal.path))
-        with contextlib.suppress(EOFError):
+        with contextlib.suppress(EOFError, OSError):
             await asyncio.to_thread(pipe.recv)

@@ -60,14 +60,16 @@ class Witness:
 
 
 class Watched(Channel):
-    """A channel whose robot tells a `witness` too."""
+    """A channel whose robot tells a `witness` too, if there is one."""
 
-    def __init__(self, context: SpawnContext, tendons: int, bodies: int, witness: Witness) -> None:
+    def __init__(self, context: SpawnContext, tendons: int, bodies: int, witness: Witness | None) -> None:
         super().__init__(context, tendons, bodies)
         self.witness, self._axes = witness, np.zeros(JOINTS + tendons)
 
     def tell(self, numbers: np.ndarray, fault: str) -> None:
         super().tell(numbers, fault)
+        if self.witness is None:
+            return
         axes = numbers[HEAD : HEAD + JOINTS + self.tendons]
         self.witness.note(numbers, bool(np.abs(axes - self._axes).max() > LEAST))
         self._axes = axes.copy()
@@ -85,6 +87,7 @@ class Hushed(on_bus.BankOnBus):
 
 def machine(channel: Watched, *setup) -> None:
     """The process of a machine with such a bank."""
+    assert channel.witness is not None
     Hushed.witness = channel.witness
     real.BankOnBus = Hushed
     real.run(channel, *setup)
