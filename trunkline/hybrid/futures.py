@@ -131,7 +131,7 @@ def futures(twin: Twin, way: Way, draws: Draws) -> Iterator[Piece]:
     servos = _servos(model, way, twin.start)
     first = np.zeros((count, model.nu))
     first[:, motors] = way.commands[0]
-    first[:, servos.motors] = servos.commands[0]
+    first[:, servos.motors] = servos.at(np.zeros(1), way.joints[:1])
     hold(batch, model, first)
     winches, own = Winches(batch, first[:, motors]), np.arange(count, dtype=np.int32)
     for begin in range(0, frames, FRAMES):
@@ -141,7 +141,7 @@ def futures(twin: Twin, way: Way, draws: Draws) -> Iterator[Piece]:
             batch.bind("eq_active")[:, ties] = 0
         rows = way.at(time)
         controls = np.zeros((count, len(time), model.nu))
-        controls[:, :, servos.motors] = servos.at(time)
+        controls[:, :, servos.motors] = servos.at(time, rows[:, : len(joints)])
         sent = np.repeat(rows[None, :, len(joints) :], count, axis=0)
         controls[:, :, motors] = winches.deliver(sent, own)
         found = move(batch, controls, RECORD, every, every - 1)
@@ -160,15 +160,17 @@ def eased(model: mujoco.MjModel, hanging: bool) -> mujoco.MjModel:
 
 @dataclass(frozen=True)
 class _Servos:
-    """`commands` (N, 7), rad, of the servos `motors` at `times` (N,), s; none on a fixed mount."""
+    """By how much the servos `motors` are sent `beyond` (N, 7), rad, where the plan says, at `times` (N,), s; none on a
+    fixed mount."""
 
     motors: list[int]
     times: np.ndarray
-    commands: np.ndarray
+    beyond: np.ndarray
 
-    def at(self, time: np.ndarray) -> np.ndarray:
-        columns = [np.interp(time, self.times, column) for column in self.commands.T]
-        return np.column_stack(columns) if columns else np.zeros((len(time), 0))
+    def at(self, time: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        """What they are sent at `time` (n,), s, so that they stand at `angles` (n, 7), rad. Shape (n, 7)."""
+        columns = [np.interp(time, self.times, column) for column in self.beyond.T]
+        return angles + (np.column_stack(columns) if columns else 0.0)
 
 
 def _servos(model: mujoco.MjModel, way: Way, start: np.ndarray | None) -> _Servos:
@@ -190,7 +192,7 @@ def _servos(model: mujoco.MjModel, way: Way, start: np.ndarray | None) -> _Servo
     qvel[:, model.jnt_dofadr[joints]], qacc[:, model.jnt_dofadr[joints]] = speeds, gains
     stand = servo_commands(model, angles, joint_torques(model, qpos, qvel, qacc))
     ratio = -model.actuator_biasprm[motors, 2] / model.actuator_gainprm[motors, 0]
-    return _Servos(motors, times, stand + ratio * speeds)
+    return _Servos(motors, times, stand - angles + ratio * speeds)
 
 
 def _set_parameters(batch: Batch, twin: Twin, draws: Draws) -> None:

@@ -120,7 +120,8 @@ class Plant:
     def _sent(self, joints: np.ndarray) -> np.ndarray:
         """What the servos are sent so that they are at `joints`, bearing the arm as it hangs now. Shape (7,)."""
         before, now = self._last
-        speed, gain = (joints - now) / self.tick, (joints - 2 * now + before) / self.tick**2
+        gain = (joints - 2 * now + before) / self.tick**2
+        speed = (joints - now) / self.tick + gain * self.tick / 2  # at the tick's end, not its mean
         self._last = np.stack([now, joints])
         data, dofs = self._data, self.model.jnt_dofadr[self._joints]
         data.qpos[:] = self.batch.bind("qpos")[0]
