@@ -3,8 +3,8 @@
     python -m benchmarks.pictures [PACKAGE] [--folder docs]
 
 The true server and its processes on the simulated robot; the committed page in a headless Chromium, by its buttons, its
-slider and its keys. Drawing is by software, and all share a processor. So the page may be silent for longer, the plan
-is kept back until its state's picture is taken, and the page hears of no later state while that of the delay is taken.
+slider and its keys. Drawing is by software, and all share a processor. So page and robot may be silent for longer, the
+plan is kept back until its state's picture is taken, and the page hears of no later state while that of the delay is.
 All else is as conf/live and conf/teleop have it. `make browser` installs the browser.
 """
 
@@ -24,7 +24,7 @@ from PIL import Image
 from benchmarks.browser import Page, browsing
 from trunkline.errors import InputError, in_one_line
 from trunkline.foresight.package import only_package
-from trunkline.live import foreseer, lease
+from trunkline.live import foreseer, lease, robot
 from trunkline.live.desk import Planning
 from trunkline.live.session import Address, opened
 from trunkline.live.settings import Config
@@ -35,7 +35,7 @@ from trunkline.teleop.messages import Mode
 ADDRESS, SIZE, YIELDS = Address(18452), (760, 640), 3  # of the page: pixels, and how nice its browser is
 COLOURS = 128  # of a picture's palette
 PATIENCE = 60.0  # s for a state to come
-SILENCE = 10.0  # s for which the page may say nothing
+SILENCE, STALE = 10.0, 1.0  # s for which the page and the robot's process may say nothing
 LOOKS = 0.02  # s between looks at the page
 EYE, AT = (1.29, 1.04, 1.94), (0.35, 0.43, 0.05)  # m, in the room: where the picture is taken from, and what it is of
 # presses of each arrow, 1 cm each, for the mount's target and for the tip's
@@ -96,10 +96,11 @@ class Kept:
 
 
 class Camera:
-    """At a page, its pictures into `folder`."""
+    """At a page. pictures: PNGs by state; they are made small later, as the server shares this thread."""
 
-    def __init__(self, page: Page, folder: Path) -> None:
-        self.page, self.folder = page, folder
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.pictures: dict[Mode, bytes] = {}
 
     async def until(self, expression: str, what: str) -> None:
         """
@@ -130,10 +131,7 @@ class Camera:
             after = await self.page.value(MODE)
             if after != mode or time.monotonic() > end:
                 raise InputError(f"state {mode!r}: over before its picture was taken, the page is in {after!r}")
-        picture = Image.open(io.BytesIO(base64.b64decode(png))).convert("RGB")
-        path = self.folder / f"live-{mode}.png"
-        picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
-        print(f"{path}: {path.stat().st_size / 1000:.0f} kB", flush=True)
+        self.pictures[mode] = base64.b64decode(png)
 
     async def key(self, code: str, kind: str = "") -> None:
         """Pressed and let go, or only what `kind` says of it."""
@@ -217,17 +215,20 @@ async def taken(camera: Camera, planning: Kept) -> None:
     await camera.take("stopped", "trunkline.state.robot !== 'running'")
 
 
-async def session(package: Path, folder: Path) -> None:
+async def session(package: Path) -> dict[Mode, bytes]:
+    """PNGs by state."""
     config, teleop = load_folder(Config, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
     safety = replace(teleop.core.safety, silence=SILENCE, plan_wait=PATIENCE)
     teleop = replace(teleop, core=replace(teleop.core, safety=safety))
-    lease.SILENCE = SILENCE
+    lease.SILENCE, robot.STALE = SILENCE, STALE
     with tempfile.TemporaryDirectory() as logs:
         config = replace(config, journal=replace(config.journal, folder=logs))
         async with opened(package, ADDRESS, lambda line: None, config=config, teleop=teleop) as (server, made):
             planning = made.desk.planning = Kept(made.desk.planning)
             async with browsing(f"{ADDRESS.url}/#token={server.house.token}", SIZE, YIELDS) as page:
-                await taken(Camera(page, folder), planning)
+                camera = Camera(page)
+                await taken(camera, planning)
+    return camera.pictures
 
 
 @in_one_line
@@ -236,10 +237,15 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--folder", type=Path, default=PROJECT / "docs")
     given = parser.parse_args(arguments)
-    asyncio.run(session(given.package or only_package(), given.folder))
-    missing = [mode for mode in get_args(Mode) if not (given.folder / f"live-{mode}.png").is_file()]
+    pictures = asyncio.run(session(given.package or only_package()))
+    missing = [mode for mode in get_args(Mode) if mode not in pictures]
     if missing:
-        raise InputError(f"{given.folder}: no picture of {', '.join(missing)}")
+        raise InputError(f"states: found no picture of {', '.join(missing)}, expected one of each")
+    for mode, png in pictures.items():
+        path = given.folder / f"live-{mode}.png"
+        picture = Image.open(io.BytesIO(png)).convert("RGB")
+        picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+        print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
     return 0
 
 
