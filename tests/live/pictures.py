@@ -1,6 +1,6 @@
 """A picture of each state of a live session's page, for docs/live.md: docs/live-hold.png, docs/live-aim.png, ...
 
-    python -m benchmarks.pictures [PACKAGE] [--folder docs]
+    python -m tests.live.pictures [PACKAGE] [--folder docs]
 
 The true server and its processes on the simulated robot; the committed page in a headless Chromium, by its buttons, its
 slider and its keys. Drawing is by software, and all share a processor. So page and robot may be silent for longer, the
