@@ -1,6 +1,7 @@
 """How soon a preview is there, and whether the simulated robot does what it shows: on a package, by the process that
 plans in a live session. Each plan begins at rest; the robot is the live session's, stepped without waiting. The thing
-of a live session's settings is there, and the arm may touch it on its way."""
+of a live session's settings is there, and the arm may push it on its way: such plans are told apart, as contacts are
+softer in a preview (`trunkline/hybrid/futures.py`)."""
 
 import queue
 import time
@@ -34,6 +35,7 @@ ENOUGH = 3.6  # s of a preview
 AROUND, HEADING = (0.15, 0.3, 0.1), 0.5  # m of mounts about the first, rad
 PULLS, LOOSE = (0.03, 0.12), 0.2  # m by which the first cable is pulled, and the others paid out
 COMES = 600.0  # s that the process may take
+PUSHED = 2e-3  # m by which a thing has moved that was pushed; on its string it never rests
 
 
 @dataclass(frozen=True)
@@ -59,13 +61,23 @@ def rows(path: Path) -> list[Row]:
         found = list(previews(process, heard, package, config, simulation, world))
     first, enough, whole = np.array([(one.first, one.enough, one.whole) for one in found]).T
     shown, long = np.array([one.times[-1] for one in found]), np.isfinite(enough)
-    apart = np.concatenate([distances(one, simulation) for one in found])
+    apart: dict[bool, list[np.ndarray]] = {False: [], True: []}
+    for one in found:
+        off, pushed = distances(one, simulation)
+        apart[pushed].append(off)
     return [
         Row(f"first piece of a preview after its plan, {len(found)} plans", _told(first, 1e3, "ms"), "≤ 150 ms"),
         Row(f"… {ENOUGH:g} s of preview, of the {long.sum()} that are so long", _told(enough[long], 1, "s"), "≤ 1.5 s"),
         Row(f"… the whole preview, of {shown.min():.1f} to {shown.max():.1f} s", _told(whole, 1, "s"), "none"),
-        Row(f"preview against the simulated robot, tip, {len(apart)} frames", _told(apart, 1e3, "mm"), "≤ 1 mm"),
+        _apart("preview against the simulated robot, tip", apart[False], "≤ 1 mm"),
+        _apart("… where the arm pushes what hangs in its way", apart[True], "none"),
     ]
+
+
+def _apart(what: str, found: list[np.ndarray], goal: str) -> Row:
+    """Distances of plans, m."""
+    frames = np.concatenate([np.empty(0), *found])
+    return Row(f"{what}, {len(found)} plans, {len(frames)} frames", _told(frames, 1e3, "mm"), goal)
 
 
 def _told(values: np.ndarray, scale: float, unit: str) -> str:
@@ -144,8 +156,9 @@ def _heard(heard: queue.Queue, serial: int) -> Previewed | None:
     return Previewed(plan, times, poses, pieces[0][0], min(there, default=np.nan), pieces[-1][0])
 
 
-def distances(found: Previewed, simulation: Simulation) -> np.ndarray:
-    """Of the tip from where the preview has it, m (F,), once the simulated robot runs the plan."""
+def distances(found: Previewed, simulation: Simulation) -> tuple[np.ndarray, bool]:
+    """Of the tip from where the preview has it, m (F,), once the simulated robot runs the plan; whether it pushed the
+    thing."""
     plant = Plant(simulation)
     robot = SimulatedRobot(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
@@ -154,12 +167,14 @@ def distances(found: Previewed, simulation: Simulation) -> np.ndarray:
     if refused := robot.start(found.plan, found.plan.digest()):
         raise InputError(refused)
     body, place = subject_of(simulation).tip
-    row, times, poses = simulation.bodies.index(body), [0.0], [plant.poses()]
+    row, times, poses, things = simulation.bodies.index(body), [0.0], [plant.poses()], [plant.thing()]
     until = found.times + simulation.twin.model.opt.timestep  # of the step that ends with a frame
     while times[-1] < until[-1]:
         robot.advance(plant.tick)
         times.append(times[-1] + plant.tick)
         poses.append(plant.poses())
+        things.append(plant.thing())
     tip = tip_path(np.array(poses)[:, row], place)
     there = np.stack([np.interp(until, times, axis) for axis in tip.T], axis=1)
-    return np.linalg.norm(there - tip_path(found.poses[:, row].astype(float), place), axis=1)
+    pushed = bool((np.ptp(np.array(things)[:, :3], axis=0) > PUSHED).any())
+    return np.linalg.norm(there - tip_path(found.poses[:, row].astype(float), place), axis=1), pushed

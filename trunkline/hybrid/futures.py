@@ -33,6 +33,7 @@ from trunkline.simulation.winch import Winches
 
 FRAME = 1 / 60  # s, about, between frames of a motion
 FRAMES = 15  # of a piece: 0.25 s
+BESIDE = 0.004  # s to both sides, of what tells how fast a plan goes
 EASED_IMPRATIO = 10.0  # friction over normal impedance: what is held creeps more, but far less than counts as a slip
 UNIT_CENTER = re.compile(r"unit_\d+_center")
 RECORD = ("qpos", "site_xpos", "xpos", "xquat")
@@ -183,9 +184,8 @@ def _servos(model: mujoco.MjModel, way: Way, start: np.ndarray | None) -> _Servo
     if not len(joints):
         return _Servos([], times, np.zeros((len(times), 0)))
     motors = [model.actuator(f"{name}_position").id for name in JOINTS]
-    angles = way.at(times)[:, : len(joints)]
-    speeds = np.gradient(angles, FRAME, axis=0) if len(times) > 1 else np.zeros_like(angles)
-    gains = np.gradient(speeds, FRAME, axis=0) if len(times) > 1 else np.zeros_like(angles)
+    before, angles, after = (way.at(times + part * BESIDE)[:, : len(joints)] for part in (-1, 0, 1))
+    speeds, gains = (after - before) / (2 * BESIDE), (after - 2 * angles + before) / BESIDE**2
     qpos = np.tile(model.qpos0 if start is None else start, (len(times), 1))
     qvel, qacc = np.zeros((2, len(times), model.nv))
     qpos[:, model.jnt_qposadr[joints]] = angles
