@@ -36,7 +36,7 @@ export class RobotScene {
     this.bodies = bodies;
     const moving = mergedGeoms(geoms.filter(({ body }) => body >= 0), meshes);
     this.still = this.reach = this.tipReach = null;
-    const still = mergedGeoms(geoms.filter(({ body }) => body < 0), meshes);
+    const still = mergedGeoms(geoms.filter(({ body, size }) => body < 0 && size[0] < WIDEST / 2), meshes); // not the floor
     if (moving) {
       this.live = skinned(moving, new MeshLambertMaterial({ vertexColors: true }), bodies.length);
       const glass = new MeshLambertMaterial({ color: GHOST, transparent: true, opacity: 0.45, depthWrite: false });

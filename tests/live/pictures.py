@@ -46,7 +46,6 @@ AIMED = (
 LED = (("Digit1", {"ArrowLeft": 15}), ("Digit2", {"ArrowLeft": 15}))
 WATCHED, MOVED = 0.55, 0.5  # shares of the preview and of the mount's way, at which their pictures are taken
 BACK = 0.05  # share by which the preview is taken back, as its slider hears only of what changes
-BEHIND = 0.03  # m of the mount, which follows
 
 MODE = "document.querySelector('#mode').dataset.mode"
 # nothing is wrong or late
@@ -189,8 +188,8 @@ async def taken(camera: Camera, planning: Kept) -> None:
     await camera.take("plan")
     planning.go_on()
     await camera.until("trunkline.playback?.whole && trunkline.drawn.ghost.visible", "the preview")
-    place = await camera.place("#scrub", WATCHED - BACK)
     await camera.until(f"trunkline.playback.played > {WATCHED} * trunkline.playback.duration", "half of the preview")
+    place = await camera.place("#scrub", WATCHED - BACK)
     await camera.mouse("mousePressed", *place)  # where the slider is held, it stays
     await camera.until("trunkline.playback.held", "a slider that is held")
     await camera.drawn()
@@ -209,7 +208,7 @@ async def taken(camera: Camera, planning: Kept) -> None:
     await camera.key("KeyF")
     await camera.until(f"{MODE} === 'follow' && trunkline.state.robot === 'running'", "state 'follow'")
     await camera.move(LED)
-    await camera.take("follow", f"{AWAY} > {BEHIND} && {CALM}")
+    await camera.take("follow")
     await camera.key("Space")
     await camera.key("KeyG", "keyUp")
     await camera.take("stopped", "trunkline.state.robot !== 'running'")
