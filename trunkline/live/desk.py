@@ -227,8 +227,8 @@ class Desk:
         journal = self.journal
         journal.standing(standing)
         robot = self.robot.state()
-        said = NUMBER.sub("", intent.notice)  # what counts on is told once
-        now = (intent.mode, said), (robot.mode, robot.fault, robot.digest), self.alignment, self.world
+        said, fault = (NUMBER.sub("", text) for text in (intent.notice, robot.fault))  # what counts on is told once
+        now = (intent.mode, said), (robot.mode, fault, robot.digest), self.alignment, self.world
         mode, acts, alignment, world = self._logged or (None,) * 4
         self._logged = now
         if now[0] != mode:
