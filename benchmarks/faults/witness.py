@@ -18,14 +18,16 @@ HEAD = 5  # numbers that a robot tells before its axes
 class Witness:
     """Each number is written whole, by one process; times are s of the clock that all processes of a machine share.
 
-    The robot's: held, when it was last commanded to hold; moved, when its axes, as they are sent, last moved; begun,
-    how many motions it began; running, whether one goes on. The benchmark's: silent, until when the first motor is.
+    The robot's: held, when it was first commanded to hold in its last motion, as it brakes it is so again and again;
+    moved, when its axes, as they are sent, last moved; begun, how many motions it began; running, whether one goes on.
+    The benchmark's: silent, until when the first motor is.
     """
 
     def __init__(self, context: SpawnContext) -> None:
         self._held, self._moved, self._begun, self._running, self._silent = (
             context.RawValue(ctypes.c_double, 0.0) for _ in range(5)
         )
+        self._told, self._held_in = 0.0, 0.0  # the last command to hold, and the motion in which the first one was
 
     @property
     def held(self) -> float:
@@ -55,7 +57,9 @@ class Witness:
         """Of the robot's process: what it tells the server."""
         if moved:
             self._moved.value = time.monotonic()
-        self._held.value, self._begun.value = numbers[HELD], numbers[SERIAL]
+        if numbers[HELD] != self._told and numbers[SERIAL] != self._held_in:
+            self._held.value, self._held_in = numbers[HELD], numbers[SERIAL]
+        self._told, self._begun.value = numbers[HELD], numbers[SERIAL]
         self._running.value = MODES[int(numbers[MODE])] == "running"
 
 
