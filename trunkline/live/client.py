@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 from aiohttp import WSCloseCode, web
@@ -61,14 +62,15 @@ class Client:
 
     async def send(self) -> None:
         """What is in its outbox, until it leaves."""
-        while not self.socket.closed:
-            item = self.outbox.take()
-            if item is None:
-                await self.outbox.ready.wait()
-            elif isinstance(item, str):
-                await self.socket.send_str(item)
-            else:
-                await self.socket.send_bytes(item)
+        with suppress(ConnectionError):  # it has left meanwhile
+            while not self.socket.closed:
+                item = self.outbox.take()
+                if item is None:
+                    await self.outbox.ready.wait()
+                elif isinstance(item, str):
+                    await self.socket.send_str(item)
+                else:
+                    await self.socket.send_bytes(item)
 
     async def ping(self, now: Callable[[], float]) -> None:
         """Its clock against the server's, until it leaves."""
