@@ -155,10 +155,11 @@ def write(book: Book, pipe, period: float) -> None:
     while True:
         if pipe.poll(max(due - time.monotonic(), 0.0)):
             try:
-                record = pipe.recv()
+                records = pipe.recv()
             except (EOFError, OSError):
                 return
-            book.write(record)
+            for record in records:
+                book.write(record)
         if time.monotonic() >= due:
             book.flush()
             due = time.monotonic() + period

@@ -160,9 +160,12 @@ class JournalProcess(Journal):
             self._process.join()
 
     def _send(self) -> None:
+        """Records until there is a None, all that wait at once: to send each alone costs as much as to make it."""
+        waiting, records = self._waiting, []
         try:
-            while (record := self._waiting.get()) is not None and not self._lost:
-                self._pipe.send(record)
+            while None not in records and not self._lost:
+                records = [waiting.get(), *(waiting.get() for _ in range(waiting.qsize()))]
+                self._pipe.send([record for record in records if record is not None])
         except OSError:
             self._lost = f"log: {self.path.name}: its process has ended; nothing is executed"
         finally:
