@@ -161,7 +161,8 @@ class JournalProcess(Journal):
 
     def _send(self) -> None:
         """Records until there is a None, all that wait at once: to send each alone costs as much as to make it."""
-        waiting, records = self._waiting, []
+        waiting = self._waiting
+        records: list[Record | None] = []
         try:
             while None not in records and not self._lost:
                 records = [waiting.get(), *(waiting.get() for _ in range(waiting.qsize()))]

@@ -57,11 +57,13 @@ class Showing:
 
     def new_state(self, now: float, holder: str) -> talk.State | None:
         """What has changed, a new mode at once, all else every STATES; None where nothing is to be told."""
-        state, (since, before) = self._desk.told(holder), self._said
-        if state == before:
-            return None
-        urgent = before is None or (state.mode, state.robot, state.fault) != (before.mode, before.robot, before.fault)
+        (since, before), intent, robot = self._said, self._desk.intent, self._desk.robot.state()
+        assert intent is not None
+        urgent = before is None or (intent.mode, robot.mode, robot.fault) != (before.mode, before.robot, before.fault)
         if not urgent and now - since < STATES:
+            return None
+        state = self._desk.told(holder)
+        if state == before:
             return None
         self._said = now, state
         return state
