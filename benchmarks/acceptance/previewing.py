@@ -162,7 +162,7 @@ def distances(found: Previewed, simulation: Simulation) -> tuple[np.ndarray, boo
     plant = Plant(simulation)
     robot = SimulatedRobot(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
-        lambda joints, commands, _: plant.move(joints, commands),
+        lambda joints, commands, _: plant.move(joints, commands, smooth=True),
     )  # fmt: skip
     if refused := robot.start(found.plan, found.plan.digest()):
         raise InputError(refused)

@@ -13,6 +13,7 @@ BUTTONS = ("trigger", "grip", "stick_pressed", "primary", "secondary")
 NOWHERE = Controller((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0), tracked=False)
 STICK = HAND.index("stick_x")
 _AT = {name: place for place, name in enumerate(HAND)}
+_BUTTONS = [_AT[name] for name in BUTTONS]
 
 
 def controllers(received: Received) -> tuple[Controller, Controller]:
@@ -31,7 +32,7 @@ def stops(received: Received) -> bool:
 
 def buttons(received: Received) -> bytes:
     """Which are held on either hand: other buttons, other bytes."""
-    return (received.hands[:, [_AT[name] for name in BUTTONS]] >= PRESSED).tobytes()
+    return (received.hands.take(_BUTTONS, axis=1) >= PRESSED).tobytes()
 
 
 def held(received: Received, side: str) -> Held | None:

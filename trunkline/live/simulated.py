@@ -28,7 +28,7 @@ from trunkline.panda.shipped import JOINTS
 from trunkline.simulation.motion import batch_of, hold
 from trunkline.simulation.rubbing import REFRESH, rubbing
 from trunkline.simulation.winch import Winches
-from trunkline.teleop.executor import SimulatedRobot
+from trunkline.teleop.executor import FOLLOWS, SimulatedRobot
 from trunkline.teleop.following import Following
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import Limits
@@ -83,10 +83,11 @@ class Plant:
         if self._rub is not None:
             self._rub.begin(np.arange(1))
 
-    def move(self, joints: np.ndarray, commands: np.ndarray) -> None:
+    def move(self, joints: np.ndarray, commands: np.ndarray, smooth: bool = False) -> None:
         """One tick with the axes on their way to `joints` (7,), rad, and `commands` (K,), m: each step is sent where
-        they are as it begins."""
-        servo, share = self._sent(joints), (np.arange(self.steps) / self.steps)[:, None]
+        they are as it begins. smooth: they go as a plan does, so that the servos can be sent the speed at the tick's
+        end, not its mean; of axes that follow, or are heard late, that would be noise."""
+        servo, share = self._sent(joints, smooth), (np.arange(self.steps) / self.steps)[:, None]
         controls = np.zeros((1, self.steps, self.model.nu))
         controls[0][:, self._servos] = self._servo + share * (servo - self._servo)
         sent = (self._commands + share * (commands - self._commands))[None]
@@ -117,11 +118,11 @@ class Plant:
         """Of the cables as the last tick began, m (K,)."""
         return self._data.ten_length[self.model.actuator_trnid[self._motors, 0]]
 
-    def _sent(self, joints: np.ndarray) -> np.ndarray:
+    def _sent(self, joints: np.ndarray, smooth: bool = False) -> np.ndarray:
         """What the servos are sent so that they are at `joints`, bearing the arm as it hangs now. Shape (7,)."""
         before, now = self._last
         gain = (joints - 2 * now + before) / self.tick**2
-        speed = (joints - now) / self.tick + gain * self.tick / 2  # at the tick's end, not its mean
+        speed = (joints - now) / self.tick + (gain * self.tick / 2 if smooth else 0.0)
         self._last = np.stack([now, joints])
         data, dofs = self._data, self.model.jnt_dofadr[self._joints]
         data.qpos[:] = self.batch.bind("qpos")[0]
@@ -243,6 +244,6 @@ def run(channel: Channel, simulation: Simulation) -> None:
     plant = Plant(simulation)
     robot = SimulatedRobot(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,
-        lambda joints, commands, _: plant.move(joints, commands),
+        lambda joints, commands, _: plant.move(joints, commands, robot.state().digest != FOLLOWS),
     )  # fmt: skip
     drive(Loop(channel, robot, plant), parent)
