@@ -57,7 +57,7 @@ def rows(path: Path) -> list[Row]:
     joints = RigidIK(teleop.mount_offset).solve(SEARCH, config.ready, DOWN, 0.0)
     simulation = simulation_of(package, teleop, config, joints)
     world = make_world(solids(config), () if config.thing is None else (config.thing,))
-    with planning(path, teleop, config, simulation) as (process, heard):
+    with planning(path, teleop, config, simulation, world) as (process, heard):
         found = list(previews(process, heard, package, config, simulation, world))
     first, enough, whole = np.array([(one.first, one.enough, one.whole) for one in found]).T
     shown, long = np.array([one.times[-1] for one in found]), np.isfinite(enough)
@@ -88,11 +88,11 @@ def _told(values: np.ndarray, scale: float, unit: str) -> str:
 
 @contextmanager
 def planning(
-    path: Path, teleop: Teleop, config: Config, simulation: Simulation
+    path: Path, teleop: Teleop, config: Config, simulation: Simulation, world: World
 ) -> Iterator[tuple[ForeseerProcess, queue.Queue]]:
     """The process once it is ready, and what it answers: (time at which it came, answer)."""
     heard: queue.Queue = queue.Queue()
-    setup = path.resolve(), teleop, config.preview, simulation.bodies
+    setup = path.resolve(), teleop, config.preview, simulation.bodies, world
     process = ForeseerProcess(foreseer.run, setup, lambda answer: heard.put((time.monotonic(), answer)))
     try:
         if not process.ready.wait(COMES):

@@ -73,6 +73,15 @@ def test_a_plan_then_its_preview_in_pieces_then_the_batch():
     assert len(told.foreseen.times) == len(told.foreseen.tip) == len(told.foreseen.spread)
 
 
+def test_the_first_plan_in_a_world_that_was_prepared_for_composes_no_twin(monkeypatch):
+    once = Foreseer(made().planner, made().foresight, made().bodies)
+    once.prepare(order())
+    composed = []
+    monkeypatch.setattr(foreseer, "compose_twin", lambda *given: composed.append(given))
+    assert isinstance(next(one for one in once.answers(order(2)) if isinstance(one, foreseer.Shown)), foreseer.Shown)
+    assert not composed
+
+
 def test_of_a_grasp_the_batch_tells_how_surely_it_holds():
     planned, *_, told = made().answers(order(8, "the cylinder"))
     assert planned.report.refused == ""

@@ -165,6 +165,10 @@ class Foreseer:
         for found in self._foreseen(order, plan, twin, way, go_on):
             yield Told(serial, told(digest, found))
 
+    def prepare(self, order: Order) -> None:
+        """Compose its twin, which the next order takes, where nothing has changed."""
+        self._twin(order.world, _beside(order), order.joints, order.commands)
+
     def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> Twin:
         """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
         kept, twin = self._kept
@@ -306,8 +310,10 @@ class ForeseerProcess:
                     self._begin()
 
 
-def run(answers, orders, newest, path: Path, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> None:
-    """The process: until its parent is gone."""
+def run(
+    answers, orders, newest, path: Path, config: Config, previewing: Previewing, bodies: tuple[str, ...], world: World
+) -> None:
+    """The process: until its parent is gone. world: the first plans are likely to be asked for in it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
     os.environ["TRUNKLINE_THREADS"] = str(max(thread_count() - 1, 1))  # the rest is the server's and the robot's
     with suppress(OSError):
@@ -316,22 +322,25 @@ def run(answers, orders, newest, path: Path, config: Config, previewing: Preview
     end_with_parent()
     package = read_package(path)
     foreseer = Foreseer.of(package, config, previewing, bodies)
-    warm(foreseer, package)
+    warm(foreseer, package, world)
     answers.send(Ready())
     serve(answers, orders, newest, foreseer)
 
 
-def warm(foreseer: Foreseer, package: Package) -> None:
-    """Plan and preview once for nothing: what is compiled on its first call would keep the first user waiting."""
+def warm(foreseer: Foreseer, package: Package, world: World) -> None:
+    """Plan and preview once for nothing: what is compiled on its first call would keep the first user waiting, and so
+    would the twin of the `world`."""
     robot, straight = foreseer.known.robot, package.straight
     joints = np.array(robot.ready)
     x, y, z = (float(value) for value in mount_pose(joints[None], robot.mount_offset)[0][0])
     targets = Targets(Target((x, y, z)), Target((x, y, z)), DOWN, 0.0, 0, 0.0)
     a, b, c = (float(value) for value in package.tip((x, y, z), targets, straight - PULL * np.eye(len(straight))[0]))
     request = Request(0, replace(targets, tip=Target((a, b, c))), "", package.digest)
-    for answer in foreseer.answers(Order(request, World(""), joints, straight)):
+    order = Order(request, World(""), joints, straight)
+    for answer in foreseer.answers(order):
         if isinstance(answer, Shown):
-            return
+            break
+    foreseer.prepare(replace(order, world=world))
 
 
 def serve(answers, orders, newest, foreseer: Foreseer) -> None:

@@ -70,10 +70,10 @@ def make(
     package = read_package(path)
     joints = RigidIK(teleop.mount_offset).solve(SEARCH, config.ready, DOWN, 0.0)
     simulation, maps = simulation_of(package, teleop, config, joints), unpacked.maps_of(package.files)
-    setup = path.resolve(), teleop, config.preview, simulation.bodies
+    world = make_world(solids(config), () if config.thing is None else (config.thing,))
+    setup = path.resolve(), teleop, config.preview, simulation.bodies, world
     planning = ForeseerProcess(foreseer.run, setup, heard)  # first: it takes longest until it is ready
     drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
-    world = make_world(solids(config), () if config.thing is None else (config.thing,))
     journal = JournalProcess(new_path(Path(config.journal.folder)), subject_of(simulation), config.journal.period)
     robot = robot_of(simulation, hardware)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
