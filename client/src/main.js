@@ -22,6 +22,7 @@ const STILL = 0.3; // s without a grip, after which the core's targets are taken
 const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no plan is shown; it may come before its mode does
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
 const BUSY = new Set(["plan", ...SHOWN_IN, "execute", "follow"]); // modes after which it is to be read why they ended
+const SLOW = 0.06, REST = 2; // s that two pictures may take before some are left out, and how much longer one then stays
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
 
 const find = (id) => document.getElementById(id);
@@ -57,7 +58,7 @@ class Page {
     this.resize();
     addEventListener("resize", () => this.resize());
     find("help").open = innerWidth >= WIDE;
-    this.before = clock();
+    [this.before, this.took] = [clock(), 0];
     this.hands = { left: noHand(), right: noHand() };
     // At a desk, hands do not wait for the picture: slow drawing is no silent client.
     setInterval(() => this.immersive.session || this.send(this.atDesk(clock()), false, clock()), 1000 / INPUT_RATE);
@@ -248,8 +249,9 @@ class Page {
 
   draw(frame) {
     const now = clock(), dt = Math.min(now - this.before, 0.1);
-    this.before = now;
     const immersed = Boolean(frame && this.immersive.session && this.immersive.space);
+    if (!immersed && now - this.before < REST * this.took) return; // what sends and hears needs a processor too
+    this.before = now;
     if (immersed) this.send(this.inHeadset(now, frame), true, now);
     this.play(dt);
     this.mark(this.hands, immersed);
@@ -257,6 +259,12 @@ class Page {
     if (!immersed) this.orbit.update();
     this.drawn.scene.background = immersed ? null : (this.ground ??= new Color(BACK));
     this.renderer.render(this.drawn.scene, this.camera);
+    this.measure(now);
+  }
+
+  /** How long a picture takes where it takes long: until the next could be begun. */
+  measure(now) {
+    requestAnimationFrame(() => requestAnimationFrame(() => (this.took = clock() - now > SLOW ? clock() - now : 0)));
   }
 
   inHeadset(now, frame) {

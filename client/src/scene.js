@@ -64,11 +64,15 @@ export class RobotScene {
     if (this.known) this.world(this.known);
   }
 
-  /** Draws by `draw` what is not there yet as well, of no size: to compile it later would take longer than an input may. */
+  /** Draws by `draw` what is hidden or not there yet as well: to compile it later would take longer than an input may. */
   everythingOnce(draw) {
     this.pretend(new Float32Array(this.count * STRIDE).fill(NaN));
     this.foreseen({ tip: [[0, 0, 0], [0, 0, 1e-6]], spread: [0, 0] });
+    const hidden = [];
+    this.scene.traverse((one) => one.visible || hidden.push(one));
+    for (const one of hidden) one.visible = true;
     draw();
+    for (const one of hidden) one.visible = false;
     this.pretend(null);
     this.foreseen(null);
   }

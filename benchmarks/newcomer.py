@@ -1,0 +1,153 @@
+"""From the command to a twin that has moved, in a browser: what README and page say, done without a thought.
+
+    python -m benchmarks.newcomer [PACKAGE] [--times 3]
+
+The command is started, the address that it prints is opened in a headless Chromium that draws by software, control is
+taken, the mount's target is moved by a few keys, a plan asked for, watched to its end and confirmed, and the grip held
+until the page says that the robot has arrived. All is as a user has it: no setting is changed. A person reads besides.
+"""
+
+import argparse
+import asyncio
+import os
+import re
+import signal
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.browser import Page, browsing
+from trunkline.errors import InputError, in_one_line
+from trunkline.foresight.package import only_package
+from trunkline.pipeline.config import PROJECT
+from trunkline.pipeline.results import recorded
+
+PORT, SIZE = 18454, (1280, 800)
+KEYS = ("Digit1", *["ArrowRight"] * 5, "Digit2", *["ArrowRight"] * 5)  # both targets 5 cm to the side
+PATIENCE, LOOKS = 120.0, 0.05  # s for each step, and between looks
+PACE = 0.2  # s between keys
+GOAL = 120.0  # s
+MODE = "document.querySelector('#mode').dataset.mode"
+STEPS = (
+    ("address printed", ""),
+    ("page shows the robot", "Boolean(globalThis.trunkline?.loaded && trunkline.frame && trunkline.state)"),
+    ("control taken, aiming", f"{MODE} === 'aim'"),
+    ("preview begins", f"{MODE} === 'preview'"),
+    ("preview watched to its end", f"{MODE} === 'ready'"),
+    ("robot moves", f"{MODE} === 'execute'"),
+    ("robot has arrived", f"{MODE} === 'aim' && trunkline.state.robot === 'done'"),
+)
+
+
+async def until(page: Page, what: str, happens: str) -> None:
+    """
+    Raises:
+        InputError: it does not happen in PATIENCE s.
+    """
+    end = time.monotonic() + PATIENCE
+    while not await page.value(happens):
+        if time.monotonic() > end:
+            says = await page.value("document.querySelector('#status')?.innerText")
+            raise InputError(f"{what}: found {says!r} after {PATIENCE:g} s")
+        await asyncio.sleep(LOOKS)
+
+
+async def key(page: Page, code: str, *kinds: str) -> None:
+    for kind in kinds or ("rawKeyDown", "keyUp"):
+        await page.ask("Input.dispatchKeyEvent", type=kind, code=code)
+
+
+async def click(page: Page, name: str) -> None:
+    box = f"document.querySelector('{name}').getBoundingClientRect()"
+    x, y, wide, high = [await page.value(f"{box}.{side}") for side in ("x", "y", "width", "height")]
+    for kind in ("mousePressed", "mouseReleased"):
+        place = {"x": x + wide / 2, "y": y + high / 2, "button": "left", "clickCount": 1}
+        await page.ask("Input.dispatchMouseEvent", type=kind, **place)
+
+
+async def visit(url: str, done) -> None:
+    """The page's part; `done` is told the name of each step as it is."""
+    page_steps = iter(STEPS[1:])
+
+    async def step(page: Page) -> None:
+        what, happens = next(page_steps)
+        await until(page, what, happens)
+        done(what)
+
+    async with browsing(url, SIZE) as page:
+        await step(page)
+        await until(page, "control can be taken", "!document.querySelector('#control').disabled")
+        await click(page, "#control")
+        await step(page)
+        for code in KEYS:
+            await key(page, code)
+            await asyncio.sleep(PACE)
+        await until(page, "both targets are in reach", "trunkline.state?.targets?.tip?.reach === 'inside'")
+        await key(page, "Enter")
+        await step(page)
+        await step(page)
+        await key(page, "KeyG", "rawKeyDown")
+        await until(page, "the grip is held", "trunkline.hands.left.grip || trunkline.hands.right.grip")
+        await key(page, "Enter")
+        await step(page)
+        await step(page)
+        await key(page, "KeyG", "keyUp")
+
+
+async def once(package: Path) -> list[float]:
+    """s from the command to each of STEPS."""
+    began, found = time.monotonic(), []
+
+    def done(what: str) -> None:
+        found.append(time.monotonic() - began)
+        print(f"{what}: {found[-1]:.1f} s", file=sys.stderr, flush=True)
+
+    with tempfile.TemporaryDirectory() as folder:  # in which the log is
+        server = await asyncio.create_subprocess_exec(
+            sys.executable, "-m", "trunkline.live", package, "--port", str(PORT), cwd=folder,
+            stdout=asyncio.subprocess.PIPE, stdin=asyncio.subprocess.DEVNULL, env=_environment(),
+        )  # fmt: skip
+        try:
+            assert server.stdout is not None
+            async with asyncio.timeout(PATIENCE):
+                while not (address := re.search(rb"http://\S+#token=\S+", line := await server.stdout.readline())):
+                    if not line:
+                        raise InputError("the command: has ended before it printed an address")
+            done(STEPS[0][0])
+            await visit(address[0].decode(), done)
+        finally:
+            server.send_signal(signal.SIGINT)
+            await server.wait()
+    return found
+
+
+def _environment() -> dict[str, str]:
+    return os.environ | {"PYTHONPATH": str(PROJECT)}
+
+
+def main(package: Path, times: int) -> None:
+    rows = np.array([asyncio.run(once(package)) for _ in range(times)])
+    print(f"| step | s since the command: median of {times} | most |")
+    print("|---|---:|---:|")
+    for (what, _), column in zip(STEPS, rows.T, strict=True):
+        print(f"| {what} | {np.median(column):.0f} | {column.max():.0f} |")
+    print(f"\nGoal: {GOAL:g} s until it has moved, a person's reading included.")
+
+
+@in_one_line
+def run(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(prog="benchmarks.newcomer", description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("package", nargs="?", type=Path)
+    parser.add_argument("--times", type=int, default=3)
+    given = parser.parse_args(arguments)
+    package = (given.package or only_package()).resolve()
+    with recorded("newcomer", given.times >= 3):
+        main(package, given.times)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(run(sys.argv[1:]))
