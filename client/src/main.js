@@ -22,7 +22,8 @@ const STILL = 0.3; // s without a grip, after which the core's targets are taken
 const OVER = new Set(["hold", "aim", "follow", "stopped"]); // modes in which no plan is shown; it may come before its mode does
 const SHOWN_IN = new Set(["preview", "ready", "delay"]);
 const BUSY = new Set(["plan", ...SHOWN_IN, "execute", "follow"]); // modes after which it is to be read why they ended
-const SLOW = 0.06, REST = 2; // s that two pictures may take before some are left out, and how much longer one then stays
+// s that two pictures may take before some are left out, how much longer one then stays, and s that count at most
+const SLOW = 0.06, REST = 2, MOST = 0.2;
 const DESKTOP = { position: new Vector3(), quaternion: new Quaternion().setFromAxisAngle(new Vector3(1, 0, 0), -Math.PI / 2) };
 
 const find = (id) => document.getElementById(id);
@@ -264,7 +265,8 @@ class Page {
 
   /** How long a picture takes where it takes long: until the next could be begun. */
   measure(now) {
-    requestAnimationFrame(() => requestAnimationFrame(() => (this.took = clock() - now > SLOW ? clock() - now : 0)));
+    const told = () => (this.took = clock() - now > SLOW ? Math.min(clock() - now, MOST) : 0);
+    requestAnimationFrame(() => requestAnimationFrame(told));
   }
 
   inHeadset(now, frame) {

@@ -158,8 +158,7 @@ test("out of reach is told in words, by a ring and by an offer that R takes", as
   await page.keyboard.press("Digit1");
   for (let n = 0; n < 65; n++) await page.keyboard.press("ArrowUp"); // beyond the ball of what the mount can reach
   await until(page, () => globalThis.trunkline.state.targets?.rigid.reach === "outside");
-  await page.waitForTimeout(400);
-  assert.ok(await page.evaluate(() => globalThis.trunkline.marks.targets.rigid.ring.visible));
+  await until(page, () => globalThis.trunkline.marks.targets.rigid.ring.visible);
   await page.keyboard.press("Enter");
   await until(page, () => /out of reach/.test(document.querySelector("#notice").textContent));
   await picture(page, "4-out-of-reach");
@@ -183,7 +182,7 @@ test("a lost connection is said, the robot turns grey, and it comes back", async
   await loaded(page);
   await server.tell("drop");
   await until(page, () => document.querySelector("#mode").dataset.mode === "lost", null, "words on the lost connection");
-  assert.ok(await page.evaluate(() => globalThis.trunkline.drawn.faded));
+  await until(page, () => globalThis.trunkline.drawn.faded);
   await server.tell("listen");
   await until(page, () => globalThis.trunkline.wire.up && globalThis.trunkline.state && true);
   await until(page, () => !globalThis.trunkline.drawn.faded);
