@@ -6,6 +6,7 @@ import contextlib
 import os
 import signal
 import tempfile
+import time
 from collections import defaultdict
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -17,6 +18,7 @@ from trunkline.errors import InputError
 FLAGS = ("--headless=new", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
          "--ignore-gpu-blocklist", "--disable-background-networking", "--remote-debugging-port=0")  # fmt: skip
 PATIENCE = 30.0  # s for the browser to come
+LOOKS = 0.02  # s between looks at a page
 # a frame counts once something was drawn in it, by whatever call of WebGL
 COUNT = """
 globalThis.drawn = 0;
@@ -77,6 +79,37 @@ class Page:
     async def value(self, expression: str):
         """Of JavaScript in the page."""
         return (await self.ask("Runtime.evaluate", expression=expression))["result"].get("value")
+
+    async def until(self, expression: str, what: str, seconds: float) -> None:
+        """
+        Raises:
+            InputError: it does not become true in so many s.
+        """
+        end = time.monotonic() + seconds
+        while not await self.value(expression):
+            if time.monotonic() > end:
+                says = await self.value("document.querySelector('#status')?.innerText")
+                raise InputError(f"{what}: not reached in {seconds:g} s; the page says {says!r}")
+            await asyncio.sleep(LOOKS)
+
+    async def key(self, code: str, kind: str = "") -> None:
+        """Pressed and let go, or only what `kind` says of it."""
+        for one in [kind] if kind else ["rawKeyDown", "keyUp"]:
+            await self.ask("Input.dispatchKeyEvent", type=one, code=code)
+
+    async def mouse(self, kind: str, x: float, y: float) -> None:
+        await self.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+
+    async def place(self, name: str, share: float = 0.5) -> tuple[float, float]:
+        """Of the element `name`, at a share of its width, in pixels."""
+        box = f"document.querySelector('{name}').getBoundingClientRect()"
+        x, y, wide, high = [await self.value(f"{box}.{side}") for side in ("x", "y", "width", "height")]
+        return x + share * wide, y + high / 2
+
+    async def click(self, name: str) -> None:
+        place = await self.place(name)
+        await self.mouse("mousePressed", *place)
+        await self.mouse("mouseReleased", *place)
 
     async def picture(self, path: Path) -> None:
         path.write_bytes(base64.b64decode((await self.ask("Page.captureScreenshot"))["data"]))

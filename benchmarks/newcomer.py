@@ -27,7 +27,7 @@ from trunkline.pipeline.results import recorded
 
 PORT, SIZE = 18454, (1280, 800)
 KEYS = ("Digit1", *["ArrowRight"] * 5, "Digit2", *["ArrowRight"] * 5)  # both targets 5 cm to the side
-PATIENCE, LOOKS = 120.0, 0.05  # s for each step, and between looks
+PATIENCE = 120.0  # s for each step
 PACE = 0.2  # s between keys
 GOAL = 120.0  # s
 MODE = "document.querySelector('#mode').dataset.mode"
@@ -42,59 +42,33 @@ STEPS = (
 )
 
 
-async def until(page: Page, what: str, happens: str) -> None:
-    """
-    Raises:
-        InputError: it does not happen in PATIENCE s.
-    """
-    end = time.monotonic() + PATIENCE
-    while not await page.value(happens):
-        if time.monotonic() > end:
-            says = await page.value("document.querySelector('#status')?.innerText")
-            raise InputError(f"{what}: found {says!r} after {PATIENCE:g} s")
-        await asyncio.sleep(LOOKS)
-
-
-async def key(page: Page, code: str, *kinds: str) -> None:
-    for kind in kinds or ("rawKeyDown", "keyUp"):
-        await page.ask("Input.dispatchKeyEvent", type=kind, code=code)
-
-
-async def click(page: Page, name: str) -> None:
-    box = f"document.querySelector('{name}').getBoundingClientRect()"
-    x, y, wide, high = [await page.value(f"{box}.{side}") for side in ("x", "y", "width", "height")]
-    for kind in ("mousePressed", "mouseReleased"):
-        place = {"x": x + wide / 2, "y": y + high / 2, "button": "left", "clickCount": 1}
-        await page.ask("Input.dispatchMouseEvent", type=kind, **place)
-
-
 async def visit(url: str, done) -> None:
     """The page's part; `done` is told the name of each step as it is."""
     page_steps = iter(STEPS[1:])
 
     async def step(page: Page) -> None:
         what, happens = next(page_steps)
-        await until(page, what, happens)
+        await page.until(happens, what, PATIENCE)
         done(what)
 
     async with browsing(url, SIZE) as page:
         await step(page)
-        await until(page, "control can be taken", "!document.querySelector('#control').disabled")
-        await click(page, "#control")
+        await page.until("!document.querySelector('#control').disabled", "control can be taken", PATIENCE)
+        await page.click("#control")
         await step(page)
         for code in KEYS:
-            await key(page, code)
+            await page.key(code)
             await asyncio.sleep(PACE)
-        await until(page, "both targets are in reach", "trunkline.state?.targets?.tip?.reach === 'inside'")
-        await key(page, "Enter")
+        await page.until("trunkline.state?.targets?.tip?.reach === 'inside'", "both targets are in reach", PATIENCE)
+        await page.key("Enter")
         await step(page)
         await step(page)
-        await key(page, "KeyG", "rawKeyDown")
-        await until(page, "the grip is held", "trunkline.hands.left.grip || trunkline.hands.right.grip")
-        await key(page, "Enter")
+        await page.key("KeyG", "rawKeyDown")
+        await page.until("trunkline.hands.left.grip || trunkline.hands.right.grip", "the grip is held", PATIENCE)
+        await page.key("Enter")
         await step(page)
         await step(page)
-        await key(page, "KeyG", "keyUp")
+        await page.key("KeyG", "keyUp")
 
 
 async def once(package: Path) -> list[float]:

@@ -36,7 +36,6 @@ ADDRESS, SIZE, YIELDS = Address(18452), (760, 640), 3  # of the page: pixels, an
 COLOURS = 128  # of a picture's palette
 PATIENCE = 60.0  # s for a state to come
 SILENCE, STALE = 10.0, 1.0  # s for which the page and the robot's process may say nothing
-LOOKS = 0.02  # s between looks at the page
 EYE, AT = (1.29, 1.04, 1.94), (0.35, 0.43, 0.05)  # m, in the room: where the picture is taken from, and what it is of
 # presses of each arrow, 1 cm each, for the mount's target and for the tip's
 AIMED = (
@@ -102,16 +101,7 @@ class Camera:
         self.pictures: dict[Mode, bytes] = {}
 
     async def until(self, expression: str, what: str) -> None:
-        """
-        Raises:
-            InputError: it does not become true in PATIENCE s.
-        """
-        end = time.monotonic() + PATIENCE
-        while not await self.page.value(expression):
-            if time.monotonic() > end:
-                says = await self.page.value("document.querySelector('#status')?.innerText")
-                raise InputError(f"{what}: not reached in {PATIENCE:g} s; the page says {says!r}")
-            await asyncio.sleep(LOOKS)
+        await self.page.until(expression, what, PATIENCE)
 
     async def drawn(self, frames: int = 2) -> None:
         first = await self.page.value("globalThis.drawn")
@@ -132,32 +122,13 @@ class Camera:
                 raise InputError(f"state {mode!r}: over before its picture was taken, the page is in {after!r}")
         self.pictures[mode] = base64.b64decode(png)
 
-    async def key(self, code: str, kind: str = "") -> None:
-        """Pressed and let go, or only what `kind` says of it."""
-        for one in [kind] if kind else ["rawKeyDown", "keyUp"]:
-            await self.page.ask("Input.dispatchKeyEvent", type=one, code=code)
-
-    async def mouse(self, kind: str, x: float, y: float) -> None:
-        await self.page.ask("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
-
-    async def place(self, name: str, share: float = 0.5) -> tuple[float, float]:
-        """Of the element `name`, at a share of its width, in pixels."""
-        box = f"document.querySelector('{name}').getBoundingClientRect()"
-        x, y, wide, high = [await self.page.value(f"{box}.{side}") for side in ("x", "y", "width", "height")]
-        return x + share * wide, y + high / 2
-
-    async def press(self, name: str) -> None:
-        place = await self.place(name)
-        await self.mouse("mousePressed", *place)
-        await self.mouse("mouseReleased", *place)
-
     async def move(self, steps: tuple[tuple[str, dict[str, int]], ...]) -> None:
         """Targets, by arrows."""
         for target, arrows in steps:
-            await self.key(target)
+            await self.page.key(target)
             for arrow, presses in arrows.items():
                 for _ in range(presses):
-                    await self.key(arrow)
+                    await self.page.key(arrow)
             await self.drawn()
 
 
@@ -173,7 +144,7 @@ async def arrive(camera: Camera) -> None:
 
 
 async def aim(camera: Camera) -> None:
-    await camera.press("#control")
+    await camera.page.click("#control")
     await camera.until(f"{MODE} === 'aim'", "state 'aim'")
     await camera.move(AIMED)
 
@@ -184,33 +155,33 @@ async def taken(camera: Camera, planning: Kept) -> None:
     await camera.take("hold")
     await aim(camera)
     await camera.take("aim", f"{SETTLED} && {CALM}")
-    await camera.key("Enter")
+    await camera.page.key("Enter")
     await camera.take("plan")
     planning.go_on()
     await camera.until("trunkline.playback?.whole && trunkline.drawn.ghost.visible", "the preview")
     await camera.until(f"trunkline.playback.played > {WATCHED} * trunkline.playback.duration", "half of the preview")
-    place = await camera.place("#scrub", WATCHED - BACK)
-    await camera.mouse("mousePressed", *place)  # where the slider is held, it stays
+    place = await camera.page.place("#scrub", WATCHED - BACK)
+    await camera.page.mouse("mousePressed", *place)  # where the slider is held, it stays
     await camera.until("trunkline.playback.held", "a slider that is held")
     await camera.drawn()
     await camera.take("preview")
-    await camera.mouse("mouseReleased", *place)
+    await camera.page.mouse("mouseReleased", *place)
     await camera.take("ready", f"trunkline.told && trunkline.playback.at >= trunkline.playback.there && {CALM}")
     way = await camera.page.value(AWAY)
-    await camera.key("KeyG", "rawKeyDown")
+    await camera.page.key("KeyG", "rawKeyDown")
     await camera.drawn()
     await camera.page.value(STILL)
-    await camera.key("Enter")
+    await camera.page.key("Enter")
     await camera.take("delay", "true")
     await camera.page.value("trunkline.hearOn()")
     await camera.take("execute", f"{AWAY} < {(1 - MOVED) * way}")
     await camera.until(f"{MODE} === 'aim' && trunkline.state.robot === 'done'", "the motion's end")
-    await camera.key("KeyF")
+    await camera.page.key("KeyF")
     await camera.until(f"{MODE} === 'follow' && trunkline.state.robot === 'running'", "state 'follow'")
     await camera.move(LED)
     await camera.take("follow")
-    await camera.key("Space")
-    await camera.key("KeyG", "keyUp")
+    await camera.page.key("Space")
+    await camera.page.key("KeyG", "keyUp")
     await camera.take("stopped", "trunkline.state.robot !== 'running'")
 
 
