@@ -13,9 +13,10 @@ import time
 import numpy as np
 
 from trunkline.errors import InputError, in_one_line
+from trunkline.execution.adapted import Adapted, ArmSettings, panda
 from trunkline.execution.adapter import TELL
-from trunkline.execution.arm import Arm, ArmSettings
-from trunkline.execution.machine import TICK, Machine
+from trunkline.execution.limb import TICK
+from trunkline.execution.machine import Machine
 from trunkline.execution.pace import PacedRobot
 from trunkline.execution.stream import LIMITS
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -38,7 +39,7 @@ def main(arguments: list[str]) -> int:
 
 
 def measure(robot: str, address: str) -> None:
-    arm = Arm(ArmSettings(os.environ.get("ROBOT_PYTHON", ""), address, 0.1), robot)
+    arm = panda(ArmSettings(os.environ.get("ROBOT_PYTHON", ""), address, 0.1), robot)
     machine = Machine(arm, None, STRAIGHT)
     limits = limits_of(load_folder(Teleop, PROJECT / "conf/teleop").motors)
     try:
@@ -62,7 +63,7 @@ def way(start: np.ndarray, end: np.ndarray, limits) -> Plan:
     return Plan(0.002, rows[:, :7], rows[:, 7:], (("transfer", 0),), "none", "none")
 
 
-def moved(machine: Machine, arm: Arm, mover: PacedRobot, plan: Plan, stop: float) -> str:
+def moved(machine: Machine, arm: Adapted, mover: PacedRobot, plan: Plan, stop: float) -> str:
     """A row of the table: `plan` run to its end, or stopped after `stop` s, and RESTS s of rest: a
     simulator that falls behind gets there later.
 
@@ -82,11 +83,11 @@ def moved(machine: Machine, arm: Arm, mover: PacedRobot, plan: Plan, stop: float
         told = arm.told
         if told is not None and (not times or told.time > times[-1]):
             times.append(told.time)
-            off.append(np.abs(np.subtract(told.measured, told.commanded)).max())
+            off.append(np.abs(np.subtract(told.measured, told.sent)).max())
     if refused or machine.fault:
         raise InputError(refused or machine.fault)
     rate = TELL * (len(times) - 1) / (times[-1] - times[0])
-    end = np.abs(arm.joints - mover.joints).max()
+    end = np.abs(arm.sent - mover.joints).max()
     return f"{mover.state().mode} | {rate:.0f} | {1e3 * max(off):.2f} mrad | {1e3 * end:.3f} mrad"
 
 

@@ -27,12 +27,13 @@ from typing import cast
 import numpy as np
 
 from trunkline.errors import InputError, in_one_line
+from trunkline.execution.bank import SIMULATED
 from trunkline.execution.settings import Config as Execution
 from trunkline.foresight.package import only_package
 from trunkline.live import lease
 from trunkline.live.aligning import mark_at
 from trunkline.live.desk import Robot
-from trunkline.live.hardware import SIMULATED, hardware_of
+from trunkline.live.hardware import hardware_of
 from trunkline.live.house import Made
 from trunkline.live.server import Server
 from trunkline.live.session import Address, opened

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.execution.bank import SIMULATED
 from trunkline.execution.settings import Config
 from trunkline.execution.urgency import URGENT
-from trunkline.live.hardware import SIMULATED, Hardware, hardware_of
+from trunkline.live.hardware import Hardware, hardware_of
 from trunkline.pipeline.config import PROJECT, load_folder
 
 ADDRESS, PORT = "127.0.0.1", 1337  # franka-sim listens to every address: give it a network of its own

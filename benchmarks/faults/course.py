@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.faults.hushed import HUSH
 from benchmarks.faults.operator import JUMP, PATIENCE
 from benchmarks.faults.scene import Scene, staged
 from trunkline.errors import InputError
@@ -17,7 +18,6 @@ from trunkline.live.logbook import read_logbook
 
 MOVING = 0.4  # s for which the robot has moved before anything is done
 HANG = 0.5  # s
-HUSH = 0.05  # s
 AWAY = 0.6  # s after which who controls comes back, of the 1 s after which it controls no more
 STILL = 0.15  # s without motion: it rests
 NEVER = 3.0  # s without a hold: it was told none
@@ -80,7 +80,9 @@ FAULTS = (
     Fault("server killed -9", lambda s: s.signal(signal.SIGKILL)),
     Fault("log's process killed", _kill("journal")),
     Fault("robot's process killed", _kill("robot")),
-    Fault(f"a motor silent for {1e3 * HUSH:g} ms", lambda s: s.witness.hush(HUSH), motors=True),
+    Fault(f"a motor silent for {1e3 * HUSH:g} ms", lambda s: s.witness.hush(), motors=True),
+    Fault("motors' process hangs", lambda s: os.kill(s.witness.motors, signal.SIGSTOP), motors=True),
+    Fault("motors' process killed", lambda s: os.kill(s.witness.motors, signal.SIGKILL), motors=True),
 )
 
 

@@ -16,9 +16,10 @@ from pathlib import Path
 from benchmarks.faults.operator import ADDRESS, PATIENCE, Operator
 from benchmarks.faults.witness import Watched, Witness, machine
 from trunkline.errors import InputError
+from trunkline.execution.bank import SIMULATED
 from trunkline.execution.settings import Config
 from trunkline.live import real, robot
-from trunkline.live.hardware import SIMULATED, hardware_of
+from trunkline.live.hardware import hardware_of
 from trunkline.live.session import opened
 from trunkline.pipeline.config import PROJECT, load_folder
 

@@ -1,13 +1,18 @@
 """What the robot's own process notes of its motion, where the benchmark sees it, whoever else has ended."""
 
 import ctypes
+import os
+import signal
 import time
 from multiprocessing.context import SpawnContext
 
 import numpy as np
 
-from trunkline.execution import on_bus
+from trunkline.execution.adapted import Adapted
+from trunkline.execution.hosting import hosted
+from trunkline.execution.motors import MotorsOnBus
 from trunkline.live import real
+from trunkline.live.hardware import Hardware
 from trunkline.live.robot import HELD, MODE, MODES, SERIAL, Channel
 from trunkline.teleop.trajectory import JOINTS
 
@@ -19,12 +24,12 @@ class Witness:
     """Each number is written whole, by one process; times are s of the clock that all processes of a machine share.
 
     The robot's: held, when it was first commanded to hold in its last motion, as it brakes it is so again and again;
-    moved, when its axes, as they are sent, last moved; begun, how many motions it began; running, whether one goes on.
-    The benchmark's: silent, until when the first motor is.
+    moved, when its axes, as they are sent, last moved; begun, how many motions it began; running, whether one goes on;
+    motors, the process of its motors, where it has some.
     """
 
     def __init__(self, context: SpawnContext) -> None:
-        self._held, self._moved, self._begun, self._running, self._silent = (
+        self._held, self._moved, self._begun, self._running, self._motors = (
             context.RawValue(ctypes.c_double, 0.0) for _ in range(5)
         )
         self._told, self._held_in = 0.0, 0.0  # the last command to hold, and the motion in which the first one was
@@ -46,12 +51,16 @@ class Witness:
         return bool(self._running.value)
 
     @property
-    def silent(self) -> float:
-        return self._silent.value
+    def motors(self) -> int:
+        return int(self._motors.value)
 
-    def hush(self, seconds: float) -> None:
-        """The first motor gives no feedback for so many s."""
-        self._silent.value = time.monotonic() + seconds
+    @motors.setter
+    def motors(self, pid: int) -> None:
+        self._motors.value = pid
+
+    def hush(self) -> None:
+        """The first motor gives no feedback for `hushed.HUSH` s."""
+        os.kill(self.motors, signal.SIGUSR1)
 
     def note(self, numbers: np.ndarray, moved: bool) -> None:
         """Of the robot's process: what it tells the server."""
@@ -79,19 +88,15 @@ class Watched(Channel):
         self._axes = axes.copy()
 
 
-class Hushed(on_bus.BankOnBus):
-    """A bank whose first motor is silent as long as the `witness` has it."""
-
-    witness: Witness
-
-    def turn(self) -> None:
-        self.bank.motors[0].silent = time.monotonic() < self.witness.silent
-        super().turn()
-
-
 def machine(channel: Watched, *setup) -> None:
-    """The process of a machine with such a bank."""
-    assert channel.witness is not None
-    Hushed.witness = channel.witness
-    real.BankOnBus = Hushed
+    """The process of a machine whose first motor can be silent."""
+    witness = channel.witness
+    assert witness is not None
+
+    def motors(hardware: Hardware) -> Adapted:
+        found = hosted(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface), "benchmarks.faults.hushed")
+        witness.motors = found.process.pid
+        return found
+
+    real.motors_of = motors
     real.run(channel, *setup)

@@ -1,6 +1,7 @@
 """The adapter as a process, before a robot that is none; margins are wide, as machines are busy."""
 
 import ast
+import re
 import time
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from tests.support.waiting import SOON, until
 from trunkline.errors import InputError
 from trunkline.execution import adapter
-from trunkline.execution.arm import Arm, ArmSettings
+from trunkline.execution.adapted import ArmSettings, panda
 
 SETTINGS = ArmSettings(python="", address="nowhere", astray=0.1)
 ROOT = Path(__file__).parents[2]
@@ -18,13 +19,13 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def arm():
-    found = Arm(SETTINGS, "fake")
+    found = panda(SETTINGS, "fake")
+    until(lambda: found.ready or found.fault, lambda: found.turn(time.monotonic()))
     yield found
     found.close()
 
 
 def test_it_brakes_when_setpoints_end(arm):
-    arm.begin()
     for ahead in (0.02, 0.04):
         arm.send(time.monotonic() + ahead, np.array(adapter.Fake.READY))
     until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
@@ -32,43 +33,41 @@ def test_it_brakes_when_setpoints_end(arm):
 
 
 def test_it_refuses_what_starts_elsewhere(arm):
-    arm.begin()
     arm.send(time.monotonic() + 0.03, np.array(adapter.Fake.READY) + 0.1)
     until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
     assert arm.fault.startswith(("setpoint: starts 0.1 rad from where the robot is", "its adapter is silent"))
 
 
 def test_it_gives_the_robot_back_once_nobody_speaks_to_it(arm):
-    arm.begin()
-    arm._socket.close()
-    assert arm._process.wait(SOON) == 0
+    arm.line.close()
+    assert arm.process.wait(SOON) == 0
 
 
 def test_an_adapter_that_is_killed_is_a_fault(arm):
-    arm.begin()
-    arm._process.kill()
+    arm.process.kill()
     until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
     assert arm.fault == "its adapter has ended"
 
 
 def test_a_library_that_is_not_there_is_one_line():
-    arm = Arm(SETTINGS, "fr3")
-    with pytest.raises(InputError, match=r"^robot nowhere: \w+Error: "):
-        arm.begin()
+    arm = panda(SETTINGS, "fr3")
+    until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
+    assert re.match(r"\w+Error: ", arm.fault)
+    assert not arm.ready
     arm.close()
 
 
 def test_a_python_that_is_not_there_is_one_line():
-    with pytest.raises(InputError, match=r"^panda.python: found /nowhere/python"):
-        Arm(ArmSettings("/nowhere/python", "nowhere", 0.1), "panda")
+    with pytest.raises(InputError, match=r"^arm\.python: found /nowhere/python"):
+        panda(ArmSettings("/nowhere/python", "nowhere", 0.1), "panda")
 
 
 def test_it_imports_what_any_environment_has():
-    for name in ("adapter", "adapter_frames", "stream", "urgency"):
+    for name in ("adapter", "limb_frames", "stream", "urgency"):
         tree = ast.parse((ROOT / f"trunkline/execution/{name}.py").read_text(encoding="utf-8"))
         modules = {node.module for node in tree.body if isinstance(node, ast.ImportFrom)}
         assert modules <= {
-            "collections", "collections.abc", "dataclasses", "typing", "trunkline.execution.adapter_frames",
+            "collections", "collections.abc", "dataclasses", "typing", "trunkline.execution.limb_frames",
             "trunkline.execution.stream", "trunkline.execution.urgency", "trunkline.panda.kinematics",
             "trunkline.panda.limits",
         }  # fmt: skip

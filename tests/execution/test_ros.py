@@ -17,7 +17,6 @@ from cyclonedds.topic import Topic
 from rosbags.typesys import Stores, get_typestore
 
 from tests.support.waiting import until
-from trunkline.errors import InputError
 from trunkline.execution import ros_arm
 from trunkline.execution.ros_arm import RosArm
 from trunkline.execution.ros_messages import Header, JointState, JointTrajectory, Time, trajectory
@@ -86,9 +85,8 @@ class Controller:
 def joined(monkeypatch):
     monkeypatch.setenv("CYCLONEDDS_URI", f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>")
     controller, arm = Controller(), RosArm(SETTINGS)
-    until(lambda: not np.isnan(arm.joints).any(), lambda: (controller.turn(), arm.turn(time.monotonic())))
-    until(lambda: arm.link.listeners > 0, controller.turn)
-    arm.begin()
+    until(lambda: not np.isnan(arm.sent).any(), lambda: (controller.turn(), arm.turn(time.monotonic())))
+    until(lambda: arm.ready, lambda: (controller.turn(), arm.turn(time.monotonic())))
     arm.fault = ""  # of a busy machine, until both knew each other
     yield arm, controller
     arm.close()
@@ -96,7 +94,7 @@ def joined(monkeypatch):
 
 def test_a_controller_hears_where_the_joints_shall_be(joined):
     arm, controller = joined
-    np.testing.assert_array_equal(arm.joints, READY)
+    np.testing.assert_array_equal(arm.sent, READY)
     target, due = READY + 0.05, time.monotonic() + 0.03
 
     def each():
@@ -128,8 +126,9 @@ def test_silence_and_a_joint_astray_are_faults(joined):
 def test_no_controller_is_one_line(monkeypatch):
     monkeypatch.setenv("CYCLONEDDS_URI", f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>")
     monkeypatch.setattr(ros_arm, "CONNECTING", 0.05)
-    with pytest.raises(InputError, match=r"^/joint_states: found no state of panda_joint1 and others within 0 s"):
-        RosArm(replace(SETTINGS, domain=78)).begin()
+    arm = RosArm(replace(SETTINGS, domain=78))
+    until(lambda: arm.fault, lambda: arm.turn(time.monotonic()))
+    assert arm.fault == "/joint_states: found no state of panda_joint1 and others within 0 s"
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="the names of threads are Linux's")

@@ -107,14 +107,15 @@ def stub(monkeypatch):
 def arm(stub):
     arm = RosArm(SETTINGS)
     stub.say(READY)
-    arm.begin()
+    arm.turn(time.monotonic())
+    assert arm.ready
     yield arm
     arm.close()
 
 
 def test_a_node_sends_one_point_for_when_it_is_due(stub, arm):
     assert stub.domain == SETTINGS.domain
-    np.testing.assert_array_equal(arm.joints, READY)
+    np.testing.assert_array_equal(arm.sent, READY)
     arm.send(time.monotonic() + 1.5, READY + 0.05)
     arm.send(time.monotonic() + 1.5, READY + 0.06)  # within PERIOD of the last
     (order,) = stub.heard

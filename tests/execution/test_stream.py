@@ -1,11 +1,14 @@
 """What the Panda is sent: it follows setpoints, and brakes within its limits where they end or ask for too much."""
 
+import contextlib
+import itertools
 import math
+import socket
 
 import numpy as np
 import pytest
 
-from trunkline.execution.adapter_frames import SENT, TOLD, Frames, Setpoint, Told
+from trunkline.execution.limb_frames import Line, Setpoint, Told
 from trunkline.execution.stream import LIMITS, SILENT, Stream
 
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
@@ -203,11 +206,41 @@ def test_frames_come_back():
     assert Setpoint.unpack(setpoint.pack()) == setpoint
     told = Told(1.0, tuple(READY), tuple(READY + 1), "reflex: é")
     assert Told.unpack(told.pack()) == told
-    assert len(Told(1.0, (0.0,) * 7, (0.0,) * 7, "é" * 200).pack()) == TOLD.size
+    assert len(Told(1.0, (0.0,) * 3, (0.0,) * 3, "é" * 200).pack()) == Told.size(3)
 
 
-def test_frames_are_cut_however_they_come():
-    data, frames, found = b"".join(Setpoint(n, tuple(READY)).pack() for n in range(9)), Frames(SENT.size), []
+@pytest.fixture
+def line():
+    ours, theirs = socket.socketpair()
+    theirs.settimeout(5.0)
+    yield Line(ours, Setpoint.size(7)), theirs
+    ours.close()
+    theirs.close()
+
+
+def test_frames_are_cut_however_they_come(line):
+    ours, theirs = line
+    data, found = b"".join(Setpoint(n, tuple(READY)).pack() for n in range(9)), []
     for begin in range(0, len(data), 50):
-        found += frames.cut(data[begin : begin + 50])
+        theirs.send(data[begin : begin + 50])
+        found += ours.heard()
     assert [Setpoint.unpack(frame).due for frame in found] == list(range(9))
+    assert ours.open
+    theirs.close()
+    assert ours.heard() == []
+    assert not ours.open
+
+
+def test_frames_that_are_missed_are_missed_whole(line):
+    ours, theirs = line
+    frames = (bytes([n % 256]) * 3000 for n in itertools.count())
+    with contextlib.suppress(BlockingIOError):
+        while True:
+            ours.send(next(frames))
+    got = b""
+    for _ in range(300):  # as there is room again
+        got += theirs.recv(3000)
+        with contextlib.suppress(BlockingIOError):
+            ours.send(next(frames))
+    found = {bytes(got[n : n + 3000]) for n in range(0, len(got) - 2999, 3000)}
+    assert all(len(set(frame)) == 1 for frame in found)

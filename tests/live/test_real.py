@@ -9,16 +9,19 @@ import numpy as np
 import pytest
 
 from tests.live.test_robot import simulation, until
-from tests.support.motors import Workbench, homed
+from tests.support.motors import PlayedMotors, homed
 from tests.support.operator import PACKAGE, config
 from trunkline.errors import InputError
-from trunkline.execution.adapter_frames import Setpoint
-from trunkline.execution.machine import LEAD, SMOOTH, TICK
+from trunkline.execution.bank import SIMULATED
+from trunkline.execution.cables import Cables
+from trunkline.execution.limb import TICK
+from trunkline.execution.limb_frames import Setpoint
+from trunkline.execution.machine import LEAD, SMOOTH
 from trunkline.execution.pace import PacedRobot
 from trunkline.execution.settings import Config
 from trunkline.execution.stream import LIMITS, Stream
 from trunkline.live.__main__ import parsed
-from trunkline.live.hardware import SIMULATED, hardware_of
+from trunkline.live.hardware import hardware_of
 from trunkline.live.real import Moved, Pursuit, RealRobot
 from trunkline.live.robot import DEAD_MAN, HELD, MODE, MODES, PERMIT, PERMITTED, STOPS, Channel, Goal
 from trunkline.live.session import alignment_for
@@ -43,30 +46,14 @@ class PlayedArm:
     """An adapter's logic before a robot that goes where it is sent."""
 
     def __init__(self, rig):
-        self._rig, self.stream, self.fault = rig, Stream(READY, LIMITS["panda"]), ""
-        self.joints = self.measured = READY
-
-    def begin(self):
-        pass
+        self._rig, self.stream, self.fault, self.ready = rig, Stream(READY, LIMITS["panda"]), "", True
+        self.sent = self.measured = READY
 
     def send(self, due, joints):
         self.stream.hear(Setpoint(due, tuple(joints)), self._rig.now)
 
     def turn(self, now):
         self.fault = self.fault or self.stream.fault
-
-
-class PlayedMotors:
-    def __init__(self, bench: Workbench):
-        self._bench, self.motors = bench, bench.motors
-        self.wanted = [0.0] * 3, [0.0] * 3
-
-    @property
-    def fault(self):
-        return self.motors.fault
-
-    def turn(self, pulls, speeds):
-        self.wanted = pulls, speeds
 
 
 class Rig:
@@ -76,8 +63,8 @@ class Rig:
         self.bench, self.sent, self.pulls = homed(), [], []
         self.now = self.bench.now
         self.arm, self.motors = PlayedArm(self), PlayedMotors(self.bench)
-        machine = Moved(self.arm, self.motors, STRAIGHT, clock=lambda: self.now)
-        machine._home = lambda motors: None
+        self.cables = Cables(self.motors, self.now)
+        machine = Moved(self.arm, self.cables, STRAIGHT, clock=lambda: self.now)
         limits = limits_of(config().motors)
         joints = machine.begin(np.zeros(7))
         robot = PacedRobot(joints, STRAIGHT, limits, PACKAGE, lambda q, c, _: machine.move(q, c), LIMITS["panda"])

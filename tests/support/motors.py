@@ -81,6 +81,21 @@ class Workbench:
         return np.array(off), np.array(counted)
 
 
+class PlayedMotors:
+    """The motors of a bench, which a test turns."""
+
+    def __init__(self, bench):
+        self._bench, self.motors = bench, bench.motors
+        self.wanted = [0.0] * 3, [0.0] * 3
+
+    @property
+    def fault(self):
+        return self.motors.fault
+
+    def turn(self, pulls, speeds):
+        self.wanted = pulls, speeds
+
+
 def homed():
     """A workbench of its own, its motors homed."""
     return copy.deepcopy(_homed())

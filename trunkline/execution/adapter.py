@@ -4,7 +4,7 @@ and, over a socket, the process that started it.
     python -m trunkline.execution.adapter ROBOT ADDRESS DESCRIPTOR
 
 ROBOT: `panda` (panda-python, libfranka 0.9), `fr3` (pylibfranka) or `fake`, which is no robot. DESCRIPTOR: of the
-socket. `trunkline.execution.arm` starts it; by hand it is of no use.
+socket. `trunkline.execution.adapted` starts it; by hand it is of no use.
 """
 
 import contextlib
@@ -15,11 +15,12 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from trunkline.execution.adapter_frames import SENT, Frames, Setpoint, Told
+from trunkline.execution.limb_frames import Line, Setpoint, Told
 from trunkline.execution.stream import LIMITS, Stream
 from trunkline.execution.urgency import be_urgent
 
 TELL = 5  # cycles from one frame told to the next
+JOINTS = 7
 CUTOFF = 100.0  # Hz, of the filter that libfranka 0.9 has by default
 
 Joints = Sequence[float]
@@ -96,9 +97,8 @@ class Adapter:
     """Between the socket and the device."""
 
     def __init__(self, robot: str, channel: socket.socket) -> None:
-        self._limits, self._socket = LIMITS["fr3" if robot == "fr3" else "panda"], channel
-        self._frames, self._stream, self._count, self._open = Frames(SENT.size), None, 0, True
-        channel.setblocking(False)
+        self._limits, self._line = LIMITS["fr3" if robot == "fr3" else "panda"], Line(channel, Setpoint.size(JOINTS))
+        self._stream, self._count = None, 0
 
     def cycle(
         self, measured: Joints, desired: Joints, dt: float, rates: tuple[Joints, Joints] | None
@@ -109,36 +109,25 @@ class Adapter:
         now, stream = time.monotonic(), self._stream
         if rates is not None:
             stream.found(desired, *rates)
-        for frame in self._heard():
+        for frame in self._line.heard():
             stream.hear(Setpoint.unpack(frame), now)
-        if not self._open:
+        if not self._line.open:
             stream.brake("the machine's process is gone")
         sent = stream.cycle(now, dt).tolist()
         if self._count % TELL == 0:
             self.tell(Told(now, tuple(measured), tuple(sent), stream.fault))
         self._count += 1
-        return sent, stream.resting and not self._open
+        return sent, stream.resting and not self._line.open
 
     def fail(self, fault: str) -> None:
         """The robot has ended control."""
-        sent = tuple(self._stream.joints) if self._stream is not None else (0.0,) * 7
-        self._socket.setblocking(True)
+        sent = tuple(self._stream.joints) if self._stream is not None else (0.0,) * JOINTS
         self.tell(Told(time.monotonic(), sent, sent, fault))
 
     def tell(self, told: Told) -> None:
         """Unless nobody listens; whoever is slow misses a frame."""
         with contextlib.suppress(OSError):
-            self._socket.send(told.pack())
-
-    def _heard(self) -> Sequence[bytes]:
-        try:
-            data = self._socket.recv(1 << 16)
-        except BlockingIOError:
-            return []
-        except OSError:
-            data = b""
-        self._open = self._open and bool(data)
-        return self._frames.cut(data)
+            self._line.send(told.pack())
 
 
 def main(arguments: list[str]) -> int:

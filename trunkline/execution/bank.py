@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from trunkline.execution.gm6020 import COUNTS, NUMBERS, TORQUE, Feedback, commanded, feedback_frame
 
+SIMULATED = "virtual"  # the bus behind which such motors are
 WATCHDOG = 0.1  # s
 STEP = 0.00025  # s
 RIPPLE, PER_TURN = 6.4e-3, 9  # rad/A, as one lab measured it

@@ -14,6 +14,7 @@ from trunkline.execution.gm6020 import FEEDBACK, Feedback
 from trunkline.execution.reel import Reel, ReelSettings
 
 SILENT = 0.02  # s without feedback of a motor
+HOMING = 60.0  # s
 PRESENT = 1.0  # s within which each must be heard at first
 
 
@@ -33,6 +34,20 @@ class MotorSettings:
             raise ValueError(f"sides: found {len(self.sides)}, expected one for each of {len(self.numbers)} motors")
         if len(set(self.numbers)) < len(self.numbers):
             raise ValueError(f"numbers: found {list(self.numbers)}, expected each once")
+
+
+@dataclass(frozen=True)
+class MotorsOnBus:
+    """`motors` on a `bus` of python-can's `interface`; on the bus `bank.SIMULATED`, simulated ones."""
+
+    motors: MotorSettings
+    bus: str
+    interface: str
+
+    @property
+    def axes(self) -> int:
+        """How many cables."""
+        return len(self.motors.numbers)
 
 
 class Motors:

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import can
 
 from trunkline.errors import InputError
-from trunkline.execution.bank import Bank, Plant
+from trunkline.execution.bank import SIMULATED, Bank, Plant
 from trunkline.execution.gm6020 import FEEDBACK, NUMBERS, RATE, Feedback, command_frames, feedback_of
-from trunkline.execution.motors import Motors, MotorSettings
+from trunkline.execution.motors import Motors, MotorSettings, MotorsOnBus
 
 FILTERS: can.typechecking.CanFilters = [
     {"can_id": FEEDBACK + number, "can_mask": 0x7FF, "extended": False} for number in NUMBERS
@@ -113,6 +113,27 @@ class SimulatedMotors(BusMotors):
     def close(self) -> None:
         super().close()
         self._bank.close()
+
+
+def motors_on(settings: MotorsOnBus) -> BusMotors:
+    """The motors that are named.
+
+    Raises:
+        InputError: their bus is not there.
+    """
+    bus = open_bus(settings.interface, settings.bus)
+    if settings.bus != SIMULATED:
+        return BusMotors(settings.motors, bus)
+    bank = BankOnBus(plants_of(settings.motors), open_bus(settings.interface, settings.bus))
+    return SimulatedMotors(settings.motors, bus, bank)
+
+
+def plants_of(settings: MotorSettings) -> list[Plant]:
+    """Simulated motors that are as the settings have them."""
+    reel = settings.reel
+    return [
+        Plant(inertia=reel.inertia, radius=reel.radius, stiffness=reel.stiffness, side=side) for side in settings.sides
+    ]
 
 
 class BankInThread(BankOnBus):

@@ -10,10 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.execution.ros_settings import RosSettings, Said
+from trunkline.execution.ros_settings import CONNECTING, RosSettings, Said
 
 PERIOD = 0.01  # s between points
-CONNECTING = 20.0  # s
 SILENT = 0.2  # s without the joints' state
 
 
@@ -57,54 +56,38 @@ def link_of(settings: RosSettings) -> Link:
 
 
 class RosArm:
-    """A robot that a controller moves, and whose joints' states are told. measured: the newest, (7,), rad."""
+    """A `Limb` of the Panda's joints, rad, that a controller moves, and whose states are told."""
 
     def __init__(self, settings: RosSettings) -> None:
-        self._settings, self.fault = settings, ""
-        self.measured, self._sent = np.full(len(settings.names), np.nan), np.full(len(settings.names), np.nan)
+        self._settings, self.fault, self.ready = settings, "", False
+        self.measured, self._sent = np.full(settings.axes, np.nan), np.full(settings.axes, np.nan)
         self._heard, self._told = time.monotonic(), 0.0
+        self._until = self._heard + CONNECTING
         self.link = link_of(settings)
 
     @property
-    def joints(self) -> np.ndarray:
-        """As they were sent last, or are where nothing was sent, (7,), rad."""
+    def sent(self) -> np.ndarray:
         return np.where(np.isnan(self._sent), self.measured, self._sent)
 
-    def begin(self) -> None:
-        """Wait until the joints' state is told and a controller listens.
-
-        Raises:
-            InputError: either is not there.
-        """
-        end = time.monotonic() + CONNECTING
-        while np.isnan(self.measured).any() or not self.link.listeners:
-            if time.monotonic() > end:
-                known = not np.isnan(self.measured).any()
-                missing = self._settings.trajectory if known else self._settings.states
-                side = (
-                    "found nobody who listens" if known else f"found no state of {self._settings.names[0]} and others"
-                )
-                raise InputError(f"{missing}: {side} within {CONNECTING:.0f} s")
-            time.sleep(0.01)
-            self._hear(time.monotonic())
-
-    def send(self, due: float, joints: np.ndarray) -> None:
-        """Where the joints shall be at `due`, s: (7,), rad."""
+    def send(self, due: float, axes: np.ndarray) -> None:
         now = time.monotonic()
         if now - self._told < PERIOD:
             return
-        self._told, self._sent = now, np.array(joints)
+        self._told, self._sent = now, np.array(axes)
         try:
-            self.link.send(max(due - now, 0.0), joints.tolist())
+            self.link.send(max(due - now, 0.0), axes.tolist())
         except InputError as error:
             self._fail(str(error))
 
     def turn(self, now: float) -> None:
         """Hear the joints' state."""
         self._hear(now)
+        if not self.ready:
+            self._look(now)
+            return
         if (silent := now - self._heard) > SILENT:
             self._fail(f"{self._settings.states}: silent for {1e3 * silent:.0f} ms")
-        off = np.abs(self.measured - self.joints)
+        off = np.abs(self.measured - self.sent)
         if off.max() > self._settings.astray:
             name, most = self._settings.names[int(off.argmax())], self._settings.astray
             self._fail(f"{name}: found {off.max():.3g} rad from where it is sent, expected at most {most:g}")
@@ -112,6 +95,15 @@ class RosArm:
     def close(self) -> None:
         """The controller is sent no more, and stands at the last point."""
         self.link.close()
+
+    def _look(self, now: float) -> None:
+        """Whether the joints' state is told and a controller listens."""
+        known = not np.isnan(self.measured).any()
+        self.ready = known and self.link.listeners > 0
+        if not self.ready and now > self._until:
+            missing = self._settings.trajectory if known else self._settings.states
+            side = "found nobody who listens" if known else f"found no state of {self._settings.names[0]} and others"
+            self._fail(f"{missing}: {side} within {CONNECTING:.0f} s")
 
     def _hear(self, now: float) -> None:
         for names, positions in self.link.states():

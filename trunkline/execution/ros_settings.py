@@ -8,6 +8,7 @@ from pydantic import Field
 Name = Annotated[str, Field(pattern=r"^(/\w+)+$", max_length=255)]
 Said = tuple[list[str], list[float]]  # names of joints, and where each is, rad
 NEWEST = 10  # states that wait to be heard
+CONNECTING = 20.0  # s
 NANO = 1_000_000_000
 
 
@@ -22,3 +23,8 @@ class RosSettings:
     states: Name
     names: tuple[str, str, str, str, str, str, str]
     astray: Annotated[float, Field(gt=0, le=0.5)]
+
+    @property
+    def axes(self) -> int:
+        """How many joints."""
+        return len(self.names)

@@ -1,6 +1,6 @@
 """All settings of conf/execution/config.yaml."""
 
-from trunkline.execution.arm import ArmSettings
+from trunkline.execution.adapted import ArmSettings
 from trunkline.execution.motors import MotorSettings
 from trunkline.execution.ros_settings import RosSettings
 from trunkline.settings import settings

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.execution.adapter_frames import Setpoint
+from trunkline.execution.limb_frames import Setpoint
 from trunkline.panda.kinematics import Q_MAX, Q_MIN
 from trunkline.panda.limits import ACCELERATION, JERK, VELOCITY
 
@@ -113,7 +113,7 @@ class Stream:
 
     def hear(self, setpoint: Setpoint, now: float) -> None:
         """A setpoint, at `now`, s."""
-        joints = np.array(setpoint.joints)
+        joints = np.array(setpoint.axes)
         if not (math.isfinite(setpoint.due) and np.isfinite(joints).all()):
             self.brake("setpoint: found values that are not finite")
         elif math.isnan(self._heard) and (off := float(np.abs(joints - self.joints).max())) > NEAR:
@@ -170,9 +170,9 @@ class Stream:
                 late = 1e3 * (now - self._heard)
                 self.brake(f"setpoints have run out, the last came {late:.0f} ms ago")
                 return None
-            return np.array(queue[0].joints)
+            return np.array(queue[0].axes)
         share = (self._clock - queue[0].due) / (queue[1].due - queue[0].due)
-        first, second = np.array(queue[0].joints), np.array(queue[1].joints)
+        first, second = np.array(queue[0].axes), np.array(queue[1].axes)
         return first + max(share, 0.0) * (second - first)
 
     def _take(self, wanted: np.ndarray, dt: float, missed: bool) -> None:
@@ -219,4 +219,4 @@ def _moved(before: np.ndarray, place: np.ndarray, dt: float) -> np.ndarray:
 
 
 def _same(first: Setpoint, second: Setpoint) -> bool:
-    return all(abs(a - b) < SAME for a, b in zip(first.joints, second.joints, strict=True))
+    return all(abs(a - b) < SAME for a, b in zip(first.axes, second.axes, strict=True))

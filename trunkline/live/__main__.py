@@ -16,9 +16,10 @@ from pathlib import Path
 
 from trunkline.called import called
 from trunkline.errors import InputError, in_one_line
+from trunkline.execution.bank import SIMULATED
 from trunkline.live.access import is_local, names_of
 from trunkline.live.certificate import fingerprint, make_certificate, tls_context
-from trunkline.live.hardware import MOTORS, ROBOTS, SIMULATED
+from trunkline.live.hardware import MOTORS, ROBOTS
 
 PORT = 8443  # kept: anchors of a headset belong to scheme, host and port
 ANY = ("0.0.0.0", "::", "")

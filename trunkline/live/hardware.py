@@ -5,14 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.execution.arm import ArmSettings
+from trunkline.execution.adapted import ArmSettings
+from trunkline.execution.bank import SIMULATED
 from trunkline.execution.motors import MotorSettings
 from trunkline.execution.ros_settings import RosSettings
 from trunkline.execution.settings import Config
 from trunkline.execution.stream import LIMITS, RobotLimits
 from trunkline.teleop.config import Config as Teleop
 
-SIMULATED = "virtual"  # the bus behind which the motors are simulated
 ROBOTS = ("simulated", "panda", "fr3", "ros2")
 MOTORS = ("simulated", "gm6020")
 MARGIN = 0.8  # share of a robot's own limits that plans may come to; the rest is for what bridges lost commands

@@ -16,15 +16,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from trunkline.errors import InputError
-from trunkline.execution.arm import Arm
-from trunkline.execution.bank import Plant as PlantOfMotor
-from trunkline.execution.machine import Arm as ArmOfMachine
+from trunkline.execution.adapted import panda
+from trunkline.execution.hosting import hosted
+from trunkline.execution.limb import Limb
 from trunkline.execution.machine import Machine
-from trunkline.execution.motors import MotorSettings
-from trunkline.execution.on_bus import BankOnBus, BusMotors, SimulatedMotors, open_bus
+from trunkline.execution.motors import MotorsOnBus
 from trunkline.execution.pace import PacedRobot
 from trunkline.execution.urgency import be_urgent
-from trunkline.live.hardware import SIMULATED, Hardware
+from trunkline.live.hardware import Hardware
 from trunkline.live.robot import POSE, READY, Channel, RobotProcess, Standing
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.panda.shipped import JOINTS
@@ -118,33 +117,16 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
             machine.close()
 
 
-def arm_of(hardware: Hardware) -> ArmOfMachine | None:
+def arm_of(hardware: Hardware) -> Limb | None:
     """The robot, None where none is named."""
     if hardware.robot == "ros2":
-        from trunkline.execution.ros_arm import RosArm  # with what it needs installed
-
-        return RosArm(hardware.ros)
-    return Arm(hardware.arm, hardware.robot) if hardware.robot else None
+        return hosted(hardware.ros)
+    return panda(hardware.arm, hardware.robot) if hardware.robot else None
 
 
-def motors_of(hardware: Hardware) -> BusMotors | None:
-    """The tendons' motors, or simulated ones; None where none are named."""
-    if not hardware.bus:
-        return None
-    bus = open_bus(hardware.interface, hardware.bus)
-    if hardware.bus != SIMULATED:
-        return BusMotors(hardware.motors, bus)
-    bank = BankOnBus(bank_of(hardware.motors), open_bus(hardware.interface, hardware.bus))
-    return SimulatedMotors(hardware.motors, bus, bank)
-
-
-def bank_of(settings: MotorSettings) -> list[PlantOfMotor]:
-    """Simulated motors that are as the settings have them."""
-    reel = settings.reel
-    return [
-        PlantOfMotor(inertia=reel.inertia, radius=reel.radius, stiffness=reel.stiffness, side=side)
-        for side in settings.sides
-    ]
+def motors_of(hardware: Hardware) -> Limb | None:
+    """The tendons' motors, None where none are named."""
+    return hosted(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface)) if hardware.bus else None
 
 
 class Pursuit:

@@ -1,0 +1,29 @@
+"""The adapter of simulated motors, the first of which is silent for HUSH s at the signal SIGUSR1."""
+
+import signal
+import sys
+import time
+
+from trunkline.execution import hosting, on_bus
+
+HUSH = 0.05  # s
+
+
+class Hushed(on_bus.BankOnBus):
+    """Such a bank. `until`: s until which its first motor is silent."""
+
+    until = 0.0
+
+    def turn(self) -> None:
+        self.bank.motors[0].silent = time.monotonic() < Hushed.until
+        super().turn()
+
+
+def hush(*_) -> None:
+    Hushed.until = time.monotonic() + HUSH
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGUSR1, hush)
+    on_bus.BankOnBus = Hushed
+    sys.exit(hosting.main(sys.argv[1:]))

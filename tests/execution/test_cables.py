@@ -1,0 +1,128 @@
+"""Motors as a limb: with a bench that a test turns, and in a process of their own."""
+
+import os
+import signal
+import time
+from functools import partial
+
+import numpy as np
+import pytest
+
+from tests.support import waiting
+from tests.support.motors import TICK, PlayedMotors, Workbench, homed, motor_settings
+from trunkline.execution.bank import SIMULATED
+from trunkline.execution.cables import HOMING, SILENT, Cables
+from trunkline.execution.hosting import hosted
+from trunkline.execution.motors import MotorsOnBus
+
+LEAD = 0.03  # s
+
+until = partial(waiting.until, seconds=30.0)
+
+
+class Played:
+    """Cables on a bench's clock."""
+
+    def __init__(self, bench):
+        self.bench = bench
+        self.cables = Cables(PlayedMotors(bench), bench.now)
+
+    def play(self, seconds, way=None):
+        """Sent `way(t)`, m, of all cables, LEAD s ahead, t from 0 on; nothing without it."""
+        begun = self.bench.now
+        for _ in range(round(seconds / TICK)):
+            self.bench.now += TICK
+            now = self.bench.now
+            for frame in self.bench.bank.advance(now):
+                self.bench.hear(frame)
+            if way is not None:
+                self.cables.send(now + LEAD, np.full(3, way(now - begun)))
+            self.cables.turn(now)
+            self.bench.drive(*self.cables._motors.wanted, now)
+
+
+def test_they_are_where_they_are_sent_when_it_is_due():
+    played = Played(homed())
+    played.play(1.0, lambda t: 0.03 * min(t, 1.0))
+    np.testing.assert_allclose(played.cables.sent, 0.03 * (1.0 - LEAD), atol=1e-6)
+    np.testing.assert_allclose(played.bench.pulls, played.cables.sent, atol=1.5e-3)
+    assert played.cables.fault == ""
+
+
+def test_where_setpoints_end_they_hold_and_follow_no_more():
+    played = Played(homed())
+    played.play(0.5, lambda t: 0.03 * t)
+    played.play(LEAD + SILENT)
+    assert played.cables.fault.startswith("silent for 5")
+    held = played.cables.sent
+    np.testing.assert_allclose(held, 0.015, atol=1e-6)
+    played.play(0.3, lambda t: 0.05)
+    np.testing.assert_array_equal(played.cables.sent, held)
+    np.testing.assert_allclose(played.bench.pulls, held, atol=5e-4)
+    assert all(played.bench.currents)
+
+
+def test_a_setpoint_that_is_no_number_is_not_followed():
+    played = Played(homed())
+    played.play(0.2, lambda t: 0.0)
+    played.cables.send(played.bench.now + LEAD, np.array([0.0, np.nan, 0.0]))
+    played.play(0.2, lambda t: 0.01)
+    assert played.cables.fault == "setpoint: found values that are not finite"
+    np.testing.assert_array_equal(played.cables.sent, 0.0)
+
+
+def test_motors_that_are_not_homed_in_time_are_a_fault():
+    played = Played(Workbench())
+    played.play(0.1)
+    assert not played.cables.ready
+    played.cables.turn(played.bench.now + HOMING)
+    assert played.cables.fault == "not homed after 60 s"
+
+
+# --- as a process, in real time; margins are wide, as machines are busy
+
+
+@pytest.fixture
+def limb():
+    found = hosted(MotorsOnBus(motor_settings(), SIMULATED, "virtual"))
+    until(lambda: found.ready or found.fault, lambda: found.turn(time.monotonic()))
+    yield found
+    found.close()
+
+
+def test_in_a_process_of_their_own_they_home_and_follow(limb):
+    if limb.fault:
+        pytest.skip(f"this machine is too busy: {limb.fault}")
+    np.testing.assert_allclose(limb.measured, 0.0, atol=2e-3)
+
+    def each():
+        limb.send(time.monotonic() + LEAD, np.full(3, 0.001))
+        limb.turn(time.monotonic())
+
+    until(lambda: limb.fault or limb.sent.min() > 0.0009, each)
+    assert limb.fault == "" or "silent" in limb.fault
+
+
+def test_their_process_killed_is_a_fault(limb):
+    limb.process.kill()
+    until(lambda: limb.fault, lambda: limb.turn(time.monotonic()))
+    assert limb.fault == "its adapter has ended" or "silent" in limb.fault
+
+
+def test_their_process_hanging_is_a_fault(limb):
+    os.kill(limb.process.pid, signal.SIGSTOP)
+    until(lambda: limb.fault, lambda: limb.turn(time.monotonic()))
+    os.kill(limb.process.pid, signal.SIGCONT)
+    assert "silent for" in limb.fault
+
+
+def test_it_ends_once_nobody_speaks_to_it(limb):
+    limb.line.close()
+    assert limb.process.wait(waiting.SOON) == 0
+
+
+def test_a_bus_that_is_not_there_is_one_line():
+    found = hosted(MotorsOnBus(motor_settings(), "nowhere0", "socketcan"))
+    until(lambda: found.fault, lambda: found.turn(time.monotonic()))
+    assert found.fault.startswith("bus nowhere0: found no socketcan bus that opens")
+    found.close()

@@ -1,0 +1,104 @@
+"""The adapter of what runs in this environment: the tendons' motors, or a controller of ROS 2.
+
+    python -m trunkline.execution.hosting SETTINGS DESCRIPTOR
+
+SETTINGS: of either, as JSON. DESCRIPTOR: of the socket to the machine's process, which starts it; by hand it is of
+no use.
+"""
+
+import contextlib
+import gc
+import math
+import socket
+import sys
+import time
+
+import numpy as np
+from pydantic import TypeAdapter
+
+from trunkline.errors import InputError
+from trunkline.execution.adapted import Adapted
+from trunkline.execution.bank import SIMULATED
+from trunkline.execution.limb import TICK, Limb
+from trunkline.execution.limb_frames import Line, Setpoint, Told
+from trunkline.execution.motors import HOMING, MotorsOnBus
+from trunkline.execution.ros_settings import CONNECTING, RosSettings
+from trunkline.execution.urgency import be_urgent
+
+TELL = 5  # turns from one frame told to the next
+LATE = 0.02  # s that turns may be behind before some are left out
+SETTLES = 0.2  # s for which a limb that nobody sends is held before it is given back
+STARTING = 5.0  # s that a process has to start
+
+
+Hosted = MotorsOnBus | RosSettings
+HOSTED: TypeAdapter[Hosted] = TypeAdapter(Hosted)
+
+
+def hosted(settings: Hosted, module: str = "trunkline.execution.hosting") -> Adapted:
+    """The limb of these settings, in a process of its own, which runs the `module`."""
+    patience = CONNECTING if isinstance(settings, RosSettings) else HOMING
+    command = [sys.executable, "-m", module, HOSTED.dump_json(settings).decode()]
+    return Adapted(command, settings.axes, patience + STARTING)
+
+
+def limb_of(settings: Hosted) -> Limb:
+    """The same, in this process.
+
+    Raises:
+        InputError: what it needs is not there.
+    """
+    if isinstance(settings, RosSettings):
+        from trunkline.execution.ros_arm import RosArm  # each with what it needs installed
+
+        return RosArm(settings)
+    from trunkline.execution.cables import Cables
+    from trunkline.execution.on_bus import motors_on
+
+    return Cables(motors_on(settings), time.monotonic())
+
+
+def host(limb: Limb, line: Line) -> None:
+    """Turn the limb until nobody is at the other end, and SETTLES s more."""
+    due, gone, turns, fault = time.monotonic(), math.inf, 0, ""
+    while (now := time.monotonic()) - gone < SETTLES:
+        for frame in line.heard():
+            setpoint = Setpoint.unpack(frame)
+            limb.send(setpoint.due, np.array(setpoint.axes))
+        gone = gone if line.open else min(gone, now)
+        limb.turn(now)
+        if limb.fault != fault or (limb.ready and turns % TELL == 0):
+            fault = limb.fault
+            tell(line, Told(now, tuple(limb.measured), tuple(limb.sent), fault))
+        turns, due = turns + 1, max(due + TICK, now - LATE)
+        time.sleep(max(due - time.monotonic(), 0.0))
+
+
+def tell(line: Line, told: Told) -> None:
+    """Unless nobody listens; whoever is slow misses a frame."""
+    with contextlib.suppress(OSError):
+        line.send(told.pack())
+
+
+def main(arguments: list[str]) -> int:
+    settings, descriptor = HOSTED.validate_json(arguments[0]), int(arguments[1])
+    with socket.socket(fileno=descriptor) as channel:
+        line, limb = Line(channel, Setpoint.size(settings.axes)), None
+        try:
+            limb = limb_of(settings)
+            gc.freeze()
+            if isinstance(settings, RosSettings) or settings.bus != SIMULATED:
+                be_urgent()
+            host(limb, line)
+        except InputError as error:
+            unknown = (math.nan,) * settings.axes
+            tell(line, Told(time.monotonic(), unknown, unknown, str(error)))
+            return 1
+        finally:
+            if limb is not None:
+                limb.close()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
