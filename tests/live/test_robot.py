@@ -22,7 +22,7 @@ from trunkline.live import simulated
 from trunkline.live.bodies import Poses, drawn
 from trunkline.live.house import SEARCH, subject_of
 from trunkline.live.logbook import tip_path
-from trunkline.live.robot import DEAD_MAN, PERMIT, PERMITTED, POSE, STOPS, Channel, RobotProcess
+from trunkline.live.robot import DEAD_MAN, FRESH, PERMIT, PERMITTED, POSE, STOPS, TELLS, Channel, RobotProcess, told_by
 from trunkline.live.settings import Config
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -250,3 +250,10 @@ def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
     assert DEAD_MAN < loop.held - began < DEAD_MAN + LATE
     assert np.abs(plan().joints - robot.joints).max(axis=1).min() < 1e-3
     assert DEAD_MAN < time.monotonic() - began < 2.0
+
+
+def test_the_next_telling_is_the_first_from_when_it_is_wanted():
+    for told in (0.0, 0.9995, 1.0, 1.002, 3.0):
+        after = told_by(1.0, told) - FRESH
+        assert 1.0 - 1e-9 <= after < 1.0 + TELLS
+        assert (after - told) / TELLS == pytest.approx(round((after - told) / TELLS))

@@ -6,6 +6,7 @@ no permit, only by another start.
 """
 
 import ctypes
+import math
 import multiprocessing
 import time
 from collections.abc import Callable
@@ -22,11 +23,18 @@ from trunkline.teleop.trajectory import JOINTS, Limits
 
 DEAD_MAN = 0.08  # s without a permit
 STALE = 0.15  # s without a sign of the robot's process
+TELLS = 1 / 240  # s, about, from one telling of the robot's process to the next
+FRESH = 0.0005  # s after which that is heard
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
 TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before axes, sent and measured, thing and bodies
 PERMIT, PERMITTED, STOPS, STOPPED = range(4)  # of what it is told
 POSE = 7
+
+
+def told_by(due: float, told: float) -> float:
+    """The first s from `due` on at which a robot that told of itself at `told`, s, should have done so anew."""
+    return told + math.ceil((due - told) / TELLS) * TELLS + FRESH
 
 
 class Channel:

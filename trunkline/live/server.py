@@ -25,6 +25,7 @@ from trunkline.live.controllers import held
 from trunkline.live.desk import Desk
 from trunkline.live.garbage import Garbage
 from trunkline.live.lease import Control
+from trunkline.live.robot import told_by
 from trunkline.live.scene import Shells
 from trunkline.live.settings import Alignment
 from trunkline.live.showing import Showing, piece
@@ -375,12 +376,13 @@ class Server:
             await asyncio.wait_for(asyncio.gather(*ends), PARTING)
 
     async def _run(self) -> None:
-        """Ticks at the house's rate; one that is late is not made up for."""
+        """Ticks at the house's rate, each once the robot has told of itself; one that is late is not made up for."""
         period = 1 / self.house.rate
         self._ticked = self.now()
         due = self._ticked + period
         while True:
-            await asyncio.sleep(max(due - self.now(), 0.0))
+            after = told_by(due, self.desk.robot.standing().time)
+            await asyncio.sleep(max(after - self.now(), 0.0))
             self.step()
             due = max(due + period, self._ticked)
 

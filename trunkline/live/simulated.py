@@ -23,7 +23,7 @@ from trunkline.hybrid.compose import panda_joints
 from trunkline.hybrid.futures import Twin
 from trunkline.hybrid.torques import servo_commands
 from trunkline.live.bodies import Poses
-from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, Channel, Goal
+from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Channel, Goal
 from trunkline.panda.shipped import JOINTS
 from trunkline.simulation.motion import batch_of, hold
 from trunkline.simulation.rubbing import REFRESH, rubbing
@@ -35,7 +35,6 @@ from trunkline.teleop.trajectory import Limits
 
 LISTENS = 0.2  # s from being woken within which a plan comes: a thread of the server's sends it
 SETTLES = 0.1  # s for which it goes on after a motion whose server is gone: a machine is that far behind, and less
-TELLS = 0.004  # s between two tellings of a robot that is moved more often
 BEHIND = 0.25  # s that real time may run ahead of the simulation before it is let go
 NICE = -5  # asked for; without the right to it, none
 
@@ -60,8 +59,9 @@ class Plant:
     def __init__(self, simulation: Simulation) -> None:
         model = simulation.twin.model
         self.model, self.batch, self._own = model, batch_of(model, 1), np.zeros(1, dtype=np.int32)
-        self.steps = max(round(REFRESH / model.opt.timestep), 1)
+        self.steps = max(round(TELLS / model.opt.timestep), 1)
         self.tick = self.steps * model.opt.timestep
+        self._ticks, self._refresh = 0, max(round(REFRESH / self.tick), 1)  # so far; from one to the next new friction
         if simulation.twin.start is not None:
             self.batch.bind("qpos")[:] = simulation.twin.start
         self._joints, self._motors = panda_joints(model), actuators(model)
@@ -81,7 +81,7 @@ class Plant:
         hold(self.batch, model, controls)
         self._winches, self._rub = Winches(self.batch, controls[:, self._motors]), rubbing(self.batch)
         if self._rub is not None:
-            self._rub.begin(np.arange(1))
+            self._rub.begin(self._own)
 
     def move(self, joints: np.ndarray, commands: np.ndarray, smooth: bool = False) -> None:
         """One tick with the axes on their way to `joints` (7,), rad, and `commands` (K,), m: each step is sent where
@@ -93,8 +93,9 @@ class Plant:
         sent = (self._commands + share * (commands - self._commands))[None]
         controls[:, :, self._motors] = self._winches.deliver(sent, self._own)
         self._servo, self._commands = servo, np.array(commands)
-        if self._rub is not None:
-            self._rub.refresh(np.arange(1))
+        if self._rub is not None and self._ticks % self._refresh == 0:
+            self._rub.refresh(self._own)
+        self._ticks += 1
         self.batch.rollout(self.steps, control=controls)
 
     @property
@@ -228,7 +229,7 @@ def drive(loop: Loop, parent: int) -> None:
             due += loop.plant.tick
             if now - due > BEHIND:
                 due = now
-        if woken or now >= told + TELLS:
+        if woken or now >= told + TELLS - loop.plant.tick / 2:
             told = now
             loop.tell(time.monotonic())
 
