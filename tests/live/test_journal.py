@@ -274,7 +274,7 @@ if __name__ == "__main__":
     journal = JournalProcess(Path(sys.argv[1]), NOTHING, 60.0)
     for number in range(1, 301):
         journal.event("tick", number=number)
-    while journal._waiting.qsize():
+    while journal._waiting:
         time.sleep(0.01)
     time.sleep(0.1)
     print("told", flush=True)

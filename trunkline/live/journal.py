@@ -6,11 +6,10 @@ written any more, `fault` says why, and whoever moves the robot has to hold it.
 
 import ctypes
 import multiprocessing
-import queue
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -45,6 +44,7 @@ from trunkline.teleop.messages import Input, Intent, Pose
 
 MOST = 5000  # records that may wait: some 15 s of a session
 _EVENT = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="null"))
+GATHERS = 0.02  # s
 PATIENCE = 5.0  # s that the process has to end in
 
 
@@ -130,7 +130,8 @@ class JournalProcess(Journal):
         )  # fmt: skip
         self._process.start()
         theirs.close()
-        self._waiting: queue.Queue[Record | None] = queue.Queue(MOST)
+        self._waiting: deque[Record] = deque()
+        self._ended = threading.Event()
         threading.Thread(target=self._send, daemon=True).start()
 
     @property
@@ -144,29 +145,28 @@ class JournalProcess(Journal):
     def keep(self, record: Record) -> None:
         if self.fault:
             return
-        try:
-            self._waiting.put_nowait(record)
-        except queue.Full:  # from here on nothing is written: what is there stays without gaps
+        if len(self._waiting) < MOST:
+            self._waiting.append(record)
+        else:  # from here on nothing is written: what is there stays without gaps
             self._lost = f"log: {self.path.name}: the disk does not keep up; nothing is executed"
 
     def close(self) -> None:
         """Write what waits, and end the file."""
         self.settle()
-        with suppress(queue.Full):
-            self._waiting.put(None, timeout=PATIENCE)
+        self._ended.set()
         self._process.join(PATIENCE)
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
 
     def _send(self) -> None:
-        """Records until there is a None, all that wait at once: to send each alone costs as much as to make it."""
-        waiting = self._waiting
-        records: list[Record | None] = []
+        """Records until it is closed, those of GATHERS s at once: to send each alone costs as much as to make it."""
+        waiting, ended = self._waiting, False
         try:
-            while None not in records and not self._lost:
-                records = [waiting.get(), *(waiting.get() for _ in range(waiting.qsize()))]
-                self._pipe.send([record for record in records if record is not None])
+            while not (ended or self._lost):
+                ended = self._ended.wait(GATHERS)
+                if records := [waiting.popleft() for _ in range(len(waiting))]:
+                    self._pipe.send(records)
         except OSError:
             self._lost = f"log: {self.path.name}: its process has ended; nothing is executed"
         finally:

@@ -11,6 +11,7 @@ import multiprocessing
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 from multiprocessing.context import SpawnContext
 
 import numpy as np
@@ -24,6 +25,7 @@ from trunkline.teleop.trajectory import JOINTS, Limits
 DEAD_MAN = 0.08  # s without a permit
 STALE = 0.15  # s without a sign of the robot's process
 TELLS = 1 / 240  # s, about, from one telling of the robot's process to the next
+LOOKS = 0.005  # s
 FRESH = 0.0005  # s after which that is heard
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
@@ -102,6 +104,9 @@ class RobotProcess:
         context = multiprocessing.get_context("spawn")
         self.channel = Channel(context, tendons, bodies)
         self._limits, self._package, self._serial, self._digest, self._begun = limits, package, 0, "", 0.0
+        edges = np.cumsum([5, JOINTS, tendons, JOINTS, tendons, POSE, POSE * bodies])
+        self._places = [slice(*ends) for ends in pairwise(edges)]
+        self._looked, self._alive = -math.inf, False  # when it was looked whether its process is there
         self._process = context.Process(target=run, args=(self.channel, *setup), daemon=True, name="robot")
         self._process.start()
 
@@ -111,8 +116,11 @@ class RobotProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether its process is there."""
-        return self._process.is_alive()
+        """Whether its process is there, as of LOOKS s ago at most: to look costs a call of the system."""
+        now = time.monotonic()
+        if now - self._looked > LOOKS:
+            self._looked, self._alive = now, self._process.is_alive()
+        return self._alive
 
     @property
     def ready(self) -> bool:
@@ -121,11 +129,9 @@ class RobotProcess:
 
     def standing(self) -> Standing:
         """The newest."""
-        numbers, k, n = self.channel.hear()[0], self.channel.tendons, self.channel.bodies
-        joints, commands, measured, lengths, thing, bodies = np.split(
-            numbers[5:], np.cumsum([JOINTS, k, JOINTS, k, POSE])
-        )
-        bodies = bodies.reshape(n, POSE)
+        numbers = self.channel.hear()[0]
+        joints, commands, measured, lengths, thing, bodies = (numbers[place] for place in self._places)
+        bodies = bodies.reshape(self.channel.bodies, POSE)
         return Standing(numbers[TIME], numbers[HELD], joints, commands, thing, bodies, measured, lengths)
 
     def check(self, plan: Plan) -> str:
