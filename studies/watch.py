@@ -1,10 +1,10 @@
 """In how many trials a watch finds a softer arm, and how often it cries wolf: `python -m studies.watch`
 
 The stand-in lab records the arm as it is and with all joints 5 % softer, under conditions that its session mostly does
-not have, each trial with noise of its own. `trunkline.watch` takes the logs in as a lab's and scores them; the
-reference is the first trials of each kind that come, and, beside it, the demo session's, which were planned and not
-drawn. Trials that are scored are kept in docs/results/watch.csv, as they take long; the charts are made anew from
-them. Each chart begins with trials of the unchanged arm.
+not have, each trial with noise of its own. `trunkline.watch` takes the logs in as a lab's and scores them. For each chart
+the unchanged arm's trials are put in another order: the first of each kind are its reference; beside it, the demo
+session's, which were planned and not drawn. Trials that are scored are kept in docs/results/watch.csv, as they take
+long; the charts are made anew from them.
 """
 
 import argparse
@@ -49,7 +49,7 @@ from trunkline.watch.watch import LEARN, scorer_of
 
 MODEL, TRIALS = Path("artifacts/identify_control/arm.xml"), Path("data/processed/filter")
 SOFTER = 0.95  # of the stiffness
-SEED, SEEDS = 7, 20
+SEED, SEEDS = 8, 20
 KINDS = ("static_tilt", "release", "curl", "static_pull", "motion")  # a number of its own for the draws of each
 EACH = {"static_tilt": 160, "release": 130, "static_pull": 60, "curl": 40, "motion": 10}  # of the unchanged arm
 AFTER = {"static_tilt": 3, "release": 3, "curl": 3, "static_pull": 3}  # of the softer one, a seed
@@ -171,57 +171,64 @@ def referred(rows: Rows, scorer: Scorer) -> list[Score]:
     return [unpacked(known[f"reference_{trial.name}"]["told"]) for trial in trials]
 
 
-def false_alarms(empty: Chart, scores: list[Score], words: str, names: tuple[str, ...]) -> list[str]:
-    """Of charts over the unchanged arm's trials, begun anew after each alarm."""
+def false_alarms(charts: list[Chart], rests: list[list[Score]], words: str, names: tuple[str, ...]) -> list[str]:
+    """Of charts over the trials of the unchanged arm that are no reference, begun anew after each alarm."""
     lines = []
     kinds = {"of all kinds, mixed": KINDS} | {f"`{kind}` alone": (kind,) for kind in TELLING}
     for mixture, chosen in kinds.items():
-        chart = deepcopy(empty)
-        chart.restart = True
-        own = [score for score in scores if score.kind in chosen]
-        alarms = [charted.alarms for charted in map(chart.add, own) if charted.alarms]
-        who = ", ".join(sorted({names[p] for found in alarms for p in found})) or "–"
-        often = f"{len(own) / len(alarms):.0f}" if alarms else f"more than {len(own)}"
-        lines.append(f"| {words} | {mixture} | {len(own)} | {len(alarms)} | {often} | {who} |")
+        alarms, count = [], 0
+        for empty, rest in zip(charts, rests, strict=True):
+            chart, own = deepcopy(empty), [score for score in rest if score.kind in chosen]
+            chart.restart = True
+            found = [charted.alarms for charted in map(chart.add, own)]
+            alarms.append([one for one in found if one])
+            count += len(own)
+        number = sum(map(len, alarms))
+        who = ", ".join(sorted({names[p] for found in alarms for one in found for p in one})) or "–"
+        often = f"{count / number:.0f}" if number else f"more than {count}"
+        quiet = f"{sum(not found for found in alarms)} of {len(charts)}"
+        lines.append(f"| {words} | {mixture} | {count} | {number} | {often} | {quiet} | {who} |")
     return lines
 
 
 def found_lines(
-    empty: Chart, seeds: int, pool: dict[str, list[Score]], softer: dict[str, dict[int, Score]], words: str, names
+    charts: list[Chart], rests: list[list[Score]], softer: dict[str, dict[int, Score]], words: str, names
 ) -> list[str]:
     """In how many trials of the softer arm each kind of trial finds it, and what is said to have changed."""
     lines = []
     mixed = {"tilts and releases in turn": ("static_tilt", "release", "static_tilt")}
     streams = mixed | {f"`{kind}` alone": (kind,) * LATEST for kind in AFTER}
     for mixture, kinds in streams.items():
-        cases = [case for seed in range(seeds) if (case := stream(seed, kinds, pool, softer)) is not None]
-        found = [outcome(empty, case) for case in cases]
-        told = [(when, explain(chart.suspects(), chart.baseline, list(chart.lines))) for when, chart in found if when]
+        cases = [
+            (empty, case) for seed, (empty, rest) in enumerate(zip(charts, rests, strict=True))
+            if (case := stream(seed, kinds, rest, softer)) is not None
+        ]  # fmt: skip
         if not cases:
             continue
+        found = [outcome(empty, case) for empty, case in cases]
+        told = [(when, explain(chart.suspects(), chart.baseline, list(chart.lines))) for when, chart in found if when]
         cells = [str(sum(when == n for when, _ in found)) for n in range(1, LATEST + 1)]
         cells.append(str(sum(not when for when, _ in found)))
         right = [one for _, one in told if names[one.best.parameter] == "stiffness"]
         cells.append(f"{len(right)} of {len(told)}")
         true = float(np.log(SOFTER))
         held = sum(abs(one.best.size - true) <= one.best.half_width for one in right)
-        size = np.median([one.best.size for one in right]) if right else np.nan
-        cells += [f"{100 * np.expm1(size):+.1f} %", f"{held} of {len(right)}"]
+        size = f"{100 * np.expm1(np.median([one.best.size for one in right])):+.1f} %" if right else "–"
+        cells += [size, f"{held} of {len(right)}"]
         cells.append(", ".join(sorted({names[c.parameter] for one in right for c in one.alike})) or "–")
         lines.append(f"| {words} | {mixture} | {len(cases)} | {' | '.join(cells)} |")
     return lines
 
 
-def stream(seed: int, kinds: tuple[str, ...], pool, softer) -> tuple[list[Score], list[Score]] | None:
+def stream(
+    seed: int, kinds: tuple[str, ...], rest: list[Score], softer: dict[str, dict[int, Score]]
+) -> tuple[list[Score], list[Score]] | None:
     """Trials of the unchanged arm, drawn, and those of the softer one that follow; None where they are not done."""
     rng = np.random.default_rng([SEED, seed])
     places = {kind: count(seed * AFTER[kind]) for kind in kinds}
-    found = [softer[kind].get(next(places[kind])) for kind in kinds]
-    after = [score for score in found if score is not None]
-    if len(after) < len(found):
-        return None
-    usual = [score for kind in dict.fromkeys(kinds) for score in pool[kind]]
-    if len(usual) < BEFORE:
+    after = [score for kind in kinds if (score := softer[kind].get(next(places[kind]))) is not None]
+    usual = [score for score in rest if score.kind in kinds]
+    if len(after) < len(kinds) or len(usual) < BEFORE:
         return None
     return [usual[i] for i in rng.choice(len(usual), BEFORE, replace=False)], after
 
@@ -238,30 +245,34 @@ def outcome(empty: Chart, case: tuple[list[Score], list[Score]]) -> tuple[int, C
     return 0, chart
 
 
-def report(reference: list[Score], trials: list, known: dict[str, dict], seeds: int, scorer: Scorer) -> None:
+def report(reference: list[Score], trials: list, rows: dict[str, dict], seeds: int, scorer: Scorer) -> None:
     """What the scores so far say."""
     names = scorer.parameters
-    told = {key: str(known[name]["told"]) for key in trials if (name := "_".join(map(str, key))) in known}
+    told = {key: str(rows[name]["told"]) for key in trials if (name := "_".join(map(str, key))) in rows}
     refused = [text for text in told.values() if text.startswith("refused")]
     scores = {key: unpacked(text) for key, text in told.items() if not text.startswith("refused")}
     unchanged = [score for (arm, _, _), score in scores.items() if arm == "unchanged"]
     softer = {kind: {i: s for (arm, k, i), s in scores.items() if (arm, k) == ("softer", kind)} for kind in AFTER}
-    first = [score for kind in KINDS for score in [score for score in unchanged if score.kind == kind][:LEARN]]
+    orders = [np.random.default_rng([SEED, seed]).permutation(len(unchanged)) for seed in range(seeds)]
+    mixed = [[unchanged[i] for i in order] for order in orders]
+    firsts = [[s for kind in KINDS for s in [s for s in own if s.kind == kind][:LEARN]] for own in mixed]
     seen, wolf = [], []
-    for words, known_trials in (("as they come", first), ("as planned", reference)):
-        empty = chart_of(Baseline(known_trials), len(names))
-        rest = [score for score in unchanged if not any(score is one for one in known_trials)]
-        pool = {kind: [score for score in rest if score.kind == kind] for kind in KINDS}
-        seen += found_lines(empty, seeds, pool, softer, words, names)
-        wolf += false_alarms(empty, rest, words, names)
+    for words, references in (("as they come", firsts), ("as planned", [reference] * seeds)):
+        known = [{id(score) for score in own} for own in references]
+        rests = [[score for score in own if id(score) not in ids] for own, ids in zip(mixed, known, strict=True)]
+        made = {id(own): chart_of(Baseline(own), len(names)) for own in references}
+        charts = [made[id(own)] for own in references]
+        seen += found_lines(charts, rests, softer, words, names)
+        wolf += false_alarms(charts, rests, words, names)
     heads = ["reference", "trials of the softer arm", "charts", *(f"found in {n}" for n in range(1, LATEST + 1))]
     heads += ["later or not", "named stiffness", "said to be, median", "± holds it", "not told apart from"]
     print("\n".join([f"| {' | '.join(heads)} |", "|---|---|" + "---:|" * (len(heads) - 3) + "---|", *seen]))
-    heads = ["reference", "trials of the unchanged arm", "trials", "false alarms", "one in", "by the charts of"]
-    print("\n".join([f"\n| {' | '.join(heads)} |", "|---|---|---:|---:|---:|---|", *wolf]))
+    heads = ["reference", "trials of the unchanged arm", "trials", "false alarms", "one in", "charts without any"]
+    heads.append("by the charts of")
+    print("\n".join([f"\n| {' | '.join(heads)} |", "|---|---|---:|---:|---:|---:|---|", *wolf]))
     print(f"\nrefused as logs: {len(refused)} of {len(told)} trials")
     print(f"reference: as they come, the first {LEARN} of each kind; as planned, {len(reference)} of the session")
-    if line := other_commits(known):
+    if line := other_commits(rows):
         print(line)
 
 

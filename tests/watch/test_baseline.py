@@ -45,6 +45,45 @@ def test_trials_done_alike_are_compared_with_each_other():
     assert other.deviation > 3 * found.deviation  # of a level of its own, it scatters as levels do
 
 
+def test_an_offset_that_changes_with_the_level_is_followed():
+    """As a softer model is off more the more it bends; where it is not, a curve is hardly ever taken."""
+    rng = np.random.default_rng(6)
+
+    def tilt(bow: float, change: float = 0.0):
+        level = float(rng.uniform(25, 100))
+        return drawn("static_tilt", rng, (bow * (level / 60) ** 2 + change, 0), level)
+
+    values, bent = [], 0
+    for _ in range(400):
+        baseline = Baseline([tilt(0.0) for _ in range(12)])
+        values.append(baseline.departure(tilt(0.0), 0).z)
+        bent += len(baseline.departure(tilt(0.0), 0).group.mean) > 1
+    assert np.std(values) == pytest.approx(1, abs=0.15)
+    assert bent / 400 < 0.02
+    baseline = Baseline([tilt(0.1) for _ in range(12)])
+    softer = [baseline.departure(tilt(0.1, -0.05), 0).change for _ in range(20)]
+    assert np.mean(softer) == pytest.approx(-0.05, abs=0.01)
+    assert abs(baseline.departure(tilt(0.1), 0).z) < 4
+
+
+def test_a_reference_trial_unlike_the_others_is_left_out():
+    rng = np.random.default_rng(7)
+    own = [drawn("release", rng) for _ in range(11)]
+    touched = drawn("release", rng, (-0.5, 0))
+    baseline, without = Baseline([*own[:5], touched, *own[5:]]), Baseline(own)
+    assert list(baseline.odd) == [5]
+    assert 0 in baseline.odd[5]
+    score = drawn("release", rng, (-0.05, 0))
+    assert baseline.departure(score, 0).z == pytest.approx(without.departure(score, 0).z)
+    assert without.odd == {}
+
+
+def test_few_reference_trials_are_all_kept():
+    rng = np.random.default_rng(8)
+    own = [*(drawn("release", rng) for _ in range(LEAST)), drawn("release", rng, (-0.5, 0))]
+    assert Baseline(own).odd == {}
+
+
 def test_too_few_reference_trials_and_other_kinds_chart_nothing():
     rng = np.random.default_rng(5)
     assert Baseline([drawn("curl", rng) for _ in range(LEAST)]).departures(drawn("curl", rng)) == {}

@@ -22,7 +22,7 @@ def test_false_alarms_are_as_rare_as_asked_for():
     count = trials = 0
     for _ in range(150):
         found = baseline(rng)
-        best = min(deviation for _, deviation in found.typical(0))
+        best = min(one.deviation for one, _ in found.typical(0))
         chart = Chart(found, {0: Line(limit, best)}, restart=True)
         for _ in range(60):
             count += bool(chart.add(drawn(KINDS[rng.integers(3)], rng)).alarms)

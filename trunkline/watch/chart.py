@@ -18,13 +18,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import ndtri, stdtr
 
-from trunkline.watch.baseline import Baseline, Departure
+from trunkline.watch.baseline import POWERS, Baseline, Departure
 from trunkline.watch.scores import Score
 
 FORGETTING = 0.25  # λ: Montgomery (2013, section 9.2) advises 0.05 to 0.25; the largest sees a few per cent soonest
 ALONE = 0.75  # of the limit, that one trial may move the chart
 NEAR = 1.0  # a chart's standard deviation; a change begins where the chart was last within (after Nishina 1992: at 0)
-FALSE_ALARMS = 1 / 500  # a trial, for all parameters together: an average run length of 500, as in the tables of EWMA
+FALSE_ALARMS = 1 / 5000  # a trial, for all parameters together, of normal estimates: real ones have longer tails
 RUNS, LENGTH, SEED = 2000, 200, 1  # of the simulation
 WIDEST = 12.0  # a limit; with more, a chart says nothing
 LONG_RUN = FORGETTING / (2 - FORGETTING)  # Var(A) after a long run of trials with w = 1
@@ -106,7 +106,7 @@ def chart_of(baseline: Baseline, parameters: int, rate: float = FALSE_ALARMS, re
     typical = {p: found for p in range(parameters) if (found := baseline.typical(p))}
     lines = {}
     for p, found in typical.items():
-        best = min(deviation for _, deviation in found)
+        best = min(one.deviation for one, _ in found)
         lines[p] = Line(limit_of(baseline, p, rate / len(typical)), best)
     return Chart(baseline, lines, restart)
 
@@ -114,23 +114,23 @@ def chart_of(baseline: Baseline, parameters: int, rate: float = FALSE_ALARMS, re
 def limit_of(baseline: Baseline, p: int, rate: float) -> float:
     """The limit of |Q| that trials of an unchanged arm, of the reference's mixture, pass at this rate."""
     rng, typical = np.random.default_rng([SEED, p]), baseline.typical(p)
-    best = min(deviation for _, deviation in typical)
-    weights = np.array([best / deviation for _, deviation in typical])
-    groups = list({group.key: group for group, _ in typical}.values())
+    deviations = np.array([one.deviation for one, _ in typical])
+    weights = deviations.min() / deviations
+    groups = list({one.group.key: one.group for one, _ in typical}.values())
     place = {group.key: i for i, group in enumerate(groups)}
-    of = np.array([place[group.key] for group, _ in typical])
+    of = np.array([place[one.group.key] for one, _ in typical])
     degrees = np.array([group.degrees for group in groups])
     # what a reference of these sizes gets wrong, in each run: the mean, and the spread over the true one
-    shared = np.array([group.spread / np.sqrt(group.weight) / d for group, d in typical])
+    shared = np.array([one.group.shared(score.level) / one.deviation for one, score in typical])
     # the spread is pooled over the conditions of a kind, so its error is theirs together
     pools = {(key[0], len(key) > 1): i for i, key in enumerate(place)}
     pooled = np.array([pools[key[0], len(key) > 1] for key in place])
-    means, spreads = rng.normal(size=(RUNS, len(groups))), rng.chisquare(degrees, (RUNS, len(groups))) / degrees
+    means, spreads = rng.normal(size=(RUNS, len(groups), POWERS)), rng.chisquare(degrees, (RUNS, len(groups))) / degrees
     spreads = np.sqrt(spreads[:, pooled])
     drawn = rng.integers(len(typical), size=(LENGTH, RUNS))
     row = np.arange(RUNS)
-    own = rng.normal(size=(LENGTH, RUNS)) * np.sqrt(1 - shared[drawn] ** 2)
-    x = (own - shared[drawn] * means[row, of[drawn]]) / spreads[row, of[drawn]]
+    own = rng.normal(size=(LENGTH, RUNS)) * np.sqrt(1 - np.square(shared).sum(axis=1))[drawn]
+    x = (own - np.einsum("trp,trp->tr", shared[drawn], means[row, of[drawn]])) / spreads[row, of[drawn]]
     z = -np.sign(x) * ndtri(stdtr(degrees[of[drawn]], -np.abs(x)))
     low, high = 1.0, WIDEST
     while high - low > 0.01:

@@ -80,7 +80,7 @@ def _shared(one: Charted, p: int, other: Charted, q: int, same: bool) -> float:
     if same:
         found += first.spread * second.spread / np.sqrt(one.score.information[p] * other.score.information[q])
     if first.key == second.key:
-        found += first.spread * second.spread / np.sqrt(first.weight * second.weight)
+        found += first.shared(one.score.level) @ second.shared(other.score.level)
     return float(found)
 
 

@@ -25,7 +25,7 @@ from trunkline.watch.patience import Patience
 from trunkline.watch.scores import Score, Scorer, watched_in
 from trunkline.watch.words import change_lines, chart_table, reference_lines, trial_line
 
-LEARN = 12  # trials of each kind that stand for the unchanged arm, where no reference is given
+LEARN = 15  # trials of each kind that stand for the unchanged arm, where no reference is given
 STAGES = ("identify_damping", "identify_control", "identify_stiffness")  # whose loss weighs the residuals
 
 

@@ -86,6 +86,9 @@ def reference_lines(baseline: Baseline, chart: Chart, names: tuple[str, ...]) ->
                 if unit != "%" or width < HARDLY:
                     told.append(f"{names[p]} {_short(width)} {unit}".rstrip())
         lines.append(f"  one {kind} tells to ±: {', '.join(told) or f'nothing, it takes {LEAST + 1} or more'}")
+    for number, unlike in baseline.odd.items():
+        trial, charts = baseline.reference[number].name, ", ".join(names[p] for p in unlike)
+        lines.append(f"  {trial} is unlike the others of its kind, and left out of the charts of {charts}")
     idle = [name for p, name in enumerate(names) if p not in chart.lines]
     return lines + ([f"  not charted, as the reference does not tell them: {', '.join(idle)}"] if idle else [])
 
