@@ -1,10 +1,10 @@
 """In how many trials a watch finds a softer arm, and how often it cries wolf: `python -m studies.watch`
 
-The stand-in lab records the arm as it is and with all joints 5 % softer, under conditions that its session mostly does
-not have, each trial with noise of its own. `trunkline.watch` takes the logs in as a lab's and scores them. The unchanged
-arm's trials are put in another order for each chart: the first of each kind are its reference. Beside it stands the
-demo session's, which were planned and not drawn. Trials that are scored are kept in docs/results/watch.csv, as they
-take long; the charts are made anew from them.
+The stand-in lab records the arm as it is and with all joints 5 % softer, under conditions that its session mostly
+does not have, each trial with noise of its own. `trunkline.watch` takes the logs in as a lab's and scores them. The
+unchanged arm's trials are put in another order for each chart: the first of each kind are its reference. Beside it
+stands the demo session's, which were planned and not drawn. Trials that are scored are kept in
+docs/results/watch.csv, as they take long; the charts are made anew from them.
 """
 
 import argparse
