@@ -21,7 +21,7 @@ def made(tmp_path_factory):
     root = tmp_path_factory.mktemp("made")
     (root / "params.yaml").write_text((ROOT / "params.yaml").read_text())
     write_model(root / "arm.xml")
-    for name, share, repeats, seed in (("reference", 1.0, 3, 1), ("same", 1.0, 1, 2), ("softer", 0.95, 1, 3)):
+    for name, share, repeats, seed in (("reference", 1.0, 4, 1), ("same", 1.0, 1, 2), ("softer", 0.95, 1, 3)):
         record(root / "sessions" / name, share, repeats, seed)
     (root / "drop").mkdir()
     assert main(words(root)) == 0
