@@ -91,7 +91,8 @@ def _response(trial: Charted, q: int, p: int) -> float:
 
 def _correlation(kind: str, baseline: Baseline) -> np.ndarray:
     """Of the estimates of an unchanged arm's trials of a kind, shrunk towards none. Shape (P, P)."""
-    own = [score for score in baseline.reference if score.kind == kind]
+    known = enumerate(baseline.reference)
+    own = [score for number, score in known if score.kind == kind and number not in baseline.odd]
     count = len(own[0].slope)
     values = np.full((len(own), count), np.nan)
     for i, score in enumerate(own):
