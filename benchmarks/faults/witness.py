@@ -94,7 +94,8 @@ def machine(channel: Watched, *setup) -> None:
     assert witness is not None
 
     def motors(hardware: Hardware) -> Adapted:
-        found = hosted(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface), "benchmarks.faults.hushed")
+        named = MotorsOnBus(hardware.motors, hardware.bus, hardware.interface, hardware.real)
+        found = hosted(named, "benchmarks.faults.hushed")
         witness.motors = found.process.pid
         return found
 

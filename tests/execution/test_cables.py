@@ -84,7 +84,7 @@ def test_motors_that_are_not_homed_in_time_are_a_fault():
 
 @pytest.fixture
 def limb():
-    found = hosted(MotorsOnBus(motor_settings(), SIMULATED, "virtual"))
+    found = hosted(MotorsOnBus(motor_settings(), SIMULATED, "virtual", False))
     until(lambda: found.ready or found.fault, lambda: found.turn(time.monotonic()))
     yield found
     found.close()
@@ -122,7 +122,7 @@ def test_it_ends_once_nobody_speaks_to_it(limb):
 
 
 def test_a_bus_that_is_not_there_is_one_line():
-    found = hosted(MotorsOnBus(motor_settings(), "nowhere0", "socketcan"))
+    found = hosted(MotorsOnBus(motor_settings(), "nowhere0", "socketcan", True))
     until(lambda: found.fault, lambda: found.turn(time.monotonic()))
     assert found.fault.startswith("bus nowhere0: found no socketcan bus that opens")
     found.close()

@@ -18,7 +18,6 @@ from pydantic import TypeAdapter
 
 from trunkline.errors import InputError
 from trunkline.execution.adapted import Adapted
-from trunkline.execution.bank import SIMULATED
 from trunkline.execution.limb import TICK, Limb
 from trunkline.execution.limb_frames import Line, Setpoint, Told
 from trunkline.execution.motors import HOMING, MotorsOnBus
@@ -87,7 +86,7 @@ def main(arguments: list[str]) -> int:
         try:
             limb = limb_of(settings)
             gc.freeze()
-            if isinstance(settings, RosSettings) or settings.bus != SIMULATED:
+            if settings.urgent:
                 be_urgent()
             host(limb, line)
         except InputError as error:

@@ -38,11 +38,13 @@ class MotorSettings:
 
 @dataclass(frozen=True)
 class MotorsOnBus:
-    """`motors` on a `bus` of python-can's `interface`; on the bus `bank.SIMULATED`, simulated ones."""
+    """`motors` on a `bus` of python-can's `interface`; on the bus `bank.SIMULATED`, simulated ones. urgent: whether
+    anything real moves with them."""
 
     motors: MotorSettings
     bus: str
     interface: str
+    urgent: bool
 
     @property
     def axes(self) -> int:

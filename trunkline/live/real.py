@@ -126,7 +126,9 @@ def arm_of(hardware: Hardware) -> Limb | None:
 
 def motors_of(hardware: Hardware) -> Limb | None:
     """The tendons' motors, None where none are named."""
-    return hosted(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface)) if hardware.bus else None
+    if not hardware.bus:
+        return None
+    return hosted(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface, hardware.real))
 
 
 class Pursuit:
