@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from functools import partial
 
@@ -126,3 +128,8 @@ def test_a_bus_that_is_not_there_is_one_line():
     until(lambda: found.fault, lambda: found.turn(time.monotonic()))
     assert found.fault.startswith("bus nowhere0: found no socketcan bus that opens")
     found.close()
+
+
+def test_a_robot_alone_needs_no_library_of_motors():
+    code = "import sys; sys.modules['can'] = None; import trunkline.live.real, trunkline.execution.hosting"
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

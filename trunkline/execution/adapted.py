@@ -23,7 +23,7 @@ from trunkline.execution.limb_frames import Line, Setpoint, Told
 from trunkline.panda.shipped import JOINTS
 
 ROOT = Path(__file__).parents[2]
-CONNECTING = 25.0  # s that a robot has; its adapter may wait for 20 of them
+CONNECTING = 20.0  # s that a robot has to be there
 SILENT = 0.1  # s without a frame of the adapter
 CLOSING = 3.0  # s
 

@@ -7,7 +7,6 @@ ROBOT: `panda` (panda-python, libfranka 0.9), `fr3` (pylibfranka) or `fake`, whi
 socket. `trunkline.execution.adapted` starts it; by hand it is of no use.
 """
 
-import contextlib
 import importlib
 import socket
 import sys
@@ -115,19 +114,14 @@ class Adapter:
             stream.brake("the machine's process is gone")
         sent = stream.cycle(now, dt).tolist()
         if self._count % TELL == 0:
-            self.tell(Told(now, tuple(measured), tuple(sent), stream.fault))
+            self._line.tell(Told(now, tuple(measured), tuple(sent), stream.fault))
         self._count += 1
         return sent, stream.resting and not self._line.open
 
     def fail(self, fault: str) -> None:
         """The robot has ended control."""
         sent = tuple(self._stream.joints) if self._stream is not None else (0.0,) * JOINTS
-        self.tell(Told(time.monotonic(), sent, sent, fault))
-
-    def tell(self, told: Told) -> None:
-        """Unless nobody listens; whoever is slow misses a frame."""
-        with contextlib.suppress(OSError):
-            self._line.send(told.pack())
+        self._line.tell(Told(time.monotonic(), sent, sent, fault))
 
 
 def main(arguments: list[str]) -> int:

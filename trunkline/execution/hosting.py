@@ -6,7 +6,6 @@ SETTINGS: of either, as JSON. DESCRIPTOR: of the socket to the machine's process
 no use.
 """
 
-import contextlib
 import gc
 import math
 import socket
@@ -68,15 +67,9 @@ def host(limb: Limb, line: Line) -> None:
         limb.turn(now)
         if limb.fault != fault or (limb.ready and turns % TELL == 0):
             fault = limb.fault
-            tell(line, Told(now, tuple(limb.measured), tuple(limb.sent), fault))
+            line.tell(Told(now, tuple(limb.measured), tuple(limb.sent), fault))
         turns, due = turns + 1, max(due + TICK, now - LATE)
         time.sleep(max(due - time.monotonic(), 0.0))
-
-
-def tell(line: Line, told: Told) -> None:
-    """Unless nobody listens; whoever is slow misses a frame."""
-    with contextlib.suppress(OSError):
-        line.send(told.pack())
 
 
 def main(arguments: list[str]) -> int:
@@ -91,7 +84,7 @@ def main(arguments: list[str]) -> int:
             host(limb, line)
         except InputError as error:
             unknown = (math.nan,) * settings.axes
-            tell(line, Told(time.monotonic(), unknown, unknown, str(error)))
+            line.tell(Told(time.monotonic(), unknown, unknown, str(error)))
             return 1
         finally:
             if limb is not None:
