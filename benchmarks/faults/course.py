@@ -81,6 +81,7 @@ FAULTS = (
     Fault("log's process killed", _kill("journal")),
     Fault("robot's process killed", _kill("robot")),
     Fault(f"a motor silent for {1e3 * HUSH:g} ms", lambda s: s.witness.hush(), motors=True),
+    Fault("machine's process killed, with motors", _kill("robot"), motors=True),
     Fault("motors' process hangs", lambda s: os.kill(s.witness.motors, signal.SIGSTOP), motors=True),
     Fault("motors' process killed", lambda s: os.kill(s.witness.motors, signal.SIGKILL), motors=True),
 )
