@@ -3,6 +3,9 @@ parameter: results are the same bits.
 
 `TRUNKLINE_SCHEDULER` names the scheduler's address; nothing, the default, is this machine. Work comes in pieces of
 which none depends on another. docs/cluster.md says how to start scheduler and workers.
+
+`TRUNKLINE_BATCHES` names what moves large batches of simulations that may be rough: `mujoco`, the default, or `warp`,
+MuJoCo Warp on a GPU, whose results are not the same bits.
 """
 
 import functools
@@ -14,13 +17,31 @@ from typing import Any
 import numpy as np
 
 from trunkline.cluster import VARIABLE, Cluster, at_a_piece
+from trunkline.errors import InputError, nearest
 
+BATCHES, MUJOCO, WARP = "TRUNKLINE_BATCHES", "mujoco", "warp"
 PIECES = 4  # handed out to each worker's thread, so that one with the slow pieces does not end last
 
 
 def elsewhere() -> bool:
     """Whether work is done by workers of a scheduler."""
     return bool(_address())
+
+
+def rough_by_warp() -> bool:
+    """Whether MuJoCo Warp moves large batches that may be rough. Never those of a piece of work that a scheduler
+    sent: how large they are depends on how it was cut.
+
+    Raises:
+        InputError: there is no such name, or workers are to share the work.
+    """
+    found = os.environ.get(BATCHES, "").strip() or MUJOCO
+    if found not in (MUJOCO, WARP):
+        names = [MUJOCO, WARP]
+        raise InputError(f"{BATCHES}: found {found!r}, expected one of {', '.join(names)}{nearest(found, names)}")
+    if found == WARP and elsewhere():
+        raise InputError(f"{BATCHES}: found {WARP} beside {VARIABLE}, expected one of them: a GPU is of this machine")
+    return found == WARP and not at_a_piece()
 
 
 def pieces(most: int) -> int:

@@ -114,7 +114,7 @@ class Capped:
         fitted = np.minimum(gain * self.wound, cap) - np.minimum(2.0 * self.wound, 1.0)
         return [np.concatenate([fitted, np.full((len(vectors), 1), 0.1)], axis=1)]  # and what nothing explains
 
-    def losses(self, vectors):
+    def losses(self, vectors, rough=False):
         return 0.5 * (self.residuals(vectors)[0] ** 2).sum(axis=1)
 
     def prior(self, vectors):

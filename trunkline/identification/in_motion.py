@@ -43,14 +43,17 @@ class InMotion:
     def __getstate__(self) -> dict:
         return self.__dict__ | {"_batches": {}}  # a worker makes its own
 
-    def shapes(self, fields: Fields, numbers: list[int]) -> tuple[list[np.ndarray], int]:
+    def shapes(self, fields: Fields, numbers: list[int], rough: bool = False) -> tuple[list[np.ndarray], int]:
         """Positions of C candidates' segments in trials `numbers`, in the order of `trials`, m, NaN where a candidate
         makes MuJoCo warn; and how many steps that took.
 
         First from each trial's start to its first frame, then frame by frame. Each (C, T, S, 3).
+
+        Args:
+            rough: as `batch_of` has it.
         """
         experiments, count = [self.trials[i] for i in numbers], len(next(iter(fields.values())))
-        batch, frame_step, sites = self._batch(fields, numbers), self._frame_step, self._sites
+        batch, frame_step, sites = self._batch(fields, numbers, rough), self._frame_step, self._sites
         substeps = max(1, round(frame_step / (self._model.opt.timestep * self._step_factor)))
         timestep = batch.expand("opt.timestep")
         timestep[:] = np.repeat([e.lead / substeps for e in experiments], count)
@@ -82,13 +85,14 @@ class InMotion:
             result[warned[t]] = np.nan
         return results, substeps * sum(lengths) * count
 
-    def _batch(self, fields: Fields, numbers: list[int]) -> Batch:
+    def _batch(self, fields: Fields, numbers: list[int], rough: bool) -> Batch:
         """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start, motors yet to be set."""
         experiments, count = [self.trials[i] for i in numbers], len(next(iter(fields.values())))
-        batch = self._batches.get(tuple(numbers))
+        batch = self._batches.get((*numbers, rough))
         if batch is None or batch.nsim != count * len(experiments):
             model = _without_idle(self._model, self._slack, fields)
-            batch = self._batches[tuple(numbers)] = batch_of(model, count * len(experiments))
+            self._batches.pop((*numbers, not rough), None)
+            batch = self._batches[*numbers, rough] = batch_of(model, count * len(experiments), rough)
         if self._slack:  # cables do not rub, winches do not wind
             fields = {name: values for name, values in fields.items() if name != "numeric_data"}
         batch.reset(stage=mujoco.mjtStage.mjSTAGE_NONE)

@@ -33,11 +33,13 @@ class Simulated:
 
 @dataclass
 class _Piece:
-    """Some candidates in some trials. fields: of the former. trials: by their numbers. rests: near which to look."""
+    """Some candidates in some trials. fields: of the former. trials: by their numbers. rests: near which to look.
+    rough: as `batch_of` has it."""
 
     fields: Fields
     trials: list[int]
     rests: list[np.ndarray] | None
+    rough: bool
 
 
 @dataclass
@@ -73,13 +75,14 @@ class Population:
             for group in sorted(set(slack.values()))
         ]
 
-    def simulate(self, fields: Fields, rests: list[np.ndarray] | None = None) -> Simulated:
+    def simulate(self, fields: Fields, rests: list[np.ndarray] | None = None, rough: bool = False) -> Simulated:
         """Run every candidate (the first axis of `fields`) through every experiment.
 
         Args:
             rests: near which all of them rest, as `Simulated.rests` has it of another candidate.
+            rough: as `batch_of` has it.
         """
-        parts = self._cut(fields, rests)
+        parts = self._cut(fields, rests, rough)
         found = spread(Population.run, parts, self)
         every = range(len(self._experiments))
         positions = [_joined([part.positions[i] for part in found if i in part.positions]) for i in every]
@@ -90,7 +93,7 @@ class Population:
         angles = [found[0].rests.get(i, unknown) for i in every]
         return Simulated(positions, diverged, sum(part.steps for part in found), angles)
 
-    def _cut(self, fields: Fields, rests: list[np.ndarray] | None) -> list[_Piece]:
+    def _cut(self, fields: Fields, rests: list[np.ndarray] | None, rough: bool) -> list[_Piece]:
         """All candidates in all trials; where there are workers, in pieces: some candidates each, and where those are
         too few, some trials each.
 
@@ -105,7 +108,7 @@ class Population:
             moving = [list(group.trials)[i::each] for group in self._in_motion for i in range(each)]
             trials = [numbers for numbers in (self._at_rest, *moving) if numbers]
         own = [{name: values[some] for name, values in fields.items()} for some in slices]
-        return [_Piece(candidates, numbers, rests) for candidates in own for numbers in trials]
+        return [_Piece(candidates, numbers, rests, rough) for candidates in own for numbers in trials]
 
     def run(self, piece: _Piece) -> _Found:
         found = _Found({}, {}, 0)
@@ -117,7 +120,7 @@ class Population:
             found.rests |= zip(at_rest, angles, strict=True)
         for group in self._in_motion:
             if numbers := [i for i in group.trials if i in piece.trials]:
-                results, steps = group.shapes(piece.fields, numbers)
+                results, steps = group.shapes(piece.fields, numbers, piece.rough)
                 found.positions |= zip(numbers, results, strict=True)
                 found.steps += steps
         return found

@@ -91,15 +91,17 @@ class Problem:
             follow_rest(fields, model)
         return fields
 
-    def residuals(self, vectors: np.ndarray, near: np.ndarray | None = None) -> list[np.ndarray]:
+    def residuals(self, vectors: np.ndarray, near: np.ndarray | None = None, rough: bool = False) -> list[np.ndarray]:
         """Residuals per trial, weighted so that the sum of ½ r² over all of them is the loss. Each (C, R).
 
         Args:
             near: a candidate (P,) that is close to all of them, in whose shapes at rest theirs are looked for.
+            rough: as `batch_of` has it. Never where residuals are subtracted, as for derivatives: 32-bit floats leave
+                too little of such differences.
         """
         rests = None if near is None or not any(is_static(e.kind) for e in self.experiments) else self._rests_at(near)
         begun = time.perf_counter()
-        simulated = self._sessions.simulate(partial(self.fields, vectors), rests)
+        simulated = self._sessions.simulate(partial(self.fields, vectors), rests, rough)
         if len(vectors) == 1:
             self._last = vectors[0].copy(), simulated.rests
         self.seconds += time.perf_counter() - begun
@@ -125,9 +127,9 @@ class Problem:
             self._last = vector.copy(), simulated.rests
         return self._last[1]
 
-    def losses(self, vectors: np.ndarray) -> np.ndarray:
-        """Loss of each candidate (C, P) → (C,), that of the prior included."""
-        return sum(loss_of(block) for block in self.residuals(vectors)) + loss_of(self.prior(vectors))
+    def losses(self, vectors: np.ndarray, rough: bool = False) -> np.ndarray:
+        """Loss of each candidate (C, P) → (C,), that of the prior included; `rough` where they are only ranked."""
+        return sum(loss_of(block) for block in self.residuals(vectors, rough=rough)) + loss_of(self.prior(vectors))
 
     def prior(self, vectors: np.ndarray) -> np.ndarray:
         """Residuals w (f - 1) of factors, w the `prior_weight`; 0 for scalars. (C, P) → (C, P)."""

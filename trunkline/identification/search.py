@@ -57,14 +57,15 @@ def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) ->
         if not problem.parameters:
             return evolved
         drawn = _latin_hypercube(rng, CANDIDATES, *problem.bounds())
-        candidates = np.concatenate([evolved.vector[None], drawn[np.argsort(problem.losses(drawn), kind="stable")]])
+        ranks = np.argsort(problem.losses(drawn, rough=True), kind="stable")
+        candidates = np.concatenate([evolved.vector[None], drawn[ranks]])
         found = _several(problem, _apart(problem, candidates, STARTS), ITERATIONS, TOLERANCE, report)
         return replace(found, convergence=evolved.convergence, converged=evolved.converged and found.agreeing > 1)
     candidates, count = problem.start()[None], 1
     if optimizer.starts:  # else it goes on from what is known
         drawn = _latin_hypercube(rng, optimizer.starts, *problem.bounds())
         candidates = np.concatenate([candidates, drawn])
-        candidates = candidates[np.argsort(problem.losses(candidates), kind="stable")]
+        candidates = candidates[np.argsort(problem.losses(candidates, rough=True), kind="stable")]
         count = max(optimizer.descents, STARTS) if problem.parameters else optimizer.descents
     starts = _apart(problem, candidates, count)
     found = _several(problem, starts, optimizer.iterations, optimizer.tolerance, report)
@@ -198,7 +199,7 @@ def _evolve(
     low, high = problem.bounds()
 
     def losses(columns: np.ndarray) -> np.ndarray:
-        values = problem.losses(np.ascontiguousarray(columns.T))
+        values = problem.losses(np.ascontiguousarray(columns.T), rough=True)
         last[:] = [values]
         return values
 

@@ -25,13 +25,16 @@ class Sessions:
             self._parts.append((session, own, places, population))
 
     def simulate(
-        self, fields: Callable[[str, mujoco.MjModel], Fields], rests: list[np.ndarray] | None = None
+        self,
+        fields: Callable[[str, mujoco.MjModel], Fields],
+        rests: list[np.ndarray] | None = None,
+        rough: bool = False,
     ) -> Simulated:
         """As `Population.simulate`. Args: fields: of the candidates, for a session and its model."""
         found = {}
         for session, model, places, population in self._parts:
             near = None if rests is None else [rests[i] for i in places]
-            found[session] = population.simulate(fields(session, model), near)
+            found[session] = population.simulate(fields(session, model), near, rough)
         if len(found) == 1:
             return next(iter(found.values()))
         trials = {

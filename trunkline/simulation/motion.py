@@ -6,17 +6,26 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from trunkline.scheduler import rough_by_warp
 from trunkline.simulation.rubbing import rubbing
 from trunkline.threads import thread_count
 
 CHUNK = 128  # steps a call: few calls, and records of some MB
+LEAST_BY_WARP = 1000  # simulations, about, below which a GPU has too little to do at once
 
 
-def batch_of(model: mujoco.MjModel, count: int) -> Batch:
+def batch_of(model: mujoco.MjModel, count: int, rough: bool = False) -> Batch:
     """`count` simulations of a copy of `model`, on as many threads as `thread_count` says; results do not depend on it.
 
     What costs time is off: contacts where nothing can touch, and the search for islands. A simulation that diverges
     stays so: MuJoCo would start it anew by itself.
+
+    Args:
+        rough: whether it may move by 32-bit floats, as candidates that are only ranked may. Then a large one does so on
+            a GPU, where `TRUNKLINE_BATCHES` says it (`trunkline/scheduler.py`).
+
+    Raises:
+        InputError: that names nothing known, or what cannot move this model.
     """
     model = copy.copy(model)
     off = mujoco.mjtDisableBit
@@ -24,6 +33,10 @@ def batch_of(model: mujoco.MjModel, count: int) -> Batch:
     if not model.geom_contype.any() and not model.geom_conaffinity.any() and not model.npair:
         model.opt.disableflags |= off.mjDSBL_CONTACT
     model.opt.disableflags |= off.mjDSBL_ISLAND
+    if rough_by_warp() and rough and count >= LEAST_BY_WARP:
+        from trunkline.simulation.warp_batch import WarpBatch
+
+        return WarpBatch(model, count, thread_count())
     return Batch(model, count, nthread=thread_count())
 
 
