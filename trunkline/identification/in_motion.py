@@ -12,7 +12,7 @@ from trunkline.identification.experiment import Experiment
 from trunkline.identification.parameters import Fields
 from trunkline.identification.winding import wound_by_each
 from trunkline.simulation.load import hang
-from trunkline.simulation.motion import batch_of, hold, move
+from trunkline.simulation.motion import batch_of, by_warp, hold, move
 from trunkline.simulation.winch import Winches
 
 
@@ -90,7 +90,8 @@ class InMotion:
         experiments, count = [self.trials[i] for i in numbers], len(next(iter(fields.values())))
         batch = self._batches.get((*numbers, rough))
         if batch is None or batch.nsim != count * len(experiments):
-            model = _without_idle(self._model, self._slack, fields)
+            whole = by_warp(count * len(experiments), rough)  # Warp fails with cables that are cut down
+            model = _without_idle(self._model, self._slack, fields, whole)
             self._batches.pop((*numbers, not rough), None)
             batch = self._batches[*numbers, rough] = batch_of(model, count * len(experiments), rough)
         if self._slack:  # cables do not rub, winches do not wind
@@ -121,13 +122,13 @@ class InMotion:
                 batch.bind("plastic")[:, place + end] = bend - np.clip(bend, -give, give)
 
 
-def _without_idle(model: mujoco.MjModel, slack: bool, fields: Fields) -> mujoco.MjModel:
+def _without_idle(model: mujoco.MjModel, slack: bool, fields: Fields, whole: bool = False) -> mujoco.MjModel:
     """A copy of the model without what moves nothing where all cables are slack and takes most of a step: their
-    friction on the holes, and the cables themselves."""
+    friction on the holes, and, but for `whole`, the cables themselves."""
     model = copy.copy(model)
     own = (model.tendon_frictionloss, model.tendon_stiffness, model.tendon_damping)
     bare = "tendon_frictionloss" not in fields and not any(values[cables(model)].any() for values in own)
-    if slack and bare:
+    if slack and bare and not whole:
         let_hang(model)
     elif slack:
         let_slide(model)

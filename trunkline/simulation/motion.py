@@ -33,11 +33,16 @@ def batch_of(model: mujoco.MjModel, count: int, rough: bool = False) -> Batch:
     if not model.geom_contype.any() and not model.geom_conaffinity.any() and not model.npair:
         model.opt.disableflags |= off.mjDSBL_CONTACT
     model.opt.disableflags |= off.mjDSBL_ISLAND
-    if rough_by_warp() and rough and count >= LEAST_BY_WARP:
+    if by_warp(count, rough):
         from trunkline.simulation.warp_batch import WarpBatch
 
         return WarpBatch(model, count, thread_count())
     return Batch(model, count, nthread=thread_count())
+
+
+def by_warp(count: int, rough: bool) -> bool:
+    """Whether `batch_of` has such a batch moved by MuJoCo Warp."""
+    return rough_by_warp() and rough and count >= LEAST_BY_WARP
 
 
 def hold(batch: Batch, model: mujoco.MjModel, controls: np.ndarray, ids=slice(None)) -> None:

@@ -17,7 +17,7 @@ from mujoco.batch import MODEL_FIELDS, Batch
 from trunkline.errors import InputError
 from trunkline.scheduler import BATCHES
 
-TAKEN = ("time", "qpos", "qvel", "act", "qacc_warmstart", "ctrl", "plastic")  # to Warp and back
+TAKEN = ("time", "qpos", "qvel", "act", "history", "qacc_warmstart", "ctrl", "plastic")  # to Warp and back
 GIVEN = ("qfrc_applied", "xfrc_applied", "eq_active", "mocap_pos", "mocap_quat")  # to Warp alone
 # No step of Warp's reads these: winches are outside of steps, and lengths are for what sleeps.
 UNREAD = {"numeric_data", "body_sameframe", "dof_M0", "dof_length"}
@@ -40,8 +40,10 @@ class WarpBatch(Batch):
     def __init__(self, model: mujoco.MjModel, count: int, threads: int) -> None:
         if not model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
             raise unfit("a model of which parts may touch", "one without contacts: how far off those are is not known")
-        if model.actuator_history[:, 0].any():  # at a time between two samples, rounded, it takes the wrong one
-            raise unfit("motors with a dead time", "none: 32-bit floats tell times too coarsely for it")
+        if (model.actuator_history[model.actuator_history[:, 0] > 0, 1] == 0).any():
+            raise unfit("a dead time without interpolation", "a linear one: of rounded times it takes another sample")
+        if (model.tendon_num[model.wrap_type[model.tendon_adr] == mujoco.mjtWrap.mjWRAP_SITE] < 2).any():
+            raise unfit("a cable cut down to a point", "whole ones: of such, Warp ends the process")
         self._warp, self._mujoco_warp = libraries()
         super().__init__(model, count, nthread=threads)
         self._fields = fields_of(self._mujoco_warp.Model)
@@ -53,7 +55,7 @@ class WarpBatch(Batch):
 
     def expand(self, name: str) -> np.ndarray:
         if name in MODEL_FIELDS and not self._can_have(name):
-            raise unfit(f"{name} for each simulation on its own", "what Warp can have so: no holes on which cables rub")
+            raise unfit(f"{name} for each simulation on its own", "what Warp can have so (cables that rub need more)")
         return super().expand(name)
 
     def rollout(
