@@ -85,7 +85,7 @@ class InMotion:
             result[warned[t]] = np.nan
         return results, substeps * sum(lengths) * count
 
-    def _batch(self, fields: Fields, numbers: list[int], rough: bool) -> Batch:
+    def _batch(self, fields: Fields, numbers: list[int], rough: bool = False) -> Batch:
         """A batch whose simulation t·C + c is candidate c in trial t, at the trial's start, motors yet to be set."""
         experiments, count = [self.trials[i] for i in numbers], len(next(iter(fields.values())))
         batch = self._batches.get((*numbers, rough))

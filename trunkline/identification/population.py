@@ -93,7 +93,7 @@ class Population:
         angles = [found[0].rests.get(i, unknown) for i in every]
         return Simulated(positions, diverged, sum(part.steps for part in found), angles)
 
-    def _cut(self, fields: Fields, rests: list[np.ndarray] | None, rough: bool) -> list[_Piece]:
+    def _cut(self, fields: Fields, rests: list[np.ndarray] | None, rough: bool = False) -> list[_Piece]:
         """All candidates in all trials; where there are workers, in pieces: some candidates each, and where those are
         too few, some trials each.
 
