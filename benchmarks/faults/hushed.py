@@ -23,7 +23,7 @@ def hush(*_) -> None:
     Hushed.until = time.monotonic() + HUSH
 
 
-if __name__ == "__main__":
+def main() -> int:
     signal.signal(signal.SIGUSR1, hush)
     on_bus.BankOnBus = Hushed
-    sys.exit(hosting.main(sys.argv[1:]))
+    return hosting.main(sys.argv[1:])

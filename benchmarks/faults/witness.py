@@ -95,7 +95,7 @@ def machine(channel: Watched, *setup) -> None:
 
     def motors(hardware: Hardware) -> Adapted:
         named = MotorsOnBus(hardware.motors, hardware.bus, hardware.interface, hardware.real)
-        found = hosted(named, "benchmarks.faults.hushed")
+        found = hosted(named, ("-c", "import sys; from benchmarks.faults.hushed import main; sys.exit(main())"))
         witness.motors = found.process.pid
         return found
 

@@ -11,6 +11,7 @@ import math
 import socket
 import sys
 import time
+from collections.abc import Sequence
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -33,10 +34,10 @@ Hosted = MotorsOnBus | RosSettings
 HOSTED: TypeAdapter[Hosted] = TypeAdapter(Hosted)
 
 
-def hosted(settings: Hosted, module: str = "trunkline.execution.hosting") -> Adapted:
-    """The limb of these settings, in a process of its own, which runs the `module`."""
+def hosted(settings: Hosted, program: Sequence[str] = ("-m", "trunkline.execution.hosting")) -> Adapted:
+    """The limb of these settings, in a process of its own: Python's, which runs the `program`."""
     patience = CONNECTING if isinstance(settings, RosSettings) else HOMING
-    command = [sys.executable, "-m", module, HOSTED.dump_json(settings).decode()]
+    command = [sys.executable, *program, HOSTED.dump_json(settings).decode()]
     return Adapted(command, settings.axes, patience + STARTING)
 
 
