@@ -5,6 +5,14 @@ import os
 import threading
 
 
+def parent_pid() -> int:
+    """Of the process that made this one, even if it is gone already."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    assert parent.pid is not None
+    return parent.pid
+
+
 def end_with_parent() -> None:
     """From now on this process ends with the one that made it: one whose parent was killed would wait for ever."""
     threading.Thread(target=_wait, daemon=True).start()

@@ -52,6 +52,7 @@ class Witness:
 
     @property
     def motors(self) -> int:
+        assert self._motors.value, "a session with motors"
         return int(self._motors.value)
 
     @motors.setter
@@ -94,7 +95,7 @@ def machine(channel: Watched, *setup) -> None:
     assert witness is not None
 
     def motors(hardware: Hardware) -> Adapted:
-        named = MotorsOnBus(hardware.motors, hardware.bus, hardware.interface, hardware.real)
+        named = MotorsOnBus(hardware.motors, hardware.bus, hardware.interface)
         found = hosted(named, ("-c", "import sys; from benchmarks.faults.hushed import main; sys.exit(main())"))
         witness.motors = found.process.pid
         return found

@@ -72,7 +72,7 @@ def test_it_imports_what_any_environment_has():
             "trunkline.panda.limits",
         }  # fmt: skip
         plain = {alias.name for node in tree.body if isinstance(node, ast.Import) for alias in node.names}
-        assert plain <= {"contextlib", "importlib", "math", "numpy", "os", "socket", "struct", "sys", "time"}
+        assert plain <= {"contextlib", "importlib", "math", "numpy", "os", "signal", "socket", "struct", "sys", "time"}
 
 
 class Library:

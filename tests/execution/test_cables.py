@@ -1,25 +1,11 @@
-"""Motors as a limb: with a bench that a test turns, and in a process of their own."""
-
-import os
-import signal
-import subprocess
-import sys
-import time
-from functools import partial
+"""Motors as a limb, with a bench that a test turns."""
 
 import numpy as np
-import pytest
 
-from tests.support import waiting
-from tests.support.motors import TICK, PlayedMotors, Workbench, homed, motor_settings
-from trunkline.execution.bank import SIMULATED
+from tests.support.motors import TICK, PlayedMotors, Workbench, homed
 from trunkline.execution.cables import HOMING, SILENT, Cables
-from trunkline.execution.hosting import hosted
-from trunkline.execution.motors import MotorsOnBus
 
 LEAD = 0.03  # s
-
-until = partial(waiting.until, seconds=30.0)
 
 
 class Played:
@@ -79,57 +65,3 @@ def test_motors_that_are_not_homed_in_time_are_a_fault():
     assert not played.cables.ready
     played.cables.turn(played.bench.now + HOMING)
     assert played.cables.fault == "not homed after 60 s"
-
-
-# --- as a process, in real time; margins are wide, as machines are busy
-
-
-@pytest.fixture
-def limb():
-    found = hosted(MotorsOnBus(motor_settings(), SIMULATED, "virtual", False))
-    until(lambda: found.ready or found.fault, lambda: found.turn(time.monotonic()))
-    yield found
-    found.close()
-
-
-def test_in_a_process_of_their_own_they_home_and_follow(limb):
-    if limb.fault:
-        pytest.skip(f"this machine is too busy: {limb.fault}")
-    np.testing.assert_allclose(limb.measured, 0.0, atol=2e-3)
-
-    def each():
-        limb.send(time.monotonic() + LEAD, np.full(3, 0.001))
-        limb.turn(time.monotonic())
-
-    until(lambda: limb.fault or limb.sent.min() > 0.0009, each)
-    assert limb.fault == "" or "silent" in limb.fault
-
-
-def test_their_process_killed_is_a_fault(limb):
-    limb.process.kill()
-    until(lambda: limb.fault, lambda: limb.turn(time.monotonic()))
-    assert limb.fault == "its adapter has ended" or "silent" in limb.fault
-
-
-def test_their_process_hanging_is_a_fault(limb):
-    os.kill(limb.process.pid, signal.SIGSTOP)
-    until(lambda: limb.fault, lambda: limb.turn(time.monotonic()))
-    os.kill(limb.process.pid, signal.SIGCONT)
-    assert "silent for" in limb.fault
-
-
-def test_it_ends_once_nobody_speaks_to_it(limb):
-    limb.line.close()
-    assert limb.process.wait(waiting.SOON) == 0
-
-
-def test_a_bus_that_is_not_there_is_one_line():
-    found = hosted(MotorsOnBus(motor_settings(), "nowhere0", "socketcan", True))
-    until(lambda: found.fault, lambda: found.turn(time.monotonic()))
-    assert found.fault.startswith("bus nowhere0: found no socketcan bus that opens")
-    found.close()
-
-
-def test_a_robot_alone_needs_no_library_of_motors():
-    code = "import sys; sys.modules['can'] = None; import trunkline.live.real, trunkline.execution.hosting"
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

@@ -116,8 +116,11 @@ def arm(stub):
 def test_a_node_sends_one_point_for_when_it_is_due(stub, arm):
     assert stub.domain == SETTINGS.domain
     np.testing.assert_array_equal(arm.sent, READY)
-    arm.send(time.monotonic() + 1.5, READY + 0.05)
-    arm.send(time.monotonic() + 1.5, READY + 0.06)  # within PERIOD of the last
+    for step in (0.04, 0.05):  # of those that wait the newest is sent
+        arm.send(time.monotonic() + 1.5, READY + step)
+    arm.turn(time.monotonic())
+    arm.send(time.monotonic() + 1.5, READY + 0.06)
+    arm.turn(arm._told)  # within PERIOD of the last
     (order,) = stub.heard
     (point,) = order.points
     assert order.joint_names == list(SETTINGS.names)
@@ -139,11 +142,19 @@ def test_its_faults_are_those_of_the_other_link(stub, arm):
     assert arm.fault == "/joint_states: silent for 300 ms"
     arm.fault = ""
     arm.send(time.monotonic(), READY)
+    stub.say(READY)
+    arm.turn(time.monotonic())
+    stub.say(np.full(7, np.nan))
+    arm.turn(time.monotonic())
+    assert arm.fault == "panda_joint1: found nan rad from where it is sent, expected at most 0.1"
+    arm.fault = ""
     stub.say(READY + 0.2 * np.eye(7)[3])
     arm.turn(time.monotonic())
     assert arm.fault == "panda_joint4: found 0.2 rad from where it is sent, expected at most 0.1"
     arm.fault, arm._told, stub.broken = "", 0.0, True
     arm.send(time.monotonic(), READY)
+    stub.say(READY)
+    arm.turn(time.monotonic())
     assert arm.fault == f"{SETTINGS.trajectory}: publisher is not valid"
 
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from trunkline.watch.scores import Score
 
-OFFSETS = {"static_tilt": (0.03, -0.01), "release": (-0.02, 0.2), "curl": (0.1, 0.1)}
-SPREADS = {"static_tilt": (0.002, 0.004), "release": (0.004, 0.01), "curl": (0.03, 0.05)}
+OFFSETS = {"static_tilt": (0.03, -0.01), "release": (-0.02, 0.2), "curl": (0.1, 0.1), "motion": (0.0, 0.0)}
+SPREADS = {"static_tilt": (0.002, 0.004), "release": (0.004, 0.01), "curl": (0.03, 0.05), "motion": (0.01, 0.01)}
 SLANT = 0.5  # by which a change of the first parameter shows as one of the second, at information that is alike
 
 

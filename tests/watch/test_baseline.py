@@ -1,5 +1,7 @@
 """What an unchanged arm looks like: a new trial's departure is standard normal, however few the reference trials."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -76,6 +78,18 @@ def test_a_reference_trial_unlike_the_others_is_left_out():
     score = drawn("release", rng, (-0.05, 0))
     assert baseline.departure(score, 0).z == pytest.approx(without.departure(score, 0).z)
     assert without.odd == {}
+
+
+def test_what_is_done_alike_is_odd_among_its_like_alone():
+    """Loaded tilts are not odd beside unloaded ones, nor is a level that is off the curve and repeated."""
+    rng = np.random.default_rng(9)
+    bare = [drawn("static_tilt", rng, level=60.0) for _ in range(12)]
+    loaded = [replace(drawn("static_tilt", rng, (0.3, 0), 60.0), load=0.05) for _ in range(3)]
+    assert Baseline([*bare, *loaded]).odd == {}
+    levels = {20.0: 0.0, 40.0: 0.0, 60.0: 0.4, 80.0: 0.0, 100.0: 0.0}
+    apart = [drawn("static_tilt", rng, (off, 0), level) for level, off in levels.items() for _ in range(3)]
+    assert Baseline(apart).odd == {}
+    assert abs(Baseline(apart).departure(drawn("static_tilt", rng, (0.4, 0), 60.0), 0).z) < 3.5
 
 
 def test_few_reference_trials_are_all_kept():

@@ -39,6 +39,17 @@ def test_it_names_the_parameter_that_changed_though_the_other_moves_along(parame
     assert sum(one.whole for one in found) >= 10
 
 
+def test_a_trial_of_a_kind_without_reference_between_those_that_tell_is_left_aside():
+    rng = np.random.default_rng(3)
+    chart = chart_of(Baseline([drawn("release", rng) for _ in range(15)]), 2)
+    while chart.changed() is None:
+        chart.add(drawn("release", rng, (-0.2, 0.0)))
+        if chart.changed() is None:
+            chart.add(drawn("motion", rng))
+    found = explain(chart.suspects(), chart.baseline, list(chart.lines))
+    assert found.best.parameter == 0
+
+
 def test_it_says_what_cannot_be_told_apart():
     found = explained((-0.2, 0.0), 1, alias=True)
     assert [one.parameter for one in found.alike] == [1 - found.best.parameter]

@@ -51,10 +51,11 @@ class Adapted:
     told: Told | None
 
     def __init__(
-        self, command: Sequence[str], axes: int, patience: float = CONNECTING, astray: float = math.inf
+        self, command: Sequence[str], axes: int, patience: float = CONNECTING, astray: float = math.inf, at: str = ""
     ) -> None:
-        """patience: s that the adapter has to be ready. astray: rad or m that an axis may be from where it is sent."""
-        self._axes, self._astray, self.fault, self.told = axes, astray, "", None
+        """patience: s that the adapter has to be ready. astray: rad that a joint may be from where it is sent. at: what
+        is said of where the limb should be."""
+        self._axes, self._astray, self._at, self.fault, self.told = axes, astray, at, "", None
         self._patience, self._until = patience, time.monotonic() + patience
         ours, theirs = socket.socketpair()
         self.line, path = Line(ours, Told.size(axes)), os.environ.get("PYTHONPATH", "")
@@ -92,12 +93,12 @@ class Adapted:
         self._hear()
         if self.told is None:
             if now > self._until:
-                self._fail(f"its adapter is not ready after {self._patience:.0f} s")
+                self._fail(f"its adapter is not ready after {self._patience:.0f} s{self._at}")
             return
         if (silent := now - self.told.time) > SILENT:
             self._fail(f"its adapter is silent for {1e3 * silent:.0f} ms")
         off = np.abs(np.subtract(self.told.measured, self.told.sent))
-        if off.max() > self._astray:
+        if not off.max() <= self._astray:  # or no number
             where = f"found {off.max():.3g} rad from where it is sent, expected at most {self._astray:g}"
             self._fail(f"joint {int(off.argmax()) + 1}: {where}")
 
@@ -133,6 +134,6 @@ def panda(settings: ArmSettings, robot: str) -> Adapted:
     python = settings.python or sys.executable
     command = [python, "-m", "trunkline.execution.adapter", robot, settings.address]
     try:
-        return Adapted(command, len(JOINTS), astray=settings.astray)
+        return Adapted(command, len(JOINTS), astray=settings.astray, at=f", expected {robot} at {settings.address}")
     except OSError as error:
         raise InputError(f"arm.python: found {python} ({error.strerror}), expected a Python") from error

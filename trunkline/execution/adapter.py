@@ -8,6 +8,7 @@ socket. `trunkline.execution.adapted` starts it; by hand it is of no use.
 """
 
 import importlib
+import signal
 import socket
 import sys
 import time
@@ -121,17 +122,17 @@ class Adapter:
     def fail(self, fault: str) -> None:
         """The robot has ended control."""
         sent = tuple(self._stream.joints) if self._stream is not None else (0.0,) * JOINTS
-        self._line.tell(Told(time.monotonic(), sent, sent, fault))
+        self._line.end(Told(time.monotonic(), sent, sent, fault))
 
 
 def main(arguments: list[str]) -> int:
     robot, address, descriptor = arguments
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends once nobody is at the other end, and the joints rest
     with socket.socket(fileno=int(descriptor)) as channel:
         adapter = Adapter(robot, channel)
         try:
             device = DEVICES[robot](address)
-            if robot != "fake":
-                be_urgent()
+            be_urgent()
             device.control(adapter.cycle)
         except Exception as error:  # whatever the robot's library raises is the fault that is told
             adapter.fail(" ".join(f"{type(error).__name__}: {error}".split()))

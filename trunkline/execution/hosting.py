@@ -8,6 +8,7 @@ no use.
 
 import gc
 import math
+import signal
 import socket
 import sys
 import time
@@ -47,13 +48,16 @@ def limb_of(settings: Hosted) -> Limb:
     Raises:
         InputError: what it needs is not there.
     """
-    if isinstance(settings, RosSettings):
-        from trunkline.execution.ros_arm import RosArm  # each with what it needs installed
+    try:
+        if isinstance(settings, RosSettings):
+            from trunkline.execution.ros_arm import RosArm
 
-        return RosArm(settings)
-    from trunkline.execution.cables import Cables
-    from trunkline.execution.on_bus import motors_on
-
+            return RosArm(settings)
+        from trunkline.execution.cables import Cables
+        from trunkline.execution.on_bus import motors_on
+    except ImportError as error:
+        extra = "ros2" if isinstance(settings, RosSettings) else "motors"
+        raise InputError(f"found no library {error.name}, expected the extra {extra} to be installed") from error
     return Cables(motors_on(settings), time.monotonic())
 
 
@@ -75,17 +79,18 @@ def host(limb: Limb, line: Line) -> None:
 
 def main(arguments: list[str]) -> int:
     settings, descriptor = HOSTED.validate_json(arguments[0]), int(arguments[1])
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends once nobody is at the other end
     with socket.socket(fileno=descriptor) as channel:
         line, limb = Line(channel, Setpoint.size(settings.axes)), None
         try:
             limb = limb_of(settings)
             gc.freeze()
-            if settings.urgent:
-                be_urgent()
+            be_urgent()
             host(limb, line)
-        except InputError as error:
+        except Exception as error:  # whatever a library raises is the fault that is told
+            said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
             unknown = (math.nan,) * settings.axes
-            line.tell(Told(time.monotonic(), unknown, unknown, str(error)))
+            line.end(Told(time.monotonic(), unknown, unknown, " ".join(said.split())))
             return 1
         finally:
             if limb is not None:

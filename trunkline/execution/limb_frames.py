@@ -10,6 +10,7 @@ import struct
 from dataclasses import dataclass
 
 TEXT = 240  # bytes of a fault, UTF-8
+LAST = 1.0  # s that the last frame may take
 
 
 @dataclass(frozen=True)
@@ -95,6 +96,12 @@ class Line:
         """The same, unless nobody listens; whoever is slow misses a frame."""
         with contextlib.suppress(OSError):
             self.send(told.pack())
+
+    def end(self, told: Told) -> None:
+        """The last frame, for which it waits."""
+        self._socket.settimeout(LAST)
+        with contextlib.suppress(OSError):
+            self._socket.sendall(self._unsent + told.pack())
 
     def close(self) -> None:
         """This end."""

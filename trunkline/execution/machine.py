@@ -7,6 +7,7 @@ machine stops it along its plan. So the limb that is well comes to rest where th
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -40,24 +41,25 @@ class Machine:
         self._smoother: Smoother | None = None
         self._due = 0.0
 
-    def begin(self, joints: np.ndarray) -> np.ndarray:
+    def begin(self, joints: np.ndarray, left: Callable[[], bool] = lambda: False) -> np.ndarray:
         """Take hold of all there is, which waits: the arm is under control, and the cables are homed.
 
         Args:
             joints: where the twin's arm is where there is no real one, (7,), rad.
+            left: whether whoever wants it is gone.
 
         Returns:
             Where the joints are, (7,), rad.
 
         Raises:
-            InputError: a limb is not there, or cannot be homed.
+            InputError: a limb is not there, or cannot be homed, or nobody waits any more.
         """
-        while not (self.fault or all(limb.ready for limb in self._limbs.values())):
+        while not (self.fault or left() or all(limb.ready for limb in self._limbs.values())):
             time.sleep(TICK)
             for limb in self._limbs.values():
                 limb.turn(self._clock())
-        if self.fault:
-            raise InputError(self.fault)
+        if self.fault or left():
+            raise InputError(self.fault or "the session is gone")
         joints = np.array(joints if self._arm is None else self._arm.sent)
         self._smoother = Smoother(np.append(joints, self._straight), SMOOTH)
         return joints
@@ -91,5 +93,5 @@ class Machine:
 
     def close(self) -> None:
         """Give back all there is: the motors are without current, the arm brakes."""
-        for limb in self._limbs.values():
-            limb.close()
+        with ThreadPoolExecutor() as pool:  # each waits for its own
+            list(pool.map(lambda limb: limb.close(), self._limbs.values()))

@@ -38,13 +38,11 @@ class MotorSettings:
 
 @dataclass(frozen=True)
 class MotorsOnBus:
-    """`motors` on a `bus` of python-can's `interface`; on the bus `bank.SIMULATED`, simulated ones. urgent: whether
-    anything real moves with them."""
+    """`motors` on a `bus` of python-can's `interface`; on the bus `bank.SIMULATED`, simulated ones."""
 
     motors: MotorSettings
     bus: str
     interface: str
-    urgent: bool
 
     @property
     def axes(self) -> int:

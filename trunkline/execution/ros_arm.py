@@ -4,6 +4,7 @@ Every PERIOD s the controller is sent one point, where the joints shall be when 
 Where no more come, it stands at the last: that is its dead man. No real controller was tried.
 """
 
+import math
 import time
 from typing import Protocol
 
@@ -62,6 +63,7 @@ class RosArm:
         self._settings, self.fault, self.ready = settings, "", False
         self.measured, self._sent = np.full(settings.axes, np.nan), np.full(settings.axes, np.nan)
         self._heard, self._told = time.monotonic(), 0.0
+        self._next: tuple[float, np.ndarray] | None = None
         self._until = self._heard + CONNECTING
         self.link = link_of(settings)
 
@@ -70,17 +72,13 @@ class RosArm:
         return np.where(np.isnan(self._sent), self.measured, self._sent)
 
     def send(self, due: float, axes: np.ndarray) -> None:
-        now = time.monotonic()
-        if now - self._told < PERIOD:
-            return
-        self._told, self._sent = now, np.array(axes)
-        try:
-            self.link.send(max(due - now, 0.0), axes.tolist())
-        except InputError as error:
-            self._fail(str(error))
+        """The newest goes with the next turn, no oftener than every PERIOD s."""
+        if not (math.isfinite(due) and np.isfinite(axes).all()):
+            self._fail("setpoint: found values that are not finite")
+        self._next = None if self.fault else (due, np.array(axes))
 
     def turn(self, now: float) -> None:
-        """Hear the joints' state."""
+        """Hear the joints' state, and send what is due."""
         self._hear(now)
         if not self.ready:
             self._look(now)
@@ -88,13 +86,23 @@ class RosArm:
         if (silent := now - self._heard) > SILENT:
             self._fail(f"{self._settings.states}: silent for {1e3 * silent:.0f} ms")
         off = np.abs(self.measured - self.sent)
-        if off.max() > self._settings.astray:
+        if not off.max() <= self._settings.astray:  # or no number
             name, most = self._settings.names[int(off.argmax())], self._settings.astray
             self._fail(f"{name}: found {off.max():.3g} rad from where it is sent, expected at most {most:g}")
+
+        if self._next is not None and now - self._told >= PERIOD:
+            self._send(now, *self._next)
 
     def close(self) -> None:
         """The controller is sent no more, and stands at the last point."""
         self.link.close()
+
+    def _send(self, now: float, due: float, joints: np.ndarray) -> None:
+        self._told, self._sent, self._next = now, joints, None
+        try:
+            self.link.send(max(due - now, 0.0), joints.tolist())
+        except InputError as error:
+            self._fail(str(error))
 
     def _look(self, now: float) -> None:
         """Whether the joints' state is told and a controller listens."""

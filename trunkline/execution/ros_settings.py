@@ -24,8 +24,6 @@ class RosSettings:
     names: tuple[str, str, str, str, str, str, str]
     astray: Annotated[float, Field(gt=0, le=0.5)]
 
-    urgent = True  # a real robot, as far as anybody knows
-
     @property
     def axes(self) -> int:
         """How many joints."""

@@ -27,7 +27,7 @@ from trunkline.live.hardware import Hardware
 from trunkline.live.robot import POSE, READY, Channel, RobotProcess, Standing
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.panda.shipped import JOINTS
-from trunkline.processes import end_with_parent
+from trunkline.processes import end_with_parent, parent_pid
 from trunkline.teleop.following import Follower, Following
 from trunkline.teleop.trajectory import Limits
 
@@ -94,20 +94,19 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
     """The machine's process: until its parent is gone, or it is ended."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
-    parent = os.getppid()
+    parent = parent_pid()
     threadpool_limits(1)
     machine = None
     try:
         arm = arm_of(hardware)
         machine = Moved(arm, motors_of(hardware), begins.commands)
-        joints = machine.begin(begins.joints)
+        joints = machine.begin(begins.joints, lambda: os.getppid() != parent)
         moved = machine
         robot = PacedRobot(
             joints, begins.commands, begins.limits, begins.package, lambda q, c, _: moved.move(q, c), hardware.limits
         )  # fmt: skip
         gc.freeze()
-        if hardware.real:
-            be_urgent()
+        be_urgent()
         drive(Loop(channel, robot, machine), parent)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
@@ -128,7 +127,7 @@ def motors_of(hardware: Hardware) -> Limb | None:
     """The tendons' motors, None where none are named."""
     if not hardware.bus:
         return None
-    return hosted(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface, hardware.real))
+    return hosted(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface))
 
 
 class Pursuit:

@@ -25,6 +25,7 @@ from trunkline.hybrid.torques import servo_commands
 from trunkline.live.bodies import Poses
 from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Channel, Goal
 from trunkline.panda.shipped import JOINTS
+from trunkline.processes import parent_pid
 from trunkline.simulation.motion import batch_of, hold
 from trunkline.simulation.rubbing import REFRESH, rubbing
 from trunkline.simulation.winch import Winches
@@ -59,9 +60,10 @@ class Plant:
     def __init__(self, simulation: Simulation) -> None:
         model = simulation.twin.model
         self.model, self.batch, self._own = model, batch_of(model, 1), np.zeros(1, dtype=np.int32)
-        self.steps = max(round(TELLS / model.opt.timestep), 1)
+        friction = max(round(REFRESH / model.opt.timestep), 1)  # steps from one to the next new friction
+        self._refresh = next((n for n in range(2, friction) if friction % n == 0), friction)  # the same, in ticks
+        self._ticks, self.steps = 0, friction // self._refresh
         self.tick = self.steps * model.opt.timestep
-        self._ticks, self._refresh = 0, max(round(REFRESH / self.tick), 1)  # so far; from one to the next new friction
         if simulation.twin.start is not None:
             self.batch.bind("qpos")[:] = simulation.twin.start
         self._joints, self._motors = panda_joints(model), actuators(model)
@@ -241,7 +243,7 @@ def run(channel: Channel, simulation: Simulation) -> None:
     with suppress(OSError):
         os.nice(NICE)
     threadpool_limits(1)
-    parent = os.getppid()
+    parent = parent_pid()
     plant = Plant(simulation)
     robot = SimulatedRobot(
         simulation.joints, simulation.commands, simulation.limits, simulation.package,

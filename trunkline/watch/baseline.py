@@ -12,7 +12,7 @@ new one was (kind, level, load), m is their mean, and s is pooled within such co
 freedom chart nothing.
 """
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -102,7 +102,7 @@ class Baseline:
         """Of parameter `p`; None where the trial does not tell it, or too few reference trials do."""
         least, whole, alike = self._kinds.get((score.kind, p), (0.0, None, {}))
         group, information = alike.get(score.condition, whole), score.information[p]
-        if group is None or information <= least:
+        if group is None or information <= least or (score.level is None and len(group.mean) > 1):
             return None
         change, deviation = float(score.estimates[p] - group.at(score.level)), group.deviation(score, p)
         tail = ndtri(stdtr(group.degrees, -abs(change) / deviation))
@@ -127,11 +127,20 @@ def _telling(own: list[Score], p: int) -> tuple[float, list[Score], list[Score]]
     telling = [score for score in own if score.information[p] > least]
     if len(telling) <= LEAST:
         return least, telling, []
-    weights, values = _columns(telling, p)
-    most = max(_designs(telling), key=lambda design: design.shape[1])
-    unlike = odd(values, weights, most, LEAST)
-    kept, left_out = ([score for score, is_so in zip(telling, unlike, strict=True) if is_so == so] for so in (0, 1))
-    return least, kept, left_out
+    left_out = []
+    for load in sorted({score.load for score in telling}):
+        alike = [score for score in telling if score.load == load]
+        weights, values = _columns(alike, p)
+        design = np.concatenate([_designs(alike)[-1], _repeated(alike)], axis=1)
+        left_out += [score for score, is_odd in zip(alike, odd(values, weights, design, LEAST), strict=True) if is_odd]
+    return least, [score for score in telling if score not in left_out], left_out
+
+
+def _repeated(scores: list[Score]) -> np.ndarray:
+    """A column for each condition that there is twice or more: such trials are compared with each other. (n, c)."""
+    counts = Counter(score.condition for score in scores)
+    conditions = [condition for condition, count in counts.items() if count > 1]
+    return np.array([[float(score.condition == one) for one in conditions] for score in scores])
 
 
 def _groups(kind: str, telling: list[Score], p: int, least: float) -> tuple[float, Group | None, dict[tuple, Group]]:

@@ -47,7 +47,7 @@ class Explanation:
 
 def explain(trials: list[Charted], baseline: Baseline, parameters: list[int]) -> Explanation:
     """What explains `trials` best, of a change in one of `parameters`."""
-    correlation = {kind: _correlation(kind, baseline) for kind in {one.score.kind for one in trials}}
+    correlation = {kind: _correlation(kind, baseline) for kind in {one.score.kind for one in trials if one.departures}}
     rows = [(i, p) for i, one in enumerate(trials) for p in sorted(one.departures)]
     off = np.array([trials[i].departures[p].change for i, p in rows])
     covariance = np.zeros((len(rows), len(rows)))
@@ -93,7 +93,7 @@ def _correlation(kind: str, baseline: Baseline) -> np.ndarray:
     """Of the estimates of an unchanged arm's trials of a kind, shrunk towards none. Shape (P, P)."""
     known = enumerate(baseline.reference)
     own = [score for number, score in known if score.kind == kind and number not in baseline.odd]
-    count = len(own[0].slope)
+    count = len(baseline.reference[0].slope)
     values = np.full((len(own), count), np.nan)
     for i, score in enumerate(own):
         for p, departure in baseline.departures(score).items():

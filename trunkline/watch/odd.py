@@ -10,18 +10,21 @@ import numpy as np
 from scipy.stats import t as student
 
 CHANCE = 1e-5  # that any of n normal trials is called odd; the longer tails of real ones are not to be cut off
+RANK = 1e-9  # of the largest singular value, below which a column is one of the others
 MOST = 0.25  # share of n that may be
 
 
 def odd(values: np.ndarray, information: np.ndarray, design: np.ndarray, least: int) -> np.ndarray:
     """Which of the estimates `values` (n,), of variance s² / `information` (n,) around what is linear in the columns of
     `design` (n, k), are odd; shape (n,), bool. The others keep so many degrees of freedom, at `least`."""
-    count, terms = design.shape
+    count, root = len(values), np.sqrt(information)
     left, furthest, last = np.ones(count, dtype=bool), [], 0
-    root = np.sqrt(information)
-    for taken in range(min(int(MOST * count), count - terms - least)):
-        scaled = (root * left)[:, None] * design
-        basis = np.linalg.qr(scaled)[0]
+    for taken in range(int(MOST * count)):
+        basis, sizes, _ = np.linalg.svd((root * left)[:, None] * design, full_matrices=False)
+        basis = basis[:, sizes > RANK * sizes[0]]
+        terms = basis.shape[1]
+        if count - taken - terms <= least:
+            break
         off = root * left * values
         off = off - basis @ (basis.T @ off)
         free = np.clip(1 - np.square(basis).sum(axis=1), 1e-9, None)

@@ -23,7 +23,7 @@ from trunkline.watch.intake import take
 from trunkline.watch.ledger import Ledger, alone, digest, read_score, told
 from trunkline.watch.patience import Patience
 from trunkline.watch.scores import Score, Scorer, watched_in
-from trunkline.watch.words import change_lines, chart_table, reference_lines, trial_line
+from trunkline.watch.words import change_lines, chart_table, odd_lines, reference_lines, trial_line
 
 LEARN = 15  # trials of each kind that stand for the unchanged arm, where no reference is given
 STAGES = ("identify_damping", "identify_control", "identify_stiffness")  # whose loss weighs the residuals
@@ -140,8 +140,11 @@ class Watch:
 
     def _chart_one(self, where: str, score: Score) -> None:
         if not self.reference:  # what is learned may have changed
-            before = self.chart.changed()
+            before, said = self.chart.changed(), odd_lines(self.chart.baseline, self.scorer.parameters)
             self.chart, self.wheres = self._chart()
+            for line in odd_lines(self.chart.baseline, self.scorer.parameters):
+                if line not in said:
+                    print(f"watch: reference: {line}", flush=True)
             if where not in self.wheres:
                 print(f"watch: {where}: kept to learn from", flush=True)
                 return

@@ -86,11 +86,18 @@ def reference_lines(baseline: Baseline, chart: Chart, names: tuple[str, ...]) ->
                 if unit != "%" or width < HARDLY:
                     told.append(f"{names[p]} {_short(width)} {unit}".rstrip())
         lines.append(f"  one {kind} tells to ±: {', '.join(told) or f'nothing, it takes {LEAST + 1} or more'}")
-    for number, unlike in baseline.odd.items():
-        trial, charts = baseline.reference[number].name, ", ".join(names[p] for p in unlike)
-        lines.append(f"  {trial} is unlike the others of its kind, and left out of the charts of {charts}")
+    lines += [f"  {line}" for line in odd_lines(baseline, names)]
     idle = [name for p, name in enumerate(names) if p not in chart.lines]
     return lines + ([f"  not charted, as the reference does not tell them: {', '.join(idle)}"] if idle else [])
+
+
+def odd_lines(baseline: Baseline, names: tuple[str, ...]) -> list[str]:
+    """Which reference trials were left out, and of what."""
+    lines = []
+    for number, unlike in baseline.odd.items():
+        trial, charts = baseline.reference[number].name, ", ".join(names[p] for p in unlike)
+        lines.append(f"{trial} is unlike the others of its kind, and left out of the charts of {charts}")
+    return lines
 
 
 def chart_table(chart: Chart, names: tuple[str, ...], wheres: list[str]) -> pd.DataFrame:
