@@ -116,8 +116,8 @@ class WatchedFit(Fit):
         if sum(e.frames for e in experiments) == self.frames and step_factor == 1:
             residuals = problem.residuals
 
-            def noted(vectors: np.ndarray, near: np.ndarray | None = None) -> list[np.ndarray]:
-                blocks = residuals(vectors, near)
+            def noted(vectors: np.ndarray, near: np.ndarray | None = None, rough: bool = False) -> list[np.ndarray]:
+                blocks = residuals(vectors, near, rough)
                 self.watch.note(vectors, np.sum([loss_of(block) for block in blocks], axis=0))
                 return blocks
 
