@@ -10,11 +10,14 @@ import yaml
 
 from tests.identification.test_stage import settings
 from tests.support.matched_plant import release, small_model, static_pull, tilt
+from tests.support.small_arm import small_spec
 from tests.support.workbench import workbench
+from trunkline.arm.joints import Joints, add_elements
 from trunkline.certificate.arms import arm_of
 from trunkline.check.told import to_identify_from, told_by
 from trunkline.identification.identify import with_parameters
 from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.per_session import make_room
 from trunkline.pipeline.config import load_folder
 from trunkline.sessions.session import read_session
 from trunkline.suggest.__main__ import main
@@ -182,6 +185,17 @@ def test_the_tip_answers_a_parameter_as_another_arm_does(model, grid):
     ends = [arm_of(with_parameters(model, {"stiffness": value * np.exp(s * step)})).tips(poses) for s in (1, -1)]
     np.testing.assert_allclose(moves, (ends[0] - ends[1]) / (2 * step), atol=2e-3 * np.abs(moves).max())
     assert not tip_moves(model, ["damping"], poses).any(), "nothing at rest answers to damping"
+
+
+def test_what_another_session_has_for_itself_moves_no_tip_of_the_first(grid):
+    spec = small_spec(4)
+    spec.option.timestep = small_model(4).opt.timestep
+    add_elements(spec, Joints(), 1e-5)
+    make_room(spec, {"mount_tilt_x@friday": "mount_tilt_x"})
+    twin = spec.compile()
+    moves = tip_moves(twin, ["mount_tilt_x", "mount_tilt_x@friday"], workspace(twin, grid)[:8])
+    assert moves[0].any()
+    assert not moves[1].any()
 
 
 def test_a_release_is_bent_towards_its_side(model, grid):

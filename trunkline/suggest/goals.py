@@ -12,7 +12,7 @@ import numpy as np
 
 from trunkline.certificate.arms import arm_of, arms_with
 from trunkline.certificate.poses import Conditions, Poses, draw_poses
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import parameter_named
 from trunkline.suggest.information import StageInformation
 from trunkline.suggest.settings import Recordable
 
@@ -54,7 +54,7 @@ def workspace(model: mujoco.MjModel, grid: Recordable) -> Poses:
 def tip_moves(model: mujoco.MjModel, names: list[str], poses: Poses) -> np.ndarray:
     """∂tip/∂z by differences to both sides, m, 0 where an arm finds no rest. Shape (P, N, 3)."""
     count = len(names)
-    axes = [PARAMETERS[name] for name in names]
+    axes = [parameter_named(name) for name in names]
     read = [axis.read(model) for axis in axes]
     missing = np.array([not axis.signed and value <= 0 for axis, value in zip(axes, read, strict=True)])
     z = np.array([axis.coordinate(1.0 if lacks else v) for axis, v, lacks in zip(axes, read, missing, strict=True)])

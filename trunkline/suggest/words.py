@@ -4,7 +4,7 @@ import numpy as np
 import yaml
 
 from trunkline.check.told import TWO_SIDED, Told
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters import parameter_named
 from trunkline.suggest.candidates import Candidate
 from trunkline.suggest.goals import Goal
 from trunkline.suggest.information import StageInformation
@@ -82,7 +82,7 @@ def _change(before: Told, now: Told) -> str:
 
 def _width(told: Told) -> str:
     """Of an interval: a number in its unit, a factor, or percent where that is as good."""
-    parameter = PARAMETERS[told.name]
+    parameter = parameter_named(told.name)
     if told.share >= 1:
         return "undetermined"
     if parameter.signed:
