@@ -98,7 +98,7 @@ class Hands:
         if mode == "aim":
             return {"grip": 1.0, "trigger": float(spent % 1.2 > 0.8)}
         if mode == "ready":
-            return {"grip": 1.0, "trigger": float(spent > 0.2)}
+            return {"grip": 1.0, "trigger": float(0.2 < spent % 1.2 < 1.0)}  # one that falls into a silence is no press
         if mode in ("delay", "execute"):
             return {"grip": 1.0}
         return {"primary": float(spent % 0.5 < 0.2)} if mode == "stopped" else {}
