@@ -174,8 +174,8 @@ class PlainFit(Fit):
         problem, best = super().problem(model, experiments, step_factor), Best()
         residuals = problem.residuals
 
-        def noted(vectors: np.ndarray, near: np.ndarray | None = None) -> list[np.ndarray]:
-            blocks = residuals(vectors, near)
+        def noted(vectors: np.ndarray, near: np.ndarray | None = None, rough: bool = False) -> list[np.ndarray]:
+            blocks = residuals(vectors, near, rough)
             best.weighed |= bool((problem.trial_weights != 1).any())
             loss = float(sum(loss_of(block)[0] for block in blocks))
             if len(vectors) == 1 and not best.weighed and loss < best.loss:  # others are tried around an iterate

@@ -23,7 +23,8 @@ def test_it_counts_in_how_many_trials_a_change_is_found():
     softer = {kind: {i: drawn(kind, rng, (np.log(0.8), 0)) for i in range(3 * AFTER[kind])} for kind in kinds}
     softer |= {kind: {} for kind in AFTER if kind not in kinds}
     empty = chart_of(Baseline([score for own in pool.values() for score in own[:12]]), 2)
-    lines = found_lines(empty, 3, pool, softer, "made up", ("stiffness", "damping"))
+    rest = [score for own in pool.values() for score in own[12:]]
+    lines = found_lines([empty] * 3, [rest] * 3, softer, "made up", ("stiffness", "damping"))
     assert len(lines) == 1 + len(kinds)  # what was not recorded has no row
     for line in lines:
         cells = [cell.strip() for cell in line.strip("|").split("|")]
