@@ -3,7 +3,9 @@
 import numpy as np
 
 from tests.support.motors import TICK, PlayedMotors, Workbench, homed
-from trunkline.execution.cables import HOMING, SILENT, Cables
+from trunkline.execution.cables import Cables
+from trunkline.execution.motors import HOMING
+from trunkline.execution.stream import SILENT
 
 LEAD = 0.03  # s
 

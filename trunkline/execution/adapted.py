@@ -97,10 +97,6 @@ class Adapted:
             return
         if (silent := now - self.told.time) > SILENT:
             self._fail(f"its adapter is silent for {1e3 * silent:.0f} ms")
-        off = np.abs(np.subtract(self.told.measured, self.told.sent))
-        if not off.max() <= self._astray:  # or no number
-            where = f"found {off.max():.3g} rad from where it is sent, expected at most {self._astray:g}"
-            self._fail(f"joint {int(off.argmax()) + 1}: {where}")
 
     def close(self) -> None:
         """The adapter hears no more: it brings its limb to rest, and gives it back."""
@@ -118,8 +114,16 @@ class Adapted:
                 self._fail(told.fault)
             if self.told is not None or not told.fault:
                 self.told = told
+                self._look(told)
         if not self.line.open:
             self._fail("its adapter has ended")
+
+    def _look(self, told: Told) -> None:
+        """Whether each joint is where it is sent."""
+        off = np.abs(np.subtract(told.measured, told.sent))
+        if not off.max() <= self._astray:  # or no number
+            where = f"found {off.max():.3g} rad from where it is sent, expected at most {self._astray:g}"
+            self._fail(f"joint {int(off.argmax()) + 1}: {where}")
 
     def _fail(self, fault: str) -> None:
         self.fault = self.fault or fault

@@ -7,8 +7,7 @@ import numpy as np
 
 from trunkline.execution.motors import HOMING
 from trunkline.execution.on_bus import BusMotors
-
-SILENT = 0.05  # s without a setpoint
+from trunkline.execution.stream import SILENT
 
 
 class Cables:

@@ -19,17 +19,16 @@ from pydantic import TypeAdapter
 
 from trunkline.errors import InputError
 from trunkline.execution.adapted import Adapted
+from trunkline.execution.adapter import TELL
 from trunkline.execution.limb import TICK, Limb
 from trunkline.execution.limb_frames import Line, Setpoint, Told
 from trunkline.execution.motors import HOMING, MotorsOnBus
 from trunkline.execution.ros_settings import CONNECTING, RosSettings
 from trunkline.execution.urgency import be_urgent
 
-TELL = 5  # turns from one frame told to the next
 LATE = 0.02  # s that turns may be behind before some are left out
 SETTLES = 0.2  # s for which a limb that nobody sends is held before it is given back
 STARTING = 5.0  # s that a process has to start
-
 
 Hosted = MotorsOnBus | RosSettings
 HOSTED: TypeAdapter[Hosted] = TypeAdapter(Hosted)
