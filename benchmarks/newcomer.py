@@ -11,7 +11,6 @@ import argparse
 import asyncio
 import os
 import re
-import signal
 import sys
 import tempfile
 import time
@@ -93,7 +92,7 @@ async def once(package: Path) -> list[float]:
             done(STEPS[0][0])
             await visit(address[0].decode(), done)
         finally:
-            server.send_signal(signal.SIGINT)
+            server.terminate()
             await server.wait()
     return found
 

@@ -1,7 +1,10 @@
 """A session over real sockets: from two hands to a robot that has arrived, and every way out."""
 
 import asyncio
+import contextlib
 import gc
+import os
+import signal
 import socket
 from contextlib import closing
 
@@ -12,6 +15,7 @@ from tests.support.live import Hands, binary, controlling, hand, laid
 from tests.teleop.test_plan import MOUNT, OFFSET, TIP
 from trunkline.errors import InputError
 from trunkline.live import wire
+from trunkline.live.__main__ import main
 from trunkline.live.garbage import NEVER
 from trunkline.live.session import Address, expect_free
 from trunkline.panda.kinematics import mount_pose
@@ -261,6 +265,27 @@ def test_a_stop_is_heard_beyond_the_rate_limit_too():
             assert here.robot.stops
 
     asyncio.run(session())
+
+
+@pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM])
+def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, told):
+    """As by Ctrl-C, so by `kill` and by whatever else ends a service."""
+    closed = []
+
+    @contextlib.asynccontextmanager
+    async def opened(*_):
+        try:
+            asyncio.get_running_loop().call_later(0.05, os.kill, os.getpid(), told)
+            await asyncio.sleep(10.0)
+            yield None, None
+        finally:
+            await asyncio.sleep(0.05)
+            closed.append(told)
+
+    monkeypatch.setattr("trunkline.live.session.opened", opened)
+    assert main(["package.tgz", "--port", "18459"]) == 0
+    assert closed == [told]
+    assert capsys.readouterr().out.splitlines() == ["ended"]
 
 
 def test_an_address_that_is_taken_is_refused_before_anything_is_loaded():

@@ -31,7 +31,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
         InputError: an address that others reach, without TLS.
     """
     parser = argparse.ArgumentParser(prog=called("trunkline.live"), description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("package", type=Path)
+    parser.add_argument("package", type=Path, metavar="PACKAGE", help="folder or .tgz that package_unity writes")
     parser.add_argument("--host", default="127.0.0.1", help="an address of this machine")
     parser.add_argument("--port", type=int, default=PORT)
     parser.add_argument("--tls", action="store_true", help="with a certificate made now")
@@ -84,7 +84,7 @@ def main(arguments: list[str]) -> int:
 
     try:
         asyncio.run(serve(options, names, context))
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, asyncio.CancelledError):
         print("ended")
     return 0
 

@@ -1,10 +1,11 @@
-"""A live session: its processes, its port, its address. It goes on until it is interrupted."""
+"""A live session: its processes, its port, its address."""
 
 import argparse
 import asyncio
 import contextlib
 import functools
 import gc
+import signal
 import socket
 import ssl
 import sys
@@ -138,7 +139,10 @@ async def opened(
 
 
 async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLContext | None) -> None:
-    """Until it is interrupted."""
+    """Until it is interrupted or told to end: either way robot and log are closed in order."""
+    task = asyncio.current_task()
+    assert task is not None, "asyncio runs it"
+    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
     log = functools.partial(print, flush=True)
     hardware = hardware_of(
         options.robot, options.motors, options.bus, options.interface,

@@ -1,4 +1,8 @@
-"""What logs hold, and a session.yaml for them: `python -m trunkline.preparation.inspect LOG…`"""
+"""What logs hold, and a session.yaml for them: `python -m trunkline.preparation.inspect LOG…`
+
+Prints of each log its topics with their rates, its bodies with how often they are seen, and the gaps; then a
+session.yaml in which you have to check each trial's experiment, level and split. Writes nothing.
+"""
 
 import argparse
 import sys
@@ -12,7 +16,10 @@ from trunkline.preparation.survey import describe, survey
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    parser = argparse.ArgumentParser(prog=called("trunkline.preparation.inspect"), description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog=called("trunkline.preparation.inspect"), description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
     parser.add_argument("logs", nargs="+", type=Path, metavar="LOG", help="an MCAP log, or a folder of them")
     surveys, code = [], 0
     for path in _logs(parser.parse_args(arguments).logs):

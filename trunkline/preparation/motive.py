@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("exports", nargs="+", type=Path, metavar="CSV")
+    parser.add_argument("exports", nargs="+", type=Path, metavar="CSV", help="an export of Motive's, a trial each")
     parser.add_argument("--session", required=True, type=Path, help="folder that becomes the session")
     chosen = parser.parse_args(arguments)
     chosen.session.mkdir(parents=True, exist_ok=True)
