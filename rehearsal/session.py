@@ -190,6 +190,7 @@ class Session:
                 try:
                     now = self.now + tick / RATE / TICKS
                     self.executor.joints, self.executor.commands = self.follower.tick(now)
+                    self.fault = self.fault or self.follower.refused
                 except InputError as error:
                     self.fault, self.follower = str(error), None
             self.executor.advance(1 / RATE / TICKS)

@@ -2,6 +2,7 @@
 
 import multiprocessing
 import os
+import signal
 import threading
 
 
@@ -11,6 +12,12 @@ def parent_pid() -> int:
     assert parent is not None
     assert parent.pid is not None
     return parent.pid
+
+
+def leave_signals_to_parent() -> None:
+    """What a terminal sends to all of its processes, by Ctrl-C or as it is closed, is the parent's to hear."""
+    for one in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(one, signal.SIG_IGN)
 
 
 def end_with_parent() -> None:

@@ -1,7 +1,9 @@
 """A real machine in a session: Panda and motors on one clock, and either's fault halts both. Nothing here is real."""
 
 import multiprocessing
+import os
 import queue
+import signal
 import time
 from dataclasses import replace
 
@@ -295,6 +297,15 @@ def test_a_pursuit_is_there_once_it_has_come_to_where_the_machine_stays():
         pursuit.go(now)
     assert pursuit.there
     np.testing.assert_allclose(pursuit.here, rest + 0.05, atol=1e-9)
+
+
+def test_a_twin_that_hangs_is_a_fault_while_it_does(robot):
+    """Or a picture at rest would be taken for the robot's."""
+    os.kill(robot._twin.pid, signal.SIGSTOP)
+    until(lambda: robot.state().mode == "fault")
+    assert robot.state().fault.startswith("the twin, which is drawn, is silent for 0.5")
+    os.kill(robot._twin.pid, signal.SIGCONT)
+    until(lambda: robot.state().mode != "fault")
 
 
 def test_without_its_twin_nothing_is_permitted(robot):

@@ -22,7 +22,9 @@ from trunkline.live import simulated
 from trunkline.live.bodies import Poses, drawn
 from trunkline.live.house import SEARCH, subject_of
 from trunkline.live.logbook import tip_path
-from trunkline.live.robot import DEAD_MAN, FRESH, PERMIT, PERMITTED, POSE, STOPS, TELLS, Channel, RobotProcess, told_by
+from trunkline.live.robot import (
+    DEAD_MAN, FRESH, MODE, MODES, PERMIT, PERMITTED, POSE, STOPS, TELLS, Channel, RobotProcess, told_by,
+)  # fmt: skip
 from trunkline.live.settings import Config
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.pipeline.config import PROJECT, load_folder
@@ -87,6 +89,18 @@ def until(happens, seconds=5.0, each=lambda: None):
         assert time.monotonic() < end, "it did not happen"
         each()
         time.sleep(0.005)
+
+
+def test_a_robot_whose_session_ends_comes_to_rest_on_its_way_first():
+    s = simulation()
+    found = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
+    until(lambda: found.ready, 60.0)
+    way = back(found)
+    until(lambda: np.abs(found.standing().joints - way.joints[0]).max() > 0.05, each=found.permit)
+    found.close()
+    numbers, _ = found.channel.hear()
+    assert MODES[int(numbers[MODE])] == "idle"
+    assert np.abs(way.joints - found.standing().joints).sum(axis=1).min() < 0.02
 
 
 def back(robot):

@@ -13,7 +13,7 @@ from tests.support.links import clock_error
 from trunkline.errors import InputError
 from trunkline.live.__main__ import parsed
 from trunkline.live.certificate import fingerprint, make_certificate, tls_context
-from trunkline.live.clock import LATEST, PINGS, ClientClock
+from trunkline.live.clock import JUMP, LATEST, PINGS, ClientClock
 from trunkline.live.lease import SILENCE, Control
 from trunkline.live.outbox import MOST_SAID, WINDOW, Outbox
 
@@ -34,8 +34,20 @@ def test_an_answer_to_what_was_not_asked_does_nothing_and_a_round_begins_anew():
         assert not clock.pong(number, 5.0, now + 0.02)
     assert clock.offset == pytest.approx(0.005)
     assert clock.fault(100.0, 100.0) == ""
-    assert "old" in clock.fault(100.0 - LATEST - 0.1, 100.0)
+    assert "s old; the clock has jumped" in clock.fault(100.0 - JUMP - 0.1, 100.0)
     assert "ahead" in clock.fault(101.0, 100.0)
+
+
+def test_what_comes_late_does_not_count_nor_anything_over_a_link_that_is_slow():
+    """Evenly late inputs tell of a grip that was let go long ago, and nothing in them says so."""
+    clock = ClientClock()
+    for now in range(PINGS):
+        clock.pong(clock.ping(float(now)), now + 0.05, now + 0.1)
+    assert clock.fault(100.0 - 0.9 * LATEST, 100.0) == ""
+    assert clock.fault(99.1, 100.0) == "input: it comes 0.90 s late, expected at most 0.25 s"
+    for now in range(PINGS):
+        clock.pong(clock.ping(float(now)), now + 0.4, now + 0.8)
+    assert clock.fault(100.0, 100.0) == "input: there and back takes 0.80 s, expected at most 0.25 s"
 
 
 STEP = st.tuples(

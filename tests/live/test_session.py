@@ -11,7 +11,7 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from tests.support.live import Hands, binary, controlling, hand, laid
+from tests.support.live import Hands, Laid, binary, controlling, hand, laid
 from tests.teleop.test_plan import MOUNT, OFFSET, TIP
 from trunkline.errors import InputError
 from trunkline.live import wire
@@ -19,6 +19,8 @@ from trunkline.live.__main__ import main
 from trunkline.live.garbage import NEVER
 from trunkline.live.session import Address, expect_free
 from trunkline.panda.kinematics import mount_pose
+from trunkline.teleop.messages import Intent
+from trunkline.teleop.plan import Plan
 
 UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
 
@@ -92,6 +94,43 @@ def test_a_robot_follows_moving_targets_until_both_grips_are_let_go():
             assert not here.planning.plans
 
     asyncio.run(session())
+
+
+def test_a_robot_that_follows_stops_where_the_process_that_plans_is_silent_and_does_not_go_on():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            await guest.hears("state", mode="aim")
+            guest.left, guest.right = grips(MOUNT), grips(TIP)
+            await asyncio.sleep(0.8)
+            guest.right = grips(TIP, stick_pressed=1.0)
+            await guest.hears("state", motion="follow", robot="running")
+            seeking = here.desk._seeking
+            answers, seeking._order = seeking._order, lambda order: None
+            told = await guest.hears("state", mode="stopped")
+            assert "the process that plans has not answered for 0.5" in told["notice"]
+            seeking._order = answers
+            aside = np.array([0.0, 0.05, 0.0])
+            guest.left, guest.right = grips(MOUNT + aside), grips(TIP + aside)
+            await asyncio.sleep(0.5)
+            rests = here.robot.robot.joints.copy()
+            await asyncio.sleep(0.5)
+            np.testing.assert_array_equal(here.robot.robot.joints, rests)
+            assert here.desk.intent.mode == "stopped"
+
+    asyncio.run(session())
+
+
+def test_a_start_that_is_on_its_way_is_stopped_by_what_comes_after_it():
+    here = Laid(0)
+    desk, plan = here.desk, Plan(1.0, np.zeros((2, 7)), np.zeros((2, 3)), (), "", "")
+    desk.plan, here.robot.start = plan, lambda *_: ""  # its process has not told of it yet
+    desk._drive(Intent("execute", "execute", "", None, (None, None), execute=plan.digest()))
+    assert here.robot.permits == 1
+    desk._drive(Intent("hold", "hold", "", None, (None, None)))
+    assert len(here.robot.stops) == 1
+    desk._drive(Intent("hold", "hold", "", None, (None, None)))
+    assert len(here.robot.stops) == 1
 
 
 def test_nobody_is_told_that_nobody_who_controls_is_silent():
@@ -267,10 +306,11 @@ def test_a_stop_is_heard_beyond_the_rate_limit_too():
     asyncio.run(session())
 
 
-@pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, told):
-    """As by Ctrl-C, so by `kill` and by whatever else ends a service."""
+    """As by Ctrl-C, so by `kill`, by whatever else ends a service, and by a terminal that is closed."""
     closed = []
+    monkeypatch.setattr(signal, "getsignal", lambda _: signal.SIG_DFL)  # also where the tests run under `nohup`
 
     @contextlib.asynccontextmanager
     async def opened(*_):

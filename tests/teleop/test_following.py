@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tests.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT, WORLD, targets
+from trunkline.panda.collision import clearance
 from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.following import KNOT, Follower, Following, sought
 from trunkline.teleop.messages import Box, World
@@ -122,3 +123,18 @@ def test_it_brakes_within_its_limits_wherever_the_targets_are(followed):
     moving = np.vstack([before, rows[-index - 1 :]])
     assert (np.abs(np.diff(moving, 2, axis=0)).max(axis=0) / DT**2 <= 1.001 * LIMITS.acceleration).all()
     assert 2 < index < 30
+
+
+def test_it_rests_within_its_limits_before_it_would_touch_itself():
+    """Between two poses that are clear, with the mount beside the second link on the way."""
+    here = np.array([0.0, 0.808, 0.498, -2.374, -1.223, 1.167, 0.785])
+    there = np.array([0.0, 1.254, 0.777, -2.825, -0.64, 2.191, 0.785])
+    assert clearance(np.stack([here, there]), OFFSET).min() > 0.02
+    follower, rows = Follower(LIMITS, Following(0.0, 0.0, OFFSET), here, STRAIGHT, DT), [np.append(here, STRAIGHT)] * 3
+    follower.hear(0.0, np.append(there, STRAIGHT))
+    while not follower.rests:
+        rows.append(np.concatenate(follower.tick(len(rows) * DT)))
+        assert len(rows) < 300
+    assert follower.refused == "self-collision: the robot would touch itself as it follows"
+    assert 0 < clearance(np.array(rows)[:, :7], OFFSET).min() < 0.01
+    assert (np.abs(np.diff(rows, 2, axis=0)).max(axis=0) / DT**2 <= 1.001 * LIMITS.acceleration).all()

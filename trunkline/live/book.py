@@ -3,7 +3,6 @@
 It imports little, so that the process is there soon.
 """
 
-import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,17 +14,22 @@ import numpy as np
 from mcap.writer import Writer
 from rosbags.typesys import Stores, get_typestore
 
+from trunkline.processes import leave_signals_to_parent
+
 POSES, STATIC = "/tf", "/tf_static"
+TWIN = "/tf_twin"  # poses that a twin drew of a real machine: nobody measured them
 JOINTS_SENT, JOINTS = "/joints/command", "/joint_states"  # the latter: ROS's name for what is measured
 TENDONS_SENT, TENDONS = "/tendons/command", "/tendons/state"
 HEADSET, PARTS = "/headset/", ("left", "right", "view")
 EVENTS, INPUT, INTENT = "/events", "/core/input", "/core/intent"
 BASE, REFERENCE = "rigid_base", "reference"  # frames
+SIMULATED = "simulated"  # the hardware of a session in which nothing is real
+WRIST = "link_7"  # the rigid robot's last body, which carries the mount
 TEXT = 240  # bytes of a fault
 TEXTS = (EVENTS, INPUT, INTENT)
 GEOMETRY = ("Vector3", "Point", "Quaternion", "Pose", "Transform", "TransformStamped")
 TYPES = {
-    POSES: "tf2_msgs/msg/TFMessage",
+    **dict.fromkeys((POSES, TWIN), "tf2_msgs/msg/TFMessage"),
     STATIC: "tf2_msgs/msg/TFMessage",
     **dict.fromkeys((JOINTS_SENT, JOINTS, TENDONS_SENT, TENDONS), "sensor_msgs/msg/JointState"),
     **{HEADSET + part: "geometry_msgs/msg/PoseStamped" for part in PARTS},
@@ -48,13 +52,19 @@ class Record(NamedTuple):
 class Subject:
     """Whose session it is: names of the bodies (N), of the rigid robot's joints and of the cables (K), whose lengths
     are `straight` (K,), m, in the straight arm; a pull is that less the length. tip: the body of the arm's tip, and
-    where it is in that, m."""
+    where it is in that, m. hardware: what of it is real, in words."""
 
     bodies: tuple[str, ...]
     joints: tuple[str, ...]
     tendons: tuple[str, ...]
     straight: np.ndarray
     tip: tuple[str, tuple[float, float, float]]
+    hardware: str = SIMULATED
+
+    @property
+    def poses(self) -> str:
+        """The topic of the bodies' poses."""
+        return POSES if self.hardware == SIMULATED else TWIN
 
 
 NOTHING = Subject((), (), (), np.empty(0), ("", (0.0, 0.0, 0.0)))
@@ -69,13 +79,15 @@ class Book:
         self._writer.start(profile="ros2", library="trunkline")
         schemas = {name: self._schema(name) for name in sorted(set(TYPES.values()))}
         self._channels = {
-            topic: self._writer.register_channel(topic, "cdr", schemas[name]) for topic, name in TYPES.items()
+            topic: self._writer.register_channel(topic, "cdr", schemas[name])
+            for topic, name in TYPES.items()
+            if topic not in (POSES, TWIN) or topic == subject.poses
         }
         self._posed = -np.inf
 
     def write(self, record: Record) -> None:
         """Poses that are not newer than the last are left out."""
-        if record.topic == POSES:
+        if record.topic == self._subject.poses:
             if record.stamp <= self._posed:
                 return
             self._posed = record.stamp
@@ -135,23 +147,25 @@ def new_file(path: Path) -> BinaryIO:
 
 
 def run(
-    pipe, told, path: Path, subject: Subject, zero: int, period: float, opened: Callable[[Path], BinaryIO]
+    pipe, told, kept, path: Path, subject: Subject, zero: int, period: float, opened: Callable[[Path], BinaryIO]
 ) -> None:  # fmt: skip
-    """The process: until nobody holds the pipe's other end, be it that the server was killed."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupted session ends its log when all is told
+    """The process: until nobody holds the pipe's other end, be it that the server was killed. `told`: why it cannot
+    write; `kept`: how many of the pipe's messages are in the file, from 0 on once it is open."""
+    leave_signals_to_parent()
     try:
         with opened(path) as file:
             book = Book(file, subject, zero)
-            write(book, pipe, period)
+            write(book, pipe, kept, period)
             book.finish()
     except OSError as error:
         text = f"log: {path.name}: {(error.strerror or str(error)).lower()}; nothing is executed"
         told.value = text.encode()[: TEXT - 1]
 
 
-def write(book: Book, pipe, period: float) -> None:
+def write(book: Book, pipe, kept, period: float) -> None:
     """All that comes, on the disk every `period` s."""
-    due = time.monotonic() + period
+    due, heard = time.monotonic() + period, 0
+    kept.value = heard
     while True:
         if pipe.poll(max(due - time.monotonic(), 0.0)):
             try:
@@ -160,6 +174,8 @@ def write(book: Book, pipe, period: float) -> None:
                 return
             for record in records:
                 book.write(record)
+            heard += 1
         if time.monotonic() >= due:
             book.flush()
+            kept.value = heard
             due = time.monotonic() + period

@@ -11,7 +11,8 @@ from dataclasses import dataclass, field
 PINGS = 10  # of a round
 EVERY = 10.0  # s between rounds
 FORWARD = 0.05  # s by which a stamp may be ahead of now: the offset's own error, generously
-LATEST = 1.0  # s that an input may be late
+LATEST = 0.25  # s that an input may be late, or be on its way there and back: a grip that is let go has to be seen
+JUMP = 1.0  # s beyond which nothing was that slow: the clock is another
 
 
 @dataclass
@@ -52,6 +53,10 @@ class ClientClock:
         if self.offset is None:
             return "input: the clock's offset is not known yet"
         late = now - (stamp + self.offset)
-        if -FORWARD <= late <= LATEST:
-            return ""
-        return f"input: its stamp is {abs(late):.3g} s {'old' if late > 0 else 'ahead'}; the clock has jumped"
+        if late < -FORWARD or late > JUMP:
+            return f"input: its stamp is {abs(late):.3g} s {'old' if late > 0 else 'ahead'}; the clock has jumped"
+        if late > LATEST:
+            return f"input: it comes {late:.2f} s late, expected at most {LATEST:g} s"
+        if self.round_trip > LATEST:
+            return f"input: there and back takes {self.round_trip:.2f} s, expected at most {LATEST:g} s"
+        return ""

@@ -110,6 +110,7 @@ class Desk:
         self.journal.event(
             "begin", version=__version__, package=core.package, rate=rate, settings=core.settings,
             mount_offset=core.mount_offset, tip={"body": subject.tip[0], "place": subject.tip[1]},
+            hardware=subject.hardware,
         )  # fmt: skip
 
     # --- what is heard
@@ -269,17 +270,18 @@ class Desk:
         running = self.robot.state()
         if intent.motion == "hold":
             self._fault = self._fault if intent.mode == "stopped" else ""
-            self._started, self._ran = "", False
-            if running.mode == "running":
+            if running.mode == "running" or (self._started and not self._ran):  # a start on its way reads as idle
                 self.robot.stop()
+            self._started, self._ran = "", False
             return
         if self._started != (intent.execute or FOLLOWS):
             self._begin(intent)
         self._ran = self._ran or running.mode == "running"
         if self._ran and running.mode == "idle":
             self._fault = "it has come to rest by itself"
-        if self.blocked and not self._fault:
-            self._fault = self.blocked
+        fault = self.blocked or (self._seeking.fault if intent.motion == "follow" else "")
+        if fault and not self._fault:
+            self._fault = fault
             self.robot.stop()
         if not self._fault:
             self.robot.permit()

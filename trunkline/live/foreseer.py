@@ -8,7 +8,6 @@ One order at a time; a newer one ends the one before within a quarter of a simul
 import itertools
 import multiprocessing
 import os
-import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -28,7 +27,7 @@ from trunkline.hybrid.preview import WITHIN, Preview, nominal, preview
 from trunkline.live import talk
 from trunkline.live.bodies import Poses
 from trunkline.panda.kinematics import mount_pose
-from trunkline.processes import end_with_parent
+from trunkline.processes import end_with_parent, leave_signals_to_parent
 from trunkline.teleop.config import Config
 from trunkline.teleop.following import sought
 from trunkline.teleop.messages import PlanReport, Request, Target, Targets, Thing, World
@@ -314,7 +313,7 @@ def run(
     answers, orders, newest, path: Path, config: Config, previewing: Previewing, bodies: tuple[str, ...], world: World
 ) -> None:
     """The process: until its parent is gone. world: the first plans are likely to be asked for in it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
+    leave_signals_to_parent()
     os.environ["TRUNKLINE_THREADS"] = str(max(thread_count() - 1, 1))  # the rest is the server's and the robot's
     with suppress(OSError):
         os.nice(NICE)

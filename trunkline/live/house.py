@@ -12,7 +12,7 @@ from trunkline.foresight.package import Package, read_package
 from trunkline.foresight.twin import believed, compose_twin
 from trunkline.live import foreseer, simulated
 from trunkline.live.bodies import drawn
-from trunkline.live.book import Subject
+from trunkline.live.book import SIMULATED, Subject
 from trunkline.live.desk import Desk
 from trunkline.live.foreseer import ForeseerProcess
 from trunkline.live.hardware import Hardware
@@ -47,8 +47,8 @@ class Made:
     journal: JournalProcess
 
     def close(self) -> None:
+        self.robot.close()  # first: it may be moving
         self.planning.close()
-        self.robot.close()
         self.journal.close()
 
 
@@ -74,22 +74,25 @@ def make(
     setup = path.resolve(), teleop, config.preview, simulation.bodies, world
     planning = ForeseerProcess(foreseer.run, setup, heard)  # first: it takes longest until it is ready
     drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
-    journal = JournalProcess(new_path(Path(config.journal.folder)), subject_of(simulation), config.journal.period)
+    subject = subject_of(simulation, hardware)
+    journal = JournalProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
     robot = robot_of(simulation, hardware)
     core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
     desk = Desk(core, robot, planning, world, teleop.handling.lift, journal, package.period)
     desk.begin(config.rate)
+    journal.await_begun()
     return Made(desk, package.digest, drawing, Shells.of(maps), robot, planning, journal)
 
 
-def subject_of(simulation: Simulation) -> Subject:
-    """Whom a log is about: the simulated robot."""
+def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:
+    """Whom a log is about: the simulated robot, or the real one, of which a twin is drawn."""
     model = simulation.twin.model
     tendons = tuple(model.tendon(number).name for number in model.actuator_trnid[actuators(model), 0])
     site = model.site("tip")
     x, y, z = (float(value) for value in site.pos)
     tip = model.body(site.bodyid[0]).name, (x, y, z)
-    return Subject(simulation.bodies, tuple(JOINTS), tendons, simulation.commands, tip)
+    words = SIMULATED if hardware is None else hardware.words()
+    return Subject(simulation.bodies, tuple(JOINTS), tendons, simulation.commands, tip, words)
 
 
 def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:

@@ -24,16 +24,18 @@ from trunkline.execution.motors import MotorsOnBus
 from trunkline.execution.pace import PacedRobot
 from trunkline.execution.urgency import be_urgent
 from trunkline.live.hardware import Hardware
-from trunkline.live.robot import POSE, READY, Channel, RobotProcess, Standing
+from trunkline.live.robot import POSE, READY, TIME, Channel, RobotProcess, Standing
 from trunkline.live.simulated import Loop, Plant, Simulation, drive
 from trunkline.panda.shipped import JOINTS
-from trunkline.processes import end_with_parent, parent_pid
+from trunkline.processes import end_with_parent, leave_signals_to_parent, parent_pid
 from trunkline.teleop.following import Follower, Following
+from trunkline.teleop.messages import ExecutorReport
 from trunkline.teleop.trajectory import Limits
 
 DELAY, MEAN = 0.15, 0.1  # s that the twin is behind the machine, and over which it takes the mean of what it hears
 RESTS, STILL, LEAST = 2.0, 2e-4, 1e-9  # s in which no pose (m) and no axis (rad, m) changes by more: the twin rests
 NICE = 5  # of the twin: a picture may wait
+UNSEEN = 0.5  # s without a picture, after which nobody sees what moves
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,13 @@ class RealRobot(RobotProcess):
         poses = self._drawn.hear()[0][-POSE * (1 + self._drawn.bodies) :].reshape(-1, POSE)
         return replace(super().standing(), thing=poses[0], bodies=poses[1:])
 
+    def state(self) -> ExecutorReport:
+        found, drawn = super().state(), self._drawn.hear()[0]
+        silent = time.monotonic() - drawn[TIME]
+        if found.mode != "fault" and drawn[READY] > 0 and silent > UNSEEN:
+            return ExecutorReport("fault", found.digest, f"the twin, which is drawn, is silent for {silent:.2f} s")
+        return found
+
     def close(self) -> None:
         super().close()
         self._twin.kill()
@@ -92,7 +101,7 @@ class RealRobot(RobotProcess):
 
 def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
     """The machine's process: until its parent is gone, or it is ended."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
+    leave_signals_to_parent()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     parent = parent_pid()
     threadpool_limits(1)
@@ -107,7 +116,7 @@ def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
         )  # fmt: skip
         gc.freeze()
         be_urgent()
-        drive(Loop(channel, robot, machine), parent)
+        drive(Loop(channel, robot, machine), parent, lambda: moved.behind)
     except InputError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
         sys.exit(1)
@@ -151,8 +160,11 @@ class Pursuit:
         """A tick on, at `now`, s."""
         try:
             self.here = np.append(*self._follower.tick(now))
-        except InputError:  # there is no way that keeps the limits: on from here, at rest
-            self._begin(self.here)
+            lost = self._follower.rests  # it braked, as it would have touched itself
+        except InputError:  # there is no way that keeps the limits
+            lost = True
+        if lost:
+            self._begin(self.here)  # on from here, at rest
 
     def _begin(self, here: np.ndarray) -> None:
         following = Following(DELAY, MEAN, self._simulation.mount_offset)
@@ -165,7 +177,7 @@ def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
     """The twin's process: it follows what the machine's axes are sent, DELAY s later, as a robot follows targets: this
     process hears of them unevenly, and a jump from one to the next would throw the twin about. Once it rests where they
     rest, it is left alone: a preview needs the processor more."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
+    leave_signals_to_parent()
     os.environ["TRUNKLINE_THREADS"] = "1"
     os.nice(NICE)
     threadpool_limits(1)
@@ -187,7 +199,7 @@ def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
             if np.abs(here - before).max() > LEAST or np.nanmax(np.abs(now - poses)) > STILL:
                 poses, since = now, due
         told = np.zeros(channel.size)
-        told[READY] = 1.0
+        told[TIME], told[READY] = time.monotonic(), 1.0
         told[-POSE * (1 + channel.bodies) :] = poses
         channel.tell(told, "")
         due = max(due + plant.tick, time.monotonic() - plant.tick)

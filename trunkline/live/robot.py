@@ -26,11 +26,12 @@ DEAD_MAN = 0.08  # s without a permit
 STALE = 0.15  # s without a sign of the robot's process
 TELLS = 1 / 240  # s, about, from one telling of the robot's process to the next
 LOOKS = 0.005  # s
+RESTING = 0.5  # s that braking may take before its process is ended
 FRESH = 0.0005  # s after which that is heard
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
 TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before axes, sent and measured, thing and bodies
-PERMIT, PERMITTED, STOPS, STOPPED = range(4)  # of what it is told
+PERMIT, PERMITTED, STOPS = range(3)  # of what it is told
 POSE = 7
 
 
@@ -46,7 +47,7 @@ class Channel:
         self.tendons, self.bodies = tendons, bodies
         self.size = 5 + 2 * (JOINTS + tendons) + POSE * (1 + bodies)
         self._told, self._number = context.RawArray(ctypes.c_double, self.size), context.RawValue(ctypes.c_uint64, 0)
-        self._asked, self._fault = context.RawArray(ctypes.c_double, 4), context.RawArray(ctypes.c_char, TEXT)
+        self._asked, self._fault = context.RawArray(ctypes.c_double, 3), context.RawArray(ctypes.c_char, TEXT)
         self.plans, self.wake = context.Queue(), context.Semaphore(0)
 
     @property
@@ -175,7 +176,6 @@ class RobotProcess:
     def stop(self) -> None:
         asked = self.channel.asked
         asked[PERMITTED] = 0
-        asked[STOPPED] = time.monotonic()
         asked[STOPS] += 1
         self.channel.wake.release()
 
@@ -192,8 +192,11 @@ class RobotProcess:
         return ExecutorReport(mode, self._digest, fault if mode == "fault" else "")  # type: ignore[arg-type]
 
     def close(self) -> None:
-        """End its process."""
+        """Bring it to rest, and end its process."""
         self.stop()
+        until = time.monotonic() + RESTING
+        while self.state().mode == "running" and time.monotonic() < until:
+            time.sleep(LOOKS)
         self.channel.plans.cancel_join_thread()
         self._process.terminate()
         self._process.join(5.0)

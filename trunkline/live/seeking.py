@@ -10,6 +10,8 @@ from trunkline.teleop.messages import Targets, World
 from trunkline.teleop.targets import why_not
 from trunkline.teleop.trajectory import JOINTS
 
+SILENT = 0.5  # s
+
 
 class Seeking:
     """`order` asks for axes; `hear` takes them, with the s since their targets. refused: why the newest targets are
@@ -26,6 +28,13 @@ class Seeking:
         self._times: dict[int, float] = {}  # of what is being sought
         self._found: list[tuple[float, np.ndarray | None]] = []  # before the robot may follow
         self._near: np.ndarray | None = None
+
+    @property
+    def fault(self) -> str:
+        """Why the robot must not go on following, "" where it may: a process that plans and comes back after a while
+        would send it to where the targets are by then."""
+        silent = self._now - min(self._times.values(), default=self._now)
+        return f"the process that plans has not answered for {silent:.2f} s" if silent > SILENT else ""
 
     def advance(self, dt: float) -> None:
         """Let `dt` s pass."""

@@ -142,7 +142,9 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
     """Until it is interrupted or told to end: either way robot and log are closed in order."""
     task = asyncio.current_task()
     assert task is not None, "asyncio runs it"
-    asyncio.get_running_loop().add_signal_handler(signal.SIGTERM, task.cancel)
+    for told in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(told) is not signal.SIG_IGN:  # `nohup` has it ignored
+            asyncio.get_running_loop().add_signal_handler(told, task.cancel)
     log = functools.partial(print, flush=True)
     hardware = hardware_of(
         options.robot, options.motors, options.bus, options.interface,

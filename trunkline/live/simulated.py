@@ -7,8 +7,8 @@ that bear the arm. So what was previewed is what happens.
 import copy
 import math
 import os
-import signal
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from queue import Empty
@@ -25,7 +25,7 @@ from trunkline.hybrid.torques import servo_commands
 from trunkline.live.bodies import Poses
 from trunkline.live.robot import DEAD_MAN, MODES, PERMIT, PERMITTED, STOPS, TELLS, Channel, Goal
 from trunkline.panda.shipped import JOINTS
-from trunkline.processes import parent_pid
+from trunkline.processes import leave_signals_to_parent, parent_pid
 from trunkline.simulation.motion import batch_of, hold
 from trunkline.simulation.rubbing import REFRESH, rubbing
 from trunkline.simulation.winch import Winches
@@ -217,8 +217,11 @@ class Loop:
         return robot.follow(asked, self.plant.tick)
 
 
-def drive(loop: Loop, parent: int) -> None:
-    """Turn by turn, in real time, until the process `parent` is gone, and a motion that went on has come to rest."""
+def drive(loop: Loop, parent: int, behind: Callable[[], float] = lambda: BEHIND) -> None:
+    """Turn by turn, in real time, until the process `parent` is gone, and a motion that went on has come to rest.
+
+    behind: s that real time may run ahead of what is moved before it is let go, asked for after each tick.
+    """
     now = due = told = time.monotonic()
     moved = now if loop.moves else -math.inf
     while os.getppid() == parent or now - moved < SETTLES:
@@ -229,7 +232,7 @@ def drive(loop: Loop, parent: int) -> None:
         if now >= due:
             loop.advance()
             due += loop.plant.tick
-            if now - due > BEHIND:
+            if now - due > behind():
                 due = now
         if woken or now >= told + TELLS - loop.plant.tick / 2:
             told = now
@@ -238,7 +241,7 @@ def drive(loop: Loop, parent: int) -> None:
 
 def run(channel: Channel, simulation: Simulation) -> None:
     """The process: until its parent is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's to hear
+    leave_signals_to_parent()
     os.environ["TRUNKLINE_THREADS"] = "1"
     with suppress(OSError):
         os.nice(NICE)

@@ -138,6 +138,8 @@ class SimulatedRobot:
             self.stop()
             if given_up:  # it finds no way to brake either
                 follower.rests = True
+        if follower.refused:
+            self._fault, self._braking = self._fault or follower.refused, True
         if follower.rests:
             self._follower = None
             self._report = ExecutorReport("fault" if self._fault else "idle", FOLLOWS, self._fault)

@@ -27,6 +27,7 @@ from trunkline.teleop.trajectory import JOINTS, Limits
 
 KNOT = 0.1  # s between targets that are looked at, linear between: a hand that aims moves evenly for so long
 SAMPLES = 24  # of a mean
+LOOKS = np.array([0.25, 0.5, 0.75, 1.0])  # shares of the time to rest at which it is looked whether it touches itself
 
 
 def sought(
@@ -56,14 +57,18 @@ class Following:
 
 class Follower:
     """From rest at `joints` (7,), rad, and `commands` (K,), m, in ticks of `dt` s. `rests`: whether it has come to
-    rest, once it brakes."""
+    rest, once it brakes. `refused`: why it brakes of itself, "" while it does not.
+
+    No tick leads to where braking would end, or come by, with the robot touching itself: braking begins one tick
+    before, from where that was looked at.
+    """
 
     def __init__(
         self, limits: Limits, following: Following, joints: np.ndarray, commands: np.ndarray, dt: float
     ) -> None:
         here = np.append(joints, commands)
         self._mount_offset, self._dt, self._delay = following.mount_offset, dt, following.delay
-        self._braking, self.rests = False, False
+        self._braking, self.rests, self.refused = False, False, ""
         self._width = min(following.period, max(2 * (self._delay - KNOT), 0.0))
         self._times: list[float] = []
         self._goals = [here]  # of `_times`, and before these where it began
@@ -95,28 +100,43 @@ class Follower:
     def brake(self) -> None:
         """To rest, as soon as the limits allow; ticks bring it there, wherever the targets are."""
         self._braking = True
-        self._now.control_interface, self._now.minimum_duration = ruckig.ControlInterface.Velocity, None
-        self._now.target_velocity = self._now.target_acceleration = [0.0] * len(self.goal)
+        _to_rest(self._now, self._now)
 
     def tick(self, now: float) -> tuple[np.ndarray, np.ndarray]:
         """Joints (7,), rad, and commands (K,), m, that the robot is sent at `now`, s: one tick after the last ones.
 
         Raises:
-            InputError: Ruckig finds no way, or the next pose would touch itself; the robot is to be stopped.
+            InputError: Ruckig finds no way; the robot is to be stopped.
         """
         if not self._braking:
             here, next_one = self._way(now), self._way(now + self._dt)
             velocity = np.clip((next_one - here) / self._dt, -self._velocity, self._velocity)
             self._now.target_position, self._now.target_velocity = next_one.tolist(), velocity.tolist()
-        result = self._ruckig.update(self._now, self._next)
-        if result < 0:
-            raise InputError(f"following: Ruckig found {result}, expected a way to the targets")
+        result = self._update()
+        if not self._braking and self._touches():
+            self.refused = "self-collision: the robot would touch itself as it follows"
+            self.brake()
+            result = self._update()
         found = np.array(self._next.new_position)
-        if not self._braking and clearance(found[None, :JOINTS], self._mount_offset)[0] <= 0:
-            raise InputError("self-collision: the robot would touch itself as it follows")
         self._next.pass_to_input(self._now)
         self.rests = self._braking and result == ruckig.Result.Finished
         return found[:JOINTS], found[JOINTS:]
+
+    def _update(self) -> ruckig.Result:
+        result = self._ruckig.update(self._now, self._next)
+        if result < 0:
+            raise InputError(f"following: Ruckig found {result}, expected a way to the targets")
+        return result
+
+    def _touches(self) -> bool:
+        """Whether the robot would touch itself where it brakes from the next tick on."""
+        given, way = _to_rest(ruckig.InputParameter(len(self.goal)), self._now), ruckig.Trajectory(len(self.goal))
+        given.current_position, given.current_velocity = self._next.new_position, self._next.new_velocity
+        given.current_acceleration = self._next.new_acceleration
+        if ruckig.Ruckig(len(self.goal)).calculate(given, way) < 0:
+            return True
+        places = [way.at_time(share * way.duration)[0][:JOINTS] for share in LOOKS]
+        return bool(clearance(np.array(places), self._mount_offset).min() <= 0)
 
     def _way(self, now: float) -> np.ndarray:
         """Where the axes shall be at `now`, (7 + K,), rad and m."""
@@ -125,3 +145,13 @@ class Follower:
         at = now - self._delay + self._width * ((np.arange(SAMPLES) + 0.5) / SAMPLES - 0.5)
         goals = np.array(self._goals[-len(self._times) :])
         return np.array([np.interp(at, self._times, axis).mean() for axis in goals.T])
+
+
+def _to_rest(given: ruckig.InputParameter, limits: ruckig.InputParameter) -> ruckig.InputParameter:
+    """`given`, which asks for rest wherever that is, as soon as `limits` allow."""
+    given.control_interface, given.minimum_duration = ruckig.ControlInterface.Velocity, None
+    given.max_velocity, given.max_acceleration, given.max_jerk = (
+        limits.max_velocity, limits.max_acceleration, limits.max_jerk,
+    )  # fmt: skip
+    given.target_velocity = given.target_acceleration = [0.0] * given.degrees_of_freedom
+    return given
