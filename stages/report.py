@@ -3,20 +3,21 @@
 import json
 from pathlib import Path
 
-from trunkline.certificate.certificate import Asked, certify, digests
+from trunkline.certificate.certificate import Asked, certify, digest_of_code, digests
 from trunkline.certificate.page import page
 from trunkline.errors import existing
 from trunkline.figures.certificate import pose_figure, uncertainty_figure
 from trunkline.figures.style import save_figure
 from trunkline.pipeline.inputs import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.settings import settings
+from trunkline.settings import read_yaml, settings
 from trunkline.trials.splits import DECIDING
 from trunkline.trials.trial import read_trials
 
 ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
 MODEL = ARTIFACTS / "identify_control/arm.xml"
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")
+CHECKOUT = Path(__file__).resolve().parent.parent
 
 
 @settings
@@ -31,7 +32,10 @@ def main(config: Config) -> None:
     tables = {stage: told(stage, "parameters") for stage in STAGES}
     metrics = {stage: told(stage) for stage in (*STAGES, "score", "ingest", "filter")}
     found = certify(config, read_model(MODEL), read_trials(TRIALS, DECIDING), tables, metrics)
-    facts = found.facts | {"files": digests([MODEL, *(ARTIFACTS / s / "parameters.json" for s in STAGES)])}
+    facts = found.facts | {
+        "files": digests([MODEL, *(ARTIFACTS / s / "parameters.json" for s in STAGES)]),
+        "code": digest_of_code(CHECKOUT, code()),
+    }
     with output_folder(ARTIFACTS / "report") as folder:
         save_figure(uncertainty_figure(found.budget.tips, found.budget.radius), folder / "uncertainty.png", 110)
         save_figure(pose_figure(found.shapes), folder / "poses.png", 110)
@@ -39,6 +43,12 @@ def main(config: Config) -> None:
         (folder / "certificate.html").write_text(page(facts, found.replays, pictures), encoding="utf-8")
         write_json(folder / "facts.json", facts)
         write_json(folder / "metrics.json", found.metrics)
+
+
+def code() -> list[str]:
+    """Files and folders of the checkout whose code makes the certificate: those by which DVC makes it again."""
+    deps = read_yaml(CHECKOUT / "dvc.yaml").stages.report.deps
+    return [dep for dep in deps if dep.startswith(("stages/", "trunkline/"))]
 
 
 if __name__ == "__main__":

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from stages.report import CHECKOUT, code
 from tests.certificate.sample import ASKED, INGESTED, sample, sample_trials, table, write
 from tests.support.matched_plant import small_model
-from trunkline.certificate.certificate import COMMAND, check_fitted, inputs_of
+from trunkline.certificate.certificate import COMMAND, check_fitted, digest_of_code, inputs_of
 from trunkline.certificate.poses import Conditions
 from trunkline.certificate.replays import LOST, UNIT
 from trunkline.certificate.words import NOTHING, limits_of, open_lines, strong_pairs, verdict
@@ -124,6 +125,26 @@ def test_a_model_of_another_session_is_refused_in_one_line():
 def test_a_model_of_another_arm_is_refused_in_one_line():
     with pytest.raises(InputError, match="session.yaml: segments: trial tilt_0_identify: found 'unit_04'"):
         sample(model=small_model(3), trials=None)
+
+
+def test_the_code_has_one_digest_which_every_change_of_it_changes(tmp_path):
+    (tmp_path / "rooms/__pycache__").mkdir(parents=True)
+    (tmp_path / "stage.py").write_text("a")
+    (tmp_path / "rooms/one.py").write_text("b")
+    parts, found = ["stage.py", "rooms"], set()
+    found.add(digest_of_code(tmp_path, parts))
+    (tmp_path / "rooms/__pycache__/one.pyc").write_text("left by Python")
+    assert {digest_of_code(tmp_path, parts[::-1])} == found
+    (tmp_path / "rooms/one.py").write_text("c")
+    found.add(digest_of_code(tmp_path, parts))
+    (tmp_path / "rooms/one.py").rename(tmp_path / "rooms/two.py")
+    found.add(digest_of_code(tmp_path, parts))
+    assert len(found) == 3
+
+
+def test_the_committed_certificate_names_the_committed_code():
+    facts = json.loads((CHECKOUT / "artifacts/report/facts.json").read_text())
+    assert facts["code"] == digest_of_code(CHECKOUT, code())
 
 
 def test_the_page_stands_by_itself(html):

@@ -1,5 +1,6 @@
 """Batches that MuJoCo Warp moves: when they are, what they refuse, and how far off from MuJoCo's."""
 
+import json
 import sys
 from dataclasses import replace
 
@@ -8,9 +9,10 @@ import numpy as np
 import pytest
 from mujoco.batch import Batch
 
+from tests.identification.test_stage import settings, truth_of
 from tests.simulation.test_motion import delayed
 from tests.simulation.test_rubbing import rubbing_arm
-from tests.support.matched_plant import curl, release, segments_of, small_model
+from tests.support.matched_plant import begin_project, curl, release, segments_of, small_model
 from tests.support.small_arm import small_spec
 from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.elements import arm_hinges, cables, give_way, let_hang
@@ -18,11 +20,13 @@ from trunkline.errors import InputError
 from trunkline.identification.experiment import prepare
 from trunkline.identification.linearisation import linearise
 from trunkline.identification.loss import LossWeights
-from trunkline.identification.parameters import candidate_fields
+from trunkline.identification.parameters import PARAMETERS, candidate_fields
 from trunkline.identification.population import Population
 from trunkline.identification.problem import Bounds, Problem
+from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.simulation import motion
 from trunkline.simulation.motion import batch_of, hold, move
+from trunkline.trials.trial import write_trials
 
 SECONDS = 0.5
 BOUND = 5e-6  # m, of any site in that time, as docs/cluster.md states it
@@ -239,3 +243,26 @@ def test_derivatives_stay_with_mujoco(no_library, trials):
     assert np.isfinite(problem.losses(problem.start()[None])).all()
     with pytest.raises(InputError, match="no library mujoco_warp"):
         problem.losses(problem.start()[None], rough=True)
+
+
+def test_a_stage_whose_starts_warp_ranks_finds_what_it_finds_by_mujoco(library, tmp_path, monkeypatch):
+    """End to end: the search's population goes by Warp, its descents and all that is written by MuJoCo."""
+    monkeypatch.chdir(tmp_path)
+    model = begin_project(tmp_path, 4)
+    truth, middle = truth_of(model, damping=1.4), PARAMETERS["damping"].read(model)
+    write_trials(tmp_path / "data/processed/filter",
+                 [release(truth, 0.3, frames=40), release(truth, -0.25, frames=40),
+                  release(truth, 0.2, "validate", frames=40)])  # fmt: skip
+    config = settings(["release"], ["release"], {"damping": (0.3 * middle, 3 * middle)})
+    found, moved, begin = {}, [], library.WarpBatch.__init__
+    monkeypatch.setattr(library.WarpBatch, "__init__",
+                        lambda self, *given: (moved.append(given), begin(self, *given))[1])  # fmt: skip
+    for name in ("warp", "mujoco"):
+        monkeypatch.setenv("TRUNKLINE_BATCHES", name)
+        moved.clear()
+        run("identify_damping", config, CAD_MODEL)
+        assert bool(moved) == (name == "warp")
+        table = json.loads((tmp_path / "artifacts/identify_damping/parameters.json").read_text())
+        found[name] = table["parameters"]["damping"]["value"]
+    assert found["warp"] == pytest.approx(found["mujoco"], rel=1e-4)
+    assert found["warp"] == pytest.approx(1.4 * middle, rel=0.02)

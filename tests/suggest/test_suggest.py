@@ -20,7 +20,7 @@ from trunkline.identification.parameters import PARAMETERS
 from trunkline.identification.per_session import make_room
 from trunkline.pipeline.config import load_folder
 from trunkline.sessions.session import read_session
-from trunkline.suggest.__main__ import main
+from trunkline.suggest.__main__ import DESCRIBED, main, twin, with_room
 from trunkline.suggest.candidates import candidates
 from trunkline.suggest.goals import GOALS, tip_moves, weights_for, workspace
 from trunkline.suggest.information import StageInformation, information, shares_of, stage_information
@@ -196,6 +196,17 @@ def test_what_another_session_has_for_itself_moves_no_tip_of_the_first(grid):
     moves = tip_moves(twin, ["mount_tilt_x", "mount_tilt_x@friday"], workspace(twin, grid)[:8])
     assert moves[0].any()
     assert not moves[1].any()
+
+
+def test_two_sessions_on_an_arm_that_no_stage_identified_have_a_mount_each(project, model):
+    monday = [replace(tilt(model, angle), session="monday") for angle in (20, 60)]
+    friday = [replace(tilt(model, 40), session="friday")]
+    spec, told = twin(None, project)
+    assert told == DESCRIBED
+    found = with_room(spec, monday + friday, project)
+    held = [found.numeric(index).name for index in range(found.nnumeric)]
+    assert "mount_tilt_x@friday" in held
+    assert not [name for name in held if name.endswith("@monday")]
 
 
 def test_a_release_is_bent_towards_its_side(model, grid):

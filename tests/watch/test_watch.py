@@ -72,6 +72,14 @@ def test_an_unchanged_arm_is_within_limits_and_a_softer_one_is_found_within_thre
     assert (lab / "out/chart.png").stat().st_size > 10_000
 
 
+def test_a_reference_of_few_conditions_is_said(lab, capsys):
+    shutil.rmtree(lab / "out")
+    assert watch(lab) == 0
+    said = capsys.readouterr().out
+    assert f"reference: {4 * len(TILTS)} static_tilt under {len(TILTS)} conditions" in said
+    assert "few conditions of static_tilt, as where a session is planned for identification" in said
+
+
 def test_nothing_is_scored_twice(lab, capsys):
     drop(lab, "same")
     watch(lab)

@@ -195,3 +195,12 @@ def digest_of_trials(trials: list[Trial]) -> str:
 def digests(files: list[Path]) -> dict[str, str]:
     """SHA-256 of files, by their paths."""
     return {path.as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def digest_of_code(root: Path, parts: list[str]) -> str:
+    """SHA-256 of all files of `parts`, files or folders in `root`, with their paths; not of what Python keeps there."""
+    total = hashlib.sha256()
+    inside = {file for part in parts for file in (root / part, *(root / part).rglob("*")) if file.is_file()}
+    for name in sorted(file.relative_to(root).as_posix() for file in inside if "__pycache__" not in file.parts):
+        total.update(name.encode() + b"\0" + (root / name).read_bytes() + b"\0")
+    return total.hexdigest()

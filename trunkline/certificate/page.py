@@ -198,7 +198,8 @@ def _data(facts: dict) -> str:
 
 def _versions(facts: dict) -> str:
     files = {f"SHA-256 of {path}": digest for path, digest in facts["files"].items()}
-    told = facts["versions"] | files | {"digest of the trials": facts["trials"]}
+    made = {"SHA-256 of the code": facts["code"], "digest of the trials": facts["trials"]}
+    told = facts["versions"] | made | files
     rows = [(False, [name, found]) for name, found in told.items()]
     table = _table("Versions and digests", ["what", "is"], rows, "code")
     return f"<h2>How it was made</h2>\n<p>To make it again: <code>{escape(facts['command'])}</code></p>\n{table}"

@@ -19,8 +19,11 @@ from trunkline.called import called
 from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.evaluate.model import read_arm
 from trunkline.evaluate.session import trials_of
+from trunkline.identification.per_session import make_room, names_apart, other_sessions
+from trunkline.identification.settings import IdentificationSettings
 from trunkline.identification.setup import check_parameters
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
+from trunkline.pipeline.inputs import read_spec
 from trunkline.settings import read_yaml
 from trunkline.suggest.candidates import Candidate, candidates
 from trunkline.suggest.goals import GOALS, Goal, weights_for
@@ -65,8 +68,9 @@ def main(arguments: list[str] | None = None) -> int:
     told = parser.parse_args(arguments)
     _check(told)
     grid = load_folder(Recordable, own_or_project(told.settings, "conf") / "suggest")
-    model, source = twin(told.model, told.settings)
+    spec, source = twin(told.model, told.settings)
     trials = trials_of(told.session, told.settings, "suggest")
+    model = with_room(spec, trials, told.settings)
     print(f"twin: {source}", flush=True)
     stages, offered = told_of(model, trials, grid, told.settings, told.only, told.error / 100)
     weights = weights_for(told.goal, stages, model, grid)
@@ -92,17 +96,30 @@ def _check(told: argparse.Namespace) -> None:
         raise InputError(f"--error: found {told.error:g}, expected more than 0 and up to 100 %")
 
 
-def twin(path: Path | None, root: Path) -> tuple[mujoco.MjModel, str]:
+def twin(path: Path | None, root: Path) -> tuple[mujoco.MjSpec, str]:
     """The MJCF at `path`; without, the last that the pipeline in `root` has identified, else the CAD model; and which.
     """
-    if path is not None:
-        return read_arm(path), f"{path}"
-    for stage in reversed(STAGES):
-        file = root / "artifacts" / stage / "arm.xml"
-        if file.is_file():
-            return read_arm(file), f"{file}"
+    identified = (root / "artifacts" / stage / "arm.xml" for stage in reversed(STAGES))
+    file = path or next(filter(Path.is_file, identified), None)
+    if file is not None:
+        read_arm(file)
+        return read_spec(file), f"{file}"
     description = settings_of("build_mjcf", root)
-    return described_arm(description, own_or_project(root, "conf")).spec.compile(), DESCRIBED
+    return described_arm(description, own_or_project(root, "conf")).spec, DESCRIBED
+
+
+def with_room(spec: mujoco.MjSpec, trials: list[Trial], root: Path) -> mujoco.MjModel:
+    """The arm, with a number for what each session of `trials` has for itself: one that was not identified from them
+    has none."""
+    for config in _settings(root).values():
+        make_room(spec, names_apart(list(config.parameters), config.per_session, other_sessions(trials)))
+    return spec.compile()
+
+
+def _settings(root: Path) -> dict[str, IdentificationSettings]:
+    """Of the stages in params.yaml."""
+    given = read_yaml(root / "params.yaml")
+    return {stage: settings_of(stage, root) for stage in STAGES if stage in given}
 
 
 def told_of(
@@ -110,8 +127,7 @@ def told_of(
 ) -> tuple[Stages, list[Candidate]]:
     """What every stage in params.yaml knows and would learn, and the candidates that are offered: of the kinds `only`,
     if there are any, and none that goes as a trial of the session did."""
-    given, stages = read_yaml(root / "params.yaml"), []
-    settings = {stage: settings_of(stage, root) for stage in STAGES if stage in given}
+    settings, stages = _settings(root), []
     read = {kind for config in settings.values() for kind in config.experiments}
     kinds = tuple(kind for kind in EXPERIMENTS if kind in read and (not only or kind in only))
     every = candidates(grid, model, kinds, FRAMES)

@@ -1,5 +1,7 @@
 """A watch in words: a line a trial, what has changed, and the chart as a table."""
 
+from collections import Counter
+
 import numpy as np
 import pandas as pd
 
@@ -9,6 +11,7 @@ from trunkline.watch.chart import Chart, Charted
 from trunkline.watch.explanation import Change, Explanation
 
 TWO_SIDED = 1.96
+REPEATED = 2  # times a condition, on average, from which the reference knows few of those to come
 HARDLY = 100.0  # %, of a change that one trial does not tell from none
 
 
@@ -70,11 +73,15 @@ def _told(change: Change, names: tuple[str, ...]) -> str:
 
 
 def reference_lines(baseline: Baseline, chart: Chart, names: tuple[str, ...]) -> list[str]:
-    """How many trials of each kind stand for the unchanged arm, which change a trial of each shows, and what is not
-    charted."""
+    """How many trials of each kind, under how many conditions, stand for the unchanged arm; which change a trial of
+    each shows; and what is not charted."""
     kinds = list(dict.fromkeys(score.kind for score in baseline.reference))
-    counts = [f"{sum(score.kind == kind for score in baseline.reference)} {kind}" for kind in kinds]
-    lines = [f"reference: {', '.join(counts)}"]
+    trials = Counter(score.kind for score in baseline.reference)
+    conditions = Counter(kind for kind, *_ in {score.condition for score in baseline.reference})
+    lines = ["reference: " + ", ".join(f"{trials[kind]} {kind} under {conditions[kind]} conditions" for kind in kinds)]
+    if repeated := [kind for kind in kinds if trials[kind] >= REPEATED * conditions[kind]]:
+        lines.append(f"  few conditions of {', '.join(repeated)}, as where a session is planned for identification: "
+                     "trials under others may raise more false alarms (docs/watch.md)")  # fmt: skip
     for kind in kinds:
         told = []
         for p in chart.lines:
