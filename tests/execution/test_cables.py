@@ -1,11 +1,12 @@
 """Motors as a limb, with a bench that a test turns."""
 
 import numpy as np
+import pytest
 
 from tests.support.motors import TICK, PlayedMotors, Workbench, homed
 from trunkline.execution.cables import Cables
+from trunkline.execution.limb import SILENT
 from trunkline.execution.motors import HOMING
-from trunkline.execution.stream import SILENT
 
 LEAD = 0.03  # s
 
@@ -17,8 +18,8 @@ class Played:
         self.bench = bench
         self.cables = Cables(PlayedMotors(bench), bench.now)
 
-    def play(self, seconds, way=None):
-        """Sent `way(t)`, m, of all cables, LEAD s ahead, t from 0 on; nothing without it."""
+    def play(self, seconds, way=None, turns=True):
+        """Sent `way(t)`, m, of all cables, LEAD s ahead, t from 0 on; nothing without it. turns: whether they do."""
         begun = self.bench.now
         for _ in range(round(seconds / TICK)):
             self.bench.now += TICK
@@ -27,7 +28,8 @@ class Played:
                 self.bench.hear(frame)
             if way is not None:
                 self.cables.send(now + LEAD, np.full(3, way(now - begun)))
-            self.cables.turn(now)
+            if turns:
+                self.cables.turn(now)
             self.bench.drive(*self.cables._motors.wanted, now)
 
 
@@ -43,13 +45,22 @@ def test_where_setpoints_end_they_hold_and_follow_no_more():
     played = Played(homed())
     played.play(0.5, lambda t: 0.03 * t)
     played.play(LEAD + SILENT)
-    assert played.cables.fault.startswith("silent for 5")
+    assert played.cables.fault.startswith("heard no setpoint for 5")
     held = played.cables.sent
     np.testing.assert_allclose(held, 0.015, atol=1e-6)
     played.play(0.3, lambda t: 0.05)
     np.testing.assert_array_equal(played.cables.sent, held)
     np.testing.assert_allclose(played.bench.pulls, held, atol=5e-4)
     assert all(played.bench.currents)
+
+
+@pytest.mark.parametrize(("late", "fault"), [(0.045, ""), (0.055, "heard no setpoint for 5")])
+def test_where_they_are_late_themselves_it_is_a_fault_though_setpoints_wait(late, fault):
+    played = Played(homed())
+    played.play(0.5, lambda t: 0.03 * t)
+    played.play(late, lambda t: 0.03 * (0.5 + t), turns=False)
+    played.play(0.01, lambda t: 0.03 * (0.5 + late + t))
+    assert played.cables.fault[: len("heard no setpoint for 5")] == fault
 
 
 def test_a_setpoint_that_is_no_number_is_not_followed():

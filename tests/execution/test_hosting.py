@@ -2,6 +2,7 @@
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -12,8 +13,10 @@ import pytest
 
 from tests.support import waiting
 from tests.support.motors import motor_settings
+from trunkline.execution import hosting
 from trunkline.execution.bank import SIMULATED
 from trunkline.execution.hosting import hosted
+from trunkline.execution.limb_frames import Line
 from trunkline.execution.motors import MotorsOnBus
 
 LEAD = 0.03  # s
@@ -38,7 +41,7 @@ def test_in_a_process_of_their_own_they_home_and_follow(limb):
         limb.turn(time.monotonic())
 
     until(lambda: limb.fault or limb.sent.min() > 0.0009, each)
-    assert limb.fault == "" or "silent" in limb.fault
+    assert limb.fault == "" or "silent" in limb.fault or "no setpoint" in limb.fault
 
 
 def test_their_process_killed_is_a_fault(limb):
@@ -78,6 +81,31 @@ def test_a_library_that_is_not_there_is_one_line():
     until(lambda: found.fault, lambda: found.turn(time.monotonic()))
     assert found.fault == "found no library can, expected the extra motors to be installed"
     found.close()
+
+
+class Failing:
+    """A limb that fails at its first turn. `done`: what was done, in order."""
+
+    def __init__(self, done):
+        self._done = done
+
+    def turn(self, now):
+        raise RuntimeError("no more")
+
+    def close(self):
+        self._done.append("given back")
+
+
+def test_a_limb_that_fails_is_given_back_before_anything_waits(monkeypatch):
+    ours, theirs = socket.socketpair()
+    done, settings = [], MotorsOnBus(motor_settings(), SIMULATED, "virtual")
+    monkeypatch.setattr(hosting, "limb_of", lambda settings: Failing(done))
+    monkeypatch.setattr(hosting, "be_urgent", lambda: None)
+    monkeypatch.setattr(hosting.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(Line, "end", lambda line, told: done.append(told.fault))
+    assert hosting.main([hosting.HOSTED.dump_json(settings).decode(), str(theirs.detach())]) == 1
+    assert done == ["given back", "RuntimeError: no more"]
+    ours.close()
 
 
 def test_it_is_not_ended_by_a_signal_as_long_as_somebody_is_there(limb):

@@ -1,5 +1,6 @@
 """Motors and bank on python-can's virtual bus, in real time; margins are wide, as machines are busy."""
 
+from dataclasses import replace
 from functools import partial
 
 import can
@@ -60,6 +61,42 @@ def test_a_closed_driver_leaves_no_current(joined):
     until(lambda: all(motor.current for motor in bank.bank.motors), lambda: driver.turn([0.0] * 3, [0.0] * 3))
     driver._send(driver._off)
     until(lambda: not any(motor.current for motor in bank.bank.motors))
+
+
+class BrokenBus:
+    """A bus that gives nothing but errors, and takes frames but for those of the id `deaf`. `sent`: (id, data)."""
+
+    def __init__(self, hears=False, deaf=None):
+        self._hears, self._deaf, self.sent = hears, deaf, []
+
+    def set_filters(self, filters):
+        pass
+
+    def recv(self, timeout):
+        if not self._hears:
+            raise can.CanOperationError("gone")
+
+    def send(self, message):
+        if message.arbitration_id == self._deaf:
+            raise can.CanOperationError("full")
+        self.sent.append((message.arbitration_id, bytes(message.data)))
+
+
+def test_a_bus_that_gives_nothing_but_errors_is_still_told_no_current():
+    bus = BrokenBus()
+    driver = BusMotors(motor_settings(), bus)
+    for turn in range(1, 4):
+        driver.turn([0.01] * 3, [0.0] * 3)
+        assert bus.sent == [(0x1FE, bytes(8))] * turn
+    assert driver.fault == "bus: gone"
+
+
+def test_where_one_frame_is_not_taken_the_other_still_is():
+    bus = BrokenBus(hears=True, deaf=0x1FE)
+    driver = BusMotors(replace(motor_settings(), numbers=(1, 5, 6)), bus)
+    driver.turn([0.01] * 3, [0.0] * 3)
+    assert driver.fault == "bus: full"
+    assert bus.sent == [(0x2FE, bytes(8))]
 
 
 def test_a_bus_that_is_not_there_is_one_line():

@@ -16,7 +16,7 @@ from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 from rosbags.typesys import Stores, get_typestore
 
-from tests.support.waiting import until
+from tests.support.waiting import SOON, until
 from trunkline.execution import ros_arm
 from trunkline.execution.ros_arm import RosArm
 from trunkline.execution.ros_messages import Header, JointState, JointTrajectory, Time, trajectory
@@ -95,7 +95,7 @@ def joined(monkeypatch):
 def test_a_controller_hears_where_the_joints_shall_be(joined):
     arm, controller = joined
     np.testing.assert_array_equal(arm.sent, READY)
-    target, due = READY + 0.05, time.monotonic() + 0.03
+    target, due = READY + 0.05, time.monotonic() + SOON
 
     def each():
         arm.send(due, target)
@@ -106,7 +106,7 @@ def test_a_controller_hears_where_the_joints_shall_be(joined):
     (point,) = controller.heard[0].points
     np.testing.assert_allclose(point.positions, target, rtol=0, atol=1e-12)
     assert controller.heard[0].joint_names == list(SETTINGS.names)
-    assert 0 <= point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec <= 0.03
+    assert 0 <= point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec <= SOON
     until(
         lambda: np.abs(arm.measured - target).max() < 1e-12, lambda: (controller.turn(), arm._hear(time.monotonic()))
     )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.execution.ros_arm import RosArm
+from trunkline.execution.ros_arm import PERIOD, RosArm
 from trunkline.execution.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -107,7 +107,7 @@ def stub(monkeypatch):
 def arm(stub):
     arm = RosArm(SETTINGS)
     stub.say(READY)
-    arm.turn(time.monotonic())
+    arm.turn(arm._heard)
     assert arm.ready
     yield arm
     arm.close()
@@ -116,16 +116,17 @@ def arm(stub):
 def test_a_node_sends_one_point_for_when_it_is_due(stub, arm):
     assert stub.domain == SETTINGS.domain
     np.testing.assert_array_equal(arm.sent, READY)
+    now = arm._heard
     for step in (0.04, 0.05):  # of those that wait the newest is sent
-        arm.send(time.monotonic() + 1.5, READY + step)
-    arm.turn(time.monotonic())
-    arm.send(time.monotonic() + 1.5, READY + 0.06)
-    arm.turn(arm._told)  # within PERIOD of the last
+        arm.send(now + 1.5, READY + step)
+    arm.turn(now)
+    arm.send(now + 1.5, READY + 0.06)
+    arm.turn(now)  # within PERIOD of the last
     (order,) = stub.heard
     (point,) = order.points
     assert order.joint_names == list(SETTINGS.names)
     np.testing.assert_allclose(point.positions, READY + 0.05, rtol=0, atol=1e-12)
-    assert 1.4 < point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec <= 1.5
+    assert point.time_from_start.sec + 1e-9 * point.time_from_start.nanosec == pytest.approx(1.5, abs=1e-6)
     assert not point.velocities
 
 
@@ -138,23 +139,27 @@ def test_what_it_hears_is_the_newest(stub, arm):
 
 
 def test_its_faults_are_those_of_the_other_link(stub, arm):
-    arm.turn(arm._heard + 0.3)
+    now = arm._heard
+    arm.turn(now + 0.3)
     assert arm.fault == "/joint_states: silent for 300 ms"
     arm.fault = ""
-    arm.send(time.monotonic(), READY)
+    arm.send(now, READY)
     stub.say(READY)
-    arm.turn(time.monotonic())
+    arm.turn(now)
     stub.say(np.full(7, np.nan))
-    arm.turn(time.monotonic())
+    arm.turn(now)
     assert arm.fault == "panda_joint1: found nan rad from where it is sent, expected at most 0.1"
     arm.fault = ""
     stub.say(READY + 0.2 * np.eye(7)[3])
-    arm.turn(time.monotonic())
+    arm.turn(now)
     assert arm.fault == "panda_joint4: found 0.2 rad from where it is sent, expected at most 0.1"
-    arm.fault, arm._told, stub.broken = "", 0.0, True
-    arm.send(time.monotonic(), READY)
+    arm.fault, stub.counts = "", 0
     stub.say(READY)
-    arm.turn(time.monotonic())
+    arm.turn(now)
+    assert arm.fault == f"{SETTINGS.trajectory}: nobody listens any more"
+    arm.fault, stub.counts, stub.broken = "", 1, True
+    arm.send(now, READY)
+    arm.turn(now + 2 * PERIOD)
     assert arm.fault == f"{SETTINGS.trajectory}: publisher is not valid"
 
 

@@ -8,8 +8,9 @@ import socket
 import numpy as np
 import pytest
 
+from trunkline.execution.limb import SILENT
 from trunkline.execution.limb_frames import Line, Setpoint, Told
-from trunkline.execution.stream import LIMITS, SILENT, Stream
+from trunkline.execution.stream import LIMITS, Stream
 
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 DT, LEAD, BEGINS, SECONDS = 0.001, 0.03, 0.1, 2.0
@@ -100,7 +101,7 @@ def test_silence_counts_though_setpoints_far_ahead_were_sent():
         stream.hear(Setpoint(step * DT, tuple(READY)), 0.0)
     for step in range(round(SILENT / DT) + 2):
         stream.cycle(step * DT, DT)
-    assert stream.fault == "silent for 51 ms, expected setpoints every 1 ms"
+    assert stream.fault == "heard no setpoint for 51 ms, expected one every 1 ms"
 
 
 def test_before_the_first_setpoint_it_holds():

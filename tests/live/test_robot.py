@@ -23,7 +23,18 @@ from trunkline.live.bodies import Poses, drawn
 from trunkline.live.house import SEARCH, subject_of
 from trunkline.live.logbook import tip_path
 from trunkline.live.robot import (
-    DEAD_MAN, FRESH, MODE, MODES, PERMIT, PERMITTED, POSE, STOPS, TELLS, Channel, RobotProcess, told_by,
+    DEAD_MAN,
+    FRESH,
+    MODE,
+    MODES,
+    PERMIT,
+    PERMITTED,
+    POSE,
+    STOPS,
+    TELLS,
+    Channel,
+    RobotProcess,
+    told_by,
 )  # fmt: skip
 from trunkline.live.settings import Config
 from trunkline.live.simulated import Loop, Plant, Simulation, drive

@@ -19,11 +19,11 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.errors import InputError
+from trunkline.execution.adapter import AXES
+from trunkline.execution.limb import CONNECTING
 from trunkline.execution.limb_frames import Line, Setpoint, Told
-from trunkline.panda.shipped import JOINTS
 
 ROOT = Path(__file__).parents[2]
-CONNECTING = 20.0  # s that a robot has to be there
 SILENT = 0.1  # s without a frame of the adapter
 CLOSING = 3.0  # s
 
@@ -138,6 +138,6 @@ def panda(settings: ArmSettings, robot: str) -> Adapted:
     python = settings.python or sys.executable
     command = [python, "-m", "trunkline.execution.adapter", robot, settings.address]
     try:
-        return Adapted(command, len(JOINTS), astray=settings.astray, at=f", expected {robot} at {settings.address}")
+        return Adapted(command, AXES, astray=settings.astray, at=f", expected {robot} at {settings.address}")
     except OSError as error:
         raise InputError(f"arm.python: found {python} ({error.strerror}), expected a Python") from error

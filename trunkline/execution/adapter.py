@@ -20,7 +20,7 @@ from trunkline.execution.stream import LIMITS, Stream
 from trunkline.execution.urgency import be_urgent
 
 TELL = 5  # cycles from one frame told to the next
-JOINTS = 7
+AXES = len(LIMITS["panda"].velocity)
 CUTOFF = 100.0  # Hz, of the filter that libfranka 0.9 has by default
 
 Joints = Sequence[float]
@@ -97,7 +97,7 @@ class Adapter:
     """Between the socket and the device."""
 
     def __init__(self, robot: str, channel: socket.socket) -> None:
-        self._limits, self._line = LIMITS["fr3" if robot == "fr3" else "panda"], Line(channel, Setpoint.size(JOINTS))
+        self._limits, self._line = LIMITS["fr3" if robot == "fr3" else "panda"], Line(channel, Setpoint.size(AXES))
         self._stream, self._count = None, 0
 
     def cycle(
@@ -121,7 +121,7 @@ class Adapter:
 
     def fail(self, fault: str) -> None:
         """The robot has ended control."""
-        sent = tuple(self._stream.joints) if self._stream is not None else (0.0,) * JOINTS
+        sent = tuple(self._stream.joints) if self._stream is not None else (0.0,) * AXES
         self._line.end(Told(time.monotonic(), sent, sent, fault))
 
 

@@ -5,15 +5,16 @@ from collections import deque
 
 import numpy as np
 
+from trunkline.execution.limb import Watchdog
 from trunkline.execution.motors import HOMING
 from trunkline.execution.on_bus import BusMotors
-from trunkline.execution.stream import SILENT
 
 
 class Cables:
     """A `Limb` whose axes are the cables' pulls from zero, m.
 
-    Where setpoints end, the cables hold at the last one, and follow no more. Where a motor fails, none is driven.
+    Where setpoints end, or this process is late itself, the cables hold at the last one, and follow no more. Where a
+    motor fails, none is driven.
     """
 
     def __init__(self, motors: BusMotors, begun: float) -> None:
@@ -21,7 +22,7 @@ class Cables:
         self._motors, self._until, self._fault = motors, begun + HOMING, ""
         self.sent = np.zeros(len(motors.motors.reels))
         self._queue: deque[tuple[float, np.ndarray]] = deque()
-        self._heard, self._fresh = math.inf, False  # when setpoints came, and whether some did since the last turn
+        self._watchdog, self._fresh = Watchdog(), False  # whether setpoints came since the last turn
 
     @property
     def fault(self) -> str:
@@ -45,10 +46,11 @@ class Cables:
     def turn(self, now: float) -> None:
         if not self.ready and now > self._until:
             self._fail(f"not homed after {HOMING:.0f} s")
+        if late := self._watchdog.late(now):
+            self._fail(late)
         if self._fresh:
-            self._heard, self._fresh = now, False
-        if now - self._heard > SILENT:
-            self._fail(f"silent for {1e3 * (now - self._heard):.0f} ms, expected setpoints every 1 ms")
+            self._watchdog.feed(now)
+            self._fresh = False
         self.sent, speeds = self._at(now)
         self._motors.turn(self.sent.tolist(), speeds.tolist())
 

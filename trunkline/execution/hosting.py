@@ -13,6 +13,7 @@ import socket
 import sys
 import time
 from collections.abc import Sequence
+from contextlib import closing
 
 import numpy as np
 from pydantic import TypeAdapter
@@ -20,10 +21,10 @@ from pydantic import TypeAdapter
 from trunkline.errors import InputError
 from trunkline.execution.adapted import Adapted
 from trunkline.execution.adapter import TELL
-from trunkline.execution.limb import TICK, Limb
+from trunkline.execution.limb import CONNECTING, TICK, Limb
 from trunkline.execution.limb_frames import Line, Setpoint, Told
 from trunkline.execution.motors import HOMING, MotorsOnBus
-from trunkline.execution.ros_settings import CONNECTING, RosSettings
+from trunkline.execution.ros_settings import RosSettings
 from trunkline.execution.urgency import be_urgent
 
 LATE = 0.02  # s that turns may be behind before some are left out
@@ -80,20 +81,17 @@ def main(arguments: list[str]) -> int:
     settings, descriptor = HOSTED.validate_json(arguments[0]), int(arguments[1])
     signal.signal(signal.SIGTERM, signal.SIG_IGN)  # it ends once nobody is at the other end
     with socket.socket(fileno=descriptor) as channel:
-        line, limb = Line(channel, Setpoint.size(settings.axes)), None
+        line = Line(channel, Setpoint.size(settings.axes))
         try:
-            limb = limb_of(settings)
-            gc.freeze()
-            be_urgent()
-            host(limb, line)
-        except Exception as error:  # whatever a library raises is the fault that is told
+            with closing(limb_of(settings)) as limb:
+                gc.freeze()
+                be_urgent()
+                host(limb, line)
+        except Exception as error:  # whatever a library raises is the fault that is told, once the limb is given back
             said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
             unknown = (math.nan,) * settings.axes
             line.end(Told(time.monotonic(), unknown, unknown, " ".join(said.split())))
             return 1
-        finally:
-            if limb is not None:
-                limb.close()
     return 0
 
 

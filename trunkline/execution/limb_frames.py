@@ -1,7 +1,7 @@
 """Frames between the machine's process and a limb's adapter, over a socket: of one size each way, little-endian.
 
-This, `adapter` and `stream` run in an environment of the robot's own library: they import the standard library, numpy
-and `trunkline.panda` alone.
+This, `adapter`, `limb`, `stream` and `urgency` run in an environment of the robot's own library: they import the
+standard library, numpy, each other and `trunkline.panda` alone.
 """
 
 import contextlib

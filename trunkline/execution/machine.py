@@ -5,6 +5,7 @@ by less moves nothing otherwise. What ends one of them is the machine's fault, w
 machine stops it along its plan. So the limb that is well comes to rest where the plan has it, and holds.
 """
 
+import math
 import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -39,7 +40,7 @@ class Machine:
         self._arm, self._motors, self._straight, self._clock = arm, motors, np.array(straight, dtype=float), clock
         self._limbs = {name: limb for name, limb in (("robot", arm), ("motors", motors)) if limb is not None}
         self._smoother: Smoother | None = None
-        self._due = 0.0
+        self._due, self._anew = 0.0, False
 
     def begin(self, joints: np.ndarray, left: Callable[[], bool] = lambda: False) -> np.ndarray:
         """Take hold of all there is, which waits: the arm is under control, and the cables are homed.
@@ -74,7 +75,8 @@ class Machine:
         assert self._smoother is not None
         now, wanted = self._clock(), self._smoother.next(np.append(joints, commands))
         self._due += TICK
-        if self._due < now:  # the first, or one that is late by more than LEAD
+        self._anew = self._due < now  # the first, or one that is late by more than LEAD
+        if self._anew:
             self._due = now + LEAD
         if self._arm is not None:
             self._arm.send(self._due, wanted[:JOINTS])
@@ -82,6 +84,12 @@ class Machine:
             self._motors.send(self._due, self._straight - wanted[JOINTS:])
         for limb in self._limbs.values():
             limb.turn(now)
+
+    @property
+    def behind(self) -> float:
+        """s by which moves may be late and be made up for: none once they are due anew, LEAD s from now. If they were,
+        all that follows would be due that much later for good."""
+        return 0.0 if self._anew else math.inf
 
     def measured(self) -> np.ndarray:
         """The arm's joints, rad (7,); NaN without an arm."""

@@ -56,24 +56,28 @@ class BusMotors:
                 feedback = feedback_of(message.arbitration_id, bytes(message.data))
                 if feedback is not None and not message.is_error_frame:
                     newest[feedback.number] = feedback
-            now = time.monotonic()
-            for feedback in newest.values():
-                self.motors.hear(feedback, now)
-            self._send(self.motors.currents(pulls, speeds, now) if not self._fault else self._off)
         except (can.CanError, OSError) as error:
-            self._fault = self._fault or f"bus: {error}"
+            self._fail(error)
+        now = time.monotonic()
+        for feedback in newest.values():
+            self.motors.hear(feedback, now)
+        self._send(self._off if self.fault else self.motors.currents(pulls, speeds, now))
 
     def close(self) -> None:
         """No current, and no bus."""
-        try:
-            self._send(self._off)
-        except (can.CanError, OSError) as error:
-            self._fault = self._fault or f"bus: {error}"
+        self._send(self._off)
         self._bus.shutdown()
 
     def _send(self, currents: dict[int, float]) -> None:
+        """Each frame that the bus takes."""
         for identifier, data in command_frames(currents):
-            self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+            try:
+                self._bus.send(can.Message(arbitration_id=identifier, data=data, is_extended_id=False))
+            except (can.CanError, OSError) as error:
+                self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        self._fault = self._fault or f"bus: {error}"
 
 
 class BankOnBus:

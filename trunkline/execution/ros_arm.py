@@ -1,7 +1,8 @@
 """The Panda behind a controller of ROS 2, a `joint_trajectory_controller`.
 
 Every PERIOD s the controller is sent one point, where the joints shall be when it is due; the next takes its place.
-Where no more come, it stands at the last: that is its dead man. No real controller was tried.
+Points have no velocities, so it goes there evenly from where it then is, however fast that is: what is too fast is
+refused here. Where no more come, it stands at the last: that is its dead man. No real controller was tried.
 """
 
 import math
@@ -11,10 +12,13 @@ from typing import Protocol
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.execution.ros_settings import CONNECTING, RosSettings, Said
+from trunkline.execution.limb import CONNECTING, TICK, Watchdog
+from trunkline.execution.ros_settings import RosSettings, Said
+from trunkline.execution.stream import LIMITS, ROUNDING
 
 PERIOD = 0.01  # s between points
 SILENT = 0.2  # s without the joints' state
+VELOCITY = LIMITS["panda"].velocity  # (7,), rad/s
 
 
 class Link(Protocol):
@@ -22,7 +26,7 @@ class Link(Protocol):
 
     @property
     def listeners(self) -> int:
-        """How many controllers hear what is sent."""
+        """How many hear what is sent; that they are controllers, nobody knows."""
         ...
 
     def send(self, seconds: float, joints: list[float]) -> None:
@@ -57,13 +61,19 @@ def link_of(settings: RosSettings) -> Link:
 
 
 class RosArm:
-    """A `Limb` of the Panda's joints, rad, that a controller moves, and whose states are told."""
+    """A `Limb` of the Panda's joints, rad, that a controller moves, and whose states are told.
+
+    After a fault nothing is sent: the controller stands at the last point, which is on the way, at most the setpoints'
+    lead from where the joints are. Any other point, such as where they are measured, would turn them back.
+    """
 
     def __init__(self, settings: RosSettings) -> None:
         self._settings, self.fault, self.ready = settings, "", False
         self.measured, self._sent = np.full(settings.axes, np.nan), np.full(settings.axes, np.nan)
         self._heard, self._told = time.monotonic(), 0.0
         self._next: tuple[float, np.ndarray] | None = None
+        self._watchdog, self._fresh = Watchdog(), False  # whether setpoints came since the last turn
+        self._way: tuple[float, np.ndarray] | None = None  # when the last point is due, and where it was gone to from
         self._until = self._heard + CONNECTING
         self.link = link_of(settings)
 
@@ -75,7 +85,7 @@ class RosArm:
         """The newest goes with the next turn, no oftener than every PERIOD s."""
         if not (math.isfinite(due) and np.isfinite(axes).all()):
             self._fail("setpoint: found values that are not finite")
-        self._next = None if self.fault else (due, np.array(axes))
+        self._next, self._fresh = (due, np.array(axes)), True
 
     def turn(self, now: float) -> None:
         """Hear the joints' state, and send what is due."""
@@ -83,26 +93,52 @@ class RosArm:
         if not self.ready:
             self._look(now)
             return
-        if (silent := now - self._heard) > SILENT:
-            self._fail(f"{self._settings.states}: silent for {1e3 * silent:.0f} ms")
-        off = np.abs(self.measured - self.sent)
-        if not off.max() <= self._settings.astray:  # or no number
-            name, most = self._settings.names[int(off.argmax())], self._settings.astray
-            self._fail(f"{name}: found {off.max():.3g} rad from where it is sent, expected at most {most:g}")
-
-        if self._next is not None and now - self._told >= PERIOD:
+        self._check(now)
+        if not self.fault and self._next is not None and now - self._told >= PERIOD:
             self._send(now, *self._next)
 
     def close(self) -> None:
         """The controller is sent no more, and stands at the last point."""
         self.link.close()
 
+    def _check(self, now: float) -> None:
+        """Whether setpoints and states come, somebody listens, and each joint is where it is sent."""
+        settings = self._settings
+        if late := self._watchdog.late(now):
+            self._fail(late)
+        if self._fresh:
+            self._watchdog.feed(now)
+            self._fresh = False
+        if not self.link.listeners:
+            self._fail(f"{settings.trajectory}: nobody listens any more")
+        if (silent := now - self._heard) > SILENT:
+            self._fail(f"{settings.states}: silent for {1e3 * silent:.0f} ms")
+        off = np.abs(self.measured - self.sent)
+        if not off.max() <= settings.astray:  # or no number
+            name = settings.names[int(off.argmax())]
+            self._fail(f"{name}: found {off.max():.3g} rad from where it is sent, expected at most {settings.astray:g}")
+
     def _send(self, now: float, due: float, joints: np.ndarray) -> None:
-        self._told, self._sent, self._next = now, joints, None
+        """A point, unless the way there from where the last ones have the joints by now is too fast."""
+        here = self._at(now)
+        speed = np.abs(joints - here) / max(due - now, TICK)
+        joint = int((speed / VELOCITY).argmax())
+        if speed[joint] > ROUNDING * VELOCITY[joint]:
+            asked = f"asks for {speed[joint]:.3g} rad/s, expected at most {VELOCITY[joint]:.3g}"
+            self._fail(f"setpoint: {self._settings.names[joint]} {asked}")
+            return
+        self._told, self._sent, self._next, self._way = now, joints, None, (due, here)
         try:
             self.link.send(max(due - now, 0.0), joints.tolist())
         except InputError as error:
             self._fail(str(error))
+
+    def _at(self, now: float) -> np.ndarray:
+        """Where the points that were sent have the joints at `now`, s; (7,), rad."""
+        if self._way is None:
+            return self.measured
+        due, here = self._way
+        return here + min((now - self._told) / max(due - self._told, TICK), 1.0) * (self._sent - here)
 
     def _look(self, now: float) -> None:
         """Whether the joints' state is told and a controller listens."""

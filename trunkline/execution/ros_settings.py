@@ -8,7 +8,6 @@ from pydantic import Field
 Name = Annotated[str, Field(pattern=r"^(/\w+)+$", max_length=255)]
 Said = tuple[list[str], list[float]]  # names of joints, and where each is, rad
 NEWEST = 10  # states that wait to be heard
-CONNECTING = 20.0  # s
 NANO = 1_000_000_000
 
 

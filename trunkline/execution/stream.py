@@ -15,11 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from trunkline.execution.limb import Watchdog
 from trunkline.execution.limb_frames import Setpoint
 from trunkline.panda.kinematics import Q_MAX, Q_MIN
 from trunkline.panda.limits import ACCELERATION, JERK, VELOCITY
 
-SILENT = 0.05  # s without a setpoint
 BEHIND = 0.3  # s by which setpoints may be played late
 SAME = 1e-7  # rad within which setpoints are of one place
 NEAR = 2e-3  # rad by which the first setpoint may be off
@@ -92,8 +92,7 @@ class Stream:
         self._planned = self._sent  # the same of the setpoints
         self._bridge, self._lost = Bridge(0.0 * self._sent), False
         self._queue: deque[Setpoint] = deque()
-        self._heard = self._clock = math.nan
-        self._behind = 0.0
+        self._watchdog, self._clock, self._behind = Watchdog(), math.nan, 0.0
 
     @property
     def joints(self) -> np.ndarray:
@@ -116,11 +115,11 @@ class Stream:
         joints = np.array(setpoint.axes)
         if not (math.isfinite(setpoint.due) and np.isfinite(joints).all()):
             self.brake("setpoint: found values that are not finite")
-        elif math.isnan(self._heard) and (off := float(np.abs(joints - self.joints).max())) > NEAR:
+        elif math.isinf(self._watchdog.heard) and (off := float(np.abs(joints - self.joints).max())) > NEAR:
             self.brake(f"setpoint: starts {off:.3g} rad from where the robot is, expected at most {NEAR:g}")
         elif not self._queue or setpoint.due > self._queue[-1].due:
             self._queue.append(setpoint)
-        self._heard = now
+        self._watchdog.feed(now)
 
     def brake(self, fault: str) -> None:
         """Come to rest, and stay there, because of `fault`."""
@@ -128,8 +127,8 @@ class Stream:
 
     def cycle(self, now: float, dt: float) -> np.ndarray:
         """What the robot is sent at `now`, s, `dt` s of its own time after the last one; (7,), rad."""
-        if not self.fault and self._queue and now - self._heard > SILENT:
-            self.brake(f"silent for {1e3 * (now - self._heard):.0f} ms, expected setpoints every 1 ms")
+        if late := self._watchdog.late(now):
+            self.brake(late)
         cycles, lost = max(round(dt / CYCLE), 1) if dt > 0 else 0, self._lost
         for later in reversed(range(cycles)):
             self._go(now - later * dt / cycles, dt / cycles, missed=lost and later > 0)
@@ -167,7 +166,7 @@ class Stream:
             queue.popleft()
         if len(queue) == 1:
             if self._clock > queue[0].due:
-                late = 1e3 * (now - self._heard)
+                late = 1e3 * (now - self._watchdog.heard)
                 self.brake(f"setpoints have run out, the last came {late:.0f} ms ago")
                 return None
             return np.array(queue[0].axes)
