@@ -1,11 +1,14 @@
 """Foresight against what happened, from a log whose truth is known."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
-from tests.live.test_journal import NAMES, SUBJECT, ZERO
+from tests.live.test_journal import NAMES, REAL, SUBJECT, ZERO
 from tests.support.operator import Operator
-from tests.teleop.test_plan import START, STRAIGHT
+from tests.teleop.test_plan import OFFSET, START, STRAIGHT
 from trunkline.foresight.believing import make_world
 from trunkline.live import talk
 from trunkline.live.book import Book
@@ -13,9 +16,11 @@ from trunkline.live.hindsight import executions, lines, main
 from trunkline.live.journal import Journal
 from trunkline.live.logbook import read_logbook
 from trunkline.live.robot import Standing
+from trunkline.panda.kinematics import joint_frames, mount_pose
 from trunkline.teleop.messages import ExecutorReport, Intent, Thing
 
 DIGEST, BEGIN, DELAY, OFF, LASTS, STEP = "d" * 64, 100.0, 0.04, 0.002, 2.0, 0.02
+OFF_JOINT = 0.003 * np.eye(7)[3]  # rad, by which a real robot is elsewhere than previewed: across its way
 CUP = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.6, 0.0, 0.2))
 
 
@@ -27,28 +32,42 @@ def place(time):
     return np.stack(path, axis=-1)
 
 
+def joints(time):
+    """The rigid robot's, rad (T, 7)."""
+    return START + 0.3 * np.sin(np.clip(np.asarray(time, float), 0.0, LASTS))[..., None] * np.eye(7)[0]
+
+
+def wrist(time):
+    """Its last body, (T, 7)."""
+    frame = joint_frames(joints(time))[-1]
+    turns = Rotation.from_matrix(np.stack(frame[:3], axis=1).transpose(2, 0, 1))
+    return np.concatenate([frame.p.T, turns.as_quat(scalar_first=True)], axis=1)
+
+
 class Clocked(Journal):
-    def __init__(self, file):
-        self.time = 99.0
-        super().__init__(SUBJECT, lambda: self.time)
-        self.book = Book(file, SUBJECT, ZERO)
+    def __init__(self, file, **hardware):
+        self.time, subject = 99.0, replace(SUBJECT, **hardware)
+        super().__init__(subject, lambda: self.time)
+        self.book = Book(file, subject, ZERO)
 
     def keep(self, record):
         self.book.write(record)
 
 
-def recorded(path, probability=0.8, held=True, end=None, spread=0.01):
-    """A log of one execution; `end`: s after which it was stopped."""
+def recorded(path, probability=0.8, held=True, end=None, spread=0.01, measured=False, **hardware):
+    """A log of one execution; `end`: s after which it was stopped; `measured`: whether the joints are."""
     with open(path, "wb") as file:
-        journal, operator = Clocked(file), Operator()
-        journal.event("begin", package="p", tip={"body": SUBJECT.tip[0], "place": SUBJECT.tip[1]})
+        journal, operator = Clocked(file, **hardware), Operator()
+        tip = {"body": SUBJECT.tip[0], "place": SUBJECT.tip[1]}
+        journal.event("begin", package="p", tip=tip, mount_offset=OFFSET, **hardware)
         journal.event("world", world=make_world((), (CUP,)))
         preview = talk.Preview(DIGEST, STEP, LASTS, STEP, (("approach", 0.0),))
         journal.event("preview", preview=preview)
         times = np.arange(1, round(LASTS / STEP) + 1) * STEP
         for first in range(0, len(times), 20):
             piece = place(times[first : first + 20])
-            journal.piece(first, float(times[first]), np.stack([piece] * len(NAMES), axis=1))
+            rows = [wrist(times[first : first + 20]), piece, piece]
+            journal.piece(first, float(times[first]), np.stack(rows, axis=1))
         tip = place(times[-1])[:3] + [0.0, 0.0, 0.1]
         journal.event("foreseen", foreseen=talk.Foreseen(
             DIGEST, probability, 0.6, 0.9, (LASTS,), (tuple(tip),), (spread,), 0.9, 12))  # fmt: skip
@@ -61,7 +80,8 @@ def recorded(path, probability=0.8, held=True, end=None, spread=0.01):
                 journal.event("robot", robot=ExecutorReport("idle", DIGEST))
                 break
             poses = np.stack([place(time - DELAY)] * len(NAMES)) + [0.0, 0.0, OFF, 0.0, 0.0, 0.0, 0.0]
-            journal.standing(Standing(journal.time, 0.0, START, STRAIGHT, poses[0], poses))
+            sensed = joints(time - DELAY) + OFF_JOINT if measured else None
+            journal.standing(Standing(journal.time, 0.0, START, STRAIGHT, poses[0], poses, sensed))
             intent: Intent = operator.step()
             journal.step(1 / 60, operator.given, intent)
         if end is None:
@@ -103,6 +123,30 @@ def test_of_a_plan_that_was_stopped_its_part_is_compared_and_no_outcome(tmp_path
     said = capsys.readouterr().out
     assert "tip 2.0 mm, at most 2.0 mm from the preview over 0.9 s, 40 ms later" in said
     assert "grasp foreseen at 0.80, not tried to its end" in said
+
+
+def test_of_a_real_machine_the_mount_is_compared_and_nobody_saw_the_arm(tmp_path, capsys):
+    """A twin did and held what was foreseen."""
+    path = recorded(tmp_path / "run.mcap", measured=True, hardware=REAL)
+    (found,) = executions(read_logbook(path))
+    assert (found.end, found.within, found.held, found.seen) == ("done", None, None, False)
+    away = np.linalg.norm(np.diff(mount_pose(np.stack([START, START + OFF_JOINT]), OFFSET)[0], axis=0))
+    assert found.delay == pytest.approx(DELAY, abs=2e-3)
+    assert [found.median, found.worst] == pytest.approx([away] * 2, rel=0.1)
+    assert found.seconds == pytest.approx(LASTS - STEP, abs=0.05)
+    assert main([str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "; mount " in said
+    assert "tip 2.0 mm" not in said
+    assert "grasp foreseen at 0.80, which nobody saw" in said
+    assert "1 executed\n  nobody saw the arm: its shape, its tip and its grasps are not judged\n" in said
+    assert "Brier" not in said
+
+
+def test_of_motors_alone_nothing_is_compared(tmp_path):
+    (found,) = executions(read_logbook(recorded(tmp_path / "run.mcap", hardware="no real robot, motors 1, 2, 3")))
+    assert (found.end, found.seconds, found.within, found.held) == ("done", 0.0, None, None)
+    assert np.isnan([found.median, found.worst, found.delay]).all()
 
 
 def test_where_nothing_was_executed_nothing_is_said(tmp_path):

@@ -4,6 +4,7 @@ a killed process nor a full disk moves a robot or loses more than a second."""
 import asyncio
 import gc
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -14,25 +15,33 @@ from itertools import count, groupby
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import Writer
 from mcap_ros2.decoder import DecoderFactory
 
+from tests.live.test_robot import simulation
 from tests.live.test_session import asked, executing, grips
 from tests.support.disks import filling, full, stuck
 from tests.support.live import BODIES, RATE, controlling, hand, laid, patient
 from tests.support.operator import PACKAGE, Everywhere, Operator
-from tests.support.sessions import motion_truth
+from tests.support.sessions import instruments, motion_truth, record
 from tests.support.ticking import fed, ticks
 from tests.support.workbench import ROOT
 from tests.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
+from trunkline.demonstrations.recording import read_recording
 from trunkline.errors import InputError
+from trunkline.execution.settings import Config as Execution
 from trunkline.live import replay
-from trunkline.live.book import EVENTS, POSES, Book, Subject
+from trunkline.live.book import EVENTS, POSES, TWIN, Book, Subject
+from trunkline.live.hardware import hardware_of
+from trunkline.live.house import subject_of
 from trunkline.live.journal import Journal, JournalProcess, new_path
 from trunkline.live.logbook import read_logbook
 from trunkline.live.robot import Standing
 from trunkline.live.wire import HANDS
+from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.preparation.inspect import main as inspect
 from trunkline.sessions.session import read_session
+from trunkline.sessions.source import open_log
 from trunkline.takes.checks import Limits
 from trunkline.takes.intake import take_in
 from trunkline.teleop.core import Teleoperation
@@ -43,6 +52,7 @@ JOINTS = tuple(f"joint_{n}" for n in range(1, 8))
 SUBJECT = Subject(NAMES, JOINTS, ("tendon_1", "tendon_2", "tendon_3"), STRAIGHT, ("unit_01", (0.0, 0.0, -0.1)))
 ZERO = 1_700_000_000 * 10**9
 PERIOD = 0.2
+REAL = "the robot fr3 at 192.168.1.11, no real motors"
 
 
 class Written(Journal):
@@ -143,14 +153,16 @@ def test_ingest_sees_the_arm_whole_and_takes_no_hand_for_it(log, capsys):
     assert "base: base" in proposed
 
 
-def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, capsys):
-    truth = motion_truth()
-    bodies = ("link_7", "base", *truth.segments)
-    journal = Written(tmp_path / "run.mcap", Subject(bodies, JOINTS, truth.tendons, STRAIGHT, ("unit_08", (0, 0, 0))))
+def told_of(path, truth, **hardware):
+    """A log of a session in which a robot did what `truth` says, and a twin, where it is one of hardware, as well."""
+    bodies, tip = ("link_7", "base", *truth.segments), ("unit_08", (0.0, 0.0, 0.0))
+    journal = Written(path, Subject(bodies, JOINTS, truth.tendons, STRAIGHT, tip, **hardware))
     base = np.append(truth.base_position, truth.base_quaternion)
     intent = (operator := Operator()).step()
     for row in range(0, len(truth.time), 4):
         at = journal.time = float(truth.time[row])
+        if not row:
+            journal.event("begin", tip={"body": tip[0], "place": tip[1]})
         arm = np.concatenate([truth.positions[row], truth.quaternions[row]], axis=1)
         pull, wound = truth.commands[row // 5], truth.tendon_positions[row]
         joints, nothing = START + 0.1 * np.sin(at), np.full(7, np.nan)
@@ -160,6 +172,11 @@ def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, c
             journal.headset(part, at, base, False)
         journal.step(1 / 120, operator.given, intent)
     journal.close()
+
+
+def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, capsys):
+    truth = motion_truth()
+    told_of(tmp_path / "run.mcap", truth)
     assert inspect([str(tmp_path)]) == 0
     (tmp_path / "session.yaml").write_text(capsys.readouterr().out.split("Proposed session.yaml:\n")[1])
     session = read_session(tmp_path)
@@ -172,6 +189,83 @@ def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, c
     np.testing.assert_allclose(take.base_positions[there], [truth.base_position] * there.sum(), atol=1e-9)
     np.testing.assert_allclose(take.tendon_positions, truth.tendon_positions[::4], atol=1e-12)
     assert take.commands.max() == pytest.approx(truth.commands.max(), rel=1e-3)
+
+
+def test_what_a_twin_drew_of_a_real_machine_is_not_taken_for_the_arm(tmp_path, capsys):
+    truth, path = motion_truth(), tmp_path / "run.mcap"
+    told_of(path, truth, hardware=REAL)
+    assert inspect([str(path)]) == 0
+    said = capsys.readouterr().out
+    assert re.search(rf"{TWIN} +tf2_msgs/msg/TFMessage \(cdr\), drawn by a twin, not read", said)
+    assert f"  {POSES} " not in said
+    assert "no session.yaml to propose" in said
+    (tmp_path / "session.yaml").write_text(
+        "frame: {up: [0, 0, 1], unit: m}\nbase: base\ntopics: {commands: /tendons/command}\n"
+        "trials: [{file: run.mcap, experiment: motion, split: identify}]\n"
+    )
+    with open(path, "rb") as file:
+        kept = [one for one in make_reader(file).iter_messages() if not one[1].topic.startswith("/headset/")]
+    merged(path, kept)
+    with pytest.raises(InputError, match=f"no pose topic, found .*{TWIN}"):
+        open_log(path, read_session(tmp_path))
+    logbook = read_logbook(path)
+    assert logbook.poses is None
+    assert logbook.twin.names[-1] == "unit_08"
+    with pytest.raises(InputError, match="/tf: found no body 'unit_08'"):
+        read_recording(path)
+
+
+def merged(path, messages):
+    """A log of all of them, (schema, channel, message), in the order of their log times."""
+    with open(path, "wb") as file:
+        writer, channels = Writer(file), {}
+        writer.start(profile="ros2")
+        for schema, channel, message in sorted(messages, key=lambda one: one[2].log_time):
+            if channel.topic not in channels:
+                known = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, known)
+            writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
+        writer.finish()
+
+
+def test_with_motion_capture_merged_into_it_a_real_session_is_one_to_identify_from(tmp_path, capsys):
+    """Its twin did something else: no part of that is taken."""
+    truth = motion_truth()
+    twin = replace(truth, positions=truth.positions[::-1] + 1.0)
+    told_of(tmp_path / "run.mcap", twin, hardware=REAL)
+    plain = instruments(
+        position_noise_mm=0.0, orientation_noise_deg=0.0, occlusions_per_s=0.0, dropped_frames=0.0, outliers=0.0,
+        stamp_jitter_ms=0.0, epoch_s=ZERO // 10**9,
+    )  # fmt: skip
+    record(tmp_path / "seen", [truth], plain)
+    messages = []
+    for path in (tmp_path / "run.mcap", tmp_path / "seen/motion_identify.mcap"):
+        with open(path, "rb") as file:
+            found = list(make_reader(file).iter_messages())
+        messages += [one for one in found if path.name == "run.mcap" or one[1].topic == "/rigid_bodies"]
+    (tmp_path / "merged").mkdir()
+    merged(tmp_path / "merged/run.mcap", messages)
+    assert inspect([str(tmp_path / "merged")]) == 0
+    proposed = capsys.readouterr().out.split("Proposed session.yaml:\n")[1]
+    topics = "{poses: /rigid_bodies, commands: /tendons/command, tendon_positions: /tendons/state}"
+    assert f"topics: {topics}" in proposed
+    (tmp_path / "merged/session.yaml").write_text(proposed)
+    session = read_session(tmp_path / "merged")
+    ((_, take, _),) = take_in(tmp_path / "merged", session, Limits(0.2, 0.3, 0.1, 1.0))
+    assert (take.segments, take.tendons) == (truth.segments, truth.tendons), take
+    far = np.linalg.norm(take.positions[:, -1] - take.base_positions, axis=1)
+    true = np.linalg.norm(truth.positions[::4, -1] - truth.base_position, axis=1)
+    there = np.isfinite(far)
+    assert there.sum() > 100
+    np.testing.assert_allclose(far[there], true[: len(far)][there], atol=1e-3)
+
+
+def test_a_log_says_what_of_its_robot_is_real(log):
+    assert read_logbook(log).begin["hardware"] == "simulated"
+    found = hardware_of("fr3", "simulated", "", "", load_folder(Execution, PROJECT / "conf/execution"))
+    subject = subject_of(simulation(), found)
+    assert (subject.hardware, subject.poses) == (found.words(), TWIN)
+    assert subject_of(simulation()).poses == POSES
 
 
 def test_events_tell_who_controlled_what_was_planned_and_how_it_ended(log):
@@ -280,6 +374,94 @@ if __name__ == "__main__":
     print("told", flush=True)
     time.sleep(600)
 """
+
+
+def test_a_process_that_hangs_is_a_fault_before_more_than_a_second_is_lost(tmp_path):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, 0.5)
+    journal.event("tick", number=0)
+    until(lambda: path.exists() and path.stat().st_size > 500)
+    told = fed(journal, 1.2)
+    os.kill(journal.pid, signal.SIGSTOP)
+    stopped, number, longest = time.monotonic(), len(told), 0.0
+    while not journal.fault:
+        assert time.monotonic() - stopped < 10.0
+        told.append(time.monotonic())
+        number += 1
+        before = time.thread_time()
+        journal.event("tick", number=number)
+        longest = max(longest, time.thread_time() - before)
+        time.sleep(0.01)
+    seen = time.monotonic()
+    assert journal.fault == "log: run.mcap: its process does not answer for 1 s; nothing is executed"
+    os.kill(journal.pid, signal.SIGKILL)
+    journal.close()
+    assert journal.fault == "log: run.mcap: its process does not answer for 1 s; nothing is executed"
+    numbers, damage = ticks(path)
+    assert numbers == list(range(len(numbers)))
+    assert seen - told[numbers[-1]] < 1.5  # 1.05, but for a busy machine
+    assert longest < 0.05
+
+
+def test_a_process_that_stalls_for_a_moment_is_no_fault(tmp_path):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, 0.5)
+    journal.await_begun()
+    told = len(fed(journal, 0.7))
+    os.kill(journal.pid, signal.SIGSTOP)
+    time.sleep(0.3)
+    journal.event("tick", number=told + 1)
+    os.kill(journal.pid, signal.SIGCONT)
+    time.sleep(2.0)  # nothing waits, so nothing need be written
+    assert not journal.fault
+    journal.event("tick", number=told + 2)
+    journal.close()
+    assert ticks(path) == (list(range(1, told + 3)), [])
+
+
+STILL = """
+import sys, time
+from pathlib import Path
+from tests.support.ticking import fed
+if __name__ == "__main__":
+    from trunkline.live.journal import NOTHING, JournalProcess
+    journal = JournalProcess(Path(sys.argv[1]), NOTHING, 0.5)
+    journal.await_begun()
+    print(journal.pid, flush=True)
+    fed(journal, 4.0)
+    print(repr(journal.fault), flush=True)
+    journal.close()
+"""
+
+
+def test_a_machine_that_stands_still_as_a_whole_is_no_fault(tmp_path):
+    script = tmp_path / "session.py"
+    script.write_text(STILL)
+    session = subprocess.Popen([sys.executable, str(script), str(tmp_path / "run.mcap")], cwd=ROOT, text=True,
+                               stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(ROOT)})  # fmt: skip
+    both = [int(session.stdout.readline()), session.pid]
+    time.sleep(0.5)
+    for pid in both:
+        os.kill(pid, signal.SIGSTOP)
+    time.sleep(2.0)
+    for pid in reversed(both):
+        os.kill(pid, signal.SIGCONT)
+    assert session.stdout.readline() == "''\n"
+    assert session.wait(20.0) == 0
+
+
+def test_a_session_waits_until_its_log_has_begun(tmp_path, monkeypatch):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, PERIOD)
+    journal.await_begun()
+    assert path.exists()
+    journal.close()
+    monkeypatch.setattr("trunkline.live.journal.BEGINS", 0.3)
+    monkeypatch.setattr("trunkline.live.journal.PATIENCE", 0.1)
+    hangs = JournalProcess(tmp_path / "other.mcap", SUBJECT, PERIOD, stuck)
+    hangs.await_begun()
+    assert hangs.fault == "log: other.mcap: its process has not begun for 0.3 s; nothing is executed"
+    hangs.close()
 
 
 def test_where_the_session_itself_is_killed_its_log_is_ended_as_it_should(tmp_path):

@@ -3,11 +3,12 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from tests.live.test_journal import NAMES, Written
+from tests.live.test_journal import NAMES, REAL, SUBJECT, Written
 from tests.support.operator import Operator
 from tests.teleop.test_plan import START, STRAIGHT
 from trunkline.errors import InputError
@@ -35,9 +36,8 @@ def moved(time):
     return np.array(rows)
 
 
-@pytest.fixture
-def log(tmp_path):
-    journal = Written(tmp_path / "run.mcap")
+def written(path, **hardware):
+    journal = Written(path, replace(SUBJECT, **hardware))
     intent = (operator := Operator()).step()
     for number in range(round(RATE * SECONDS)):
         journal.time = at = BEGUN + number / RATE
@@ -46,7 +46,12 @@ def log(tmp_path):
         journal.standing(Standing(at, 0.0, START, STRAIGHT, np.full(7, np.nan), moved(at)))
         journal.step(1 / RATE, operator.given, intent)
     journal.close()
-    return tmp_path / "run.mcap"
+    return path
+
+
+@pytest.fixture
+def log(tmp_path):
+    return written(tmp_path / "run.mcap")
 
 
 def test_the_page_reads_the_poses_of_the_log_at_their_times(log, tmp_path, capsys):
@@ -75,6 +80,14 @@ def test_each_frame_has_the_servers_time_of_its_pose(log):
         kind, _, count, _, time = wire._HEAD.unpack_from(message, recording.LENGTH.size)
         assert (kind, count) == (wire.FROM_SERVER["robot"].number, len(NAMES) + len(wire.MARKERS))
         assert time == pytest.approx(BEGUN + number / RATE, abs=1e-6)
+
+
+def test_of_a_real_machine_its_twin_is_shown_and_called_so(log, tmp_path, capsys):
+    twin = written(tmp_path / "real.mcap", hardware=REAL)
+    found, seen = (list(recording.recorded(read_logbook(path))) for path in (twin, log))
+    assert found == seen
+    assert recording.main([str(twin), str(tmp_path / "recording.bin")]) == 0
+    assert "real.mcap: /tf_twin: its bodies are as a twin drew them: nobody saw the arm" in capsys.readouterr().out
 
 
 def test_a_log_without_poses_is_refused_by_name(tmp_path):

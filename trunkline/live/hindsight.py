@@ -4,7 +4,8 @@
 
 A line for each plan that was executed: how far the tip was from the preview's, whether it ended within the spread, and
 what was said of the grasp against what came of it. The robot begins a plan some ms after it was told to; by how many,
-is where both paths are nearest, and is said.
+is where both paths are nearest, and is said. Of a real machine nobody sees the arm: the mount stands in for the tip, by
+the joints as measured, and neither spread nor grasp is judged.
 """
 
 import argparse
@@ -17,7 +18,10 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from trunkline.errors import in_one_line
+from trunkline.live.book import SIMULATED, WRIST
 from trunkline.live.logbook import Logbook, read_logbook, tip_path
+from trunkline.panda.kinematics import FLANGE, mount_pose
+from trunkline.panda.shipped import JOINTS
 
 LATEST = 0.25  # s that a robot may need to begin
 FEWEST = 5  # poses of a path that is compared
@@ -30,7 +34,8 @@ class Execution:
     end: what the robot said at last. median, worst: distance of the tip from the preview's, m, over `seconds` of it;
     delay: s by which the robot was later; NaN where no path was kept. within: whether the tip ended within the spread;
     None where it did not come so far. probability: of the grasp as foreseen; held: whether it came about. None where
-    nothing was to be grasped, or it was not tried to its end.
+    nothing was to be grasped, or it was not tried to its end. seen: whether anybody saw the arm; where not, distances
+    are the mount's, and `within` and `held` are None.
     """
 
     digest: str
@@ -43,30 +48,32 @@ class Execution:
     within: bool | None
     probability: float | None
     held: bool | None
+    seen: bool = True
 
 
 def executions(logbook: Logbook) -> Iterator[Execution]:
     """In their order, of those that the robot began."""
     events, begin = logbook.events, logbook.begin
-    place = begin["tip"]["place"]
-    times, tips = _seen(logbook, begin["tip"]["body"], place)
+    seen = logbook.hardware == SIMULATED
+    rows, place = ("poses", begin["tip"]["place"]) if seen else (WRIST, (0.0, 0.0, FLANGE + begin["mount_offset"]))
+    times, path = _seen(logbook, begin["tip"]["body"], place) if seen else _measured(logbook, begin["mount_offset"])
     for index, event in enumerate(events):
         if event["event"] != "execute" or event["refused"]:
             continue
         digest, since = event["digest"], event["time"]
         later = [other for other in events[index + 1 :]]
         end, until = _end(later, digest, float(times[-1]) if len(times) else since)
-        preview, path = _preview(events[:index], digest, place)
+        preview, shown = _preview(events[:index], digest, rows, place)
         done = end == "done"
-        seconds, median, worst, delay, last = _compared(times - since, tips, preview, path, until - since, done)
+        seconds, median, worst, delay, last = _compared(times - since, path, preview, shown, until - since, done)
         told = next((e["foreseen"] for e in reversed(events[:index]) if _is_of(e, "foreseen", digest)), None)
         within = None
-        if told is not None and last is not None and told["spread"]:
+        if seen and told is not None and last is not None and told["spread"]:
             within = bool(np.linalg.norm(last - np.array(told["tip"][-1])) <= told["spread"][-1])
         probability = None if told is None else told["probability"]
-        held = _held(events[:index], later) if done and probability is not None else None
+        held = _held(events[:index], later) if seen and done and probability is not None else None
         since_begin = since - begin["time"]
-        yield Execution(digest, since_begin, end, seconds, median, worst, delay, within, probability, held)
+        yield Execution(digest, since_begin, end, seconds, median, worst, delay, within, probability, held, seen)
 
 
 def _is_of(event: dict, kind: str, digest: str) -> bool:
@@ -84,16 +91,26 @@ def _seen(logbook: Logbook, body: str, place) -> tuple[np.ndarray, np.ndarray]:
     return 1e-9 * (poses.stamps[there] - logbook.zero), tip_path(path, place)
 
 
-def _preview(before: list[dict], digest: str, place) -> tuple[np.ndarray, np.ndarray]:
-    """Times of the plan (F,), s, and the previewed tip (F, 3)."""
+def _measured(logbook: Logbook, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the journal's clock, s (T,), and the mount by the joints as measured (T, 3); none where nobody does."""
+    joints = logbook.joints
+    if joints is None or not set(JOINTS) <= set(joints.names):
+        return np.empty(0), np.empty((0, 3))
+    found = joints.positions[:, [joints.names.index(name) for name in JOINTS]]
+    there = np.isfinite(found).all(axis=1)
+    return 1e-9 * (joints.stamps[there] - logbook.zero), mount_pose(found[there], mount_offset)[0]
+
+
+def _preview(before: list[dict], digest: str, rows: str, place) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the plan (F,), s, and the previewed point (F, 3) at `place`, m, of the body whose poses are `rows`."""
     begun = max((i for i, e in enumerate(before) if _is_of(e, "preview", digest)), default=None)
     if begun is None:
         return np.empty(0), np.empty((0, 3))
     step, times, poses = before[begun]["preview"]["step"], [], []
     for event in before[begun:]:
         if event["event"] == "piece":
-            times += [event["begins"] + step * frame for frame in range(len(event["poses"]))]
-            poses += event["poses"]
+            times += [event["begins"] + step * frame for frame in range(len(event[rows]))]
+            poses += event[rows]
     return np.array(times), tip_path(np.array(poses).reshape(-1, 7), place)
 
 
@@ -155,12 +172,13 @@ def lines(found: list[Execution]) -> list[str]:
     for one in found:
         parts = [f"{one.time:8.1f} s  {one.digest[:12]}  {one.end}"]
         if np.isfinite(one.median):
-            apart = f"{1e3 * one.median:.1f} mm, at most {1e3 * one.worst:.1f} mm"
-            parts.append(f"tip {apart} from the preview over {one.seconds:.1f} s, {1e3 * one.delay:.0f} ms later")
+            apart = f"{'tip' if one.seen else 'mount'} {1e3 * one.median:.1f} mm, at most {1e3 * one.worst:.1f} mm"
+            parts.append(f"{apart} from the preview over {one.seconds:.1f} s, {1e3 * one.delay:.0f} ms later")
         if one.within is not None:
             parts.append("ended within the spread" if one.within else "ended beyond the spread")
         if one.probability is not None:
             came = "not tried to its end" if one.held is None else "held" if one.held else "not held"
+            came = came if one.seen else "which nobody saw"
             parts.append(f"grasp foreseen at {one.probability:.2f}, {came}")
         told.append("; ".join(parts))
     judged = [(one.probability, one.held) for one in found if one.probability is not None and one.held is not None]
@@ -172,6 +190,8 @@ def lines(found: list[Execution]) -> list[str]:
         agreed = sum((probability >= 0.5) == held for probability, held in judged)
         brier = sum((probability - held) ** 2 for probability, held in judged) / len(judged)
         told[-1] += f"; outcome as foreseen in {agreed} of {len(judged)}, Brier score {brier:.3f}"
+    if not all(one.seen for one in found):
+        told.append("nobody saw the arm: its shape, its tip and its grasps are not judged")
     return told
 
 

@@ -1,7 +1,8 @@
 """The log of a live session: all that is heard, wanted and done goes to one MCAP file, by a process of its own.
 
 So a slow disk delays no frame and no stop. What is lost by `kill -9` is younger than `period`. Where the log cannot be
-written any more, `fault` says why, and whoever moves the robot has to hold it.
+written any more, or nothing has been written for `period` and LATE s, `fault` says why, and whoever moves the robot has
+to hold it.
 """
 
 import ctypes
@@ -26,12 +27,13 @@ from trunkline.live.book import (
     JOINTS,
     JOINTS_SENT,
     NOTHING,
-    POSES,
     REFERENCE,
     STATIC,
     TENDONS,
     TENDONS_SENT,
     TEXT,
+    TWIN,
+    WRIST,
     Record,
     Subject,
     new_file,
@@ -46,6 +48,9 @@ MOST = 5000  # records that may wait: some 15 s of a session
 _EVENT = TypeAdapter(dict[str, Any], config=ConfigDict(ser_json_inf_nan="null"))
 GATHERS = 0.02  # s
 PATIENCE = 5.0  # s that the process has to end in
+BEGINS = 60.0  # s that it has to begin in
+LATE = 0.5  # s beyond `period` that it may write nothing in: 1 s of a session that nobody would ever know
+LOOKS = 0.05  # s between looks at whether it writes
 
 
 class Journal:
@@ -85,7 +90,7 @@ class Journal:
         ):  # fmt: skip
             if axes is not None and np.isfinite(axes).all():
                 self.keep(Record(topic, robot.time, now, axes))
-        self.keep(Record(POSES, robot.time, now, robot.bodies, BASE))
+        self.keep(Record(self.subject.poses, robot.time, now, robot.bodies, BASE))
 
     def headset(self, part: str, at: float, pose: np.ndarray, in_base: bool) -> None:
         """Pose (7,) of the `left` or `right` hand, or of the `view`."""
@@ -97,14 +102,17 @@ class Journal:
         self.keep(Record(STATIC, now, now, np.array([*pose.position, *pose.quaternion]), BASE))
 
     def piece(self, first: int, begins: float, poses: np.ndarray) -> None:
-        """Of a preview: the arm's last body in frames from the one numbered `first`, at `begins` s of the plan.
+        """Of a preview: the arm's last body in frames from the one numbered `first`, at `begins` s of the plan; of a
+        real machine the rigid robot's last body too, as nobody will see the arm.
 
         Args:
             poses: of all bodies, (F, N, 7).
         """
-        if self.subject.bodies:
-            rows = poses[:, self.subject.bodies.index(self.subject.tip[0])]
-            self.event("piece", first=first, begins=begins, poses=rows.tolist())
+        bodies = self.subject.bodies
+        if bodies:
+            wrist = {WRIST: poses[:, bodies.index(WRIST)].tolist()} if self.subject.poses == TWIN else {}
+            rows = poses[:, bodies.index(self.subject.tip[0])]
+            self.event("piece", first=first, begins=begins, poses=rows.tolist(), **wrist)
 
     def event(self, kind: str, **fields: object) -> None:
         """Anything else, by the name of its `kind`; fields are what JSON can hold, or dataclasses."""
@@ -122,17 +130,19 @@ class JournalProcess(Journal):
         context = multiprocessing.get_context("spawn")
         theirs, self._pipe = context.Pipe(duplex=False)
         self._told, self._lost = context.RawArray(ctypes.c_char, TEXT), ""
+        self._kept, self._sent, self._silent = context.RawValue(ctypes.c_int64, -1), 0, period + LATE
         zero = time.time_ns() - round(1e9 * self.now())  # once: a wall clock that jumps moves nothing in the log
         self.path = path
         self._process = context.Process(
-            target=run, args=(theirs, self._told, path, subject, zero, period, opened or new_file), daemon=True,
-            name="journal",
+            target=run, args=(theirs, self._told, self._kept, path, subject, zero, period, opened or new_file),
+            daemon=True, name="journal",
         )  # fmt: skip
         self._process.start()
         theirs.close()
         self._waiting: deque[Record] = deque()
         self._ended = threading.Event()
-        threading.Thread(target=self._send, daemon=True).start()
+        for work in (self._send, self._watch):
+            threading.Thread(target=work, daemon=True).start()
 
     @property
     def pid(self) -> int | None:
@@ -147,8 +157,16 @@ class JournalProcess(Journal):
             return
         if len(self._waiting) < MOST:
             self._waiting.append(record)
-        else:  # from here on nothing is written: what is there stays without gaps
-            self._lost = f"log: {self.path.name}: the disk does not keep up; nothing is executed"
+        else:
+            self._lose("the disk does not keep up")
+
+    def await_begun(self) -> None:
+        """Until its process can write, or says why not: nothing is to move before."""
+        until = time.monotonic() + BEGINS
+        while self._kept.value < 0 and not self.fault and self._process.is_alive():
+            if time.monotonic() > until:
+                self._lose(f"its process has not begun for {BEGINS:g} s")
+            time.sleep(GATHERS)
 
     def close(self) -> None:
         """Write what waits, and end the file."""
@@ -166,11 +184,27 @@ class JournalProcess(Journal):
             while not (ended or self._lost):
                 ended = self._ended.wait(GATHERS)
                 if records := [waiting.popleft() for _ in range(len(waiting))]:
+                    self._sent += 1
                     self._pipe.send(records)
         except OSError:
-            self._lost = f"log: {self.path.name}: its process has ended; nothing is executed"
+            self._lose("its process has ended")
         finally:
             self._pipe.close()
+
+    def _watch(self) -> None:
+        """Whether anything waits and nothing is written, until it is closed. It counts its own looks: where all of the
+        machine stands still for a while, that is one."""
+        looks, before = 0, self._kept.value
+        while not (self._ended.wait(LOOKS) or self._lost):
+            kept = self._kept.value
+            looks = looks + 1 if 0 <= before == kept < self._sent else 0
+            before = kept
+            if looks * LOOKS >= self._silent:
+                self._lose(f"its process does not answer for {self._silent:g} s")
+
+    def _lose(self, why: str) -> None:
+        """From here on nothing is written: what is there stays without gaps."""
+        self._lost = self._lost or f"log: {self.path.name}: {why}; nothing is executed"
 
 
 def new_path(folder: Path) -> Path:

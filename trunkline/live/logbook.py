@@ -9,8 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.live.book import EVENTS, INPUT, INTENT, POSES
+from trunkline.live.book import EVENTS, INPUT, INTENT, JOINTS, POSES, SIMULATED, TWIN
 from trunkline.logs.cdr import HEADER
+from trunkline.logs.joint_stream import JointStream, joint_stream
 from trunkline.logs.log import Log, read_log
 from trunkline.logs.pose_stream import PoseStream, pose_stream
 
@@ -29,7 +30,8 @@ class Step(NamedTuple):
 @dataclass(frozen=True)
 class Logbook:
     """`damage`: what is lost, in sentences. zero: ns since 1970 at 0 s of the events' `time`. events: in their order,
-    each with its kind as `event`."""
+    each with its kind as `event`. poses: of the robot's bodies; of a real machine None, as nobody sees them. twin: as a
+    twin drew them of a real machine. joints: the rigid robot's, as measured."""
 
     path: Path
     damage: list[str]
@@ -37,6 +39,8 @@ class Logbook:
     events: list[dict]
     steps: list[Step]
     poses: PoseStream | None
+    twin: PoseStream | None
+    joints: JointStream | None
 
     @property
     def begin(self) -> dict:
@@ -49,6 +53,11 @@ class Logbook:
         if found is None:
             raise InputError(f"{self.path}: {EVENTS}: found no event 'begin', expected the log of a live session")
         return found
+
+    @property
+    def hardware(self) -> str:
+        """What was real, in words; older logs do not say, and are of simulated robots."""
+        return self.begin.get("hardware", SIMULATED)
 
 
 def read_logbook(path: Path) -> Logbook:
@@ -66,8 +75,9 @@ def read_logbook(path: Path) -> Logbook:
         raise InputError(f"{path}: {error}, expected the log of a live session") from error
     if not steps:
         raise InputError(f"{path}: {INPUT}: found no step of the core, expected the log of a live session")
-    poses = pose_stream({None: log.topics[POSES]}) if POSES in log.topics else None
-    return Logbook(Path(path), log.damage, zero, events, steps, poses)
+    poses, twin = (pose_stream({None: log.topics[name]}) if name in log.topics else None for name in (POSES, TWIN))
+    joints = joint_stream(log.topics[JOINTS]) if JOINTS in log.topics else None
+    return Logbook(Path(path), log.damage, zero, events, steps, poses if twin is None else None, twin, joints)
 
 
 def _steps(log: Log) -> list[Step]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.live import wire
-from trunkline.live.book import POSES
+from trunkline.live.book import POSES, TWIN
 from trunkline.live.logbook import Logbook, read_logbook
 
 LENGTH = struct.Struct("<I")  # bytes of the message that follows
@@ -27,7 +27,7 @@ def recorded(logbook: Logbook) -> Iterator[bytes]:
     Raises:
         InputError: the log has no poses.
     """
-    poses = logbook.poses
+    poses = logbook.poses if logbook.twin is None else logbook.twin
     if poses is None or poses.quaternions is None or not len(poses.stamps):
         raise InputError(f"{logbook.path}: {POSES}: found no poses, expected those of the robot's bodies")
     frames, bodies, _ = poses.positions.shape
@@ -50,6 +50,8 @@ def main(arguments: list[str]) -> int:
     for damage in logbook.damage:
         print(f"{told.log}: {damage}")
     messages = list(recorded(logbook))
+    if logbook.twin is not None:
+        print(f"{told.log}: {TWIN}: its bodies are as a twin drew them: nobody saw the arm")
     try:
         told.recording.write_bytes(b"".join(messages))
     except OSError as error:

@@ -12,7 +12,7 @@ from trunkline.logs.joint_stream import JointStream, joint_stream
 from trunkline.logs.log import Log, Topic, read_log
 from trunkline.logs.messages import JOINTS, POSES
 from trunkline.logs.pose_stream import PoseStream, pose_stream
-from trunkline.sessions.source import COMMAND_WORDS, POSITION_WORDS, choose, pose_topics, static_topics
+from trunkline.sessions.source import COMMAND_WORDS, POSITION_WORDS, TWIN, choose, pose_topics, static_topics
 
 LIVE = "/core/input"  # a topic of a live session alone
 OTHERS = re.compile(r"/headset/|/joint_states$|/joints/command$")  # of people and of the rigid robot
@@ -76,6 +76,7 @@ def describe(found: Survey) -> list[str]:
     for topic in sorted(log.topics.values(), key=lambda topic: topic.name):
         schema = short_name(topic.schema)
         use = "poses" if schema in POSES else "joints" if schema in JOINTS else "not read"
+        use = "drawn by a twin, not read" if topic.name.endswith(TWIN) else use
         lines.append(
             f"  {topic.name:{width}}  {topic.schema or 'no schema'} ({topic.encoding}), {use}: "
             f"{len(topic.log_times)} messages{_pace(topic.log_times)}"

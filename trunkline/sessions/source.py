@@ -15,6 +15,7 @@ from trunkline.sessions.session import Session
 
 Stream = TypeVar("Stream")
 STATIC = "tf_static"  # how the topic's name ends
+TWIN = "tf_twin"  # the same, of poses that a model drew and nobody measured (docs/live_log.md)
 COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "position")
 
 
@@ -120,13 +121,14 @@ def choose(
 
 
 def _best(log: Log, registry: dict, words: tuple[str, ...] = ("",)) -> list[Topic]:
-    """The topics with one of `words` in their names whose schema is registered first; not what never moves."""
+    """The topics with one of `words` in their names whose schema is registered first; not what never moves, nor what
+    a model drew."""
     told = [
         topic
         for topic in log.topics.values()
         if short_name(topic.schema) in registry
         and any(word in topic.name for word in words)
-        and not topic.name.endswith(STATIC)
+        and not topic.name.endswith((STATIC, TWIN))
     ]
     rank = list(registry).index
     first = min((rank(short_name(topic.schema)) for topic in told), default=None)
