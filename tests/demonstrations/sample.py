@@ -6,7 +6,7 @@ import numpy as np
 
 from tests.support.operator import PACKAGE, Operator
 from tests.teleop.test_plan import START, STRAIGHT
-from trunkline.live.book import Book, Subject
+from trunkline.live.book import SIMULATED, Book, Subject
 from trunkline.live.journal import Journal
 from trunkline.live.robot import Standing
 from trunkline.teleop.messages import (
@@ -41,15 +41,16 @@ def sent(at: float) -> tuple[np.ndarray, np.ndarray]:
 class Session(Journal):
     """Writes here and now, by a clock that its steps move on."""
 
-    def __init__(self, path, measured: bool, names=TENDONS):
-        subject = replace(SUBJECT, tendons=names)
+    def __init__(self, path, measured: bool, names=TENDONS, hardware: str = SIMULATED):
+        subject = replace(SUBJECT, tendons=names, hardware=hardware)
         super().__init__(subject, lambda: self.time)
         self.time, self.measured, self.world = 100.0, measured, World("w", (), (CUP,))
         self.file = open(path, "wb")  # noqa: SIM115
         self.book = Book(self.file, subject, ZERO)
         given = Operator().given
         self.given = replace(given, world=self.world)
-        self.event("begin", package=PACKAGE, tip={"body": "unit_01", "place": PLACE})
+        tip = {"body": "unit_01", "place": PLACE}
+        self.event("begin", package=PACKAGE, hardware=hardware, mount_offset=0.1, tip=tip)
         self.event("world", world=self.world)
 
     def keep(self, record):
@@ -92,8 +93,8 @@ class Session(Journal):
         return digest
 
 
-def write_session(path, measured: bool = True, names=TENDONS) -> None:
-    session = Session(path, measured, names)
+def write_session(path, measured: bool = True, names=TENDONS, hardware: str = SIMULATED) -> None:
+    session = Session(path, measured, names, hardware)
     moved = targets(0.9)  # where the hands went meanwhile: not what is executed
     session.pass_by(0.5, "hold")
     digest = session.plan(1, targets(0.5))

@@ -155,6 +155,13 @@ def test_where_nobody_measures_the_state_is_what_was_sent_and_its_names_say_so(t
     np.testing.assert_allclose(first.frames[STATE][1:, :10], first.frames[ACTION][:-1], atol=1e-9)
 
 
+def test_a_tip_that_nobody_sees_is_the_twins_and_its_names_say_so(tmp_path, recording):
+    write_session(tmp_path / "real.mcap", hardware="the robot panda")
+    first, seen = (next(episodes(one, FPS)) for one in (read_recording(tmp_path / "real.mcap"), recording))
+    assert first.names[STATE][-3:] == ("tip.x.twin", "tip.y.twin", "tip.z.twin")
+    np.testing.assert_array_equal(first.frames[STATE], seen.frames[STATE])
+
+
 def test_logs_of_different_arms_are_not_mixed(log, tmp_path, capsys):
     write_session(tmp_path / "other.mcap", names=("tendon_1", "tendon_2", "tendon_4"))
     assert main([str(log), str(tmp_path / "other.mcap"), "--out", str(tmp_path / "d")]) == 1

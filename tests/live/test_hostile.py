@@ -157,10 +157,23 @@ def test_a_confirmation_that_is_sent_again_is_refused_and_moves_nothing():
             await asyncio.sleep(0.2)
             for n in range(40):
                 await guest.input(grips(MOUNT), grips(TIP, trigger=float(n > 20)), began + n / 200)
-            assert "heard before" in await guest.refused("stamp")
+            await guest.refused("s late, expected at most")
             await asyncio.sleep(1.0)
             assert here.robot.permits == 0
             assert here.robot.state().mode == "idle"
+
+    asyncio.run(session())
+
+
+def test_an_input_that_is_sent_again_at_once_counts_once():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            guest.sending.cancel()
+            stamp = guest.now()
+            for _ in range(2):
+                await guest.input(hand(MOUNT), hand(TIP), stamp)
+            await guest.refused("heard before")
 
     asyncio.run(session())
 

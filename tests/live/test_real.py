@@ -303,7 +303,7 @@ def test_a_twin_that_hangs_is_a_fault_while_it_does(robot):
     """Or a picture at rest would be taken for the robot's."""
     os.kill(robot._twin.pid, signal.SIGSTOP)
     until(lambda: robot.state().mode == "fault")
-    assert robot.state().fault.startswith("the twin, which is drawn, is silent for 0.5")
+    assert robot.state().fault.startswith("the twin that is drawn: silent for 0.5")
     os.kill(robot._twin.pid, signal.SIGCONT)
     until(lambda: robot.state().mode != "fault")
 

@@ -39,7 +39,7 @@ class Step(NamedTuple):
 class Recording:
     """sent: the robot's axes as commanded, the rigid joints', rad, and pulls of cables, m. measured: the same as
     measured; an axis that nobody measures is as it was sent, its name ends in `.sent`. tip: where the arm's tip was in
-    the rigid base, m."""
+    the rigid base, m; of a real machine where its twin had it, as nobody sees the arm: its names end in `.twin`."""
 
     path: Path
     logbook: Logbook
@@ -90,10 +90,13 @@ def _joined(parts: list[Channel]) -> Channel:
 
 
 def _tip(path: Path, logbook: Logbook) -> Channel:
-    told, poses = logbook.begin["tip"], logbook.poses
+    told, poses, ending = logbook.begin["tip"], logbook.poses, ""
+    if poses is None:
+        poses, ending = logbook.twin, ".twin"
     if poses is None or poses.quaternions is None or told["body"] not in poses.names:
         raise InputError(f"{path}: /tf: found no body {told['body']!r}, which has the tip, expected its poses")
     row = poses.names.index(told["body"])
     there = poses.present[:, row]
     path_of = np.concatenate([poses.positions[there, row], poses.quaternions[there, row]], axis=1)
-    return Channel(poses.stamps[there], tip_path(path_of, told["place"]), ("tip.x", "tip.y", "tip.z"))
+    names = tuple(f"tip.{axis}{ending}" for axis in "xyz")
+    return Channel(poses.stamps[there], tip_path(path_of, told["place"]), names)

@@ -87,10 +87,12 @@ class RealRobot(RobotProcess):
         return replace(super().standing(), thing=poses[0], bodies=poses[1:])
 
     def state(self) -> ExecutorReport:
-        found, drawn = super().state(), self._drawn.hear()[0]
+        found, (drawn, said) = super().state(), self._drawn.hear()
         silent = time.monotonic() - drawn[TIME]
-        if found.mode != "fault" and drawn[READY] > 0 and silent > UNSEEN:
-            return ExecutorReport("fault", found.digest, f"the twin, which is drawn, is silent for {silent:.2f} s")
+        if drawn[READY] > 0 and silent > UNSEEN:
+            said = f"silent for {silent:.2f} s"
+        if said and found.mode != "fault":
+            return ExecutorReport("fault", found.digest, f"the twin that is drawn: {said}")
         return found
 
     def close(self) -> None:
@@ -201,6 +203,6 @@ def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
         told = np.zeros(channel.size)
         told[TIME], told[READY] = time.monotonic(), 1.0
         told[-POSE * (1 + channel.bodies) :] = poses
-        channel.tell(told, "")
+        channel.tell(told, plant.fault)
         due = max(due + plant.tick, time.monotonic() - plant.tick)
         time.sleep(max(due - time.monotonic(), 0.0))
