@@ -108,7 +108,7 @@ def test_a_robot_that_follows_stops_where_the_process_that_plans_is_silent_and_d
             seeking = here.desk._seeking
             answers, seeking._order = seeking._order, lambda order: None
             told = await guest.hears("state", mode="stopped")
-            assert "the process that plans has not answered for 0.5" in told["notice"]
+            assert "the process that plans has not answered for 1.0" in told["notice"]
             seeking._order = answers
             aside = np.array([0.0, 0.05, 0.0])
             guest.left, guest.right = grips(MOUNT + aside), grips(TIP + aside)

@@ -10,7 +10,7 @@ from trunkline.teleop.messages import Targets, World
 from trunkline.teleop.targets import why_not
 from trunkline.teleop.trajectory import JOINTS
 
-SILENT = 0.5  # s
+SILENT = 1.0  # s; a busy machine answers within 0.5
 
 
 class Seeking:
