@@ -144,7 +144,8 @@ class Ping:
 
 @dataclass(frozen=True)
 class Clock:
-    """server = client + offset, s; of the smallest of the last ten `round_trip`s, s. Input counts from the first on."""
+    """server = client + offset, s; of the smallest of the last ten `round_trip`s, s. Input counts from the first on,
+    where neither it is more than 0.25 s late nor that `round_trip` longer."""
 
     offset: float
     round_trip: float
