@@ -22,6 +22,7 @@ from trunkline.panda.kinematics import mount_pose
 from trunkline.teleop.messages import Intent
 from trunkline.teleop.plan import Plan
 
+ENDS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
 
 
@@ -306,11 +307,12 @@ def test_a_stop_is_heard_beyond_the_rate_limit_too():
     asyncio.run(session())
 
 
-@pytest.mark.parametrize("told", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("told", ENDS)
 def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, told):
     """As by Ctrl-C, so by `kill`, by whatever else ends a service, and by a terminal that is closed."""
-    closed = []
-    monkeypatch.setattr(signal, "getsignal", lambda _: signal.SIG_DFL)  # also where the tests run under `nohup`
+    closed, before = [], [signal.getsignal(one) for one in ENDS]
+    for one in ENDS:  # also where the tests run in the background or under `nohup`, which have some ignored
+        signal.signal(one, signal.default_int_handler if one == signal.SIGINT else signal.SIG_DFL)
 
     @contextlib.asynccontextmanager
     async def opened(*_):
@@ -323,7 +325,11 @@ def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, t
             closed.append(told)
 
     monkeypatch.setattr("trunkline.live.session.opened", opened)
-    assert main(["package.tgz", "--port", "18459"]) == 0
+    try:
+        assert main(["package.tgz", "--port", "18459"]) == 0
+    finally:
+        for one, usual in zip(ENDS, before, strict=True):
+            signal.signal(one, usual)
     assert closed == [told]
     assert capsys.readouterr().out.splitlines() == ["ended"]
 
