@@ -77,6 +77,12 @@ def test_what_is_open_comes_with_the_experiments_that_would_tell_it():
     assert strong_pairs(told) == ["mount_tilt_x and mount_tilt_y rise together (+0.95)"]
 
 
+def test_an_interval_that_ends_with_its_range_is_open():
+    told = table(sample_trials(small_model(4))[:1])
+    told["parameters"]["mount_tilt_x"]["interval_95_given_model"] = [-0.02, 0.1]
+    assert open_lines(told)[0].startswith("mount_tilt_x is told to one side alone: its interval ends with its range;")
+
+
 def test_the_held_out_trials_at_rest_tell_what_the_model_lacks(certificate):
     """Springs that are too stiff by so much make tips be off by a share of the way that gravity moves them."""
     truth = small_model(4)

@@ -142,6 +142,12 @@ def test_trials_that_the_model_was_fitted_to_are_marked_and_another_session_s_ar
     assert "the model was fitted to these 2 of 7 trials" in printed
     assert "\ntilt_30_identify *" in printed
     assert "\ntilt_45_validate *" not in printed
+    later = root / "artifacts/identify_damping"  # goes on from this model, with trials of its own
+    shutil.copytree(found.parent, later)
+    table = json.loads((later / "parameters.json").read_text()) | {"fitted_to": {}}
+    (later / "parameters.json").write_text(json.dumps(table))
+    evaluate(later / "arm.xml", folder)
+    assert "the model was fitted to these 2 of 7 trials" in capsys.readouterr().out
     write_trials(folder, [replace(t, positions=t.positions + 1e-4) for t in read_trials(folder, SPLITS)])
     evaluate(found, folder)
     assert "was fitted" not in capsys.readouterr().out

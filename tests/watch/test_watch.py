@@ -86,7 +86,7 @@ def test_nothing_is_scored_twice(lab, capsys):
     before = (lab / "out/scores.jsonl").read_bytes()
     capsys.readouterr()
     assert watch(lab) == 0
-    assert capsys.readouterr().out == ""
+    assert capsys.readouterr().out == f"watch: {len(TILTS)} of {len(TILTS)} trials judged: no change is seen\n"
     assert (lab / "out/scores.jsonl").read_bytes() == before
 
 
@@ -102,7 +102,8 @@ def test_a_half_written_log_is_said_in_one_line_and_scored_once_it_is_whole(lab,
     assert len(scored(lab)) == len(TILTS) - 1
     log.write_bytes(whole[: 2 * len(whole) // 3])
     watch(lab)
-    assert capsys.readouterr().out == ""  # it grows: said before
+    (line,) = capsys.readouterr().out.splitlines()  # it grows: said before
+    assert line == f"watch: {len(TILTS) - 1} of {len(TILTS) - 1} trials judged: no change is seen"
     log.write_bytes(whole)
     watch(lab)
     assert "tilt_50_0: within limits" in capsys.readouterr().out
@@ -153,7 +154,8 @@ def test_a_trial_of_another_arm_is_refused_in_one_line(lab, capsys):
     named = "segments: {unit_01: unit_01, unit_02: joint_02}\n"
     (session / "session.yaml").write_text(text.replace("trials:", f"{named}trials:"))
     assert watch(lab) == 2
-    lines = capsys.readouterr().out.splitlines()
+    *lines, last = capsys.readouterr().out.splitlines()
+    assert last == "watch: 0 of 0 trials judged"
     assert len(lines) == len(TILTS)
     assert all("refused: session.yaml: segments: " in line and "found 'joint_02'" in line for line in lines)
 
@@ -180,6 +182,7 @@ def test_without_a_reference_the_first_trials_of_a_kind_stand_for_the_unchanged_
     assert main(given) == 1
     said = capsys.readouterr().out
     assert said.count("kept to learn from") == LEARN
+    assert f"of {LEARN + len(TILTS) + 1} trials judged: the arm has changed" in said
     assert "explained best by stiffness -" in said
 
 

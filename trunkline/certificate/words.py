@@ -74,10 +74,18 @@ def open_lines(table: dict) -> list[str]:
     """What a stage's trials leave open, and which experiment would tell it."""
     lines = []
     for name, row in (table["parameters"] | table.get("per_session", {})).items():
-        if row["at_bound"] or row["undetermined"]:
-            why = "ended on a bound of its range" if row["at_bound"] else "is not determined"
+        if why := _open(row):
             lines.append(f"{name} {why}; told by {_listed([EXPERIMENTS[kind].plural for kind in telling(name)])}")
     return lines
+
+
+def _open(row: dict) -> str:
+    if row["at_bound"]:
+        return "ended on a bound of its range"
+    if row["undetermined"]:
+        return "is not determined"
+    (low, high), (least, most) = row["interval_95_given_model"], row["range"]
+    return "is told to one side alone: its interval ends with its range" if low <= least or high >= most else ""
 
 
 def telling(name: str) -> list[str]:

@@ -71,6 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
             print(f"  {one.words()}")
         for pair in pairs:
             print(f"  hardly told apart: {pair}")
+    print("All of it is of the arm as described: where a fit ends elsewhere, some of it changes several-fold.")
     return 0
 
 

@@ -9,7 +9,7 @@ from trunkline.trials.trial import Trial, sessions_of
 
 UPRIGHT = np.radians(3)  # of tilt, below which gravity has no direction across the arm
 PULLED = 1e-3  # m, from which on a tendon counts as pulled
-SEVERAL = 0.25  # share of the largest pull, from which on two tendons are pulled together
+SEVERAL = 0.25  # share of a trial's largest pull, from which on two tendons are pulled together
 WIDEST = 180.0  # deg without a direction, from which on one side of the arm is not seen
 ONE_LINE = 20.0  # deg, within which directions lie in one plane
 
@@ -107,7 +107,12 @@ def _pulls(own: list[Trial]) -> list[str]:
         return [f"no tendon is pulled by more than {1e3 * pull:.2g} mm: is the unit in session.yaml right?"]
     if idle:
         lines.append(f"never pulled: {', '.join(idle)}")
-    at_once = max(int((np.maximum(trial.commands, 0) > SEVERAL * most.max()).sum(axis=1).max()) for trial in own)
-    if at_once == 1:
+    if max(_at_once(trial) for trial in own) == 1:
         lines.append("only one tendon is pulled at a time: how several share the load is not seen")
     return lines
+
+
+def _at_once(trial: Trial) -> int:
+    """How many tendons are pulled together, at most."""
+    pulls = np.maximum(trial.commands, 0)
+    return int((pulls > max(SEVERAL * pulls.max(initial=0), PULLED)).sum(axis=1).max(initial=0))

@@ -16,6 +16,7 @@ from trunkline.pipeline.config import settings_of
 from trunkline.pipeline.inputs import read_spec
 from trunkline.trials.trial import Trial, sessions_of
 
+TABLE, STAGES = "parameters.json", ("identify_stiffness", "identify_damping", "identify_control")
 MOST_TURN = np.radians(30)  # of the mount in the tracked base, as it may be identified; more is another frame
 
 
@@ -52,17 +53,24 @@ class Written:
 
 
 def written_beside(path: Path, root: Path) -> Written:
-    """From parameters.json beside the model; without one, frames and delay from the settings in `root`."""
-    file = path.parent / "parameters.json"
-    if not file.is_file():
+    """From parameters.json beside the model, and of what it was fitted to from those of the stages before too; without
+    one, frames and delay from the settings in `root`."""
+    folder, before = path.parent, ()
+    if not (folder / TABLE).is_file():
         settings = settings_of("identify_damping", root)
         return Written(settings.frames, settings.command_delay, {})
-    try:
-        table = json.loads(file.read_text(encoding="utf-8"))
-        compared = table["compared"]
-        return Written(compared["frames"], compared["command_delay"], table.get("fitted_to", {}))
-    except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{file}: {error!r}, expected what a stage of identification writes") from error
+    if folder.name in STAGES:
+        before = STAGES[: STAGES.index(folder.name)]
+    files = [folder.parent / stage / TABLE for stage in before if (folder.parent / stage / TABLE).is_file()]
+    fitted_to: dict[str, str] = {}
+    for file in (*files, folder / TABLE):
+        try:
+            table = json.loads(file.read_text(encoding="utf-8"))
+            compared = table["compared"]
+            fitted_to |= table.get("fitted_to", {})
+        except (ValueError, KeyError, TypeError) as error:
+            raise InputError(f"{file}: {error!r}, expected what a stage of identification writes") from error
+    return Written(compared["frames"], compared["command_delay"], fitted_to)
 
 
 def read_arm(path: Path) -> mujoco.MjModel:

@@ -2,7 +2,6 @@
 
 import textwrap
 from collections.abc import Sequence
-from itertools import cycle
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -24,7 +23,8 @@ from trunkline.trials.trial import Trial
 
 BIN = 1 / 30  # s, of the coverage picture
 LEAST_JITTER = 0.1  # ms, of the axis: less is none
-COLORS = dict(zip(EXPERIMENTS, cycle((MEASURED, IDENTIFIED, VALIDATE, INITIAL)), strict=False))
+SHADES = (MEASURED, IDENTIFIED, VALIDATE, INITIAL, "#cc79a7", "#009e73")  # the last two of Okabe and Ito's palette
+COLORS = dict(zip(EXPERIMENTS, SHADES, strict=True))
 
 
 def quality_figure(qualities: list[Quality], gathered: Gathered) -> Figure:

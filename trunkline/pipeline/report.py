@@ -32,8 +32,11 @@ def main(arguments: list[str] | None = None) -> int:
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     # `dvc repro --dry` ends at the first stage whose inputs another one has yet to write, as in a fresh clone
     verb = ["status", "--with-deps"] if told.dry_run else ["repro"]
-    command = [sys.executable, "-m", "dvc", *verb, "report"]
-    code = subprocess.run(command, cwd=told.project, env=os.environ | {"PATH": path}).returncode
+    env = os.environ | {"PATH": path}
+    settings = [sys.executable, "-m", "trunkline.pipeline.settings"]  # DVC says of a mistake there less, and later
+    if code := subprocess.run(settings, cwd=told.project, env=env).returncode:
+        return code
+    code = subprocess.run([sys.executable, "-m", "dvc", *verb, "report"], cwd=told.project, env=env).returncode
     if code == 0 and not told.dry_run:
         print(f"report: {told.project / PAGE}")
     return code

@@ -2,7 +2,7 @@
 
 Into FOLDER a lab drops sessions (folders with logs and session.yaml), or logs of one. Each trial is scored against the
 model without a fit; a control chart says when the arm has changed and which parameter would explain it. Writes
-scores.jsonl, chart.csv and chart.png. Ends with 0 where the arm is as it was, 1 where it has changed, 2 where an input
+scores.jsonl, chart.csv and chart.png. Ends with 0 where no change is seen, 1 where it has changed, 2 where an input
 cannot be used; without --once it looks again and again, until it is interrupted.
 """
 
@@ -49,6 +49,7 @@ def _run(told: argparse.Namespace) -> int:
             while True:
                 unusable = watch.look()
                 if told.once:
+                    print(f"watch: {watch.summary()}")
                     break
                 time.sleep(told.every)
         except KeyboardInterrupt:

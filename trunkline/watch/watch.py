@@ -139,23 +139,42 @@ class Watch:
         return scored, unusable
 
     def _chart_one(self, where: str, score: Score) -> None:
-        if not self.reference:  # what is learned may have changed
-            before, said = self.chart.changed(), odd_lines(self.chart.baseline, self.scorer.parameters)
-            self.chart, self.wheres = self._chart()
-            for line in odd_lines(self.chart.baseline, self.scorer.parameters):
-                if line not in said:
-                    print(f"watch: reference: {line}", flush=True)
-            if where not in self.wheres:
-                print(f"watch: {where}: kept to learn from", flush=True)
-                return
-        else:
-            before = self.chart.changed()
-            self.chart.add(score)
-            self.wheres.append(where)
+        count = self._kinds()[score.kind]
+        if not self.reference and count <= LEARN:
+            print(f"watch: {where}: kept to learn from", flush=True)
+            if count == LEARN:
+                self._learn()
+            return
+        before = self.chart.changed()
+        self.chart.add(score)
+        self.wheres.append(where)
         print(f"watch: {trial_line(where, self.chart.trials[-1], self.chart, self.scorer.parameters)}", flush=True)
         if before is None:
             for line in self._alarm():
                 print(f"watch: {line}", flush=True)
+
+    def _learn(self) -> None:
+        """A kind has all its reference trials: the chart is another one."""
+        said = odd_lines(self.chart.baseline, self.scorer.parameters)
+        self.chart, self.wheres = self._chart()
+        for line in odd_lines(self.chart.baseline, self.scorer.parameters):
+            if line not in said:
+                print(f"watch: reference: {line}", flush=True)
+
+    def _kinds(self) -> Counter[str]:
+        """How many trials of each kind were scored."""
+        return Counter(row["kind"] for row in self.ledger.rows if "slope" in row)
+
+    def summary(self) -> str:
+        """How many trials were judged and what came of it, and what is still learned, in one line."""
+        kinds = self._kinds()
+        learning = [f"{count} of {LEARN} {kind}" for kind, count in kinds.items() if count < LEARN]
+        judged = f"{len(self.chart.trials)} of {kinds.total()} trials judged"
+        found = "the arm has changed" if self.chart.changed() is not None else "no change is seen"
+        return "; ".join([
+            f"{judged}: {found}" if self.chart.trials else judged,
+            *([f"learning: {', '.join(learning)}"] if learning and not self.reference else []),
+        ])  # fmt: skip
 
     def _chart(self) -> tuple[Chart, list[str]]:
         """The chart of all trials so far, and what they are called."""

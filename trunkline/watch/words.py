@@ -43,7 +43,9 @@ def shown_in(name: str) -> tuple[str, float]:
 def trial_line(where: str, charted: Charted, chart: Chart, names: tuple[str, ...]) -> str:
     """What a new trial says: the parameter whose chart is nearest to its limit, or beyond."""
     if not charted.levels:
-        return f"{where}: says nothing: no reference trials of {charted.score.kind} to compare it with"
+        kind = charted.score.kind
+        count = sum(score.kind == kind for score in chart.baseline.reference)
+        return f"{where}: says nothing: found {count} reference trials of {kind}, it takes {LEAST + 1} or more"
     most = max(charted.levels, key=lambda p: abs(charted.levels[p]) / chart.lines[p].limit)
     own, name = charted.departures[most], names[most]
     state = "beyond limits: chart of" if charted.alarms else "within limits, nearest: chart of"
