@@ -122,6 +122,15 @@ def test_report_brings_the_page_up_to_date_with_this_python(tmp_path, elsewhere,
     assert f"report: {page}" in capfd.readouterr().out
 
 
+def test_a_mistake_in_the_settings_is_told_before_anything_runs(tmp_path, elsewhere, capfd):
+    project(tmp_path)
+    (tmp_path / "params.yaml").write_text("filter: {cutof: 20.0}\n")
+    for words in ([], ["--dry-run"]):
+        assert main(["report", "--project", str(tmp_path), *words]) == 1
+        assert "filter" in capfd.readouterr().err
+    assert not (tmp_path / "artifacts").exists()
+
+
 def test_a_report_that_fails_or_has_no_pipeline_says_so(tmp_path, elsewhere, capfd):
     assert main(["report", "--project", str(tmp_path)]) == 1
     assert "found no dvc.yaml" in capfd.readouterr().err

@@ -34,7 +34,8 @@ def main(arguments: list[str] | None = None) -> int:
     verb = ["status", "--with-deps"] if told.dry_run else ["repro"]
     env = os.environ | {"PATH": path}
     settings = [sys.executable, "-m", "trunkline.pipeline.settings"]  # DVC says of a mistake there less, and later
-    if code := subprocess.run(settings, cwd=told.project, env=env).returncode:
+    has_settings = (told.project / "params.yaml").is_file()
+    if has_settings and (code := subprocess.run(settings, cwd=told.project, env=env).returncode):
         return code
     code = subprocess.run([sys.executable, "-m", "dvc", *verb, "report"], cwd=told.project, env=env).returncode
     if code == 0 and not told.dry_run:
