@@ -30,12 +30,17 @@ def grips(place, **buttons):
     return hand(np.array(place) + UP, grip=1.0, **buttons)
 
 
-async def asked(here, guest):
-    """Both targets set, and a plan asked for; the state once its preview is there."""
+async def aimed(guest, **buttons):
+    """Both targets set, and then these of the right hand's buttons pressed."""
     await guest.hears("state", mode="aim")
     guest.left, guest.right = grips(MOUNT), grips(TIP)
     await asyncio.sleep(0.8)
-    guest.right = grips(TIP, trigger=1.0)
+    guest.right = grips(TIP, **buttons)
+
+
+async def asked(here, guest):
+    """Both targets set, and a plan asked for; the state once its preview is there."""
+    await aimed(guest, trigger=1.0)
     state = await guest.hears("state", mode="preview")
     guest.right = grips(TIP)
     return state
@@ -76,10 +81,7 @@ def test_a_robot_follows_moving_targets_until_both_grips_are_let_go():
     async def session():
         async with laid() as here:
             guest = await controlling(here)
-            await guest.hears("state", mode="aim")
-            guest.left, guest.right = grips(MOUNT), grips(TIP)
-            await asyncio.sleep(0.8)
-            guest.right = grips(TIP, stick_pressed=1.0)
+            await aimed(guest, stick_pressed=1.0)
             await guest.hears("state", mode="follow")
             aside = np.array([0.0, 0.05, 0.0])
             guest.left, guest.right = grips(MOUNT + aside), grips(TIP + aside)
@@ -101,10 +103,7 @@ def test_a_robot_that_follows_stops_where_the_process_that_plans_is_silent_and_d
     async def session():
         async with laid() as here:
             guest = await controlling(here)
-            await guest.hears("state", mode="aim")
-            guest.left, guest.right = grips(MOUNT), grips(TIP)
-            await asyncio.sleep(0.8)
-            guest.right = grips(TIP, stick_pressed=1.0)
+            await aimed(guest, stick_pressed=1.0)
             await guest.hears("state", motion="follow", robot="running")
             seeking = here.desk._seeking
             answers, seeking._order = seeking._order, lambda order: None

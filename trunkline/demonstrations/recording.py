@@ -90,9 +90,7 @@ def _joined(parts: list[Channel]) -> Channel:
 
 
 def _tip(path: Path, logbook: Logbook) -> Channel:
-    told, poses, ending = logbook.begin["tip"], logbook.poses, ""
-    if poses is None:
-        poses, ending = logbook.twin, ".twin"
+    told, poses, ending = logbook.begin["tip"], logbook.drawn, "" if logbook.twin is None else ".twin"
     if poses is None or poses.quaternions is None or told["body"] not in poses.names:
         raise InputError(f"{path}: /tf: found no body {told['body']!r}, which has the tip, expected its poses")
     row = poses.names.index(told["body"])

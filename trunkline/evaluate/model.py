@@ -16,7 +16,8 @@ from trunkline.pipeline.config import settings_of
 from trunkline.pipeline.inputs import read_spec
 from trunkline.trials.trial import Trial, sessions_of
 
-TABLE, STAGES = "parameters.json", ("identify_stiffness", "identify_damping", "identify_control")
+TABLE = "parameters.json"
+STAGES = ("identify_stiffness", "identify_damping", "identify_control")  # in their order: each goes on from the last
 MOST_TURN = np.radians(30)  # of the mount in the tracked base, as it may be identified; more is another frame
 
 

@@ -33,7 +33,12 @@ class Hardware:
     @property
     def real(self) -> bool:
         """Whether anything but simulations would move."""
-        return self.robot not in ("", "fake") or self.bus not in ("", SIMULATED)
+        return self.robot not in ("", "fake") or self.real_motors
+
+    @property
+    def real_motors(self) -> bool:
+        """Whether the motors are."""
+        return self.bus not in ("", SIMULATED)
 
     @property
     def limits(self) -> RobotLimits:
@@ -52,7 +57,7 @@ class Hardware:
         where = self.ros.trajectory if self.robot == "ros2" else self.arm.address
         robot = f"the robot {self.robot} at {where}" if self.robot else "no real robot"
         numbers = ", ".join(map(str, self.motors.numbers))
-        motors = f"motors {numbers} on the bus {self.bus}" if self.bus not in ("", SIMULATED) else "no real motors"
+        motors = f"motors {numbers} on the bus {self.bus}" if self.real_motors else "no real motors"
         return f"{robot}, {motors}"
 
 

@@ -55,6 +55,11 @@ class Logbook:
         return found
 
     @property
+    def drawn(self) -> PoseStream | None:
+        """The bodies as a page draws them: as they were seen, or where nobody saw them, as a twin drew them."""
+        return self.poses if self.twin is None else self.twin
+
+    @property
     def hardware(self) -> str:
         """What was real, in words; older logs do not say, and are of simulated robots."""
         return self.begin.get("hardware", SIMULATED)

@@ -27,7 +27,7 @@ def recorded(logbook: Logbook) -> Iterator[bytes]:
     Raises:
         InputError: the log has no poses.
     """
-    poses = logbook.poses if logbook.twin is None else logbook.twin
+    poses = logbook.drawn
     if poses is None or poses.quaternions is None or not len(poses.stamps):
         raise InputError(f"{logbook.path}: {POSES}: found no poses, expected those of the robot's bodies")
     frames, bodies, _ = poses.positions.shape

@@ -25,9 +25,9 @@ from trunkline.teleop.trajectory import JOINTS, Limits
 DEAD_MAN = 0.08  # s without a permit
 STALE = 0.15  # s without a sign of the robot's process
 TELLS = 1 / 240  # s, about, from one telling of the robot's process to the next
+FRESH = 0.0005  # s after which that is heard
 LOOKS = 0.005  # s
 RESTING = 0.5  # s that braking may take before its process is ended
-FRESH = 0.0005  # s after which that is heard
 TEXT = 240  # bytes of a fault
 MODES = ("idle", "running", "done", "fault")
 TIME, MODE, SERIAL, HELD, READY = range(5)  # of what the robot tells, before axes, sent and measured, thing and bodies

@@ -16,7 +16,6 @@ from pathlib import Path
 from aiohttp import web
 
 from trunkline.errors import InputError
-from trunkline.execution.bank import SIMULATED
 from trunkline.execution.settings import Config as Execution
 from trunkline.live.access import CODE_SECONDS, Origins, make_token
 from trunkline.live.anchors import Anchors
@@ -153,7 +152,7 @@ async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLC
     )  # fmt: skip
     if hardware is not None and hardware.real:
         log(f"REAL: {hardware.words()}. Nobody has tried this on real ones yet (docs/execution.md).")
-        if hardware.bus not in ("", SIMULATED):
+        if hardware.real_motors:
             log("The motors wind up their cables now, before the page is there: stand clear. Ctrl-C lets them go.")
     address = Address(options.port, options.host, tuple(names), context)
     expect_free(address)  # what a session needs takes long to load

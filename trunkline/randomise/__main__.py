@@ -21,13 +21,11 @@ import numpy as np
 from trunkline.called import called
 from trunkline.certificate.identified import identified
 from trunkline.errors import InputError, in_one_line
-from trunkline.evaluate.model import read_arm
+from trunkline.evaluate.model import STAGES, read_arm
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.randomise.fields import changed_fields, drawn_fields, of_model
 from trunkline.randomise.file import to_table
 from trunkline.randomise.randomisation import Randomisation, of_arm, of_population
-
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 
 
 @in_one_line

@@ -17,7 +17,7 @@ import mujoco
 from trunkline.arm.kinds import described_arm
 from trunkline.called import called
 from trunkline.errors import InputError, in_one_line, nearest
-from trunkline.evaluate.model import read_arm
+from trunkline.evaluate.model import STAGES, read_arm
 from trunkline.evaluate.session import trials_of
 from trunkline.identification.per_session import make_room, names_apart, other_sessions
 from trunkline.identification.settings import IdentificationSettings
@@ -43,7 +43,6 @@ from trunkline.trials.experiments import EXPERIMENTS
 from trunkline.trials.splits import IDENTIFY
 from trunkline.trials.trial import Trial
 
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 DESCRIBED = "as described in params.yaml, as no stage has identified one yet: suggestions are only as good as it is"
 Stages = list[StageInformation]
 
