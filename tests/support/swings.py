@@ -26,11 +26,12 @@ def experiment(positions: np.ndarray, measured: np.ndarray | None = None, kind: 
     """Of positions (T, S, 3), m, all of them measured if not said."""
     frames = len(positions)
     seen = np.ones(positions.shape[:2], bool) if measured is None else measured
-    facts = {"name": "by hand", "kind": kind, "split": "identify", "frame_step": STEP} | more
+    fit = PoseFit(np.zeros(6), np.full(3, 1e-3), 1, True)
+    facts = {"name": "by hand", "kind": kind, "split": "identify", "frame_step": STEP, "fit": fit} | more
     return Experiment(
         gravity=np.array([0.0, 0.0, -9.81]), start=np.zeros(6), velocity=np.zeros(6), lead=STEP,
         controls=np.zeros((frames, 0)), positions=positions, measured=seen,
-        fit=PoseFit(np.zeros(6), np.full(3, 1e-3), 1, True), **facts,
+        **facts,
     )  # fmt: skip
 
 
