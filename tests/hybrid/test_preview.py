@@ -143,8 +143,7 @@ def test_it_is_asked_before_each_piece_and_after_the_last_whether_to_go_on(after
             raise Unwanted
 
     with pytest.raises(Unwanted):
-        for made in asked(iter("abc"), go_on):
-            taken.append(made)
+        taken.extend(asked(iter("abc"), go_on))
     assert "".join(taken) == "abc"[:after]
 
 

@@ -1,7 +1,7 @@
 """The desk, on a clock that a test turns: what it lets the robot do, each layer of safety by itself.
 
-Behind each of these layers another one acts as well: the core, the server, or the robot's process. None of them is asked
-here, so that what fails here fails by itself.
+Behind each of these layers another one acts as well: the core, the server, or the robot's process. None of them is
+asked here, so that what fails here fails by itself.
 """
 
 from dataclasses import replace
@@ -29,6 +29,7 @@ BASE = Pose((0.0, 0.0, 0.0), IDENTITY)
 UP = np.array([0.0, 0.0, 0.6])  # from a ray's end to the hand
 DIGEST = "d" * 64
 NOTHING = np.full(7, np.nan)
+TRACKED = ("left_tracked", "right_tracked", "visible")
 
 
 class ToldRobot:
@@ -261,7 +262,7 @@ def test_a_stop_is_told_to_the_robot_at_once_and_to_the_core_at_its_next_step_wh
 # --- what is heard
 
 
-def received(stamp, left=None, right=None, flags=("left_tracked", "right_tracked", "visible")) -> Received:
+def received(stamp, left=None, right=None, flags=TRACKED) -> Received:
     """Hands over both targets with these buttons."""
 
     def row(place, buttons):
@@ -376,7 +377,7 @@ class Played:
         self.desk = desk_of(self.robot, self.planning, Journal())
         self.planning.heard = lambda answer: self.desk.answered(answer, self.now)
         self.desk.control(BASE)
-        self.left, self.right, self.flags = {}, {}, ("left_tracked", "right_tracked", "visible")
+        self.left, self.right, self.flags = {}, {}, TRACKED
 
     def tick(self, heard=True) -> Intent:
         self.now += DT
@@ -423,8 +424,7 @@ class Played:
         """At rest, whatever its buttons are and however long."""
         self.wait(0.5)
         rests = self.robot.joints.copy()
-        self.left, self.right, self.flags = {"grip": 1.0}, {"grip": 1.0, "trigger": 1.0}, ("left_tracked",
-                                                                                          "right_tracked", "visible")
+        self.left, self.right, self.flags = {"grip": 1.0}, {"grip": 1.0, "trigger": 1.0}, TRACKED
         self.wait(1.0)
         np.testing.assert_array_equal(self.robot.joints, rests)
         assert self.robot.state().mode != "running"

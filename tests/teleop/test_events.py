@@ -1,5 +1,5 @@
-"""What has changed since a plan was asked for, and what is a plan: each term decides by itself, in each mode in which it
-counts and in no other."""
+"""What has changed since a plan was asked for, and what is a plan: each term decides by itself, in each mode in which
+it counts and in no other."""
 
 from dataclasses import replace
 
@@ -94,7 +94,8 @@ def test_where_no_plan_was_asked_for_nothing_is_void(mode):
 def test_of_several_changes_the_first_is_told():
     order = [
         ({"world": World("other")}, "world changed"), ({"alignment": None}, "base alignment changed"),
-        ({"offer": OFFER}, "the offer was taken"), ({"shown": "e" * 64}, "another plan was shown"), ({}, "target moved"),
+        ({"offer": OFFER}, "the offer was taken"), ({"shown": "e" * 64}, "another plan was shown"),
+        ({}, "target moved"),
     ]  # fmt: skip
     right = replace(HELD, gripped_at=ENDS[1])
     ends = (ENDS[0], (0.6, 0.1, 0.2))

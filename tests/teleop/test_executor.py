@@ -116,7 +116,7 @@ FAULTS = {  # in the order in which they are told
 @pytest.mark.parametrize("first", range(len(FAULTS)))
 def test_of_several_faults_the_first_is_told(first):
     plan = plan_of(still())
-    for change in list(FAULTS.values())[: first : -1] + [list(FAULTS.values())[first]]:
+    for change in list(FAULTS.values())[:first:-1] + [list(FAULTS.values())[first]]:
         plan = change(plan)
     assert robot().check(plan).startswith(list(FAULTS)[first])
 

@@ -167,10 +167,10 @@ def test_an_arm_that_finds_no_rest_is_not_seen_and_the_robot_still_is(monkeypatc
 
 def test_the_arms_last_pose_before_it_closes_is_looked_at_too():
     """However rarely its poses are: the row before the curl that closes about a thing, and a plan's last one."""
-    plan = curling("approach", "curl", "lift")
-    bent = replace(plan, commands=np.where(np.arange(ROWS)[:, None] == CURL - 1, STRAIGHT - PULL, STRAIGHT))
+    rows, plan = np.arange(ROWS)[:, None], curling("approach", "curl", "lift")
+    bent = replace(plan, commands=np.where(rows == CURL - 1, STRAIGHT - PULL, STRAIGHT))
     assert _reason(bent, about(places(STRAIGHT - PULL)[-1]), CHAIN).startswith("world: the arm would come into")
-    late = replace(curling("approach"), commands=np.where(np.arange(ROWS)[:, None] == ROWS - 1, STRAIGHT - PULL, STRAIGHT))
+    late = replace(curling("approach"), commands=np.where(rows == ROWS - 1, STRAIGHT - PULL, STRAIGHT))
     assert _reason(late, about(places(STRAIGHT - PULL)[-1]), CHAIN).startswith("world: the arm would come into")
 
 
