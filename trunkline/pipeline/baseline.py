@@ -138,17 +138,17 @@ def disagreements(baseline: Baseline, folder: Path) -> list[str]:
 
 
 def company(path: Path) -> list[str]:
-    """What the commit that last changed the baseline at `path` changed beside baselines, limits, goals and docs: a line
-    a file. Merges are not looked at; empty where Git cannot say, and where the baseline is not committed."""
+    """One line if the commit that last changed the baseline at `path` changed more than baselines, limits, goals and
+    docs. Merges are not looked at; empty where Git cannot say, and where the baseline is not committed."""
     if unchecked(path.parent):
         return []
     last = (_output(path.parent, "log", "-1", "--no-merges", "--format=%h", "--", path.name) or "").strip()
-    files = _output(path.parent, "show", "--name-only", "--format=", last) if last else ""
-    return [
-        f"baseline: commit {last} changed {name} too, expected a commit of its own"
-        for name in (files or "").splitlines()
-        if not _beside(Path(name))
-    ]
+    files = _output(path.parent, "show", "--name-only", "--format=", last) if last else None
+    others = [name for name in (files or "").splitlines() if not _beside(Path(name))]
+    if not others:
+        return []
+    more = f" and {len(others) - 1} more" if others[1:] else ""
+    return [f"baseline: commit {last} changed {others[0]}{more} too, expected a commit of its own"]
 
 
 def _beside(name: Path) -> bool:
