@@ -9,6 +9,7 @@ from rehearsal.experiments.bench import Bench, Seen, Staged
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import View
+from trunkline.teleop.core import STAYS
 
 EASE = 2.0  # s in which the object begins to move
 
@@ -95,7 +96,7 @@ def interruption(views: list[View], refusals: list[tuple[float, str]], path: Pat
     for view in views:
         if not path.begun <= view.now <= path.begun + path.seconds:
             continue
-        reason = why.get(view.now) or ("out of reach" if "stays at the last" in view.intent.notice else "")
+        reason = why.get(view.now) or ("out of reach" if STAYS in view.intent.notice else "")
         if not reason:
             since = None
             continue
