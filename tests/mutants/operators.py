@@ -220,7 +220,8 @@ def _of(source: Source, node: ast.AST, parents: list) -> Iterator[Change]:
 
 def _decides(node: ast.AST, parent: ast.AST) -> bool:
     """Whether it is a condition or a term of one: what tells its being left out from it, tells its contrary from it."""
-    tests = parent.ifs if isinstance(parent, ast.comprehension) else [getattr(parent, "test", None)]
+    tests = parent.ifs if isinstance(parent, ast.comprehension) else []
+    tests = [parent.test] if isinstance(parent, ast.If | ast.IfExp) else tests
     return isinstance(parent, ast.BoolOp) or any(node is test for test in tests)
 
 

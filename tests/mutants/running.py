@@ -1,10 +1,13 @@
-"""Tests run against mutants: each in a process of its own, forked from one that has the large libraries already.
+"""Tests run against mutants: each in a process of its own, forked from one that has collected the tests.
 
-There the file's module is loaded from the mutant's text; on the disk nothing is changed. What runs in other processes
-that do not come from this one by a fork does not see it, so tests that need those kill nothing.
+There the functions of the file get the mutant's code. What shows only as a module is imported (a constant, a default),
+and whatever survives, has its tests collected anew, with the module made from the mutant's text. On the disk nothing is
+changed: what runs in other processes that do not come from this one by a fork does not see the mutant, so tests that
+need those kill nothing.
 """
 
 import contextlib
+import gc
 import importlib
 import json
 import os
@@ -13,28 +16,31 @@ import signal
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
+from types import CodeType, FunctionType
+from typing import NoReturn
 
 import pytest
 
 from tests.mutants.operators import Mutant
 
-# Before the first fork, so that no mutant waits for them; nothing of this repository, which is to be loaded after it.
+# Before the first fork, so that no group of tests waits for them; nothing of this repository.
 LIBRARIES = (
-    "aiohttp", "can", "cryptography.x509", "cryptography.hazmat.primitives.asymmetric.ec", "daqp", "hydra", "hypothesis",
-    "hypothesis.extra.numpy", "mink", "mujoco", "numba", "numpy", "omegaconf", "onnxruntime", "pandas", "pyarrow",
-    "pydantic.dataclasses", "rich.console", "ruckig", "scipy.ndimage", "scipy.optimize", "scipy.signal",
-    "scipy.spatial.transform", "scipy.stats", "skimage.measure", "threadpoolctl", "trimesh", "xml.etree.ElementTree",
-    "yaml",
+    "aiohttp", "can", "cryptography.x509", "daqp", "hydra", "hypothesis.extra.numpy", "mink", "mujoco", "numba",
+    "numpy", "omegaconf", "onnxruntime", "pandas", "pyarrow", "pydantic.dataclasses", "rich.console", "ruckig", "scipy.ndimage",
+    "scipy.optimize", "scipy.signal", "scipy.spatial.transform", "scipy.stats", "skimage.measure", "threadpoolctl",
+    "trimesh", "yaml",
 )  # fmt: skip
 KILLED, BROKEN, LATE, SURVIVED = "killed", "cannot be imported", "timeout", "survived"
-WRONG = "no result"  # of the tests: nothing can be said
-PLUGINS = ("cacheprovider", "faulthandler", "xdist", "looponfail", "junitxml", "pastebin", "anyio")
-SOONEST = 10.0  # s more than its tests take, and five times that, a mutant has
+WRONG = "no result"  # the tests say nothing
+PLUGINS = ("cacheprovider", "faulthandler", "xdist", "looponfail", "junitxml", "pastebin")
+SOONEST, LONGEST = 10.0, 60.0  # s that a mutant has beside five times what the original takes; without having tried it
 POLL = 0.01  # s
+
+Tests = tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -43,137 +49,153 @@ class Outcome:
 
     kind: str
     by: str
-    seconds: float
+    seconds: float = 0.0
 
 
-@dataclass(frozen=True)
-class Job:
-    """`text`: of the file at `path`, in place of what is on the disk; unchanged where it is None."""
-
-    path: str
-    text: str | None
-    tests: tuple[str, ...]
-    limit: float
+Pairs = list[tuple[Mutant, Outcome]]
 
 
-def load_libraries() -> None:
+def outcomes(mutants: list[Mutant], workers: int, tell: Callable[[Mutant, Outcome], None], tried: bool = True) -> Pairs:
+    """Of each, in their order. `tell`: called with each as it comes. tried: whether the tests have to pass with the
+    original first; else its word is taken that they do."""
+    _load_libraries()
+    groups: dict[Tests, list[Mutant]] = {}
+    for mutant in mutants:
+        groups.setdefault(mutant.tests, []).append(mutant)
+    jobs, results = [_Group(group, tried) for group in groups.values()], {}
+    running: list[_Group] = []
+    try:
+        while jobs or running:
+            while jobs and len(running) < workers:
+                running.append(jobs.pop(0).begin())
+            for group in list(running):
+                for mutant, outcome in group.news():
+                    if outcome.kind == SURVIVED and not group.anew:
+                        jobs.insert(0, _Group([mutant], tried=False, anew=True))
+                    else:
+                        results[mutant.key] = outcome
+                        tell(mutant, outcome)
+                if group.ended:
+                    running.remove(group)
+            time.sleep(POLL)
+    finally:
+        for group in running:
+            group.end()
+    return [(mutant, results[mutant.key]) for mutant in mutants]
+
+
+def _load_libraries() -> None:
+    """Those that are there."""
     for name in LIBRARIES:
         with contextlib.suppress(ImportError):
             importlib.import_module(name)
 
 
-def outcomes(jobs: Iterable[Job], workers: int, tell: Callable[[Job, Outcome], None]) -> list[Outcome]:
-    """Of each job, in their order, `workers` at a time. `tell`: called with each as it comes."""
-    waiting, results = list(enumerate(jobs)), {}
-    running: dict[int, _Process] = {}
-    try:
-        while waiting or running:
-            while waiting and len(running) < workers:
-                number, job = waiting.pop(0)
-                running[number] = _Process(job)
-            for number, process in list(running.items()):
-                if outcome := process.outcome():
-                    results[number] = outcome
-                    tell(running.pop(number).job, outcome)
-            time.sleep(POLL)
-    finally:
-        for process in running.values():
-            process.end()
-    return [results[number] for number in sorted(results)]
+class _Group:
+    """Mutants with the same tests, run one after the other by one process. anew: one, from its import on."""
 
+    def __init__(self, mutants: list[Mutant], tried: bool, anew: bool = False) -> None:
+        self.anew, self.ended, self._tried, self._left = anew, False, tried, list(mutants)
 
-class _Process:
-    """Of one job."""
-
-    def __init__(self, job: Job) -> None:
-        self.job, self.begun = job, time.monotonic()
-        self._folder = Path(tempfile.mkdtemp(prefix="mutant-"))
-        sys.stdout.flush()
-        sys.stderr.flush()
-        self._pid = os.fork()
+    def begin(self) -> "_Group":
+        self._folder = Path(tempfile.mkdtemp(prefix="mutants-"))
+        self._begun, (self._results, results) = time.monotonic(), os.pipe()
+        os.set_blocking(self._results, False)
+        self._pid, self._text = _forked(), b""
         if not self._pid:
-            _run(job, self._folder)
+            _collect(self._left, self._tried, self.anew, self._folder, results)
+        os.close(results)
+        return self
 
-    def outcome(self) -> Outcome | None:
-        """None while it goes on."""
-        seconds = time.monotonic() - self.begun
-        if not os.waitpid(self._pid, os.WNOHANG)[0]:
-            if seconds < self.job.limit:
-                return None
-            self.end()
-            return Outcome(LATE, f"more than {self.job.limit:.0f} s", seconds)
-        self._end_group()
-        try:
-            kind, by = json.loads((self._folder / "outcome").read_text())
-        except FileNotFoundError:
-            kind, by = KILLED if self.job.text else WRONG, "the process of the tests ended"
-        if kind == WRONG:
-            sys.stderr.write((self._folder / "output").read_text(errors="replace")[-3000:])
-        shutil.rmtree(self._folder, ignore_errors=True)
-        return Outcome(kind, by, seconds)
+    def news(self) -> Iterator[tuple[Mutant, Outcome]]:
+        """What has come since; what was not said when the process ended goes by why it ended."""
+        over = bool(os.waitpid(self._pid, os.WNOHANG)[0])
+        with contextlib.suppress(BlockingIOError):
+            while part := os.read(self._results, 1 << 16):
+                self._text += part
+        *lines, self._text = self._text.split(b"\n")
+        for line in lines:
+            yield self._left.pop(0), Outcome(*json.loads(line))
+        late = self.anew and time.monotonic() - self._begun > 2 * LONGEST
+        if over or late:
+            if late and not over:
+                self.end()
+            why = (
+                Outcome(LATE, "its import or a test") if late else Outcome(KILLED if self.anew else WRONG, "all ended")
+            )
+            yield from ((mutant, why) for mutant in self._left)
+            self._left.clear()
+            self._close()
 
     def end(self) -> None:
-        self._end_group()
+        _kill(self._pid)
         os.waitpid(self._pid, 0)
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._close()
 
-    def _end_group(self) -> None:
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(self._pid, signal.SIGKILL)
+    def _close(self) -> None:
+        if not self.ended:
+            os.close(self._results)
+            shutil.rmtree(self._folder, ignore_errors=True)
+        self.ended = True
 
 
-def _run(job: Job, folder: Path) -> None:
-    """In the new process, which ends with it."""
+def _forked() -> int:
+    sys.stdout.flush()
+    sys.stderr.flush()
+    return os.fork()
+
+
+def _kill(pid: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(pid, signal.SIGKILL)
+
+
+def _collect(mutants: list[Mutant], tried: bool, anew: bool, folder: Path, results: int) -> NoReturn:
+    """The process of a group, and of each of its mutants."""
     try:
         os.setsid()
-        output = os.open(folder / "output", os.O_CREAT | os.O_WRONLY)
         for stream in (1, 2):
-            os.dup2(output, stream)
+            os.dup2(os.open(folder / "output", os.O_CREAT | os.O_WRONLY | os.O_APPEND), stream)
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-        tempfile.tempdir = str(folder)
-        os.environ["TMPDIR"] = str(folder)
-        loaded = _load_instead(job) if job.text is not None else lambda: True
-        watcher = _Watcher()
-        arguments = ["-x", "-q", "-p", "no:" + " -p no:".join(PLUGINS), "--basetemp", str(folder / "pytest")]
-        arguments = [part for argument in arguments for part in argument.split(" ")]
-        code = pytest.main([*arguments, *job.tests], plugins=[watcher])
-        (folder / "outcome").write_text(json.dumps(_judge(code, watcher, loaded())))
+        tempfile.tempdir = os.environ["TMPDIR"] = str(folder)
+        loaded = _loaded_from(mutants[0]) if anew else lambda: True
+        runner = _Runner([] if anew else mutants, tried, results)
+        tests = [f"--basetemp={folder / 'pytest'}", *mutants[0].tests]
+        code = pytest.main(["-xq", *(f"-pno:{name}" for name in PLUGINS), *tests], plugins=[runner])
+        if runner.alone or anew:
+            _tell(results, _verdict(code, runner, anew, loaded()))
+        elif runner.uncollected:
+            for _ in mutants:
+                _tell(results, Outcome(WRONG, f"{runner.uncollected}: cannot be collected"))
     finally:
         os._exit(0)
 
 
-def _judge(code: int, watcher: "_Watcher", loaded: bool) -> tuple[str, str]:
-    if not loaded and code == pytest.ExitCode.OK:
-        return WRONG, "the tests do not import the file"
-    if watcher.uncollected or code in (pytest.ExitCode.INTERRUPTED, pytest.ExitCode.INTERNAL_ERROR):
-        return BROKEN if loaded else WRONG, watcher.uncollected
+def _tell(results: int, outcome: Outcome) -> None:
+    os.write(results, json.dumps([outcome.kind, outcome.by, outcome.seconds]).encode() + b"\n")
+
+
+def _verdict(code: int, runner: "_Runner", anew: bool, loaded: bool) -> Outcome:
+    """Of the one run that a process was for."""
+    seconds = time.monotonic() - runner.begun
+    if not loaded:
+        return Outcome(WRONG, "its tests do not import the file", seconds)
+    if runner.uncollected:
+        return Outcome(BROKEN if anew else WRONG, runner.uncollected, seconds)
     if code == pytest.ExitCode.TESTS_FAILED:
-        return KILLED, watcher.failed
-    if code == pytest.ExitCode.OK and watcher.passed:
-        return SURVIVED, f"{watcher.passed} tests passed"
-    return WRONG, f"pytest ended with {code!r}, {watcher.passed} tests passed"
+        return Outcome(KILLED, runner.failed, seconds)
+    if code == pytest.ExitCode.OK and runner.passed:
+        return Outcome(SURVIVED, f"{runner.passed} tests passed", seconds)
+    return Outcome(WRONG, f"pytest ended with {code!r}, {runner.passed} tests passed", seconds)
 
 
-def _load_instead(job: Job) -> Callable[[], bool]:
-    """From now on the module of the file comes from the text. Returns what says whether it was loaded."""
-    path, original, loads = os.path.realpath(job.path), SourceFileLoader.get_code, []
+class _Runner:
+    """Of pytest: forks once the tests are collected. `alone`: in the process of one mutant, or of the original. No
+    failure is made smaller by Hypothesis, and none is kept."""
 
-    def get_code(loader: SourceFileLoader, name: str):
-        if os.path.realpath(loader.path) != path:
-            return original(loader, name)
-        loads.append(name)
-        return compile(job.text or "", loader.path, "exec", dont_inherit=True)
-
-    SourceFileLoader.get_code = get_code
-    return lambda: bool(loads)
-
-
-class _Watcher:
-    """Of pytest: what passed, what failed first, what could not be collected. No failure is made smaller by Hypothesis,
-    and none is kept."""
-
-    def __init__(self) -> None:
-        self.passed, self.failed, self.uncollected = 0, "", ""
+    def __init__(self, mutants: list[Mutant], tried: bool, results: int) -> None:
+        self.alone, self.passed, self.failed, self.uncollected = False, 0, "", ""
+        self.begun, self._mutants, self._tried, self._results = time.monotonic(), mutants, tried, results
 
     def pytest_configure(self, config) -> None:
         from hypothesis import Phase, settings
@@ -181,24 +203,92 @@ class _Watcher:
         settings.register_profile("mutants", database=None, derandomize=True, phases=[Phase.explicit, Phase.generate])
         settings.load_profile("mutants")
 
+    def pytest_collectreport(self, report) -> None:
+        if report.failed:
+            self.uncollected = self.uncollected or report.nodeid or "the tests"
+
     def pytest_runtest_logreport(self, report) -> None:
         self.passed += report.when == "call" and report.passed
         if report.failed:
             self.failed = self.failed or report.nodeid
 
-    def pytest_collectreport(self, report) -> None:
-        if report.failed:
-            self.uncollected = self.uncollected or report.nodeid or "collection"
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtestloop(self, session) -> bool | None:
+        """True where all is done; None lets pytest run the tests."""
+        if not self._mutants or self.uncollected:
+            return None
+        limit = LONGEST
+        if self._tried:
+            original = self._outcome(None, 10 * LONGEST)
+            if self.alone:
+                return None
+            if original and original.kind != SURVIVED:
+                wrong = Outcome(WRONG, f"{original.by}, unchanged")
+                for _ in self._mutants:
+                    _tell(self._results, wrong)
+                return True
+            limit = SOONEST + 5 * original.seconds
+        for mutant in self._mutants:
+            outcome = self._outcome(mutant, limit)
+            if self.alone:
+                return None
+            _tell(self._results, outcome)
+        return True
+
+    def _outcome(self, mutant: Mutant | None, limit: float) -> Outcome:
+        """Of its run in a process of its own, in which this one is `alone` from here on."""
+        exchanged = [] if mutant is None else list(_exchanged(mutant))
+        if mutant is not None and not exchanged:
+            return Outcome(SURVIVED, "of what is there after the import nothing differs")
+        results, own = os.pipe()
+        pid, begun = _forked(), time.monotonic()
+        if not pid:
+            os.setsid()
+            self.alone, self.begun = True, begun
+            os.dup2(own, self._results)
+            for function, code in exchanged:
+                function.__code__ = code
+            return Outcome(WRONG, "")
+        os.close(own)
+        while not (over := os.waitpid(pid, os.WNOHANG)[0]) and time.monotonic() - begun < limit:
+            time.sleep(POLL)
+        _kill(pid)
+        with os.fdopen(results) as file:
+            text = file.read() if over else ""
+        if not over:
+            os.waitpid(pid, 0)
+            return Outcome(LATE, f"after {limit:.0f} s", limit)
+        return Outcome(*json.loads(text)) if text else Outcome(KILLED, "the process ended", time.monotonic() - begun)
 
 
-def limits(targets: Iterable[tuple[str, ...]], workers: int) -> Iterator[tuple[tuple[str, ...], float | str]]:
-    """Of each group of tests how long a mutant may take, s; in words why its tests say nothing, where they do not."""
-    groups = list(dict.fromkeys(targets))
-    jobs = [Job("", None, tests, 600.0) for tests in groups]
-    for tests, outcome in zip(groups, outcomes(jobs, workers, lambda job, outcome: None), strict=True):
-        good = outcome.kind == SURVIVED
-        yield tests, SOONEST + 5 * outcome.seconds if good else f"{outcome.kind}: {outcome.by}"
+def _exchanged(mutant: Mutant) -> Iterator[tuple[FunctionType, CodeType]]:
+    """The functions of the file whose code differs in the mutant, with that."""
+    path = os.path.realpath(mutant.path)
+    codes = {(code.co_qualname, code.co_firstlineno): code for code in _codes(compile(mutant.text, path, "exec"))}
+    for function in gc.get_objects():
+        if isinstance(function, FunctionType) and os.path.realpath(function.__code__.co_filename) == path:
+            old = function.__code__
+            new = codes.get((old.co_qualname, old.co_firstlineno))
+            if new is not None and new != old and new.co_freevars == old.co_freevars:
+                yield function, new
 
 
-def of(mutant: Mutant, limit: float) -> Job:
-    return Job(mutant.path, mutant.text, mutant.tests, limit)
+def _codes(code: CodeType) -> Iterator[CodeType]:
+    yield code
+    for part in code.co_consts:
+        if isinstance(part, CodeType):
+            yield from _codes(part)
+
+
+def _loaded_from(mutant: Mutant) -> Callable[[], bool]:
+    """From now on the module of the file comes from the text. Returns what says whether it was loaded."""
+    path, original, loads = os.path.realpath(mutant.path), SourceFileLoader.get_code, []
+
+    def get_code(loader: SourceFileLoader, name: str):
+        if os.path.realpath(loader.path) != path:
+            return original(loader, name)
+        loads.append(name)
+        return compile(mutant.text, loader.path, "exec", dont_inherit=True)
+
+    SourceFileLoader.get_code = get_code
+    return lambda: bool(loads)
