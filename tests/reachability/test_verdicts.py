@@ -43,8 +43,8 @@ def test_sheets_are_checked_with_tips_within_reach_and_points_beyond(monkeypatch
     tips, away = np.zeros((len(at_tips), 3)), np.ones((len(outside), 3))
     found_there = SimpleNamespace(equilibrium=SimpleNamespace(position=tips))
     for name, value in (
-        ("finer", np.zeros((3, 3))), ("sheet_at", None), ("soft_lattice", None), ("soft_field", None), ("overlap", 0.75),
-        ("points_beyond", away), ("sample_at", found_there),
+        ("finer", np.zeros((3, 3))), ("sheet_at", None), ("soft_lattice", None), ("soft_field", None),
+        ("overlap", 0.75), ("points_beyond", away), ("sample_at", found_there),
     ):  # fmt: skip
         monkeypatch.setattr(sheet_check, name, lambda *_, value=value: value)
     sheets = SimpleNamespace(
