@@ -38,7 +38,7 @@ def test_a_held_out_angle_counts_what_its_signal_calls_within_reach(monkeypatch,
 
 
 @pytest.mark.parametrize(("at_tips", "outside", "reachable", "beyond"), SIGNALS)
-def test_sheets_are_checked_with_tips_within_reach_and_points_beyond(monkeypatch, at_tips, outside, reachable, beyond):
+def test_sheets_are_checked_with_tips_and_points_beyond(monkeypatch, at_tips, outside, reachable, beyond):
     """At as many directions as are asked for, none farther aside than those of the sheets."""
     tips, away = np.zeros((len(at_tips), 3)), np.ones((len(outside), 3))
     found_there = SimpleNamespace(equilibrium=SimpleNamespace(position=tips))
