@@ -74,7 +74,7 @@ def test_of_points_that_the_links_rule_out_nothing_is_asked(asked):
 
 
 def test_the_links_reach_to_the_triangle_s_end_and_no_further():
-    """Along x at the height of the stretched wrist, by bisection: the border is sharp, and beyond it all is ruled out."""
+    """Along x at the height of the stretched wrist, by bisection: beyond a sharp border all is ruled out."""
     height = 0.2
     low, high = 0.3, 2.0
     for _ in range(60):
