@@ -68,6 +68,8 @@ class SimulatedRobot:
             return f"package: found digest {plan.package[:12]}, expected {self._package[:12]}"
         if not np.isfinite(rows).all():
             return "plan: found values that are not finite"
+        if not (np.isfinite(plan.step) and plan.step > 0):
+            return f"plan: found a step of {plan.step:g} s, expected a positive time"
         if not within_limits(plan.joints).all():
             return "plan: a joint leaves its range"
         speed = np.abs(np.diff(rows, axis=0)).max(axis=0, initial=0.0) / plan.step
@@ -76,7 +78,7 @@ class SimulatedRobot:
             name = f"joint {axis + 1}" if axis < JOINTS else f"tendon {axis + 1 - JOINTS}"
             return f"plan: {name} moves at {speed[axis]:.3g}, expected at most {self._limits.velocity[axis]:.3g}"
         off = np.abs(rows[0] - np.append(self.joints, self.commands)).max()
-        return f"plan: starts {off:.3g} away from where the robot is" if off > AT_START else ""
+        return "" if off <= AT_START else f"plan: starts {off:.3g} away from where the robot is"  # or no number
 
     def start(self, plan: Plan, digest: str) -> str:
         if self._report.mode == "running":
