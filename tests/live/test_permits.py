@@ -127,7 +127,9 @@ def test_without_a_permit_it_brakes_after_so_long_and_goes_on_by_none(played):
     assert played.robot._pace < 1.0
     held = played.told[0][HELD]
     assert DEAD_MAN <= held - (BEGINS + 0.5) + NEAR < DEAD_MAN + 2 * TICK
-    played.turn(BRAKE + TICK)  # permitted again
+    played.turn(BRAKE / 2, permits=False)
+    assert played.told[0][HELD] == held  # when it was told to hold, not since when it rests
+    played.turn(BRAKE)  # permitted again
     assert played.mode == "idle"
     assert played.told[0][HELD] == held
     assert played.rests()

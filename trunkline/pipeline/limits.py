@@ -74,6 +74,12 @@ class Limit:
         """The goal, met or missed."""
         return next((goal for goal in (self.max, self.min, self.goal) if goal is not None), None)
 
+    @property
+    def others(self) -> list[str]:
+        """Keys of metrics that it compares with."""
+        keys = [self.below and self.below.key, self.reaches, self.trials and self.trials.key]
+        return [key for key in keys if key]
+
     def misses(self, value: float, goal: float) -> bool:
         return value > goal if self.rises else value < goal
 
@@ -164,15 +170,8 @@ def read_limits(path: Path) -> Limits:
     limits = read_rows(path, TypeAdapter(Limits))
     for stage, rows in limits.items():
         for key, limit in rows.items():
-            others = [
-                limit.below.key if limit.below else "",
-                limit.reaches or "",
-                limit.trials.key if limit.trials else "",
-            ]
-            if any(of_test(stage, name) for name in (key, *others)):
-                raise InputError(
-                    f"{path}: {stage}: {key}: found a metric of `{TEST}`, expected one of a split that decides"
-                )
+            for name in (key, *limit.others):
+                refuse_test(stage, name, f"{path}: ")
     return limits
 
 
@@ -186,6 +185,12 @@ def read_rows(path: Path, adapter: TypeAdapter) -> Any:
 def of_test(stage: str, key: str) -> bool:
     """Whether a metric is of the split `test`, as all of `score` are."""
     return stage == SCORING or TEST in key.split(".")
+
+
+def refuse_test(stage: str, key: str, where: str = "") -> None:
+    """Raise InputError, which begins with `where`, for a metric of the split `test`, by which nothing is decided."""
+    if of_test(stage, key):
+        raise InputError(f"{where}{stage}: {key}: found a metric of `{TEST}`, expected one of a split that decides")
 
 
 def checked(path: Path, text: str, adapter: TypeAdapter) -> Any:
