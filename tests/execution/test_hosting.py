@@ -230,7 +230,7 @@ def test_a_bus_that_is_not_there_is_one_line():
 
 def test_a_robot_alone_needs_no_library_of_motors():
     code = "import sys; sys.modules['can'] = None; import trunkline.live.real, trunkline.execution.hosting"
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=600)  # of a busy machine
 
 
 def test_a_library_that_is_not_there_is_one_line():
