@@ -52,7 +52,7 @@ def test_a_future_that_is_not_sound_does_not_count():
 
 
 NEAR = 1e-6
-LATE_FRAMES = TIME > TIME[-1] - LAST + 1e-9  # after the frame with which the last one is compared
+LATE_FRAMES = TIME[-1] - LAST + 1e-9 < TIME  # after the frame with which the last one is compared
 
 
 def shifted(by, frames=slice(None)) -> np.ndarray:
