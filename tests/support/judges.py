@@ -196,12 +196,13 @@ def _computes(function: ast.AST) -> bool:
 
 
 def _says_why(function: ast.AST) -> bool:
-    """Whether a function returns words, none for success."""
+    """Whether a function returns words, and goes one way or another: with none for success, or with others' words."""
     words = isinstance(function, Function) and isinstance(function.returns, ast.Name) and function.returns.id == "str"
-    returned = [node.value for node in _within(function) if isinstance(node, ast.Return)]
-    empty = [node for value in returned if value is not None for node in ast.walk(value)
-             if isinstance(node, ast.Constant) and node.value == ""]  # fmt: skip
-    return words and bool(empty)
+    returned = [node.value for node in _within(function) if isinstance(node, ast.Return) and node.value is not None]
+    empty = [
+        node for value in returned for node in ast.walk(value) if isinstance(node, ast.Constant) and not node.value
+    ]
+    return words and (bool(empty) or len(returned) > 1)
 
 
 def _last(name: ast.expr) -> str:
