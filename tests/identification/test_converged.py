@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
-from trunkline.identification.search import search
+from trunkline.identification.search import _evolve, descend, search
 
 LOW, HIGH = np.log(0.2), np.log(20.0)
 PATIENT, SHORT = 25, 1  # iterations: of a search that ends by itself, and of one whose time is up
@@ -90,3 +90,24 @@ def test_a_search_that_goes_on_from_what_is_known_has_nothing_to_agree_with(iter
     result = search(Valleys(2.0, 5.0, 9.0), LeastSquares(0, 1, iterations, 1e-6), seed=3, report=quiet)
     assert (result.agreeing, result.starts) == (0, 0)
     assert result.converged is converged
+
+
+@pytest.mark.parametrize(
+    ("iterations", "tolerance", "converged"),
+    [(1, 1e-6, False), (2, 1e-12, False), (PATIENT, 1e-6, True), (PATIENT, 1e-12, True), (2, 0.9, True)],
+)
+def test_a_descent_has_converged_where_it_ended_before_its_iterations_did(iterations, tolerance, converged):
+    """Also with the first step that gains less than is asked for."""
+    problem = Valleys(2.0)
+    result = descend(problem, problem.start(), iterations, tolerance, quiet)
+    assert result.converged is converged
+
+
+@pytest.mark.parametrize(
+    ("generations", "tolerance", "converged"), [(1, 1e-9, False), (60, 1e-2, True), (3, 1e-9, False)]
+)
+def test_an_evolution_has_converged_where_its_losses_came_together(generations, tolerance, converged):
+    optimizer = DifferentialEvolution(12, 0, generations, tolerance)
+    result = _evolve(Valleys(2.0, 3.0), optimizer, np.random.default_rng(3), quiet)
+    assert result.converged is converged
+    assert len(result.convergence.best) <= generations

@@ -1,9 +1,8 @@
 """Tests run against mutants: each in a process of its own, forked from one that has collected the tests.
 
-There the functions of the file get the mutant's code. What shows only as a module is imported (a constant, a default),
-and whatever survives, has its tests collected anew, with the module made from the mutant's text. On the disk nothing is
-changed: what runs in other processes that do not come from this one by a fork does not see the mutant, so tests that
-need those kill nothing.
+There the functions of the file get the mutant's code. What shows only as a module is imported (a constant, a default)
+has its tests collected anew, with the module made from the mutant's text. On the disk nothing is changed: what runs in
+other processes that do not come from this one by a fork does not see the mutant, so tests that need those kill nothing.
 """
 
 import contextlib
@@ -30,12 +29,13 @@ from tests.mutants.operators import Mutant
 # Before the first fork, so that no group of tests waits for them; nothing of this repository.
 LIBRARIES = (
     "aiohttp", "can", "cryptography.x509", "daqp", "hydra", "hypothesis.extra.numpy", "mink", "mujoco", "numba",
-    "numpy", "omegaconf", "onnxruntime", "pandas", "pyarrow", "pydantic.dataclasses", "rich.console", "ruckig", "scipy.ndimage",
-    "scipy.optimize", "scipy.signal", "scipy.spatial.transform", "scipy.stats", "skimage.measure", "threadpoolctl",
+    "omegaconf", "onnxruntime", "pandas", "pyarrow", "pydantic.dataclasses", "rich.console", "ruckig", "scipy.optimize",
+    "scipy.ndimage", "scipy.signal", "scipy.spatial.transform", "scipy.stats", "skimage.measure", "threadpoolctl",
     "trimesh", "yaml",
 )  # fmt: skip
 KILLED, BROKEN, LATE, SURVIVED = "killed", "cannot be imported", "timeout", "survived"
 WRONG = "no result"  # the tests say nothing
+UNSEEN = "shows at import"
 PLUGINS = ("cacheprovider", "faulthandler", "xdist", "looponfail", "junitxml", "pastebin")
 SOONEST, LONGEST = 10.0, 60.0  # s that a mutant has beside five times what the original takes; without having tried it
 POLL = 0.01  # s
@@ -70,7 +70,7 @@ def outcomes(mutants: list[Mutant], workers: int, tell: Callable[[Mutant, Outcom
                 running.append(jobs.pop(0).begin())
             for group in list(running):
                 for mutant, outcome in group.news():
-                    if outcome.kind == SURVIVED and not group.anew:
+                    if outcome.kind == UNSEEN:
                         jobs.insert(0, _Group([mutant], tried=False, anew=True))
                     else:
                         results[mutant.key] = outcome
@@ -222,7 +222,7 @@ class _Runner:
             original = self._outcome(None, 10 * LONGEST)
             if self.alone:
                 return None
-            if original and original.kind != SURVIVED:
+            if original.kind != SURVIVED:
                 wrong = Outcome(WRONG, f"{original.by}, unchanged")
                 for _ in self._mutants:
                     _tell(self._results, wrong)
@@ -239,7 +239,7 @@ class _Runner:
         """Of its run in a process of its own, in which this one is `alone` from here on."""
         exchanged = [] if mutant is None else list(_exchanged(mutant))
         if mutant is not None and not exchanged:
-            return Outcome(SURVIVED, "of what is there after the import nothing differs")
+            return Outcome(UNSEEN, "no function differs")
         results, own = os.pipe()
         pid, begun = _forked(), time.monotonic()
         if not pid:
