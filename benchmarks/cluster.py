@@ -24,7 +24,7 @@ import numpy as np
 from distributed import LocalCluster
 from scipy.optimize import nnls
 
-from studies.rows import Rows, digest, other_commits
+from studies.rows import Rows, digest
 from tests.support.matched_plant import curl, motion, release, segments_of, small_model
 from trunkline.cluster import VARIABLE
 from trunkline.errors import in_one_line
@@ -48,16 +48,17 @@ def main() -> int:
     parser.add_argument("--processes", type=int, nargs="+", default=PROCESSES)
     given = parser.parse_args()
     cores, kept = min(thread_count(), len(os.sched_getaffinity(0))), given.processes == PROCESSES
-    rows = Rows("cluster", digest((CANDIDATES, FRAMES, EMPTY, BENDS, PULLS, REACH, cores, PROCESSES)), "turn")
-    with recorded("cluster", kept and given.turns == TURNS):
-        turns = list(rows.read().values()) if kept else []
+    made_of = digest((CANDIDATES, FRAMES, EMPTY, BENDS, PULLS, REACH, cores, PROCESSES))
+    rows = Rows("cluster", made_of, "turn") if kept else None
+    with recorded("cluster", kept and given.turns == TURNS, origin=rows and rows.origin):
+        turns = list(rows.read().values()) if rows else []
         for turn in measured(given.processes, given.turns - len(turns)):
-            if kept:
+            if rows:
                 rows.add(str(len(turns)), **turn)
             turns.append(turn)
         print(f"{CANDIDATES} candidates on {TRIALS} trials, {len(turns)} turns, {cores} cores")
         print("every evaluation gave the same bits as one without a scheduler")
-        if kept and (told := other_commits(rows.read())):
+        if rows and (told := rows.attempts()):
             print(told)
         tell(turns, given.processes, cores)
     return 0

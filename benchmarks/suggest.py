@@ -23,7 +23,7 @@ from threadpoolctl import threadpool_limits
 from benchmarks.suggest_lab import Lab, fixed_list, held_out, started
 from demo.plants.choice import plant_of
 from demo.rig import ROOT, Config
-from studies.rows import Rows, digest, other_commits
+from studies.rows import Rows, digest
 from trunkline.arm.kinds import described_arm
 from trunkline.errors import in_one_line
 from trunkline.identification.certainty import certainty
@@ -225,13 +225,13 @@ def main() -> int:
             rows.add(str(seed), **cells)
     kept = rows.read()
     methods = ["the paper's list", "random", *(f"suggested, for {goal}" for goal in SUGGESTED)]
-    with recorded("suggest", keep=bool(kept)):
+    with recorded("suggest", keep=bool(kept), origin=rows.origin):
         found, listed = list(kept.values()), len(fixed_list())
         first = f"{len(found)} arms, {len(started())} trials at first"
         print(f"{first}; off: median (worst) / intervals over their ranges: median\n")
         print("\n".join(table_lines(found, methods, listed)))
         print("\n".join(reached_lines(found, methods, listed)))
-        if line := other_commits(kept):
+        if line := rows.attempts():
             print(line)
     return 0
 

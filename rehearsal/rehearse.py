@@ -7,9 +7,10 @@ from typing import Annotated
 from pydantic import Field
 
 from rehearsal.experiments.registry import EXPERIMENTS
-from rehearsal.experiments.result import rewrite_results, summary
+from rehearsal.experiments.result import Result, rewrite_results, summary
+from rehearsal.experiments.stated import scores
 from rehearsal.report import draw
-from rehearsal.runs import make, source_of, wanted
+from rehearsal.runs import Source, make, source_of, wanted
 from trunkline.errors import nearest
 from trunkline.foresight.package import only_package
 from trunkline.pipeline.limits import read_limits
@@ -39,11 +40,18 @@ def main(config: Config) -> None:
     source = source_of(package)
     results = make(wanted(config.runs, config.of_variants), package, source, OUT / "runs.csv", thread_count())
     rewrite_results(OUT / "runs.csv", results)
-    metrics = {"package": source.package, **summary(results)}
+    metrics = metrics_of(source, results)
     write_json(OUT / "metrics.json", metrics)
     draw(results, OUT / "rehearsal.png")
     goals = read_limits(Path("tests/limits.yaml"))["rehearse"]
     print(rehearsal_table(metrics, goals, f"with package `{source.package}`", variants=True))
+
+
+def metrics_of(source: Source, results: list[Result]) -> dict:
+    """metrics.json: digests of what runs are made of, each experiment's `summary`, and in `preview` what `scores` says,
+    where anything was stated."""
+    stated = {"preview": found} if (found := scores(results)) else {}
+    return {"package": source.package, "code": source.code, **summary(results), **stated}
 
 
 if __name__ == "__main__":

@@ -1,7 +1,5 @@
 """Which runs a rehearsal is made of, and how they are made: side by side, each a row of the table when it ends."""
 
-import hashlib
-import json
 import multiprocessing
 import time
 from collections.abc import Iterable, Iterator
@@ -11,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from dvc.repo import Repo
 from threadpoolctl import threadpool_limits
 
 from rehearsal.experiments.ablations import VARIANTS, varied
@@ -20,13 +17,11 @@ from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, append_result, read_results
 from trunkline.cluster import VARIABLE
 from trunkline.errors import InputError
-from trunkline.foresight.package import PACKAGES
+from trunkline.pipeline.provenance import REHEARSAL, SHOWN, stage_code
 from trunkline.processes import end_with_parent
 from trunkline.scheduler import arriving, elsewhere
 from trunkline.unity.unpacked import package_digest
 from trunkline.unity.unpacked import read_package as read_files
-
-SHOWN = 12  # digits of a digest
 
 
 @dataclass(frozen=True)
@@ -52,16 +47,7 @@ class Run:
 
 def source_of(package: Path) -> Source:
     """Of a package and of the checkout in whose top we are."""
-    with Repo() as repo:
-        stage = repo.stage.load_one("rehearsal/dvc.yaml", "rehearse")
-        names = {Path(dep.fs_path).relative_to(repo.root_dir).as_posix(): dep for dep in stage.deps}
-        hashes = {
-            name: dep.get_hash().value if dep.exists else None
-            for name, dep in names.items()
-            if not name.startswith(f"{PACKAGES}/") and name != "rehearsal/params.yaml"
-        }
-    code = hashlib.sha256(json.dumps(hashes, sort_keys=True).encode()).hexdigest()
-    return Source(package_digest(read_files(package))[:SHOWN], code[:SHOWN])
+    return Source(package_digest(read_files(package))[:SHOWN], stage_code(Path("."), *REHEARSAL))
 
 
 def wanted(runs: dict[str, int], of_variants: int) -> list[Run]:

@@ -97,6 +97,13 @@ class Session:
         Its y is how far it is beside the bending plane."""
         return np.mean(self.straight, axis=0)
 
+    def foresee(self) -> Foreseen | None:
+        """What a page tells of where the tip of the newest plan goes, which grasps nothing; None without `foresight`.
+        Nothing here waits for it, so it is computed when it is asked for."""
+        if self.foresight is None or self.plan is None or self.report is None:
+            return None
+        return self.foresight.reach(self.plan, self.world, self.report.serial)
+
     def frame(self) -> View:
         """Let a frame pass."""
         self.now += 1 / RATE
@@ -210,9 +217,7 @@ class Session:
             return
         goal = None
         if not why_not(intent.targets):
-            goal, self.refused = sought(
-                self.planner, intent.targets, self.follower.goal[:JOINTS], self.world
-            )
+            goal, self.refused = sought(self.planner, intent.targets, self.follower.goal[:JOINTS], self.world)
         self.follower.hear(self.now, goal)
 
     def _move(self, joints: np.ndarray, commands: np.ndarray, dt: float) -> None:

@@ -8,7 +8,7 @@ from trunkline.certificate.page import page
 from trunkline.errors import existing
 from trunkline.figures.certificate import pose_figure, uncertainty_figure
 from trunkline.figures.style import save_figure
-from trunkline.pipeline.inputs import read_model
+from trunkline.pipeline.inputs import load_rig, read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
 from trunkline.settings import read_yaml, settings
 from trunkline.trials.splits import DECIDING
@@ -24,14 +24,17 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 class Config(Asked):
     """See conf/report/config.yaml."""
 
+    rig: str | None
+
 
 def main(config: Config) -> None:
     def told(stage: str, name: str = "metrics") -> dict:
         return json.loads(existing(ARTIFACTS / stage / f"{name}.json").read_text())
 
+    bring = None if config.rig is None else load_rig("report.rig", config.rig, "bring")
     tables = {stage: told(stage, "parameters") for stage in STAGES}
     metrics = {stage: told(stage) for stage in (*STAGES, "score", "ingest", "filter")}
-    found = certify(config, read_model(MODEL), read_trials(TRIALS, DECIDING), tables, metrics)
+    found = certify(config, read_model(MODEL), read_trials(TRIALS, DECIDING), tables, metrics, bring)
     facts = found.facts | {
         "files": digests([MODEL, *(ARTIFACTS / s / "parameters.json" for s in STAGES)]),
         "code": digest_of_code(CHECKOUT, code()),
@@ -48,7 +51,7 @@ def main(config: Config) -> None:
 def code() -> list[str]:
     """Files and folders of the checkout whose code makes the certificate: those by which DVC makes it again."""
     deps = read_yaml(CHECKOUT / "dvc.yaml").stages.report.deps
-    return [dep for dep in deps if dep.startswith(("stages/", "trunkline/"))]
+    return [dep for dep in deps if dep.startswith(("demo/", "stages/", "trunkline/"))]
 
 
 if __name__ == "__main__":

@@ -122,13 +122,15 @@ def main() -> int:
     tables = {stage: json.loads((ARTIFACTS / stage / "parameters.json").read_text()) for stage in STAGES}
     ingested = json.loads((ARTIFACTS / "ingest/metrics.json").read_text())
     kept = list(rows.read().values())
-    with recorded("certificate", keep=len(kept) == COUNT):
+    with recorded("certificate", keep=len(kept) == COUNT, origin=rows.origin):
         draws = np.random.default_rng(asked.seed)
         inputs = inputs_of(model, trials, tables, ingested, asked.arms, draws)
         found = budget(inputs, poses[: len(kept)], asked.arms, asked.each, draws)
         tips = np.array([[float(row[axis]) for axis in "xyz"] for row in kept])
         loose = np.max(pulls[: len(kept)], axis=1) <= 0
         print("\n".join(told_lines(tips, found, loose, back[: len(kept)])))
+        if line := rows.attempts():
+            print(line)
     return 0
 
 

@@ -24,7 +24,7 @@ import mujoco
 
 from benchmarks.identification.case import STAGES, require_demo, spread
 from benchmarks.identification.timing import Stopwatch
-from studies.rows import Rows, digest, other_commits
+from studies.rows import Rows, digest
 from trunkline.errors import in_one_line
 from trunkline.identification.evaluation import replay, scores
 from trunkline.identification.experiment import Experiment
@@ -222,12 +222,12 @@ def main() -> int:
     committed = [load_config(import_module(f"stages.{stage}").Config, stage) for stage in STAGES]
     table = Rows("choices", digest(committed, CAD_MODEL, TRIALS), "name")
     is_whole = {*table.read(), *arguments.only} >= set(CHOICES)
-    with recorded("choices", keep=is_whole):
+    with recorded("choices", keep=is_whole, origin=table.origin):
         for name in [name for name in arguments.only if name not in table.read()]:
             table.add(name, **cells(CHOICES[name], False, known))
         rows = table.read()
         print(table_of(rows))
-        if line := other_commits(rows):
+        if line := table.attempts():
             print(line)
     return 0
 

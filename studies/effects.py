@@ -27,7 +27,7 @@ from benchmarks.identification.case import STAGES, require_demo
 from stages.build_mjcf import Config as CadConfig
 from stages.build_mjcf import cad_arm
 from studies.choices import Chain, next_link
-from studies.rows import Rows, digest, other_commits
+from studies.rows import Rows, digest
 from trunkline.arm.holes import Holes
 from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.errors import in_one_line
@@ -220,7 +220,7 @@ def main() -> int:
     told = [load_config(CadConfig, "build_mjcf"), every, list(EFFECTS.values()), arguments.folds, arguments.only]
     is_whole = arguments.only == list(EFFECTS) and arguments.folds == FOLDS
     table = Rows("effects" if is_whole else "effects_part", digest(told, TRIALS), "effect")
-    with recorded("effects", keep=is_whole):
+    with recorded("effects", keep=is_whole, origin=table.origin):
         kept = tried(arguments.only, table, arguments.folds, known)
         rows = table.read()
         print(effect_table(rows))
@@ -233,7 +233,7 @@ def main() -> int:
             for stage in STAGES:
                 link, trials = chain(effects, stage, known), read_reported(settings_of(stage, effects))
                 print("\n".join(validated(f"{title}, {stage}", link, trials, cad_model(effects))), flush=True)
-        if line := other_commits(rows):
+        if line := table.attempts():
             print(line)
     return 0
 

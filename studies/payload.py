@@ -1,14 +1,12 @@
 """The heaviest mass that the arm holds: `python -m studies.payload`
 
 Goes over the cells of `studies/payload.yaml` and adds a row for each to docs/results/payload.csv as soon as it is done;
-stopped, it goes on from there. A file of other settings or another arm is refused, `--anew` begins another.
-`--quick` is a small chart: hanging objects of two diameters, 1 placement, a coarser ladder.
+stopped, it goes on from there. Rows of other code, other settings or another arm stay, and count for nothing.
+`--quick` is a small chart that is not kept: hanging objects of two diameters, 1 placement, a coarser ladder.
 `--cells N` stops after N more. Prints the rows and their cost; docs/results/payload.png shows them.
 """
 
 import argparse
-import hashlib
-import json
 import sys
 import time
 from dataclasses import asdict, astuple, fields
@@ -17,7 +15,8 @@ from pathlib import Path
 import pandas as pd
 from omegaconf import OmegaConf
 
-from trunkline.errors import InputError, in_one_line
+from studies.rows import Rows, digest
+from trunkline.errors import in_one_line
 from trunkline.figures.payload import payload_figure
 from trunkline.figures.style import save_figure
 from trunkline.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
@@ -30,7 +29,7 @@ from trunkline.settings import read_yaml
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SETTINGS = Path("studies/payload.yaml")
-TABLE, QUICK_TABLE = Path("docs/results/payload.csv"), Path("docs/results/payload_quick.csv")
+FIGURE = Path("docs/results/payload.png")
 QUICK = {
     "grids": [{"supports": ["hanging"], "shapes": ["cylinder", "box", "sphere", "toy"], "diameters": [0.03, 0.06],
                "frictions": [0.45], "pulls": ["dorsal"], "shortenings": [0.2]}],
@@ -45,53 +44,41 @@ def read_settings(quick: bool) -> PayloadSettings:
     return validated(PayloadSettings, values | (QUICK if quick else {}), SETTINGS)
 
 
-def read_table(path: Path, digest: str) -> pd.DataFrame:
-    """The rows so far. Raises InputError if they are of other settings."""
-    if not path.is_file():
-        return pd.DataFrame()
-    table = pd.read_csv(path)
-    if (found := set(table["settings"])) - {digest}:
-        raise InputError(
-            f"{path}: found rows of other settings or another arm ({', '.join(sorted(found))}), expected "
-            f"{digest}; --anew begins another table"
-        )
-    return table
+def name_of(cell: Cell) -> str:
+    return " ".join(map(str, astuple(cell)))
 
 
 @in_one_line
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true")
-    parser.add_argument("--anew", action="store_true")
     parser.add_argument("--cells", type=int, default=sys.maxsize)
     options = parser.parse_args()
     chart, arm = read_settings(options.quick), read_spec(MODEL)
-    told = json.dumps(
-        {
-            **{key: value for key, value in asdict(chart).items() if key != "grids"},  # of those rows tell
-            "contacts": [IMPRATIO, SOLREF, SOLIMP],
-            "arm": hashlib.sha256(MODEL.read_bytes()).hexdigest(),
-        },
-        sort_keys=True,
-    )
-    digest, path = hashlib.sha256(told.encode()).hexdigest()[:12], QUICK_TABLE if options.quick else TABLE
-    if options.anew:
-        path.unlink(missing_ok=True)
-    table = read_table(path, digest)
-    done = {Cell(*row) for row in table[KEYS].itertuples(index=False)} if len(table) else set()
-    begun, grasps, rows = time.process_time(), 0, chart_rows(arm, chart, done)
+    settings = {key: value for key, value in asdict(chart).items() if key != "grids"}  # of those rows tell
+    made_of = digest((sorted(settings.items()), IMPRATIO, SOLREF, SOLIMP), MODEL)
+    rows = None if options.quick else Rows("payload", made_of, "cell")
+    outcomes = {} if rows is None else rows.read()
+    done = {cell for cell in cells(chart) if name_of(cell) in outcomes}
+    begun, grasps = time.process_time(), 0
     with progress(min(len(cells(chart)) - len(done), options.cells), "payload", "cells") as bar:
-        for _, (cell, outcome) in zip(range(options.cells), rows, strict=False):
-            row = pd.DataFrame([[*astuple(cell), *astuple(outcome), digest]],
-                               columns=[*KEYS, *FOUND, "settings"])  # fmt: skip
-            table, grasps = pd.concat([table, row]), grasps + outcome.grasps
-            path.parent.mkdir(parents=True, exist_ok=True)
-            table.to_csv(path, index=False, float_format="%.6g")
+        for _, (cell, outcome) in zip(range(options.cells), chart_rows(arm, chart, done), strict=False):
+            found = {name: float(f"{value:.6g}") if isinstance(value, float) else value
+                     for name, value in (asdict(cell) | asdict(outcome)).items()}  # fmt: skip
+            outcomes[name_of(cell)] = found
+            if rows is not None:
+                rows.add(name_of(cell), **found)
+            grasps += outcome.grasps
             bar.update(1, last=f"{cell.support} {cell.shape} {1e3 * cell.diameter:.0f} mm: {1e3 * outcome.mass:.0f} g")
-    if len(table):
-        save_figure(payload_figure(table), path.with_suffix(".png"))
-        with recorded("payload", keep=not options.quick and len(table) == len(cells(chart))):
+    if outcomes:
+        table = pd.DataFrame(list(outcomes.values()))
+        is_whole = rows is not None and len(table) == len(cells(chart))
+        if is_whole:
+            save_figure(payload_figure(table), FIGURE)
+        with recorded("payload", keep=is_whole, origin=rows and rows.origin):
             print(table[[*KEYS, *FOUND]].to_string(index=False))
+            if rows is not None and (line := rows.attempts()):
+                print(line)
     if grasps:
         print(f"{grasps} grasps, {(time.process_time() - begun) / grasps:.2f} s of processor each")
     return 0

@@ -27,7 +27,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.identification.case import STAGES, require_demo, spread
 from stages import filter
-from studies.rows import Rows, digest, other_commits
+from studies.rows import Rows, digest
 from trunkline.elements import give_way
 from trunkline.errors import in_one_line
 from trunkline.filtering.filter import start_of
@@ -287,13 +287,13 @@ def main() -> int:
     table = Rows("spoilt", digest(told, *models, FILTERED), "session")
     work = {stage: partial(clean_row, stage) for stage in TRIALS}
     work |= {str(seed): partial(spoilt_row, spoil, seed) for spoil, seed in sessions(arguments.sessions)}
-    with recorded("spoilt", keep=arguments.sessions == SESSIONS):
+    with recorded("spoilt", keep=arguments.sessions == SESSIONS, origin=table.origin):
         done = table.read()
         for key in [key for key in work if key not in done]:
             table.add(key, **work[key]())
         rows = {key: row for key, row in table.read().items() if key in work}
         report(rows, [key for key in work if key not in TRIALS])
-        if line := other_commits(rows):
+        if line := table.attempts():
             print(line)
     return 0
 

@@ -32,7 +32,7 @@ from demo.record import Config
 from demo.recorder import write_log, write_session
 from demo.rig import ROOT
 from demo.truth import Truth
-from studies.rows import Rows, digest, other_commits
+from studies.rows import Rows, digest
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.results import recorded
@@ -272,8 +272,6 @@ def report(reference: list[Score], trials: list, rows: dict[str, dict], seeds: i
     print("\n".join([f"\n| {' | '.join(heads)} |", "|---|---|---:|---:|---:|---:|---|", *wolf]))
     print(f"\nrefused as logs: {len(refused)} of {len(told)} trials")
     print(f"reference: as they come, the first {LEARN} of each kind; as planned, {len(reference)} of the session")
-    if line := other_commits(rows):
-        print(line)
 
 
 @in_one_line
@@ -291,8 +289,10 @@ def main() -> int:
         trials = wanted(arguments.seeds, arguments.unchanged)
         collect(rows, trials, scorer)
         known, whole = rows.read(), (arguments.seeds, arguments.unchanged) == (SEEDS, sum(EACH.values()))
-        with recorded("watch", keep=whole):
+        with recorded("watch", keep=whole, origin=rows.origin):
             report(reference, trials, known, arguments.seeds, scorer)
+            if line := rows.attempts():
+                print(line)
     return 0
 
 

@@ -4,10 +4,10 @@
 tendons that tie them, which end in `_tie`, Jenkins elements, tendons named `<hinge>_slider_<number>`, and the
 diagonals of a round joint, tendons named `<hinge>_diagonal_<number>` after its first hinge.
 `trunkline/arm/holes.py` gives a cable tendons by which it rubs on its holes, named `<cable>_hole_<number>`, and the
-model a number `capstan_friction`, their coefficient. Numbers `rate_limit` and `backlash` are those of the motors'
-winches (`trunkline/simulation/winch.py`); 0 stands for none. `winding` and `preload` say what a logged command draws
-in: so many times its metres, and so many metres of each cable beyond the straight arm's where it is 0. `sections` are
-the numbers of units of an arm that is made of several.
+model a number `capstan_friction`, their coefficient, and `slip_length`, m of sliding within which it builds up.
+Numbers `rate_limit` and `backlash` are those of the motors' winches (`trunkline/simulation/winch.py`); 0 stands for
+none. `winding` and `preload` say what a logged command draws in: so many times its metres, and so many metres of each
+cable beyond the straight arm's where it is 0. `sections` are the numbers of units of an arm that is made of several.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,8 @@ import numpy as np
 
 BRANCH, SLIDER, DIAGONAL, HOLE = "branch", "slider", "diagonal", "hole"
 TIE = "_tie"  # ends the name of a branch's tendon: in a Unity scene it may not be called as the hinge
-CAPSTAN_FRICTION = "capstan_friction"
+CAPSTAN_FRICTION, SLIP_LENGTH = "capstan_friction", "slip_length"
+SLIP = 2e-4  # m, of models that do not say: see conf/build_mjcf/holes/rubbing.yaml
 HINGE_SHARE, DIAGONAL_SHARE = 2 / 3, 1 / 6  # of the hardening K c of a round joint, see `trunkline/arm/joints.py`
 RATE_LIMIT, BACKLASH = "rate_limit", "backlash"  # of winches, m/s and m of cable
 WINDING, PRELOAD, SECTIONS = "winding", "preload", "sections"
@@ -155,6 +156,11 @@ def numbers_place(model: mujoco.MjModel, name: str) -> np.ndarray:
 def capstan_friction(model: mujoco.MjModel) -> float:
     """The coefficient μ with which its cables rub, 0 where nothing rubs."""
     return numeric(model, CAPSTAN_FRICTION)
+
+
+def slip_length(model: mujoco.MjModel) -> float:
+    """m of sliding within which the friction of its cables builds up."""
+    return SLIP if numeric_place(model, SLIP_LENGTH) is None else numeric(model, SLIP_LENGTH)
 
 
 def switch_off(model: mujoco.MjModel, *names: str) -> None:

@@ -9,8 +9,9 @@ own.
 
 ROBOT_PYTHON is of an environment with pylibfranka and franka-sim; franka-sim listens to every address, so the whole
 belongs in a network of its own (docs/execution.md). A run is a row of docs/results/experiments.csv as soon as it is
-done; stopped, the command goes on from there, also with another package: each row names its own, and the line under the
-table how many there are of which. Delete the file to begin anew.
+done; stopped, the command goes on from there. Runs of other code or with another package stay in that file, and count
+for nothing; with `--again` each seed is run once more, as a further row. The first attempt of each seed counts, and the
+lines under the table tell of all others.
 """
 
 import argparse
@@ -21,7 +22,6 @@ import os
 import sys
 import tempfile
 import time
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,14 +32,15 @@ from benchmarks.experiments.machines import franka_sim, hardware
 from rehearsal import settings
 from rehearsal.experiments.bench import FLOOR, Bench, Staged, bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
-from rehearsal.experiments.result import Result, append_result, causes, rate, read_results
-from rehearsal.runs import source_of
+from rehearsal.experiments.result import COLUMNS, Result, as_row, causes, rate
+from studies.rows import Rows
 from trunkline.errors import InputError, in_one_line
 from trunkline.foresight.package import only_package
 from trunkline.live.session import Address, opened
 from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.results import FOLDER, recorded
+from trunkline.pipeline.provenance import SHOWN
+from trunkline.pipeline.results import recorded
 from trunkline.teleop.config import Config as Teleop
 
 ADDRESS, WINDOW, YIELDS = Address(8899), (320, 240), 3  # of the page: pixels, and how nice its browser is
@@ -101,11 +102,21 @@ def told(name: str, rows: list[Result], rehearsed: dict) -> str:
     return f"| {name} | {len(rows)} | {own} | {beside} | {mean:.0f} | {why} |"
 
 
-def packages(rows: list[Result], rehearsed: dict) -> str:
-    """Which packages the runs were made with, and the rehearsal."""
-    counts = Counter(row.package for row in rows)
-    told = ", ".join(f"{package} ({count} runs)" for package, count in counts.items())
-    return f"\nPackages: {told}; rehearsed: {rehearsed.get('package', 'none')}."
+def counted(rows: Rows, name: str, runs: int) -> dict[int, Result]:
+    """By seed, the first run of an experiment with this code and package."""
+    every = (
+        Result(**{key: row[key] for key in COLUMNS if key in row and key != "code"}) for row in rows.read().values()
+    )
+    return {result.seed: result for result in every if result.experiment == name and result.seed < runs}
+
+
+def others(rows: Rows, names: list[str]) -> list[str]:
+    """Lines on what is in the table beside the runs that count: further attempts, and runs of other code."""
+    line, told = rows.attempts(), []
+    for name in names:
+        runs = [row for row in rows.uncounted() if row["experiment"] == name]
+        told += [f"{name} {sum(row['success'] == 'True' for row in runs)} of {len(runs)}"] if runs else []
+    return [line, f"successes of those that do not count: {', '.join(told)}"] if line else []
 
 
 @in_one_line
@@ -114,30 +125,31 @@ def main() -> int:
     parser.add_argument("package", nargs="?", type=Path)
     parser.add_argument("--runs", type=int, default=FEWEST, help="of each experiment, seeds 0, 1, ...")
     parser.add_argument("--only", choices=sorted(EXPERIMENTS))
+    parser.add_argument("--again", action="store_true", help="each seed once more, as a further row")
     given = parser.parse_args()
     with contextlib.suppress(OSError):  # what it starts has it not
         os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(URGENT))
     python = Path(os.environ.get("ROBOT_PYTHON", ""))
     if not python.is_file():
         raise InputError(f"ROBOT_PYTHON: found {str(python)!r}, expected the Python of pylibfranka and franka-sim")
-    package, table = given.package or only_package(), FOLDER / "experiments.csv"
-    bench, source, names = bench_of(package), source_of(package), [given.only] if given.only else list(EXPERIMENTS)
-    with recorded("experiments", keep=given.runs >= FEWEST and not given.only):
+    package, names = given.package or only_package(), [given.only] if given.only else list(EXPERIMENTS)
+    bench = bench_of(package)
+    rows = Rows("experiments", bench.package.digest[:SHOWN], "run")
+    with recorded("experiments", keep=given.runs >= FEWEST and not given.only, origin=rows.origin):
         print("| experiment | runs | success (95 %) | rehearsed | s a run | why it failed |")
         print("|---|---:|---:|---:|---:|---|", flush=True)
-        made, rehearsed = [], json.loads(REHEARSED.read_text()) if REHEARSED.is_file() else {}
+        rehearsed = json.loads(REHEARSED.read_text()) if REHEARSED.is_file() else {}
         for name in names:
-            rows = {row.seed: row for row in read_results(table) if row.experiment == name}
+            done = counted(rows, name, given.runs)
             for seed in range(given.runs):
-                if seed not in rows:
+                if given.again or seed not in done:
                     found = made_of(bench, name, seed, python.absolute(), package)
-                    rows[seed] = replace(found, package=source.package, code=source.code)
-                    append_result(table, rows[seed])
+                    cells = as_row(replace(found, package=rows.made_of))
+                    rows.add(f"{name} {seed}", **{key: cells[key] for key in COLUMNS if key != "code"})
                     print(f"{name} {seed}: {found.cause or 'success'}; {found.seconds:.0f} s", file=sys.stderr)
-            counted = [rows[seed] for seed in range(given.runs)]
-            print(told(name, counted, rehearsed), flush=True)
-            made += counted
-        print(packages(made, rehearsed))
+            print(told(name, list(counted(rows, name, given.runs).values()), rehearsed), flush=True)
+        print(f"\nPackage: {rows.made_of}; rehearsed: {rehearsed.get('package', 'none')}.")
+        print("\n".join(others(rows, names)))
     return 0
 
 

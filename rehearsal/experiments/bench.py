@@ -20,6 +20,7 @@ from rehearsal.session import REFERENCE, Place, Session, View
 from rehearsal.settings import Free
 from rehearsal.settings import previewing as read_previewing
 from trunkline.errors import InputError
+from trunkline.foresight.foresight import Foresight
 from trunkline.foresight.package import Package, read_package
 from trunkline.foresight.settings import Previewing
 from trunkline.foresight.twin import Believed, believed
@@ -65,7 +66,18 @@ class Bench:
         radius, band = self.settings.diameter / 2, self.settings.band
         return Operator(self.person, (left, right), offset, radius, band, rng, self.judged)
 
-    def session(self, operator: Operator, thing: np.ndarray | None, seed: int, place: Place) -> Session:
+    @property
+    def foresight(self) -> Foresight | None:
+        """What plans are previewed with; None where nobody looks at a preview."""
+        if not self.judged:
+            return None
+        assert self.known is not None
+        return Foresight(self.known, self.package.grips(self.config), self.previewing)
+
+    def session(
+        self, operator: Operator, thing: np.ndarray | None, seed: int, place: Place,
+        foresight: Foresight | None = None,
+    ) -> Session:  # fmt: skip
         """The stand-in at its ready pose; a sphere hangs at `thing` (3,), m, or there is none."""
         s = self.settings
         x, y, z = s.mount_ready
@@ -76,7 +88,8 @@ class Bench:
         hung = Object("sphere", s.diameter, s.diameter, s.mass, where, hanging=thing is not None)
         robot = StandInRobot(self.arm, Scene(FLOOR, hung, {}, hook), self.stand_in, ready, seed)
         world = World("floor", (FLOOR_BOX,))
-        return Session(self.package, self.config, robot, (operator.left, operator.right), world, place)
+        hands = operator.left, operator.right
+        return Session(self.package, self.config, robot, hands, world, place, foresight)
 
 
 def bench_of(file: Path) -> Bench:
@@ -111,11 +124,18 @@ class Seen:
     units: np.ndarray
 
 
+def executed(frames: list[Seen]) -> Seen | None:
+    """The first frame after the first execution, None where none came to an end."""
+    pairs = zip(frames, frames[1:], strict=False)
+    return next((after for frame, after in pairs if frame.mode == "execute" != after.mode), None)
+
+
 @dataclass
 class Staged:
     """An experiment that is ready to be run: where, and what the operator does there. judge: fills in a result of how
     the script ended, the frames from where the robot began to move, and all views, and says why it failed, "" if it did
-    not. thing: what is grasped, in words."""
+    not. thing: what is grasped, in words. watch: fills in what it takes to look on after the script, while the robot
+    holds."""
 
     name: str
     seed: int
@@ -123,12 +143,15 @@ class Staged:
     script: Script
     judge: Callable[[Result, Ending, list[Seen], list[View]], str]
     thing: str = ""
+    watch: Callable[[Result, Ending, list[Seen]], None] | None = None
 
     def judged(self, ending: object, frames: list[Seen], views: list[View], seconds: float) -> Result:
         """What a run of `seconds` came to, whose script ended so."""
         result = Result(self.name, self.seed, False, seconds=seconds, object=self.thing)
-        ended = isinstance(ending, Ending)
-        result.cause = self.judge(result, ending, frames, views) if ended else "stopped: the run did not end"
+        if isinstance(ending, Ending):
+            result.cause = self.judge(result, ending, frames, views)
+        else:
+            result.cause = "stopped: the run did not end"
         result.success = not result.cause
         return result
 
@@ -136,7 +159,10 @@ class Staged:
 def perform(staged: Staged) -> tuple[Result, list[Seen]]:
     """One run, and its frames from where the robot began to move."""
     ending, frames, views = rehearse(staged.session, staged.script)
-    return staged.judged(ending, frames, views, staged.session.now), frames
+    result = staged.judged(ending, frames, views, staged.session.now)
+    if staged.watch is not None and isinstance(ending, Ending):
+        staged.watch(result, ending, frames)
+    return result, frames
 
 
 def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list[View]]:

@@ -9,6 +9,7 @@ from rehearsal.experiments.bench import Bench, Seen, Staged
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import View
+from trunkline.teleop.core import STAYS
 
 EASE = 2.0  # s in which the object begins to move
 
@@ -52,13 +53,13 @@ def on_path(bench: Bench, seed: int) -> tuple[Path, Staged]:
 
     def judge(result: Result, ending: Ending, frames: list[Seen], views: list[View]) -> str:
         tell(result, path, delay, frames, views)
-        return interruption(views, session.refusals, path, s.interruption) if ending.done else ending.why
+        return failure(ending, views, session.refusals, path, s.interruption)
 
     return path, Staged("follow", seed, session, script, judge)
 
 
 def tell(result: Result, path: Path, delay: float, frames: list[Seen], views: list[View]) -> None:
-    """How far the tip was from where the object had been, while that was on its way."""
+    """How far the tip was from where the object had been `delay` s before, while that was on its way."""
     during = [frame for frame in frames if path.begun + delay <= frame.now <= path.begun + delay + path.seconds]
     if not during:
         return
@@ -73,14 +74,29 @@ def tell(result: Result, path: Path, delay: float, frames: list[Seen], views: li
     result.robot_mm = 1e3 * float(np.median(wanted)) if wanted else float("nan")
 
 
-def interruption(views: list, refusals: list[tuple[float, str]], path: Path, longest: float) -> str:
-    """Why the robot stayed where it was for longer than `longest` s while the path went on; "" if it did not."""
+def failure(ending: Ending, views: list[View], refusals: list[tuple[float, str]], path: Path, longest: float) -> str:
+    """Why the path was not followed, "" if it was. The first of these that is so:
+
+    1. The operator gave up, or the robot left off: why. How far the tip was from the object does not count.
+    2. Nothing was looked at while the path went on: stopped.
+    3. The robot stayed where it was for longer than `longest` s meanwhile: interrupted.
+    """
+    if not ending.done:
+        return ending.why or "stopped: the operator gave up"
+    if not any(path.begun <= view.now <= path.begun + path.seconds for view in views):
+        return "stopped: the path was never begun"
+    return interruption(views, refusals, path, longest)
+
+
+def interruption(views: list[View], refusals: list[tuple[float, str]], path: Path, longest: float) -> str:
+    """Why the robot stayed where it was for longer than `longest` s while the path went on; "" if it did not. It stays
+    where targets are not followed, `refusals`: times and why; or where the core keeps the last ones, as it notices."""
     why = {now: reason for now, reason in refusals}
     since = None
     for view in views:
         if not path.begun <= view.now <= path.begun + path.seconds:
             continue
-        reason = why.get(view.now) or ("out of reach" if "stays at the last" in view.intent.notice else "")
+        reason = why.get(view.now) or ("out of reach" if STAYS in view.intent.notice else "")
         if not reason:
             since = None
             continue

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
-from rehearsal.experiments.bench import FLOOR, FLOOR_BOX, START, Bench, Seen, Staged
+from rehearsal.experiments.bench import FLOOR, FLOOR_BOX, START, Bench, Seen, Staged, executed
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending, Operator
 from rehearsal.robot.scene import Object, Scene, Surface
@@ -18,7 +18,6 @@ from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import Session
 from trunkline.errors import InputError
 from trunkline.foresight.believing import make_world
-from trunkline.foresight.foresight import Foreseen, Foresight
 from trunkline.frames import wxyz_from_rotation
 from trunkline.hybrid.grasps import object_in_base
 from trunkline.teleop.messages import Box, Thing
@@ -96,13 +95,9 @@ def session_of(
         NAME, thing.shape, thing.diameter, thing.height, thing.mass, (a, b, c), (d, e, f, g),
         "standing" if object.stands else "hanging", thing.basket,
     )  # fmt: skip
-    foresight = None
-    if bench.judged:
-        assert bench.known is not None
-        foresight = Foresight(bench.known, bench.package.grips(bench.config), bench.previewing)
     return Session(
         bench.package, bench.config, robot, (operator.left, operator.right), make_world(boxes, (told,)),
-        lambda now: robot.truth().grip, foresight,
+        lambda now: robot.truth().grip, bench.foresight,
     )  # fmt: skip
 
 
@@ -135,53 +130,63 @@ def grasp(bench: Bench, seed: int) -> Staged:
     return Staged("grasp", seed, session, script, judge, object.name)
 
 
-def held_after(frames: list[Seen]) -> Seen | None:
-    """The first frame after the first execution, None where there was none."""
-    pairs = zip(frames, frames[1:], strict=False)
-    return next((after for frame, after in pairs if frame.mode == "execute" != after.mode), None)
-
-
 def tell(result: Result, ending: Ending, session: Session, succeeded: bool) -> None:
     """What the preview had said, and how far off it was."""
     result.plans, result.probability = ending.plans, ending.probability
-    if np.isfinite(ending.probability):
-        result.agreed = float((ending.probability >= 0.5) == succeeded)
-        if session.foreseen is not None:
-            result.path_pct = 100 * tip_difference(session, session.foreseen) / session.package.geometry.length
+    result.agreed = agreed(ending.probability, succeeded)
+    if np.isfinite(ending.probability) and session.foreseen is not None:
+        nominal = session.foreseen.preview.nominal
+        apart = tip_difference(session.tips, session.foreseen.begins + nominal.time, nominal.tip[0])
+        result.path_pct = 100 * apart / session.package.geometry.length
 
 
-def tip_difference(session: Session, foreseen: Foreseen) -> float:
-    """Median distance between the robot's tip and the nominal preview's at the same time, m."""
-    nominal, times = foreseen.preview.nominal, foreseen.begins + foreseen.preview.nominal.time
-    took = np.array([time for time, _ in session.tips])
-    tips = np.array([tip for _, tip in session.tips])
-    during = (took >= times[0]) & (took <= times[-1])
-    shown = np.column_stack([np.interp(took[during], times, column) for column in nominal.tip[0].T])
-    return float(np.median(np.linalg.norm(tips[during] - shown, axis=1)))
+def agreed(probability: float, succeeded: bool) -> float:
+    """1 where a preview gave at least a half to what succeeded or less to what did not, else 0; NaN if it gave none."""
+    return float((probability >= 0.5) == succeeded) if np.isfinite(probability) else float("nan")
+
+
+def tip_difference(tips: list[tuple[float, np.ndarray]], times: np.ndarray, shown: np.ndarray) -> float:
+    """Median distance between the robot's tip and the preview's at the same time, m; NaN if there is no such time.
+
+    Args:
+        tips: s since the plan began, and the robot's tip (3,), m. times, shown: of the preview, (F,), s, and (F, 3), m.
+    """
+    during = [(time, tip) for time, tip in tips if times[0] <= time <= times[-1]]
+    if not during:
+        return float("nan")
+    took, there = (np.array(column) for column in zip(*during, strict=True))
+    foreseen = np.column_stack([np.interp(took, times, column) for column in shown.T])
+    return float(np.median(np.linalg.norm(there - foreseen, axis=1)))
 
 
 def failure(ending: Ending, frames: list[Seen], s: settings.Grasped) -> str:
-    """Why the grasp failed, "" if it did not."""
+    """Why the grasp failed, "" if it did not. The first of these that is so:
+
+    1. The operator gave up, or the robot did not do what was confirmed: why, else why no plan was to be had.
+    2. No plan was run to its end: stopped.
+    3. At that end the object hangs, or is not lifted by `lifted` m. The arm never touched it: aim; else: slip.
+    4. From then until the last frame it touches something but the arm, be it for one frame: slip.
+    5. In the last frame it is `slip` m or more from where it was in the arm: slip.
+    """
     if not ending.done:
         named = ending.why.startswith(("aim", "out of reach", "stopped", "slip"))
         return ending.why if named else f"plan refused: {ending.why}"
-    first, last = frames[0], frames[-1]
-    done = held_after(frames)
-    assert done is not None
-    lifted = done.thing[2] - first.thing[2]
-    if done.truth.hanging or lifted < s.lifted:
-        early = next((frame for frame in frames if np.linalg.norm(frame.truth.arm_thing) > 0), None)
-        if early is None:
+    done = executed(frames)
+    if done is None:
+        return "stopped: no plan was run to its end"
+    lifted = done.thing[2] - frames[0].thing[2]
+    if done.truth.hanging or not lifted >= s.lifted:
+        if not any(frame.truth.arm_thing.any() for frame in frames):
             return "aim: the arm never touched it"
         return f"slip: it was lifted by {1e3 * lifted:.0f} mm" + (", and hangs" if done.truth.hanging else "")
-    if last.truth.thing_world.any():
-        return "slip: it touches more than the arm as it is held"
-    moved = in_arm(done, last)
+    if any(frame.truth.thing_world.any() for frame in frames if frame.now >= done.now):
+        return "slip: it touched more than the arm as it was held"
+    moved = in_arm(done, frames[-1])
     return "" if moved < s.slip else f"slip: it moved by {1e3 * moved:.0f} mm in the arm as it was held"
 
 
 def in_arm(before: Seen, after: Seen) -> float:
-    """m by which the object has moved against the units that held it before."""
+    """m by which the object has moved against the units that held it before; infinite where none did."""
     holding = np.linalg.norm(before.truth.arm_thing, axis=1) > 0
     if not holding.any():
         return float("inf")

@@ -3,8 +3,8 @@
 import numpy as np
 
 from rehearsal import settings
-from rehearsal.experiments.bench import Bench, Seen, Staged
-from rehearsal.experiments.grasp import NAME, TABLE, beside, failure, held_after, offered, session_of, tell
+from rehearsal.experiments.bench import Bench, Seen, Staged, executed
+from rehearsal.experiments.grasp import NAME, TABLE, beside, failure, offered, session_of, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.robot.scene import Scene, Surface
@@ -44,8 +44,15 @@ def handle(bench: Bench, seed: int) -> Staged:
 
 
 def why_not(ending: Ending, frames: list[Seen], scene: Scene, s: settings.Grasped) -> str:
-    """Why the object does not rest on the table, "" if it does."""
-    grasped = held_after(frames)
+    """Why the object does not rest on the table, "" if it does. The first of these that is so:
+
+    1. The operator gave up, the robot did not do what was confirmed, or no plan was run to its end: as of a grasp.
+    2. In the last frame the table bears more than BORNE of the object's weight, which is slower than STILL, and the
+       arm touches it: stopped; does not: success, whatever came before.
+    3. No second plan was run: slip. While it was, the object was never above the table: slip.
+    4. Else: missed.
+    """
+    grasped = executed(frames)
     if grasped is None or not ending.done:
         return failure(ending, frames, s)
     last, table = frames[-1], scene.surfaces[TABLE]

@@ -1,40 +1,99 @@
-"""Reach a static object: a sphere hangs at a random place; success is that the soft arm's tip touches it."""
+"""Reach a static object: a sphere hangs at a random place; success is that the soft arm's tip touches it.
+
+The first contact of the arm with anything decides. Of plans that were run, what had been stated of the tip's end is
+held against where the robot's tip is then, and some seconds later.
+"""
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, Seen, Staged
-from rehearsal.experiments.result import Result
+from rehearsal.experiments.bench import Bench, Seen, Staged, executed
+from rehearsal.experiments.result import LATER, Result
 from rehearsal.operator.scripts import Ending
+from rehearsal.session import Session
+from trunkline.hybrid.preview import Stated
 
 
 def reach(bench: Bench, seed: int) -> Staged:
     rng = np.random.default_rng([seed, 0])
     thing, operator = bench.place(rng), bench.operator(rng)
-    session = bench.session(operator, thing, seed, lambda now: thing)
+    session = bench.session(operator, thing, seed, lambda now: thing, bench.foresight)
+    least, radius = bench.arm.chain.units - bench.settings.tip_units, bench.settings.diameter / 2
 
     def judge(result: Result, ending: Ending, frames: list[Seen], _) -> str:
         result.plans = ending.plans
         result.aimed_mm, result.previewed_mm = 1e3 * ending.aimed, 1e3 * ending.previewed
-        if not frames:
-            return ending.why if ending.why.startswith(("aim", "out of reach")) else f"plan refused: {ending.why}"
-        result.nearest_mm = 1e3 * min(float(np.linalg.norm(frame.truth.tip - thing)) for frame in frames)
-        return failure(bench, ending, frames)
+        if frames:
+            result.nearest_mm = 1e3 * min(float(np.linalg.norm(frame.truth.tip - thing)) for frame in frames)
+        return failure(ending, frames, least, radius)
 
-    return Staged("reach", seed, session, operator.reach(), judge)
+    def watch(result: Result, ending: Ending, frames: list[Seen]) -> None:
+        foreseen = session.foresee() if ending.done else None
+        if foreseen is not None:
+            tell_end(result, foreseen.preview.stated, tips_after(session, frames))
+
+    return Staged("reach", seed, session, operator.reach(), judge, watch=watch)
 
 
-def failure(bench: Bench, ending: Ending, frames: list[Seen]) -> str:
-    """Why the tip never touched the object, "" if it did."""
-    touching = [np.flatnonzero(np.linalg.norm(frame.truth.arm_thing, axis=1)) for frame in frames]
-    least = bench.arm.chain.units - bench.settings.tip_units
-    if any((units >= least).any() for units in touching):
-        return ""
-    if touched := [units for units in touching if len(units)]:
-        return f"collision: unit {touched[0][0] + 1} touched it first"
-    if any(np.linalg.norm(frame.truth.arm_world) > 0 for frame in frames):
-        return "collision: the arm touched the world"
+def failure(ending: Ending, frames: list[Seen], least: int, radius: float) -> str:
+    """Why the tip did not reach the object, "" if it did. The first of these that is so:
+
+    1. The robot never moved: why the operator gave up, else why no plan was to be had.
+    2. The arm touched something, and in the first frame in which it did, a force was no number: error.
+    3. In that frame it touched the world, whatever else it touched: collision.
+    4. In that frame a unit before the tip's touched the object, whatever others did: collision.
+    5. The robot did not do what was confirmed: why not.
+    6. In that frame the tip's units alone touched the object, and nothing else: success. What follows does not count.
+    7. It touched nothing. The tip target was further from the object's centre than its radius: aim.
+    8. Else: missed.
+
+    Args:
+        frames: from where the robot began to move. least: number from 0 of the first unit that counts as the tip.
+        radius: of the object, m.
+    """
+    why = ending.why or "stopped: the operator gave up"
+    if not frames:
+        return why if why.startswith(("aim", "out of reach", "stopped")) else f"plan refused: {why}"
+    first = next((frame for frame in frames if _touches(frame)), None)
+    if first is not None:
+        thing, world = first.truth.arm_thing, first.truth.arm_world
+        if not (np.isfinite(thing).all() and np.isfinite(world).all()):
+            return "error: the force of a contact is no number"
+        if world.any():
+            return "collision: the arm touched the world"
+        units = np.flatnonzero(thing.any(axis=1))
+        if units[0] < least:
+            return f"collision: unit {units[0] + 1} touched it first"
     if not ending.done:
-        return ending.why
-    if ending.aimed > bench.settings.diameter / 2:
+        return why
+    if first is not None:
+        return ""
+    if not ending.aimed <= radius:
         return "aim: the tip target was beside the object"
     return "missed: the preview's tip was on the object, the robot's was not"
+
+
+def _touches(frame: Seen) -> bool:
+    return bool(frame.truth.arm_thing.any() or frame.truth.arm_world.any())
+
+
+def tell_end(result: Result, stated: Stated, tips: dict[str, np.ndarray]) -> None:
+    """How far the robot's tip was from where the preview had it end, at the end and later; tips (3,), m, by LATER."""
+    result.radius_mm = 1e3 * float(stated.radii[-1])
+    for name, tip in tips.items():
+        setattr(result, f"{name}_mm", 1e3 * float(np.linalg.norm(tip - stated.tips[-1])))
+
+
+def tips_after(session: Session, frames: list[Seen]) -> dict[str, np.ndarray]:
+    """Where the tip appears, (3,), m, at the end of the first execution, and by LATER after it. What frames do not
+    reach, the robot holds for."""
+    done, tips, now = executed(frames), {}, session.now
+    if done is None:
+        return {}
+    for name, seconds in LATER.items():
+        frame = next((frame for frame in frames if frame.now >= done.now + seconds), None)
+        if frame is None:
+            session.robot.advance(max(done.now + seconds - now, 0.0))
+            now = max(now, done.now + seconds)
+        truth = session.robot.truth() if frame is None else frame.truth
+        tips[name] = session.seen(truth.tip)
+    return tips

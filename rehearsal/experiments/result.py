@@ -10,6 +10,8 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.hybrid.shares import wilson
 
+LATER = {"at_end": 0.0, "after_2s": 2.0, "after_10s": 10.0}  # s after an execution's end that its tip is looked at
+
 
 @dataclass
 class Result:
@@ -21,8 +23,10 @@ class Result:
     set delay before; worst_mm: its 95th percentile. robot_mm: median distance of the tip from where the operator's rays
     wanted it then: what is left when the operator's own lag and aim are taken out. probability: that the preview gave
     to the plan that was confirmed. agreed: 1 if it was at least a half for a success, or less for a failure, else 0.
-    path_pct: median distance between the robot's tip and the nominal preview's, % of the arm's length. seconds: of the
-    whole run. object: what was grasped, in words.
+    path_pct: median distance between the robot's tip and the nominal preview's, % of the arm's length. radius_mm:
+    within which the preview had stated that the tip ends; at_end_mm, after_2s_mm, after_10s_mm: of the robot's tip from
+    the middle of that, when the execution had ended and so long after it. seconds: of the whole run. object: what was
+    grasped, in words.
 
     variant: of an ablation, "" for none. package, code: digests of what the run was made of: `rehearsal.runs.Source`.
     """
@@ -41,6 +45,10 @@ class Result:
     probability: float = float("nan")
     agreed: float = float("nan")
     path_pct: float = float("nan")
+    radius_mm: float = float("nan")
+    at_end_mm: float = float("nan")
+    after_2s_mm: float = float("nan")
+    after_10s_mm: float = float("nan")
     seconds: float = 0.0
     object: str = ""
     variant: str = ""

@@ -50,6 +50,16 @@ def offset_of(reach: MapReach) -> np.ndarray:
     return np.median(np.array(inside), axis=0)
 
 
+def on_object(off: np.ndarray, radius: float) -> bool:
+    """Whether a preview's tip, `off` (3,), m, from the object's centre, is within the object: then it is confirmed."""
+    return bool(np.linalg.norm(off) < radius)
+
+
+def sure_enough(probability: float | None, accept: float) -> bool:
+    """Whether a preview that states so much is confirmed; one that states nothing is, as there is none to wait for."""
+    return probability is None or bool(probability >= accept)
+
+
 class Operator:
     """Two hands, what the object is like, and where the arm's tip is well within reach."""
 
@@ -95,7 +105,7 @@ class Operator:
                 continue
             off = self._look(previewed - view.thing)
             ending = Ending(True, "", plans, _away(targets.tip.position, view.thing), _away(previewed, view.thing))
-            if not self.judged or np.linalg.norm(off) < self.radius:
+            if not self.judged or on_object(off, self.radius):
                 view = yield from self._click(self.right, "trigger", view)
                 view = yield from self._until(lambda view: view.intent.mode == "execute")
                 view = yield from self._until(lambda view: view.intent.mode != "execute")
@@ -123,10 +133,10 @@ class Operator:
             view = yield from self._ask(view)
             if view.intent.mode != "ready":
                 ending.why = view.intent.notice or "aim: no plan was asked for"
-            elif view.probability is None or view.probability >= accept:
+            elif sure_enough(view.probability, accept):
                 ending.probability = np.nan if view.probability is None else view.probability
                 return (yield from self._confirm(view, ending, watch))
-            elif view.offer is not None and view.offer.probability >= accept:
+            elif view.offer is not None and sure_enough(view.offer.probability, accept):
                 ending.offers += 1
                 view = yield from self._take_offer(view)
                 continue
@@ -158,7 +168,7 @@ class Operator:
             if view.intent.mode != "ready":
                 ending.why = view.intent.notice or "aim: no plan was asked for"
                 return ending
-            if view.probability is None or view.probability >= accept:
+            if sure_enough(view.probability, accept):
                 ending.probability = np.nan if view.probability is None else view.probability
                 return (yield from self._confirm(view, ending, watch))
             view = yield from self._drop(view)

@@ -5,11 +5,13 @@ import pytest
 
 from tests.support.matched_plant import FRAME, curl, release, segments_of, small_model, tilt
 from tests.support.small_arm import small_spec
+from tests.support.swings import FRAMES, LIKE, STEP, TIME, TIP, experiment, swing
 from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.elements import arm_hinges, cables
 from trunkline.identification.evaluation import (
     Prediction,
+    errors_of,
     halved_step,
     period_error,
     replay,
@@ -111,6 +113,99 @@ def test_a_swing_is_compared_about_where_each_trial_rests():
     assert row["e_position_about_rest_mm"] == pytest.approx(off, rel=0.01)
     experiment.positions = experiment.positions + 0.01 * np.sin(8 * time)[:, None, None]
     assert "e_late_speed_pct" not in scores(found, [experiment])["identify"], "this arm never rests"
+
+
+def faster(begin: float, end: float, factor: float) -> np.ndarray:
+    """The swing, with a tip that moves `factor` times as fast from one time to another, s."""
+    steps = np.diff(swing(), axis=0)
+    steps[round(begin / STEP) : round(end / STEP), TIP] *= factor
+    return np.concatenate([swing()[:1], swing()[0] + np.cumsum(steps, axis=0)])
+
+
+@pytest.mark.parametrize(
+    ("begin", "end", "factor", "expected"),
+    [
+        (0.0, 1.0, 3.0, 0.0),  # only before
+        (1.0, 1.99, 1.5, 50.0),
+        (1.0, 1.99, 0.25, 75.0),
+        (2.0, 2.5, 5.0, 0.0),  # only after
+    ],
+)
+def test_the_late_speed_is_that_of_the_second_second(begin, end, factor, expected):
+    """Of a swing that does not do the same all along."""
+    row = errors_of(faster(begin, end, factor), experiment(swing()), LIKE, None, None)
+    assert row["e_late_speed_pct"] == pytest.approx(expected, abs=1e-9)
+
+
+def off_at(rows: slice, *segments: int) -> np.ndarray:
+    measured = np.ones((FRAMES, 3), bool)
+    measured[rows, segments] = False
+    return measured
+
+
+def ends_with(swing_mm: float) -> np.ndarray:
+    """A swing whose tip still moves by so much in its last half second."""
+    positions = np.where((TIME < 2.0)[:, None, None], swing(), swing()[-1])
+    positions[-1, TIP, 1] += swing_mm / 1e3
+    return positions
+
+
+REST = {"e_position_about_rest_mm", "e_tip_about_rest_mm"}
+LATE = {"e_late_speed_pct"}
+
+
+@pytest.mark.parametrize(
+    ("positions", "measured", "expected"),
+    [
+        (swing(), None, REST | LATE),
+        (ends_with(1.999), None, REST | LATE),
+        (ends_with(2.001), None, set()),
+        (ends_with(2.001), off_at(slice(-1, None), TIP), REST | LATE),  # nobody saw that it moved
+        (swing(), off_at(slice(-50, None), TIP), set()),  # where it rests is not known
+        (swing(), off_at(slice(-50, None), 0), set()),
+        (swing(), off_at(slice(-49, None), 0), REST | LATE),
+        (swing(), off_at(slice(100, 101), TIP), REST),
+        (swing(), off_at(slice(199, 200), TIP), REST),
+        (swing(), off_at(slice(99, 100), TIP), REST | LATE),
+        (swing(), off_at(slice(200, 201), TIP), REST | LATE),
+        (swing(), off_at(slice(100, 200), 0, 1), REST | LATE),  # it is the tip's
+        (swing()[:100] * [1, 1, 0] + swing()[-1] * [0, 0, 1], None, set()),  # over before it is late
+    ],
+)
+def test_a_swing_is_compared_about_its_rest_only_where_that_is_known(positions, measured, expected):
+    row = errors_of(positions, experiment(positions, measured), LIKE, None, None)
+    assert {name for name in row if "about_rest_mm" in name or "late" in name} == expected
+
+
+@pytest.mark.parametrize(
+    ("kind", "step", "frames", "expected"),
+    [
+        ("release", STEP, FRAMES, {"velocity", "period"}),
+        ("curl", STEP, FRAMES, {"velocity"}),  # pulled, it does not swing by itself
+        ("release", 0.0, FRAMES, set()),  # frames from here and there
+        ("static_path", 0.0, FRAMES, set()),
+        ("release", STEP, 1, set()),
+    ],
+)
+def test_only_what_follows_in_time_has_a_velocity_and_only_what_hangs_a_period(kind, step, frames, expected):
+    positions = swing()[:frames]
+    row = errors_of(positions, experiment(positions, kind=kind, frame_step=step), LIKE, None, None)
+    assert {word for word in ("velocity", "period") if any(word in name for name in row)} == expected
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_where_a_simulation_is_lost_it_is_the_arm_s_length_away(bad):
+    """Along every axis, in every error, from there on."""
+    real = np.zeros((FRAMES, 3, 3))
+    simulated = real.copy()
+    simulated[FRAMES // 2 :] = bad
+    row = errors_of(simulated, experiment(real), LIKE, "positions", WEIGHTS)
+    for name in ("e_internal", "e_position", "e_tip"):
+        assert row[f"{name}_mm"] == pytest.approx(0.5 * 1e3 * np.sqrt(3) * LIKE.length)
+        assert row[f"{name}_pct"] == pytest.approx(50 * np.sqrt(3))
+    assert row["loss"] > 0
+    assert np.isfinite(list(row.values())).all()
+    assert "e_late_speed_pct" not in row, "an arm that stands still has no speed to be off from"
 
 
 def test_an_arm_that_hangs_still_has_no_period():

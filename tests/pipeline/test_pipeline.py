@@ -21,6 +21,7 @@ from tests.support.bucket import bucket
 from tests.support.stub_pipeline import StubPipeline
 from trunkline.pipeline import lock, versions
 from trunkline.pipeline.config import SHARED, check_settings, group_options
+from trunkline.pipeline.origin import imported
 from trunkline.pipeline.versions import LIBRARIES
 
 ROOT = Path(__file__).parents[2]
@@ -31,13 +32,6 @@ EXAMPLES = sorted(
     for file in ROOT.glob("examples/*/dvc.yaml")
     for stage in yaml.safe_load(file.read_text())["stages"]
 )
-
-# What surrounds every stage (load, show, refuse, write) and never changes a number: no reason to run again.
-INERT = ("trunkline/arithmetic.py", "trunkline/errors.py", "trunkline/loading.py", "trunkline/progress.py")
-INERT += ("trunkline/settings.py", "trunkline/threads.py", "demo/__init__.py", "rehearsal/__init__.py")
-INERT += ("trunkline/cluster.py", "trunkline/likeness.py", "trunkline/scheduler.py")  # where it runs: the same bits
-INERT += ("trunkline/figures/", "trunkline/pipeline/", "rehearsal/report.py")
-ACTIVE = ("trunkline/pipeline/identify.py",)
 
 REHEARSE = "rehearsal/dvc.yaml:rehearse"  # takes hours: runs when it is asked for
 
@@ -82,7 +76,7 @@ def test_a_stage_lists_its_settings(stages, address):
     section = OmegaConf.to_container(OmegaConf.load(ROOT / folder / "params.yaml"))[name] or {}
     expected = {f"{folder}params.yaml": [name], **_settings("conf", name, section)}
     if section.get("rig") == "demo.rig":
-        expected |= _settings_of_the_rig()
+        expected |= _settings_of_the_rig() | (_settings_of_slow_pulls() if name == "report" else {})
     params.pop("versions.yaml")  # the next test's
     assert params == expected
 
@@ -114,6 +108,12 @@ def _settings_of_the_rig() -> dict[str, list]:
         "demo/conf/record/config.yaml": [key for key in keys if key in drawing and key not in params],
         **{f"demo/conf/record/{key}/{params[key]}.yaml": [] for key in groups},
     }
+
+
+def _settings_of_slow_pulls() -> dict[str, list]:
+    """Those by which the lab's arm is brought to a pose as slowly as in the session."""
+    files = {file: keys for file, keys in LAB_S_SETTINGS.items() if "/experiments/" in file}
+    return {"demo/params.yaml": [*_settings_of_the_rig()["demo/params.yaml"], "record.experiments"]} | files
 
 
 def test_the_lab_lists_its_settings(stages):
@@ -313,7 +313,7 @@ def test_the_chosen_plant_s_file_reruns_the_lab_and_its_rig_and_another_s_nothin
     pipeline.edit(f"demo/conf/record/plant/{chosen}.yaml", lambda text: f"{text}\nadded: 1\n")
     ran = pipeline.ran("dvc", "repro", "-q")
     assert ran[0] == "demo.record"
-    assert "stages.train_ik" in ran
+    assert {"stages.train_ik", "stages.report"} <= set(ran)
     pipeline.restore()
 
 
@@ -522,41 +522,9 @@ def _tree(file: str) -> ast.Module:
     return ast.parse((ROOT / file).read_text())
 
 
-def _inert(name: str) -> bool:
-    return name.startswith(INERT) and name not in ACTIVE
-
-
 def _code(stage) -> set[str]:
     """Files of this project that a stage's module imports, directly or not, and the rig that its settings name."""
     folder, name = _folder_and_name(stage.addressing)
     section = OmegaConf.load(ROOT / folder / "params.yaml")[name] or {}
     begins = [module for module in (stage.cmd.split()[-1], section.get("rig")) if module]
-    return set().union(*(_imported(f"{module.replace('.', '/')}.py") for module in begins))
-
-
-@cache
-def _imported(file: str) -> set[str]:
-    """Files of this project that `file` imports, directly or not, itself included."""
-    found, todo = set(), [file]
-    while todo:
-        name = todo.pop()
-        if name in found or _inert(name) or not (ROOT / name).is_file():
-            continue
-        tree = _tree(name)
-        if [type(node) for node in tree.body] == [ast.Expr]:  # a docstring alone, as in most __init__.py
-            continue
-        found.add(name)
-        if name == "trunkline/arm/kinds.py":  # it imports every file beside it
-            todo += [f"trunkline/arm/{file.name}" for file in (ROOT / "trunkline/arm").glob("*.py")]
-        for node in ast.walk(tree):
-            modules = []
-            if isinstance(node, ast.Import):
-                modules = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                modules = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-            for module in modules:
-                parts = module.split(".")
-                if parts[0] in ("trunkline", "demo", "rehearsal"):
-                    todo += ["/".join(parts) + ".py"]
-                    todo += ["/".join([*parts[:n], "__init__.py"]) for n in range(1, len(parts) + 1)]
-    return found
+    return imported(ROOT, [f"{module.replace('.', '/')}.py" for module in begins])

@@ -6,10 +6,34 @@ from pathlib import Path
 
 import pytest
 import yaml
+from pydantic import TypeAdapter
 
 from trunkline.identification.parameters import PARAMETERS
-from trunkline.pipeline.readme import generate, rehearsal_block, score_table, with_blocks
-from trunkline.pipeline.truth_table import LACKING, TRUTH, error_table, expectation, holds, identified, truth_table
+from trunkline.pipeline.baseline import Baseline, baseline_file, renewed
+from trunkline.pipeline.limits import limit_files, lookup, read_limits
+from trunkline.pipeline.readme import (
+    EXAMPLES,
+    RESULTS,
+    Shown,
+    generate,
+    rehearsal_block,
+    results_table,
+    score_table,
+    with_blocks,
+)
+from trunkline.pipeline.rehearsal_table import DISTANCES
+from trunkline.pipeline.stage import write_json
+from trunkline.pipeline.truth_table import (
+    KINDS,
+    LACKING,
+    TRUTH,
+    error_table,
+    expectation,
+    holds,
+    identified,
+    truth_table,
+)
+from trunkline.trials.splits import DECIDING, TEST, VALIDATE
 
 ROOT = Path(__file__).parents[2]
 
@@ -105,11 +129,103 @@ def test_scores_are_told_by_kind_and_together(tmp_path):
     assert rows == ["| goal", "| curls", "| motions", "| releases, curls and motions, `identify_control`"]
 
 
+LIMITS = """
+fit:
+  error.median: {max: 1.0}
+  error.p95: {better: lower, goal: 2.0}
+  unsaid: {equals: 0}
+  share: {min: 0.9}
+"""
+METRICS = {"error": {"median": 0.5, "p95": 2.5}, "unsaid": 0, "targets": 1200, "share": 0.95}
+
+
+@pytest.fixture
+def limited(tmp_path):
+    """A project's limits, whose baseline is of METRICS."""
+    file = tmp_path / "tests/limits.yaml"
+    path = tmp_path / "artifacts/fit/metrics.json"
+    for folder in (file.parent, path.parent):
+        folder.mkdir(parents=True)
+    file.write_text(LIMITS)
+    write_json(path, METRICS)
+    before = renewed(None, read_limits(file), tmp_path, "abc", "the first")
+    write_json(baseline_file(file), TypeAdapter(Baseline).dump_python(before))
+    return file
+
+
+@pytest.mark.parametrize(
+    ("figures", "row"),
+    [
+        ([Shown("share")], "0.95 | ≥ 0.9 | ≥ 0.935"),
+        ([Shown("error.median", "mm")], "0.5 mm | ≤ 1 | ≤ 0.65"),
+        ([Shown("error.p95", "mm")], "2.5 mm | ≤ 2 (missed) | ≤ 3.25"),
+        (
+            [Shown("error.median", "mm"), Shown("error.p95", "mm"), Shown("unsaid", of="targets")],
+            "0.5 / 2.5 mm / 0 of 1,200 | ≤ 1 / ≤ 2 (missed) / 0 | ≤ 0.65 / ≤ 3.25 / 0",
+        ),
+        ([Shown("error.median", "mm"), Shown("unsaid")], "0.5 mm / 0 | ≤ 1 / 0 | ≤ 0.65 / 0"),
+        ([Shown("targets"), Shown("share")], "1,200 / 0.95 | – / ≥ 0.9 | – / ≥ 0.935"),
+        ([Shown("targets")], "1,200 |  | "),
+        ([Shown("nothing", "mm"), Shown("nor.this", "mm")], "– / – mm |  | "),
+    ],
+)
+def test_a_row_has_found_goal_and_bound_of_each_of_its_figures(limited, figures, row):
+    (line,) = results_table(limited, {"fit": [("what", figures)]}).splitlines()[2:]
+    assert line == f"| what | {row} |"
+
+
+def test_a_stage_that_never_ran_has_dashes(limited):
+    (line,) = results_table(limited, {"map": [("what", [Shown("a", "mm"), Shown("b", of="c")])]}).splitlines()[2:]
+    assert line == "| what | – mm / – of – |  |  |"
+
+
+def test_commands_are_told_by_the_same_statistics_of_whatever_arm():
+    """The bad rows beside the good: median, 95th percentile, and what is missed with no doubt raised, of how many."""
+    rows = [figures for _, figures in RESULTS["train_ik"]]
+    arms = ["as_controls.frictionless", "as_controls.friction", "on_plant"]
+    for arm, figures in zip(arms, rows, strict=True):
+        names = [f"{arm}.position_error_mm.median", f"{arm}.position_error_mm.p95", f"{arm}.beyond_1pct_unsaid"]
+        assert [figure.key for figure in figures] == names
+        assert figures[-1].of.endswith("targets")
+    bands = {figure.key for _, figures in RESULTS["fk_dataset"] for figure in figures}
+    assert bands >= {"friction_band_mm.median", "friction_band_mm.p95"}
+
+
+def test_each_figure_of_the_readme_has_a_row_of_the_gate():
+    """Those of `test` by their twin of `validate`. A figure may have its row in another unit."""
+    rows = {file: read_limits(file) for file in limit_files(ROOT)}
+    own = rows[ROOT / "tests/limits.yaml"]
+    shown = [(stage, figure.key) for stage, lines in RESULTS.items() for _, figures in lines for figure in figures]
+    errors = ("e_internal", "e_position", "e_tip")
+    shown += [("identify_control", f"identified.{split}.{error}") for split in DECIDING for error in errors]
+    scored = json.loads((ROOT / "artifacts/score/metrics.json").read_text())
+    for kind, (_, stage) in KINDS.items():
+        if lookup(scored, f"{stage}.identified.{TEST}.by_experiment.{kind}") is not None:
+            shown += [(stage, f"identified.{VALIDATE}.by_experiment.{kind}.{error}") for error in errors]
+    for experiment, distance in DISTANCES.items():
+        shown.append(("rehearse", f"{experiment}.rate"))
+        shown += [("rehearse", f"{experiment}.{distance}.{at}") for at in ("median", "p95") if distance]
+    assert [key for stage, key in shown if not _has(own[stage], key)] == []
+    errors += ("e_position_about_rest", "e_tip_about_rest", "e_late_speed")
+    for name in EXAMPLES:
+        damping = rows[ROOT / "examples" / name / "limits.yaml"]["identify_damping"]
+        assert [error for error in errors if not _has(damping, f"identified.{VALIDATE}.{error}")] == []
+    for name, error in (("asl_motion", "e_position"), ("ftdcr", "e_tip_centred_rms")):
+        stiffness = rows[ROOT / "examples" / name / "limits.yaml"]["identify_stiffness"]
+        assert _has(stiffness, f"identified.{VALIDATE}.{error}")
+
+
+def _has(rows, key):
+    """Whether there is a row of a metric, in mm, % or neither; of a stage of one kind of experiment, over all of it."""
+    keys = [key, key.replace("by_experiment.release.", "")]
+    return any(f"{name}{unit}" in rows for name in keys for unit in ("", "_mm", "_pct"))
+
+
 def test_the_rehearsal_s_block_says_with_which_package_it_was_or_that_nothing_is_committed(tmp_path):
     assert rehearsal_block(tmp_path, variants=False) == "(no runs are committed yet)"
     told = {"runs": 200, "rate": 0.975, "low": 0.943, "high": 0.989, "causes": {"aim": 5}}
     told |= {"nearest_mm": {"median": 12.0, "p95": 21.0}, "variants": {"no preview": {**told, "runs": 40}}}
-    files = {"tests/limits.yaml": "rehearse:\n  reach.rate: {min: 0.98, interval: reach.high}\n"}
+    files = {"tests/limits.yaml": "rehearse:\n  reach.rate: {min: 0.98}\n"}
     files["artifacts/package_unity/manifest.json"] = "{}"
     package = hashlib.sha256(b"{}").hexdigest()[:12]
     files["artifacts/rehearse/metrics.json"] = json.dumps({"package": package, "reach": told})

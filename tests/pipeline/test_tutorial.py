@@ -79,7 +79,7 @@ def test_its_edit_of_the_settings_chooses_session_and_arm_and_no_rig(tmp_path):
     subprocess.run(shlex.split(edit), cwd=tmp_path, check=True)
     before, after = OmegaConf.load(ROOT / "params.yaml"), OmegaConf.load(tmp_path / "params.yaml")
     assert (after.ingest.session, after.build_mjcf.arm, after.train_ik.rig) == ("mine", "mine", None)
-    assert (after.report.session, after.report.arm) == ("mine", "mine")
+    assert (after.report.session, after.report.arm, after.report.rig) == ("mine", "mine", None)
     for name, value in (("session", "demo"), ("arm", "spiral")):
         section = "ingest" if name == "session" else "build_mjcf"
         after[section][name] = value

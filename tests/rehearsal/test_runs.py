@@ -11,7 +11,6 @@ import pytest
 from matplotlib.image import imread
 
 from rehearsal import runs
-from rehearsal.carry import carry
 from rehearsal.experiments.result import Result, read_results, summary
 from rehearsal.report import draw
 from rehearsal.runs import Run, Source, make, make_one, source_of, wanted
@@ -68,44 +67,6 @@ def test_rows_of_another_package_or_code_do_not_count(made, tmp_path, other):
     assert len(made) == 2
     assert (result.package, result.code) == (other.package, other.code)
     assert len(read_results(table)) == 2
-
-
-def test_runs_of_older_code_are_kept_where_a_sample_comes_to_the_same(made, tmp_path):
-    table, now = tmp_path / "runs.csv", replace(SOURCE, code="newer")
-    make(wanted({"touch": 5}, 2), Path("package.tgz"), SOURCE, table, workers=1)
-    make([Run("touch", 0)], Path("package.tgz"), now, table, workers=1)
-    assert carry(table, Path("package.tgz"), now, 1, workers=1) == (2, 6)
-    assert len(now.of(read_results(table))) == 7, "and the one that was made anew stays"
-    made.clear()
-    make(wanted({"touch": 5}, 2), Path("package.tgz"), now, table, workers=1)
-    assert not made
-
-
-def test_no_run_of_older_code_is_kept_where_one_comes_to_something_else(made, tmp_path, monkeypatch):
-    table, now = tmp_path / "runs.csv", replace(SOURCE, code="newer")
-    make(wanted({"touch": 3}, 0), Path("package.tgz"), SOURCE, table, workers=1)
-    before = table.read_bytes()
-    touch = runs.EXPERIMENTS["touch"]
-    changed = lambda bench, seed: (replace(touch(bench, seed)[0], nearest_mm=99.0), [])  # noqa: E731
-    monkeypatch.setattr(runs, "EXPERIMENTS", {"touch": changed})
-    with pytest.raises(InputError, match=r"runs\.csv: touch \d: found nearest_mm 99, expected \d"):
-        carry(table, Path("package.tgz"), now, 1, workers=1)
-    assert table.read_bytes() == before
-    with pytest.raises(InputError, match="found no runs by other code"):
-        carry(table, Path("package.tgz"), SOURCE, 1, workers=1)
-
-
-def test_runs_of_one_experiment_are_kept_beside_another_that_changed(made, tmp_path, monkeypatch):
-    table, now = tmp_path / "runs.csv", replace(SOURCE, code="newer")
-    changing = lambda bench, seed: (Result("push", seed, True, "", nearest_mm=len(made)), [])  # noqa: E731
-    monkeypatch.setattr(runs, "EXPERIMENTS", {**runs.EXPERIMENTS, "push": changing})
-    make(wanted({"touch": 3, "push": 3}, 0), Path("package.tgz"), SOURCE, table, workers=1)
-    assert carry(table, Path("package.tgz"), now, 3, workers=1, experiments=["touch"]) == (3, 3)
-    assert {one.experiment for one in now.of(read_results(table))} == {"touch"}
-    with pytest.raises(InputError, match="push"):
-        carry(table, Path("package.tgz"), now, 3, workers=1)
-    with pytest.raises(InputError, match="found no runs of touch by other code"):
-        carry(table, Path("package.tgz"), now, 3, workers=1, experiments=["touch"])
 
 
 def test_a_run_that_breaks_off_has_failed(made):

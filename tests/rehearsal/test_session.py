@@ -119,3 +119,43 @@ def test_an_operator_who_does_not_judge_confirms_the_first_plan():
     assert ending.plans == 1
     assert ending.previewed > 0.15
     assert any(view.intent.mode == "execute" for view in views)
+
+
+@pytest.fixture(scope="module")
+def ran() -> tuple[Session, list, list]:
+    """A reach whose client takes another frame for the base, with a foresight that counts what it is asked."""
+    found, operator = session([])
+    found.robot.instruments = SimpleNamespace(
+        turn=Rotation.from_rotvec([0.0, 0.05, 0.1]), shift=np.array([0.01, -0.02, 0.03])
+    )
+    found.robot.truth = lambda: SimpleNamespace(tip=np.array([0.5, 0.2, 0.4]))
+    asked, foreseen = [], SimpleNamespace(reach=lambda *given: asked.append(given) or "foreseen")
+    assert found.foresee() is None, "there is no foresight yet"
+    found.foresight = foreseen  # type: ignore[assignment]
+    assert found.foresee() is None, "there is no plan yet"
+    ending, _, views = rehearse(found, operator.reach())
+    assert ending.done
+    return found, views, asked
+
+
+def test_tip_and_object_are_seen_with_the_whole_error_of_the_alignment(ran):
+    """Also the path that is held against the preview's."""
+    found, views, _ = ran
+    turn, shift = found.robot.instruments.turn, found.robot.instruments.shift
+    tip = turn.apply([0.5, 0.2, 0.4]) + shift
+    np.testing.assert_allclose([view.tip for view in views], [tip] * len(views))
+    np.testing.assert_allclose([view.thing for view in views], [turn.apply(THING) + shift] * len(views))
+    assert len(found.tips) > 0
+    np.testing.assert_allclose([seen for _, seen in found.tips], [tip] * len(found.tips))
+
+
+def test_the_plan_that_was_run_is_foreseen_when_it_is_asked_for(ran):
+    """By the foresight of a page, in the client's world, with the plan's number as the seed."""
+    found, _, asked = ran
+    assert asked == [], "nothing that the operator does waits for it"
+    assert found.foresee() == "foreseen"
+    ((plan, world, seed),) = asked
+    assert plan is found.plan
+    assert world is found.world
+    assert seed == found.report.serial
+    np.testing.assert_allclose(found.robot.joints[0], plan.joints[-1], atol=1e-9)

@@ -7,9 +7,10 @@ import pytest
 from tests.support.bent_chain import hardening_stump, stump, stump_spec
 from trunkline.arm.holes import Holes, add_holes
 from trunkline.dataset.sampling import pull_directions
+from trunkline.elements import SLIP
 from trunkline.frames import gravity_in_base
 from trunkline.simulation.drive import drive
-from trunkline.statics.capstan import SLIP, eliminate, solve_eliminated
+from trunkline.statics.capstan import eliminate, solve_eliminated
 from trunkline.statics.chain import read_chain
 from trunkline.statics.energy import Pull, evaluate, find_hessian
 from trunkline.statics.equilibria import actuated, equilibrium, forward
@@ -22,7 +23,9 @@ FRICTION, GRAVITY = 0.3, gravity_in_base(0.6)
 
 @pytest.fixture(scope="module")
 def chain():
-    return read_chain(stump())._replace(capstan=FRICTION)
+    """Its slip length is the share of a unit's length that conf/build_mjcf/holes/rubbing.yaml names."""
+    rubbing = read_chain(stump())._replace(capstan=FRICTION)
+    return rubbing._replace(slip=0.01 * rubbing.length / rubbing.units)
 
 
 def pulls(chain, count, seed=0):
@@ -75,8 +78,8 @@ def test_torques_balance_in_mujoco(chain):
     hanging = equilibrium(chain, np.zeros((1, 3)), GRAVITY)
     loose, chords = _chords(model, data, hanging.qpos[0]), _chords(model, data, rest.qpos[0])
     slid = np.cumsum((loose - chords)[:, ::-1], axis=1)[:, ::-1]
-    assert np.abs(slid).max() > 5 * SLIP
-    turns = np.linalg.norm(rest.qpos[0].reshape(-1, 2), axis=1) * np.clip(slid / SLIP, -1, 1)  # (K, n)
+    assert np.abs(slid).max() > 5 * chain.slip
+    turns = np.linalg.norm(rest.qpos[0].reshape(-1, 2), axis=1) * np.clip(slid / chain.slip, -1, 1)  # (K, n)
     shares = np.exp(-FRICTION * (np.cumsum(turns, axis=1) - turns / 2))
     torques = np.zeros(model.nv)
     for joint in range(model.nv):
@@ -101,16 +104,16 @@ def _chords(model, data, q):
 
 
 @pytest.mark.parametrize("slope", [0.0, 500.0], ids=["tensions", "springs"])
-@pytest.mark.parametrize("reach", [0.3, 0.02], ids=["slid", "barely slid"])
-def test_derivatives_are_those_of_the_torques(slope, reach):
+@pytest.mark.parametrize(("reach", "slip"), [(0.3, 5e-4), (0.3, 2e-3), (0.02, 2e-4)])
+def test_derivatives_are_those_of_the_torques(slope, reach, slip):
     """Of a chain with everything, all tendons pulling; and the factors solve as a dense solver does."""
-    chain = read_chain(hardening_stump())
+    chain = read_chain(hardening_stump())._replace(slip=slip)
     q = np.random.default_rng(2).uniform(-reach, reach, 2 * chain.units)
     work, pull, step = new_work(chain.units, 3), _pull(chain, [4.0, 2.0, 7.0], FRICTION, slope), 1e-7
     state = work.state
     evaluate(chain, q, GRAVITY, pull, state)
     unsaturated = (state.rub.side[:, :, 1] > 0).mean()
-    assert unsaturated > 0, "some holes have slid by less than SLIP"
+    assert unsaturated > 0, "some holes have slid by less than the slip length"
     assert unsaturated < 1 or reach < 0.1, "and some by more"
     hessian, size = find_hessian(GRAVITY, pull, state), 2 * chain.units
     found = np.triu(hessian.left.T @ hessian.right) + np.tril(state.rub.left.T @ state.rub.right, -1)
@@ -197,5 +200,45 @@ def test_holes_over_which_nothing_has_slid_hold_nothing(chain):
     work, pull = new_work(chain.units, 3), _pull(chain, [10, 0, 0], FRICTION)
     evaluate(chain, np.full(2 * chain.units, 1e-3), np.zeros(3), pull, work.state)
     slid = np.abs(pull.loose - work.state.chord).sum(axis=0)[0]
-    assert 0 < slid < SLIP
-    assert (work.state.share[:, 0] > np.exp(-FRICTION * 2e-3 * chain.units * slid / SLIP)).all()
+    assert 0 < slid < chain.slip
+    assert (work.state.share[:, 0] > np.exp(-FRICTION * 2e-3 * chain.units * slid / chain.slip)).all()
+
+
+@pytest.mark.parametrize("slip", [1e-3, 2e-4])
+def test_friction_builds_up_within_the_slip_length(chain, slip):
+    """One that has slid by half of it, over a single hole, has half of the friction there."""
+    chain = chain._replace(slip=slip)
+    work, pull = new_work(chain.units, 3), _pull(chain, [10, 0, 0], FRICTION)
+    turned = np.zeros(2 * chain.units)
+    for turn in np.linspace(0, -0.5 if _shortens(chain) else 0.5, 2000):
+        turned[-1] = turn
+        evaluate(chain, turned, np.zeros(3), pull, work.state)
+        slid = (pull.loose - work.state.chord)[-1, 0]
+        if slid >= slip / 2:
+            break
+    assert slid == pytest.approx(slip / 2, rel=0.1)
+    half = np.exp(-FRICTION * abs(turn) * (slid / slip) / 2)  # of the bend at the joint itself, half counts
+    assert work.state.share[-1, 0] == pytest.approx(half, rel=1e-9)
+
+
+def test_a_model_says_its_slip_length_and_one_that_does_not_has_the_usual():
+    spec, without = stump_spec(), stump_spec()
+    add_holes(spec, Holes(FRICTION, 7, slip=7e-4))
+    assert read_chain(spec.compile()).slip == 7e-4
+    again = mujoco.MjSpec.from_string(spec.to_xml())
+    assert read_chain(again.compile()).slip == 7e-4
+    assert read_chain(without.compile()).slip == SLIP
+
+
+def test_the_band_hardly_depends_on_the_slip_length(chain):
+    """Nothing identifies it: with half and with twice of it, the ends of the band stay where they are."""
+    tensions = np.array([[9.0, 3.0, 0.0], [0.0, 6.0, 6.0], [4.0, 0.0, 0.0]])
+    gravity, nothing = np.tile(GRAVITY, (3, 1)), (np.zeros(3), np.zeros((chain.units, 2)))
+    usual, half, double = (
+        friction_band(chain._replace(slip=factor * chain.slip), tensions, gravity, *nothing, capstan=FRICTION)
+        for factor in (1, 0.5, 2)
+    )
+    for other in (half, double):
+        for end in ("loaded", "unloaded"):
+            moved = np.linalg.norm(getattr(other, end) - getattr(usual, end), axis=1)
+            assert (moved < 0.02 * usual.width).all()

@@ -11,6 +11,7 @@ from studies.effects import EFFECTS, NO_LAG, cad_model, settings_of, tried, vali
 from studies.rows import Rows
 from tests.support.matched_plant import curl, segments_of, small_model
 from trunkline.identification.experiment import prepare
+from trunkline.pipeline.origin import Origin
 
 
 def test_the_lag_of_the_motors_is_tried_after_their_dead_time():
@@ -56,7 +57,7 @@ def test_an_effect_is_kept_if_it_pays_and_is_not_tried_twice(monkeypatch, tmp_pa
 
     monkeypatch.setattr(effects, "left_out", left_out)
     monkeypatch.setattr(effects, "chain", lambda kept, stage, known: kept)
-    table = Rows("effects", "arm", "effect", tmp_path)
+    table = Rows("effects", "arm", "effect", tmp_path, Origin("aaaaaaa", "", {}))
     kept = tried(["hardening", "round", "place"], table, 3, {})
     assert kept == [EFFECTS["hardening"], EFFECTS["place"]]
     assert fits == [("identify_stiffness", number) for number in (0, 1, 2, 2)]

@@ -14,6 +14,7 @@ from trunkline.identification.experiment import prepare
 from trunkline.identification.identify import identify, values_of
 from trunkline.identification.problem import Bounds
 from trunkline.identification.suspicion import moving_start
+from trunkline.pipeline.origin import Origin
 
 CLEAN = Found(position=2.0, tip=5.0, plain_position=2.0, plain_tip=5.0, told={})
 
@@ -38,7 +39,7 @@ def told_of(monkeypatch, tmp_path):
     monkeypatch.setattr(spoilt, "require_demo", lambda path: None)
     monkeypatch.setattr(spoilt, "digest", lambda *told: "arm")
     monkeypatch.setattr(spoilt, "clean_trials", lambda stage: list(shown[stage]))
-    monkeypatch.setattr(spoilt, "Rows", lambda *told: Rows(*told, folder=tmp_path))
+    monkeypatch.setattr(spoilt, "Rows", lambda *told: Rows(*told, tmp_path, Origin("aaaaaaa", "", {})))
     spoils = tuple(replace(spoil, change=lambda trial, rng: replace(trial, level=99)) for spoil in SPOILS)
     monkeypatch.setattr(spoilt, "SPOILS", spoils)
     return asked

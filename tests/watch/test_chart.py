@@ -37,13 +37,14 @@ def test_a_rarer_false_alarm_takes_a_wider_limit_and_so_do_fewer_reference_trial
     assert limit_of(few, 0, 1 / 500) > limit_of(many, 0, 1 / 500)
 
 
-def test_one_odd_trial_raises_no_alarm_and_two_do():
+@pytest.mark.parametrize("size", [0.5, 500.0])
+def test_one_odd_trial_raises_no_alarm_however_odd_and_two_do(size):
     rng = np.random.default_rng(3)
     chart = chart_of(baseline(rng), 2)
     for _ in range(10):
         assert not chart.add(drawn("release", rng)).alarms
-    assert not chart.add(drawn("release", rng, (0.5, 0))).alarms
-    assert chart.add(drawn("release", rng, (0.5, 0))).alarms
+    assert not chart.add(drawn("release", rng, (size, 0))).alarms
+    assert chart.add(drawn("release", rng, (size, 0))).alarms
     assert chart.changed() == 11
     assert len(chart.suspects()) == 2
 

@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.elements import CAPSTAN_FRICTION, arm_hinges, hole_name, stretch_edges
+from trunkline.elements import CAPSTAN_FRICTION, SLIP, SLIP_LENGTH, arm_hinges, hole_name, stretch_edges
 from trunkline.errors import InputError
 
 RIGID_TIME, RIGID = 0.004, 0.999  # s and impedance of the friction: nearer to rigid than MuJoCo's own 0.02 and 0.95
@@ -26,10 +26,11 @@ RIGID_TIME, RIGID = 0.004, 0.999  # s and impedance of the friction: nearer to r
 @dataclass
 class Holes:
     """friction: μ, a guess. stretches: of the arm, in each of which friction is taken together; 0 for none, and at most
-    one a unit."""
+    one a unit. slip: m of sliding within which friction builds up, at rest (`trunkline/statics/capstan.py`)."""
 
     friction: Annotated[float, Field(ge=0, le=3)] = 0.0
     stretches: Annotated[int, Field(ge=0, le=30)] = 0
+    slip: Annotated[float, Field(gt=0, le=0.1)] = SLIP
 
 
 def add_holes(spec: mujoco.MjSpec, holes: Holes) -> None:
@@ -42,6 +43,7 @@ def add_holes(spec: mujoco.MjSpec, holes: Holes) -> None:
     if not holes.stretches or not cables:
         return
     spec.add_numeric(name=CAPSTAN_FRICTION, data=[holes.friction], size=1)
+    spec.add_numeric(name=SLIP_LENGTH, data=[holes.slip], size=1)
     straight = spec.compile()
     data = mujoco.MjData(straight)
     mujoco.mj_forward(straight, data)

@@ -159,7 +159,7 @@ def lacking_draws(
     """
     scales = lacking.draw(draws, rng)
     deviation = np.sqrt(scales**2 @ (ways**2).T / 2)  # of each of both directions
-    across = np.linalg.svd(arms[:, None, :])[2][:, 1:]  # (N, 2, 3)
+    across = np.linalg.svd(np.nan_to_num(arms)[:, None, :])[2][:, 1:]  # (N, 2, 3); a twin without rest has no arm
     normal = rng.standard_normal((draws, len(ways), 2))
     return deviation[..., None] * np.einsum("dnk,nkx->dnx", normal, across)
 

@@ -12,6 +12,7 @@ from pydantic import Field
 
 from trunkline.certificate.arms import arm_of
 from trunkline.certificate.budget import Budget, Inputs, budget, held_out
+from trunkline.certificate.coverage import Bring, covered
 from trunkline.certificate.facts import error_rows, parameter_facts, uncertainty_facts
 from trunkline.certificate.held_out import at_rest, tip_residuals
 from trunkline.certificate.identified import identified
@@ -44,6 +45,7 @@ class Asked:
     poses: Annotated[int, Field(ge=1, le=10_000)]
     arms: Annotated[int, Field(ge=2, le=10_000)]
     each: Annotated[int, Field(ge=1, le=1000)]
+    covered: Annotated[int, Field(ge=8, le=10_000)]
     frames: Annotated[int, Field(ge=2, le=10_000)]
     factor: Annotated[float, Field(ge=1, le=100)]
     uses: Annotated[list[Use], Field(min_length=1)]
@@ -62,14 +64,16 @@ class Certificate:
 
 
 def certify(
-    asked: Asked, model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict], metrics: dict[str, dict]
-) -> Certificate:
+    asked: Asked, model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict], metrics: dict[str, dict],
+    bring: Bring | None = None,
+) -> Certificate:  # fmt: skip
     """Of `model`, the last that the stages identified.
 
     Args:
         trials: that may decide.
         tables: parameters.json of the stages that identified, in their order. metrics: of these, and of the stages
             `score`, `ingest` and `filter`.
+        bring: the arm that the model is of, to see how often its tip is where the certificate says; None for none.
 
     Raises:
         InputError: the trials are of another arm, or of another session than the model was fitted to.
@@ -88,6 +92,11 @@ def certify(
                                               100 * inputs.lacking.rms, strict=True))  # fmt: skip
     if len(sessions := sessions_of(trials)) > 1:
         uncertainty["mounted_as_in"] = sessions[0]
+    uncertainty["measured"] = None
+    if bring:
+        drawn = draw_poses(arm_of(model).chain, conditions, asked.covered, rng)
+        stated = budget(inputs, drawn, asked.arms, asked.each, rng)
+        uncertainty["measured"] = covered(arm_of(model).chain, drawn, stated, bring, rng).metrics()
     rows = error_rows({stage: metrics[stage] for stage in tables}, metrics["score"])
     limits = limits_of(conditions, [trial.load for trial in trials])
     headline = headline_of(list(tables), metrics)
@@ -112,6 +121,8 @@ def certify(
     numbers = {"radius_mm": uncertainty["radius_mm"], "combined_mm": uncertainty["combined_mm"],
                "held_out_trials": uncertainty["held_out_trials"], "without_rest": uncertainty["without_rest"],
                "open": sum(len(stage["open"]) for stage in facts["parameters"].values())}  # fmt: skip
+    if uncertainty["measured"]:
+        numbers["coverage"] = uncertainty["measured"]
     replays = packed(prediction, model, trials[0].segments)
     return Certificate(facts, numbers, replays, held_out_shapes(prediction), found)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from trunkline.certificate.budget import LEAST, Budget
+from trunkline.certificate.budget import COVERAGE, LEAST, Budget
 from trunkline.certificate.poses import Conditions
 from trunkline.certificate.words import certainty_words, open_lines, strong_pairs, telling
 from trunkline.identification.error_tables import LABELS
@@ -81,7 +81,7 @@ def uncertainty_facts(found: Budget, conditions: Conditions, length: float, draw
     combined = _rms(found.combined[known]) * 1e3
     correlated = float(np.mean(found.correlated[known])) * 1e6
     return {
-        "coverage": 0.95,
+        "coverage": COVERAGE,
         "poses": len(found.radius),
         "without_rest": int((~known).sum()),
         "draws": draws,

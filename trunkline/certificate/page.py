@@ -174,6 +174,7 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
         f"the twin's in 95 of 100 cases in the median pose, within {radius['p95']:.3g} mm in 95 of 100 poses. That is "
         f"the expanded uncertainty, from {told['draws']} draws of all sources through the model (JCGM 100, 101, 102). "
         f"{lacking} It holds for what the session's trials at rest went up to: {pulled}.{mounted}</p>\n"
+        f"<p>{escape(_measured(told))}</p>\n"
         f"{_table(caption, head, rows)}{still}"
         f'<figure><img src="{_png(pictures["uncertainty"])}" alt="Tips at rest over the workspace from two sides, '
         f'coloured by their expanded uncertainty, {radius["median"]:.3g} mm in the median, at most '
@@ -181,6 +182,22 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
         "<figcaption>Expanded uncertainty of the tip over the workspace, the mount at the square.</figcaption>"
         "</figure>\n"
     )
+
+
+def _measured(told: dict) -> str:
+    """How often the arm's tip was within the radius, beside how often it is to be."""
+    stated, measured = f"{100 * told['coverage']:.0f} %", told["measured"]
+    if measured is None:
+        return f"Whether {stated} of tips are within it, the arm itself was not asked: not measured."
+    parts = {"poses that no trial has": measured} | (
+        {"poses with a pull": measured["pulled"]} if "pulled" in measured else {}
+    )
+    shares = [
+        f"in {100 * part['share']:.1f} % of {part['poses']} {words} (95 % interval {100 * part['low']:.0f} to "
+        f"{100 * part['high']:.0f} %)"
+        for words, part in parts.items()
+    ]
+    return f"Measured on the arm itself, beside the stated {stated}: its tip was within it {', '.join(shares)}."
 
 
 def _data(facts: dict) -> str:

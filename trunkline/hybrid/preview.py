@@ -14,11 +14,12 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.hybrid.doubts import Doubts, Draws, draw, nominal_draw
-from trunkline.hybrid.futures import Piece, Twin, Way, futures
+from trunkline.hybrid.futures import FRAME, Piece, Twin, Way, futures
 from trunkline.hybrid.shares import wilson
 
 Metres = Annotated[float, Field(gt=0, le=1)]
 WITHIN = 0.9  # share of futures whose tips are within the spread
+EVERY = 0.1  # s between the times at which a spread is stated
 
 
 class Outcome(Protocol):
@@ -58,6 +59,16 @@ class Holding:
 
 
 @dataclass(frozen=True)
+class Stated:
+    """What people are told of the tip: at `times` (n,), s, it is within `radii` (n,), m, of `tips` (n, 3), m, in WITHIN
+    of sound futures."""
+
+    times: np.ndarray
+    tips: np.ndarray
+    radii: np.ndarray
+
+
+@dataclass(frozen=True)
 class Preview:
     """What may come of a plan. Positions in the world, m.
 
@@ -89,6 +100,12 @@ class Preview:
         """Distance from the median within which the tips of WITHIN of sound futures are, m. Shape (F,)."""
         away = np.linalg.norm(self.motion.tip[self.motion.sound] - self.median, axis=2)
         return np.quantile(away, WITHIN, axis=0)
+
+    @property
+    def stated(self) -> Stated:
+        """Every EVERY s, as a page shows it; the last is of where the tip ends."""
+        every = max(round(EVERY / FRAME), 1)
+        return Stated(self.motion.time[::every], self.median[::every], self.spread[::every])
 
     @property
     def probability(self) -> float | None:

@@ -204,7 +204,7 @@ def errors_of(
 def about_rest(positions: np.ndarray, experiment: Experiment, tip: int, length: float) -> dict[str, float]:
     """What is left of the errors of a swing, simulated as `positions` (T, S, 3) m, once each segment is moved by where
     it rests at the end of this trial: how it swings, wherever it comes to rest. And by which share of itself the tip's
-    speed is off from `LATE`. Nothing of a trial that does not come to rest.
+    speed is off in `LATE`, if it has any there. Nothing of a trial that does not come to rest.
     """
     real, measured, step = experiment.positions, experiment.measured, experiment.frame_step
     last = slice(-max(round(LAST / step), 1), None)
@@ -219,7 +219,7 @@ def about_rest(positions: np.ndarray, experiment: Experiment, tip: int, length: 
     row |= {f"{name}_pct": 100 * error / length for name, error in found.items()}
     late = slice(*(round(at / step) for at in LATE))
     speeds = [np.linalg.norm(np.diff(way[late, tip], axis=0), axis=1) for way in (positions, real)]
-    if len(speeds[1]) and measured[late, tip].all():
+    if speeds[1].any() and measured[late, tip].all():
         row["e_late_speed_pct"] = 100 * abs(float(speeds[0].mean() / speeds[1].mean()) - 1)
     return row
 

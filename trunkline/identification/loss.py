@@ -99,9 +99,10 @@ def loss_of(residuals: np.ndarray) -> np.ndarray:
 def _residuals(simulated, real, scale, step_scale, measured, weights: LossWeights) -> np.ndarray:
     """Position and velocity terms of (C, T, S, K) against (T, S, K), K = 1 for distances, 3 for positions.
 
-    They are relative to `scale` (T, S) and to `step_scale`, (T - 1, S) or (S,).
+    They are relative to `scale` (T, S) and to `step_scale`, (T - 1, S) or (S,). What was not measured may be NaN: of a
+    path, nothing is filled in.
     """
-    offset = (simulated - real) / (scale + weights.epsilon)[..., None]
+    offset = np.where(measured[..., None], (simulated - real) / (scale + weights.epsilon)[..., None], 0.0)
     frames = measured.any(axis=-1).sum()
     shares = measured / np.maximum(measured.sum(axis=-1, keepdims=True), 1) / frames
     terms = [_whiten(offset, weights.delta_position, weights.weight_position * shares)]
@@ -109,6 +110,7 @@ def _residuals(simulated, real, scale, step_scale, measured, weights: LossWeight
         offset = np.diff(simulated, axis=1) - np.diff(real, axis=0)
         offset /= (step_scale + weights.epsilon_velocity)[..., None]
         pairs = measured[1:] & measured[:-1]
+        offset = np.where(pairs[..., None], offset, 0.0)
         shares = pairs / np.maximum(pairs.sum(axis=-1, keepdims=True), 1) / frames
         terms.append(_whiten(offset, weights.delta_velocity, weights.weight_velocity * shares))
     return np.concatenate([term.reshape(len(simulated), -1) for term in terms], axis=1)

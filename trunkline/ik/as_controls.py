@@ -129,13 +129,13 @@ class Reached:
         position: distance of the tip from its target at the end, m; NaN where MuJoCo found none. Shape (N,).
         doubtful: where the answer said so. Shape (N,).
         seconds: until the tip stayed near its end; NaN where it was not looked at or never did. Shape (N,).
-        rested: whether the arm was at rest at the end. Shape (N,).
+        rested: whether the arm was at rest at the end; None where nobody looked. Shape (N,).
     """
 
     position: np.ndarray
     doubtful: np.ndarray
     seconds: np.ndarray
-    rested: np.ndarray
+    rested: np.ndarray | None = None
 
     def metrics(self, length: float) -> dict:
         """Summary; a target without an end counts as missed by the arm's `length`, m."""
@@ -150,8 +150,12 @@ class Reached:
             "beyond_1pct": int(far.sum()),
             "beyond_1pct_unsaid": int((far & ~self.doubtful).sum()),
             "doubted": float(self.doubtful.mean()),
-            "rested": float(self.rested.mean()),
-        } | ({"seconds_to_rest": self.time_to_rest()} if np.isfinite(self.seconds).any() else {})
+        } | self._at_rest()
+
+    def _at_rest(self) -> dict:
+        """Of rest, what was looked at."""
+        share = {} if self.rested is None else {"rested": float(self.rested.mean())}
+        return share | ({"seconds_to_rest": self.time_to_rest()} if np.isfinite(self.seconds).any() else {})
 
     def time_to_rest(self) -> dict:
         """Median and 95th percentile, s; what never rested counts as longer than all others."""
@@ -246,4 +250,4 @@ def driven(
 def _reached(targets: np.ndarray, answer: dict[str, np.ndarray], tips: np.ndarray) -> Reached:
     position = np.linalg.norm(tips - position_of(targets), axis=1)
     nothing = np.full(len(targets), np.nan)
-    return Reached(position, answer["doubtful"], nothing, np.isfinite(position))
+    return Reached(position, answer["doubtful"], nothing)

@@ -23,7 +23,7 @@ from trunkline.foresight.package import Package, read_package
 from trunkline.foresight.settings import Previewing
 from trunkline.foresight.twin import at_rest, believed, compose_twin
 from trunkline.hybrid.futures import FRAME, Twin, Way
-from trunkline.hybrid.preview import WITHIN, Preview, nominal, preview
+from trunkline.hybrid.preview import WITHIN, nominal
 from trunkline.live import talk
 from trunkline.live.bodies import Poses
 from trunkline.panda.kinematics import mount_pose
@@ -38,7 +38,6 @@ from trunkline.threads import thread_count
 
 NICE = 10
 PULL = 0.03  # m of the first cable, for a plan that is thrown away
-EVERY = 0.1  # s between the times at which a spread is told
 
 
 @dataclass(frozen=True)
@@ -150,7 +149,7 @@ class Foreseer:
             return
         digest = plan.digest()
         yield Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan)
-        way, _ = self.foresight.way(plan, plan.phases[0][0]) if plan.phases else (_still(plan), 0.0)
+        way = self.foresight.whole(plan)
         held = _held(order)
         if held is not None and self._grasped is not None:
             twin = self.foresight.carrying(held, order.world, way, None, self._grasped)
@@ -205,19 +204,17 @@ class Foreseer:
         elif held is not None and self._grasped is not None:
             yield self.foresight.bring(plan, targets, held, order.world, None, self._grasped, serial, go_on)
         else:
-            tried = preview(twin, way, self.known.doubts, None, self.previewing.futures, serial, go_on=go_on)
-            yield Foreseen(tried, 0.0)
+            yield self.foresight.free(twin, way, serial, go_on)
 
 
 def told(digest: str, found: Foreseen) -> talk.Foreseen:
     """As clients hear it: times from the plan's beginning on."""
-    preview: Preview = found.preview
-    every = max(round(EVERY / FRAME), 1)
-    times, low_high = found.begins + preview.motion.time[::every], preview.interval or (None, None)
-    tips = tuple((float(x), float(y), float(z)) for x, y, z in preview.median[::every])
+    preview, stated = found.preview, found.preview.stated
+    low_high = preview.interval or (None, None)
+    tips = tuple((float(x), float(y), float(z)) for x, y, z in stated.tips)
     return talk.Foreseen(
-        digest, preview.probability, *low_high, tuple(map(float, times)), tips,
-        tuple(map(float, preview.spread[::every])), WITHIN, len(preview.draws), found.offer,
+        digest, preview.probability, *low_high, tuple(map(float, found.begins + stated.times)), tips,
+        tuple(map(float, stated.radii)), WITHIN, len(preview.draws), found.offer,
     )  # fmt: skip
 
 
@@ -233,10 +230,6 @@ def _held(order: Order) -> Thing | None:
     name = order.request.targets.thing
     thing = order.world.thing(name) if name else None
     return thing if thing is not None and thing.support == "held" else None
-
-
-def _still(plan: Plan) -> Way:
-    return Way(plan.step, plan.joints, plan.commands)
 
 
 class ForeseerProcess:

@@ -3,14 +3,19 @@
 `baseline.json` lies beside each `limits.yaml`. Nothing else changes it, so that many commits, each a little worse, end
 at the gate as one that is as much worse. It keeps why it was ever changed, of which commit, and what got worse by it.
 The command asks for a clean working tree: what it writes is a commit of its own.
+
+The changes are a chain: each has the digest of its values, and a hash of that, of its commit, of its words and of the
+hash before it. A value or a reason that was edited, and a change that was dropped, show without Git. With Git the last
+change's commit must be in the history and have these values: who joins commits to one makes the baseline again.
 """
 
+import hashlib
 import json
 import subprocess
 import sys
 from argparse import ArgumentParser
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter
 
@@ -19,11 +24,13 @@ from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.limits import (
     Limits,
     checked,
+    is_finite,
     limit_files,
     lookup,
     metrics_folder,
     read_limits,
     read_metrics,
+    refuse_test,
 )
 from trunkline.pipeline.stage import write_json
 from trunkline.settings import settings
@@ -32,7 +39,7 @@ Words = Annotated[str, Field(min_length=1)]
 
 
 @settings
-class Change:
+class Renewal:
     """Of which `commit` the metrics were taken, the `reason`, and what got `worse` by it, a line each."""
 
     commit: Words
@@ -41,11 +48,21 @@ class Change:
 
 
 @settings
-class Baseline:
-    """metrics: stage: dotted key: value, of the last of `changes`, which are in order."""
+class Chained(Renewal):
+    """A renewal in the chain. values: digest of its metrics. hash: of all this and of the hash before it."""
 
-    changes: Annotated[list[Change], Field(min_length=1)]
+    values: Words
+    hash: Words
+
+
+@settings
+class Baseline:
+    """metrics: stage: dotted key: value, of the last of `changes`, which are in order. unchained: those of before there
+    was a chain, as they were; the hash before the first of the chain is theirs."""
+
+    changes: Annotated[list[Chained], Field(min_length=1)]
     metrics: dict[str, dict[str, float]]
+    unchained: list[Renewal] = Field(default_factory=list)
 
 
 def baseline_file(limits: Path) -> Path:
@@ -59,17 +76,84 @@ def read_baseline(path: Path) -> Baseline:
     return checked(path, path.read_text(encoding="utf-8"), TypeAdapter(Baseline))
 
 
+def rounded(value: Any) -> Any:
+    """A number as `write_json` writes it; what is none is handed back."""
+    return float(f"{value:.9g}") if is_finite(value) else value
+
+
+def digest(content: object) -> str:
+    """Of what JSON can hold, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def linked(parent: str, commit: str, reason: str, worse: list[str], metrics: dict[str, dict[str, float]]) -> Chained:
+    """The change that follows the hash `parent`."""
+    values = digest(metrics)
+    words = {"commit": commit, "reason": reason, "worse": worse}
+    return Chained(**words, values=values, hash=digest([parent, values, words]))
+
+
+def root_hash(unchained: list[Renewal]) -> str:
+    """What the first change of the chain follows."""
+    return digest([{"commit": one.commit, "reason": one.reason, "worse": one.worse} for one in unchained])
+
+
+def breaks(baseline: Baseline) -> list[str]:
+    """One line per place at which the chain does not hold, so that something was edited or dropped; needs no Git."""
+    broken, parent = [], root_hash(baseline.unchained)
+    for number, change in enumerate(baseline.changes):
+        words = {"commit": change.commit, "reason": change.reason, "worse": change.worse}
+        if change.hash != digest([parent, change.values, words]):
+            broken.append(f"baseline: change {number}, of {change.commit}: was edited, or one before it was or is gone")
+        parent = change.hash
+    if baseline.changes[-1].values != digest(baseline.metrics):
+        broken.append(f"baseline: values are not those of its last change, of {baseline.changes[-1].commit}")
+    return broken
+
+
+def unchecked(folder: Path) -> str:
+    """Why Git cannot say whether a baseline's commit is there, "" where it can."""
+    shallow = _output(folder, "rev-parse", "--is-shallow-repository")
+    if shallow is None:
+        return "no Git here"
+    return "a shallow clone" if shallow.strip() == "true" else ""
+
+
 def disagreements(baseline: Baseline, folder: Path) -> list[str]:
-    """One line per value that is not that of its commit's metrics: it was edited. Empty where that commit is not at
-    hand, as in a shallow clone or without Git."""
-    commit, found = baseline.changes[-1].commit, []
+    """One line per value that is not that of its commit's metrics, or one that says that this commit is not in the
+    history. Empty where Git cannot say (`unchecked`)."""
+    commit, wrong = baseline.changes[-1].commit, []
+    if unchecked(folder):
+        return []
+    if _output(folder, "merge-base", "--is-ancestor", commit, "HEAD") is None:
+        return [f'baseline: commit {commit} is not in the history, expected it (`make baseline REASON="..."`)']
     for stage, values in baseline.metrics.items():
         text = _output(folder, "show", f"{commit}:./artifacts/{stage}/metrics.json")
         metrics = None if text is None else json.loads(text)
         for key, value in values.items():
-            if metrics is not None and lookup(metrics, key) != value:
-                found.append(f"{stage}: {key}: baseline {value:g}, expected that of {commit}: {lookup(metrics, key)!r}")
-    return found
+            if rounded(lookup(metrics, key)) != value:
+                wrong.append(f"{stage}: {key}: baseline {value:g}, expected that of {commit}: {lookup(metrics, key)!r}")
+    return wrong
+
+
+def company(path: Path) -> list[str]:
+    """One line if the commit that last changed the baseline at `path` changed more than baselines, limits, goals and
+    docs. Merges are not looked at; empty where Git cannot say, and where the baseline is not committed."""
+    if unchecked(path.parent):
+        return []
+    last = (_output(path.parent, "log", "-1", "--no-merges", "--format=%h", "--", path.name) or "").strip()
+    files = _output(path.parent, "show", "--name-only", "--format=", last) if last else None
+    others = [name for name in (files or "").splitlines() if not _beside(Path(name))]
+    if not others:
+        return []
+    more = f" and {len(others) - 1} more" if others[1:] else ""
+    return [f"baseline: commit {last} changed {others[0]}{more} too, expected a commit of its own"]
+
+
+def _beside(name: Path) -> bool:
+    """Whether a file may be in the commit of a baseline: `make readme` belongs to it, and rows are where it begins."""
+    rows = ("baseline.json", "limits.yaml", "release.yaml", "release.json")
+    return name.name in rows or name.suffix in (".md", ".png")
 
 
 def unrun(limits: Limits, baseline: Baseline, folder: Path) -> list[str]:
@@ -85,7 +169,7 @@ def renewed(before: Baseline | None, limits: Limits, folder: Path, commit: str, 
     """The baseline after `before`, of the metrics in `folder`.
 
     Raises:
-        InputError: metrics are missing or miss their goals.
+        InputError: metrics are missing, miss their goals, or are of the split `test`.
     """
     values: dict[str, dict[str, float]] = {}
     worse = []
@@ -95,17 +179,20 @@ def renewed(before: Baseline | None, limits: Limits, folder: Path, commit: str, 
             continue
         metrics = read_metrics(folder, stage)
         for key, limit in rows.items():
+            refuse_test(stage, key)
             if problems := limit.problems(metrics, key, None):
                 raise InputError(f"{stage}: {key}: {problems[0]}")
             if limit.equals is not None:
                 continue  # it is its own baseline
-            value = lookup(metrics, key)
+            value = rounded(lookup(metrics, key))
             values.setdefault(stage, {})[key] = value
             old = None if before is None else before.metrics.get(stage, {}).get(key)
             if old is not None and (value > old if limit.rises else value < old):
                 worse.append(f"{stage}: {key}: {old:g}, now {value:g}")
     changes = [] if before is None else before.changes
-    return Baseline(changes=[*changes, Change(commit=commit, reason=reason, worse=worse)], metrics=values)
+    parent = changes[-1].hash if changes else root_hash([])
+    change = linked(parent, commit, reason, worse, values)
+    return Baseline(changes=[*changes, change], metrics=values, unchained=before.unchained if before else [])
 
 
 def _output(folder: Path, *arguments: str) -> str | None:
@@ -115,6 +202,18 @@ def _output(folder: Path, *arguments: str) -> str | None:
     except FileNotFoundError:
         return None
     return None if done.returncode else done.stdout
+
+
+def _wanted(before: Baseline, after: Baseline, limits: Path) -> bool:
+    """Whether `after` says anything new: other values, or the same ones of a commit that is in the history.
+
+    Raises:
+        InputError: the chain is broken, which no renewal may hide.
+    """
+    path = baseline_file(limits)
+    if broken := breaks(before):
+        raise InputError(f"{path}: {broken[0]}")
+    return before.metrics != after.metrics or bool(disagreements(before, metrics_folder(limits)) or company(path))
 
 
 @in_one_line
@@ -132,13 +231,16 @@ def main(root: Path = Path("."), words: list[str] | None = None) -> int:
     if changed:
         first = changed.splitlines()[0].split()[-1]
         raise InputError(f"{first}: found changes that are not committed, expected none: a baseline has its own commit")
+    written = {}
     for file in limit_files(root):
         path = baseline_file(file)
         before = read_baseline(path) if path.is_file() else None
         after = renewed(before, read_limits(file), metrics_folder(file), commit.strip(), reason)
-        if before is not None and before.metrics == after.metrics:
+        if before is not None and not _wanted(before, after, file):
             print(f"baseline: {path.relative_to(root)}: nothing changed")
             continue
+        written[path] = after
+    for path, after in written.items():  # all or none
         write_json(path, TypeAdapter(Baseline).dump_python(after))
         print(f"baseline: wrote {path.relative_to(root)}")
         for line in after.changes[-1].worse:

@@ -2,15 +2,27 @@
 
 A row is held to its goal, where it has one, and to a bound near its value in `baseline.json`, which only
 `make baseline` changes. The gate needs no history, and fails closed: what is missing, null, not a number or not finite
-fails, and so does a row without a baseline. Metrics that no row names are let alone. A stage that has no row in the
-baseline and no metrics has never run, as the rehearsal before its first: that is told, and no failure.
+fails, and so does a row without a baseline, and a baseline that was edited. With Git it also asks that the baseline's
+commit is in the history, and changed nothing else; where Git cannot say, that is told. No row is of the split `test`:
+`python -m trunkline.pipeline.release` holds that against goals, and decides nothing. Metrics that no row names are let
+alone. A stage that has no row in the baseline and no metrics has never run, as the rehearsal before its first: that is
+told, and no failure.
 """
 
 import sys
 from pathlib import Path
 
 from trunkline.errors import InputError
-from trunkline.pipeline.baseline import Baseline, baseline_file, disagreements, read_baseline, unrun
+from trunkline.pipeline.baseline import (
+    Baseline,
+    baseline_file,
+    breaks,
+    company,
+    disagreements,
+    read_baseline,
+    unchecked,
+    unrun,
+)
 from trunkline.pipeline.limits import Limits, limit_files, metrics_folder, read_limits, read_metrics
 
 
@@ -35,6 +47,8 @@ def failures(limits: Limits, baseline: Baseline, folder: Path) -> list[str]:
 
 def main(root: Path = Path(".")) -> int:
     count, stages, found = 0, 0, 0
+    if why := unchecked(root):
+        print(f"gate: {why}: not checked whether the commits of baselines are in the history and have their values")
     for file in limit_files(root):
         try:
             limits, baseline = read_limits(file), read_baseline(baseline_file(file))
@@ -46,7 +60,8 @@ def main(root: Path = Path(".")) -> int:
         never = unrun(limits, baseline, folder)
         for stage in never:
             print(f"gate: {example}{stage}: never ran, its {len(limits[stage])} rows hold nothing yet")
-        problems = [*failures(limits, baseline, folder), *disagreements(baseline, folder)]
+        problems = [*failures(limits, baseline, folder), *breaks(baseline), *disagreements(baseline, folder)]
+        problems += company(baseline_file(file))
         for problem in problems:
             print(f"gate: FAIL {example}{problem}")
         held = [rows for stage, rows in limits.items() if stage not in never]

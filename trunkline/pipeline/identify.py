@@ -145,9 +145,7 @@ def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
     return values
 
 
-def doubts(
-    result: Identification, bounds: dict[str, Bounds], looks: dict[str, list[str]] | None = None
-) -> list[str]:
+def doubts(result: Identification, bounds: dict[str, Bounds], looks: dict[str, list[str]] | None = None) -> list[str]:
     """What a user should know before trusting the result, a line each.
 
     Args:
@@ -237,5 +235,3 @@ def read_reported(config: IdentificationSettings) -> list[Trial]:
                 f"{trials[0].name}"
             )
     return trials
-
-

@@ -35,13 +35,14 @@ def read_model(path: str | Path) -> mujoco.MjModel:
     return model
 
 
-def load_rig(key: str, module: str) -> Callable:
-    """`reach` of a module that drives the arm itself, see `ik.as_controls.Rig`. Each lab has its own.
+def load_rig(key: str, module: str, function: str = "reach") -> Callable:
+    """A function of a module that drives the arm itself, see `ik.as_controls.Rig` and `certificate.coverage.Bring`.
+    Each lab has its own.
 
     Raises:
-        InputError: naming the settings' `key`, if there is no such module or it has no `reach`.
+        InputError: naming the settings' `key`, if there is no such module or it has no such function.
     """
     try:
-        return import_module(module).reach
+        return getattr(import_module(module), function)
     except (ModuleNotFoundError, AttributeError) as error:
-        raise InputError(f"{key}: found {module!r}: {error}; expected a module with a function `reach`") from error
+        raise InputError(f"{key}: found {module!r}: {error}; expected a module with a function `{function}`") from error

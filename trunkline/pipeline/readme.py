@@ -8,7 +8,9 @@ import json
 import re
 import shutil
 import sys
-from itertools import pairwise
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, zip_longest
 from pathlib import Path
 
 import networkx
@@ -53,30 +55,58 @@ MODELS = {
     "noise_floor": "noise floor",
 }
 
-# stage: [(what it is, dotted key in metrics.json, unit)]
+
+@dataclass(frozen=True)
+class Shown:
+    """A figure of a row: dotted key in metrics.json, unit, and of a count the key of how many it is of."""
+
+    key: str
+    unit: str = ""
+    of: str = ""
+
+
+def as_sent(at: str, targets: str) -> tuple[Shown, ...]:
+    """Of commands that were sent to an arm: the same statistics of whatever arm, the bad ones beside the good."""
+    error, unsaid = f"{at}.position_error_mm", f"{at}.beyond_1pct_unsaid"
+    return Shown(f"{error}.median", "mm"), Shown(f"{error}.p95", "mm"), Shown(unsaid, of=targets)
+
+
+# stage: [(what it is, its figures)]
 RESULTS = {
     "fk_dataset": [
-        ("FK against MuJoCo settled to rest, without friction: median", "mujoco_deviation_mm.median", "mm"),
+        (
+            "FK against MuJoCo settled to rest, without friction: median",
+            (Shown("mujoco_deviation_mm.median", "mm"),),
+        ),
+        (
+            "Friction's band, between where the tip stops once pulled and once let go: median / 95th percentile",
+            (Shown("friction_band_mm.median", "mm"), Shown("friction_band_mm.p95", "mm")),
+        ),
     ],
     "train_ik": [
         (
-            "The network's commands sent to MuJoCo, without friction, tip error at rest: median",
-            "as_controls.frictionless.position_error_mm.median",
-            "mm",
+            "The network's commands sent to the twin, without friction, tip error at rest: median / 95th percentile / "
+            "beyond 1 % of length and no doubt raised",
+            as_sent("as_controls.frictionless", "as_controls.targets"),
         ),
-        ("… 95th percentile", "as_controls.frictionless.position_error_mm.p95", "mm"),
-        ("… with friction, all sent at once: median", "as_controls.friction.position_error_mm.median", "mm"),
-        ("… sent to the lab's own arm: median", "on_plant.position_error_mm.median", "mm"),
+        (
+            "… to the twin as it is, with friction, all at once",
+            as_sent("as_controls.friction", "as_controls.friction.targets"),
+        ),
+        ("… to the lab's own arm", as_sent("on_plant", "on_plant.targets")),
     ],
     "reachability": [
-        ("Rigid map: share of points on which inverse kinematics of the same Panda agrees", "rigid.accuracy", ""),
-        ("Soft maps: smallest overlap under gravities between theirs", "soft.heldout_iou_min", ""),
-    ],
-    "package_unity": [
         (
-            "Packed model against the calibrated one, without what the importer drops: largest deviation",
-            "roundtrip_max_deviation_mm",
-            "mm",
+            "Rigid map: share of points on which inverse kinematics of the same Panda agrees",
+            (Shown("rigid.accuracy"),),
+        ),
+        ("Soft maps: smallest overlap under gravities between theirs", (Shown("soft.heldout_iou_min"),)),
+    ],
+    "identify_control": [
+        (
+            "Identified model with cables that do not rub, as the package's file has them, on `validate`: position / "
+            "tip error",
+            (Shown("smooth.validate.e_position_mm", "mm"), Shown("smooth.validate.e_tip_mm", "mm")),
         ),
     ],
 }
@@ -109,18 +139,35 @@ def pipeline_graph(root: Path) -> str:
     return "\n".join(lines)
 
 
-def results_table(file: Path, results: dict[str, list[tuple[str, str, str]]]) -> str:
+def results_table(file: Path, results: Mapping[str, Sequence[tuple[str, Sequence[Shown]]]]) -> str:
     """The metrics in the working tree that `file` limits as a Markdown table, beside goals and the gate's bounds."""
     limits, baseline = read_limits(file), read_baseline(baseline_file(file))
     lines = ["| measure | found | goal | `make gate` |", "|---|---:|---:|---:|"]
     for stage, rows in results.items():
-        path = metrics_folder(file) / "artifacts" / stage / "metrics.json"
-        metrics = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
-        for what, key, unit in rows:
-            found = f"{_number(lookup(metrics, key))} {unit}".strip()
-            limit, before = limits.get(stage, {}).get(key), baseline.metrics.get(stage, {}).get(key)
-            lines.append(f"| {what} | {found} | {_goal(limit)} | {_bound(limit, before)} |")
+        metrics = _metrics(metrics_folder(file), stage)
+        for what, figures in rows:
+            keys = [figure.key for figure in figures]
+            asked = [limits.get(stage, {}).get(key) for key in keys]
+            before = [baseline.metrics.get(stage, {}).get(key) for key in keys]
+            goals = [_goal(limit, lookup(metrics, key)) for limit, key in zip(asked, keys, strict=True)]
+            bounds = [_bound(limit, value) for limit, value in zip(asked, before, strict=True)]
+            lines.append(f"| {what} | {_figures(metrics, figures)} | {_joined(goals)} | {_joined(bounds)} |")
     return "\n".join(lines)
+
+
+def _figures(metrics: dict | None, figures: Sequence[Shown]) -> str:
+    """Figures of a row, a unit that several have in a row behind the last of them."""
+    words = []
+    for figure, following in zip_longest(figures, figures[1:]):
+        of = f" of {_number(lookup(metrics, figure.of))}" if figure.of else ""
+        unit = "" if following is not None and following.unit == figure.unit else figure.unit
+        words.append(f"{_number(lookup(metrics, figure.key))}{of} {unit}".strip())
+    return " / ".join(words)
+
+
+def _joined(words: Sequence[str]) -> str:
+    """Words of a row's figures, a dash for one that has none where another has; empty where none has."""
+    return " / ".join(word or "–" for word in words) if any(words) else ""
 
 
 def identification_table(root: Path) -> str:
@@ -322,12 +369,14 @@ def _pair(metrics: dict | None, at: str, share: bool = False) -> str:
     return f"{pairs[0]} ({pairs[1]} %)" if share else pairs[0]
 
 
-def _goal(limit: Limit | None) -> str:
+def _goal(limit: Limit | None, value: float | None) -> str:
+    """The goal of a metric whose `value` is found, with a word where that misses it."""
     if limit is None:
         return ""
     words = [f"{limit.equals}"] if limit.equals is not None else []
-    words += [f"≤ {_number(limit.max)}"] if limit.max is not None else []
-    words += [f"≥ {_number(limit.min)}"] if limit.min is not None else []
+    if limit.asked is not None:
+        missed = " (missed)" if value is not None and limit.misses(value, limit.asked) else ""
+        words.append(f"{'≤' if limit.rises else '≥'} {_number(limit.asked)}{missed}")
     words += [f"{limit.below.factor:g}× below {limit.below.key.partition('.')[0].upper()}"] if limit.below else []
     return ", ".join(words)
 

@@ -1,9 +1,11 @@
 """The rehearsal's metrics as a Markdown table: what `make rehearse` prints, and what the docs show."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from trunkline.pipeline.limits import Limit, lookup
+from trunkline.pipeline.provenance import stale
 
 # in the paper's order, and the column of the tip's distance from the object by which an experiment is told
 DISTANCES = {"reach": "nearest_mm", "follow": "tip_mm", "grasp": "", "handle": ""}
@@ -15,7 +17,7 @@ def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], pack
     Args:
         metrics: as `rehearsal.experiments.result.summary` makes them.
         goals: the gate's rows of the rehearsal.
-        package: with which package the runs were made, in words.
+        package: of what the runs are, in words: `source_words`.
     """
     lines = [
         f"| experiment, {package} | runs | success | 95 % interval | goal "
@@ -32,6 +34,13 @@ def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], pack
             lines += [_row(name, f"… {kind}", row, "") for kind, row in told.get("objects", {}).items()]
             lines += [_row(name, f"… {variant}", row, "") for variant, row in told.get("variants", {}).items()]
     return "\n".join(lines)
+
+
+def source_words(root: Path, metrics: Mapping[str, Any]) -> str:
+    """For the table's head: of which code and package the committed runs are, or that they are stale, and why."""
+    for line in stale(root):
+        return f"**STALE**: {line.removeprefix('README: rehearsal: ')}"
+    return f"with this code, `{metrics['code']}`, and this package, `{metrics['package']}`"
 
 
 def _row(experiment: str, words: str, told: Mapping[str, Any], goal: str) -> str:

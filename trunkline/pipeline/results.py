@@ -1,9 +1,10 @@
-"""What studies and benchmarks print, kept beside its command and commit: docs/results/<name>.json.
+"""What studies and benchmarks print, kept beside its command and its origin: docs/results/<name>.json.
 
 `make readme` writes it into the page that has a block `<!-- results/<name> -->`; no figure of a study is typed by hand.
 """
 
 import contextlib
+import csv
 import io
 import json
 import re
@@ -11,12 +12,14 @@ import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
 from typing import TextIO
 
 from trunkline.errors import InputError
 from trunkline.pipeline.checkout import require_checkout
+from trunkline.pipeline.origin import Origin, code_of, git, origin_of, reads_of
 from trunkline.pipeline.stage import write_json
 
 FOLDER = Path("docs/results")
@@ -40,38 +43,42 @@ class Both(io.TextIOBase):
 
 
 @contextlib.contextmanager
-def recorded(name: str, keep: bool = True, root: Path = Path(".")) -> Iterator[None]:
+def recorded(name: str, keep: bool = True, root: Path = Path("."), origin: Origin | None = None) -> Iterator[None]:
     """What is printed to stdout meanwhile also goes to docs/results/<name>.json, if it ends well.
 
     Args:
         keep: False for a run whose numbers say nothing, or only part of what the file holds.
+        origin: that of rows which are summed up; without one that of the tree.
 
     Raises:
-        InputError: `root` is not the top of a checkout.
+        InputError: `root` is not the top of a checkout, or has changes that are not committed; before any work.
     """
     if not keep:
         yield
         return
     require_checkout(root)
-    commit, both = commit_of(root), Both(sys.stdout)  # first, as somebody may edit meanwhile
+    command, both = command_line(), Both(sys.stdout)
+    origin = origin or origin_of(root, name, modules_of(command))  # first, as somebody may edit meanwhile
     with contextlib.redirect_stdout(both):
         yield
     (root / FOLDER).mkdir(parents=True, exist_ok=True)
-    command = shlex.join(["python", *sys.orig_argv[1:]])
-    write_json(root / FOLDER / f"{name}.json", {"command": command, "commit": commit, "lines": both.lines()})
+    write_json(root / FOLDER / f"{name}.json", {"command": command, **asdict(origin), "lines": both.lines()})
 
 
-def commit_of(root: Path) -> str:
-    """The commit in `root`, with a mark if what is not committed may change a result; "unknown" without Git."""
-    try:
-        asked = [["rev-parse", "--short=7", "HEAD"], ["status", "--porcelain", "--", ".", ":(exclude)docs"]]
-        commit, changed = (
-            subprocess.run(["git", *words], cwd=root, capture_output=True, text=True, check=True).stdout.strip()
-            for words in asked
-        )
-    except (FileNotFoundError, subprocess.CalledProcessError):
-        return "unknown"
-    return f"{commit} with changes" if changed else commit
+def command_line() -> str:
+    """That of this process."""
+    return shlex.join(["python", *sys.orig_argv[1:]])
+
+
+def modules_of(command: str) -> list[str]:
+    """Those that a command runs.
+
+    Raises:
+        InputError: there is none; what made a result is then unknown.
+    """
+    if not (found := re.findall(r"(?<=-m )[\w.]+", command)):
+        raise InputError(f"{command}: found no module, expected `python -m studies.…` or `python -m benchmarks.…`")
+    return found
 
 
 def block(path: Path) -> str:
@@ -83,12 +90,47 @@ def block(path: Path) -> str:
     if not path.is_file():
         return "(no run is kept yet)"
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        command, commit, lines = found["command"], found["commit"], found["lines"]
+        content = json.loads(path.read_text(encoding="utf-8"))
+        command, lines, words = content["command"], content["lines"], origin_words(path.parents[2], path.stem, content)
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{path}: {error!r}, expected JSON with command, commit and lines of a study") from None
     parts = []
     for is_table, group in groupby(lines, key=lambda line: line.startswith("|")):
         text = "\n".join(group)
         parts.append(re.sub(r"\n(.+\n\|-)", r"\n\n\1", text) if is_table else f"```\n{text}\n```")  # a second header
-    return "\n\n".join([*parts, f"`{command}`\n(commit {commit})"])
+    return "\n\n".join([*parts, f"`{command}`\n({words})"])
+
+
+def origin_words(root: Path, name: str, content: dict) -> str:
+    """Of which commit and day a kept result is, and what of that which it goes through has changed since."""
+    date = f" of {content['date']}" if content.get("date") else ""
+    words = f"commit {content['commit']}{date}"
+    if "stale" in content:
+        return f"{words}; **STALE**: {content['stale']}"
+    origin = Origin(content["commit"], content["date"], content["code"])
+    if changed := origin.changed(code_of(root, modules_of(content["command"]), reads_of(root, name))):
+        return f"{words}; **STALE**, changed since: {', '.join(changed)}"
+    return f"{words}; nothing that it goes through has changed since"
+
+
+def not_in_history(root: Path) -> list[str]:
+    """A line for each kept result of docs/results, file or row, whose commit is no ancestor of HEAD.
+
+    Raises:
+        InputError: the clone is shallow, or there is no Git: it cannot be checked.
+    """
+    try:
+        if git(root, "rev-parse", "--is-shallow-repository").strip() != "false":
+            raise InputError(f"{root.resolve()}: found a shallow clone, expected the whole history")
+        history = git(root, "rev-list", "HEAD").split()
+    except (FileNotFoundError, subprocess.CalledProcessError):
+        raise InputError(f"{root.resolve()}: found no Git repository, expected the whole history") from None
+    known, lines = {commit[:7] for commit in history}, []
+    for file in sorted((root / FOLDER).glob("*.json")):
+        commits = {json.loads(file.read_text(encoding="utf-8"))["commit"]}
+        if file.with_suffix(".csv").is_file():
+            with file.with_suffix(".csv").open(newline="", encoding="utf-8") as table:
+                commits |= {row["commit"] for row in csv.DictReader(table) if row.get("commit")}
+        clean = sorted(commit.removesuffix(" with changes") for commit in commits)
+        lines += [f"{file.stem}: commit {commit}" for commit in clean if commit[:7] not in known]
+    return lines

@@ -21,9 +21,7 @@ from trunkline.pipeline.settings import check_once
 Config = TypeVar("Config")
 
 
-def run_stage(
-    name: str, schema: type[Config], main: Callable[[Config], None], root: str | Path = "."
-) -> None:
+def run_stage(name: str, schema: type[Config], main: Callable[[Config], None], root: str | Path = ".") -> None:
     """Call `main` with the stage's settings; a user's mistake ends in one line and exit code 1.
 
     `root` holds the stage's `params.yaml` and `conf/`. Meanwhile BLAS keeps to one thread, as its sums, and

@@ -3,12 +3,13 @@
 Where a unit bends by θ, a tendon that slides over its holes towards the motor loses tension by exp(-μ θ) to its far
 side (Euler, Eytelwein). Between the holes next to joint i, half of its bend counts:
 
-    T_i = T exp(-μ (Σ_{m<i} θ_m s_m + θ_i s_i / 2)),    s = clip(b / SLIP, -1, 1),    b_m = Σ_{k≥m} (L_k - c_k)
+    T_i = T exp(-μ (Σ_{m<i} θ_m s_m + θ_i s_i / 2)),    s = clip(b / l, -1, 1),    b_m = Σ_{k≥m} (L_k - c_k)
 
 with T the tension at the motor, c_k the chord across joint k, L_k what it was when nothing pulled, and so b_m the way
-by which the tendon has slid at hole m. That is how an arm rests whose tendons were drawn in since it hung without pull;
-with -μ, one whose tendons have all just slid the other way. Such forces have no energy: what Newton's method needs is
-the gradient's matrix of derivatives, which is not symmetric, but has the same rank above its blocks as below them.
+by which the tendon has slid at hole m; l is the chain's `slip`, within which friction builds up. That is how an arm
+rests whose tendons were drawn in since it hung without pull; with -μ, one whose tendons have all just slid the other
+way. Such forces have no energy: what Newton's method needs is the gradient's matrix of derivatives, which is not
+symmetric, but has the same rank above its blocks as below them.
 """
 
 from typing import NamedTuple
@@ -18,8 +19,6 @@ import numpy as np
 from trunkline.statics.factor import factorize, solve
 from trunkline.statics.kernel import kernel
 from trunkline.statics.vectors import copy
-
-SLIP = 5e-4  # m of sliding within which friction builds up
 
 
 class Rub(NamedTuple):
@@ -57,9 +56,9 @@ def share_tensions(chain, q, pull, state):
     for t in range(tendons):
         slid = 0.0
         for i in range(units - 1, -1, -1):
-            slid += (pull.loose[i, t] - state.chord[i, t]) / SLIP
+            slid += (pull.loose[i, t] - state.chord[i, t]) / chain.slip
             side[i, t, 0] = min(max(slid, -1.0), 1.0) * chain.crosses[i, t]
-            side[i, t, 1] = bend[i, 0] / SLIP * chain.crosses[i, t] if abs(slid) < 1 else 0.0
+            side[i, t, 1] = bend[i, 0] / chain.slip * chain.crosses[i, t] if abs(slid) < 1 else 0.0
         exponent = 0.0
         for i in range(units):
             half = 0.5 * pull.friction * bend[i, 0] * side[i, t, 0]

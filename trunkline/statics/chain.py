@@ -9,7 +9,7 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from trunkline.elements import DIAGONAL, actuators, all_elements, cables, capstan_friction
+from trunkline.elements import DIAGONAL, actuators, all_elements, cables, capstan_friction, slip_length
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.statics.limits import limit_angles, limit_energies, limit_gains, limit_impedances
@@ -43,6 +43,7 @@ class Chain(NamedTuple):
         gain: position gain of the tendon's actuator, N/m. Shape (K,).
         max_tension: largest pull of the tendon's actuator, N. Shape (K,).
         capstan: μ of capstan friction; less than zero stands for an arm let go, see `trunkline/statics/capstan.py`.
+        slip: m of a tendon's sliding within which it builds up.
         tip: tip site from the last joint, m. Shape (3,).
         tip_quaternion: orientation of the tip site in the reference configuration. Shape (4,).
     """
@@ -67,6 +68,7 @@ class Chain(NamedTuple):
     gain: np.ndarray
     max_tension: np.ndarray
     capstan: float
+    slip: float
     tip: np.ndarray
     tip_quaternion: np.ndarray
 
@@ -153,6 +155,7 @@ def read_chain(model: mujoco.MjModel, tip_site: str = "tip") -> Chain:
         gain=model.actuator_gainprm[order, 0],
         max_tension=_max_tensions(model, order),
         capstan=capstan_friction(model),
+        slip=slip_length(model),
         tip=tip - anchors[-1],
         tip_quaternion=tip_quaternion,
     )

@@ -20,6 +20,7 @@ from trunkline.teleop.targets import bring, offered, place, tilted, why_not
 from trunkline.teleop.transitions import TRANSITIONS, Event, first_event
 
 AIMING = ("aim", "follow")
+STAYS = "the robot stays at the last within reach"  # noticed while targets are not followed
 WATCHING = ("plan", "preview", "ready")  # nothing moves: a plan outlives that its user is not heard for a while
 PLANNED = ("plan", "preview", "ready", "delay", "execute", "follow")  # modes that a change of the world concerns
 
@@ -219,7 +220,7 @@ class Teleoperation:
             motion = "execute" if state.mode == "execute" else "follow"
         notice = state.notice
         if state.mode == "follow" and why_not(targets):
-            notice = f"{why_not(targets)}; the robot stays at the last within reach"
+            notice = f"{why_not(targets)}; {STAYS}"
         return Intent(
             state.mode,
             motion,

@@ -3,7 +3,7 @@ manifest. `calibrated.xml` of the package keeps it all."""
 
 import mujoco
 
-from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, capstan_friction, is_hole, numeric
+from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, SLIP_LENGTH, capstan_friction, is_hole, numeric
 
 
 def without_unsupported(spec: mujoco.MjSpec) -> dict[str, float]:
@@ -27,7 +27,7 @@ def without_rubbing(spec: mujoco.MjSpec) -> float:
     friction = capstan_friction(spec.compile())
     for tendon in [tendon for tendon in spec.tendons if is_hole(tendon.name)]:
         spec.delete(tendon)
-    for number in [number for number in spec.numerics if number.name == CAPSTAN_FRICTION]:
+    for number in [number for number in spec.numerics if number.name in (CAPSTAN_FRICTION, SLIP_LENGTH)]:
         spec.delete(number)
     return friction
 

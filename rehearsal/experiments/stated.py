@@ -1,0 +1,59 @@
+"""Whether what previews state comes true: probabilities of grasps and hand-overs, and the radius about the tip's end.
+
+A page says "the tip ends within r mm in 90 % of 12 futures". A run's tip is inside where it is no further than r from
+the middle of that circle; how far it is over r says by how much a radius is too small where none are inside.
+"""
+
+import numpy as np
+
+from rehearsal.experiments.calibration import base_brier, brier, stated
+from rehearsal.experiments.result import LATER, Result
+from trunkline.hybrid.shares import wilson
+
+PROBABLE = ("grasp", "handle")  # whose previews state a probability
+REACH = "reach"  # whose previews state a radius
+
+
+def scores(results: list[Result]) -> dict:
+    """`preview` of metrics.json: of runs without a variant; without a key where no run has what it is of.
+
+    previews, agreed: how many had a probability, and of how many it came out so; agreement: their share, from `low` to
+    `high`, Wilson's; path_pct_median: %; brier, brier_base. radius_mm: median and 95th percentile. coverage: for each
+    of LATER, runs with a radius, those `inside`, their share, from `low` to `high`. tip_error_radii: likewise, median
+    of the tip's distance over the radius. A tip that is nowhere is outside, and infinitely far.
+    """
+    plain = [result for result in results if not result.variant]
+    told = [row for row in plain if row.experiment in PROBABLE and np.isfinite(row.probability)]
+    return {**_probabilities(told), **_radii([row for row in plain if row.experiment == REACH])}
+
+
+def _probabilities(rows: list[Result]) -> dict:
+    if not rows:
+        return {}
+    agreed, (probability, outcome) = int(sum(row.agreed == 1 for row in rows)), stated(rows)
+    low, high = wilson(agreed, len(rows))
+    paths = [row.path_pct for row in rows if np.isfinite(row.path_pct)]
+    found = {"previews": len(rows), "agreed": agreed, "agreement": agreed / len(rows), "low": low, "high": high}
+    found |= {"brier": brier(probability, outcome), "brier_base": base_brier(outcome)}
+    return found | ({"path_pct_median": float(np.median(paths))} if paths else {})
+
+
+def _radii(rows: list[Result]) -> dict:
+    radius = np.array([row.radius_mm for row in rows])
+    if not np.isfinite(radius).any():
+        return {}
+    rows, radius = [row for row in rows if np.isfinite(row.radius_mm)], radius[np.isfinite(radius)]
+    coverage, errors = {}, {}
+    for name in LATER:
+        off = np.array([getattr(row, f"{name}_mm") for row in rows])
+        inside, runs = int(covered(off, radius).sum()), len(rows)
+        low, high = wilson(inside, runs)
+        coverage[name] = {"runs": runs, "inside": inside, "share": inside / runs, "low": low, "high": high}
+        errors[name] = {"median": float(np.median(np.where(np.isfinite(off), off, np.inf) / radius))}
+    median, p95 = (float(value) for value in np.quantile(radius, (0.5, 0.95)))
+    return {"radius_mm": {"median": median, "p95": p95}, "coverage": coverage, "tip_error_radii": errors}
+
+
+def covered(off: np.ndarray, radius: np.ndarray) -> np.ndarray:
+    """Whether tips so far from the middle of what was stated are inside of it; NaN is not. Shape (n,)."""
+    return off <= radius

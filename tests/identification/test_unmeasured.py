@@ -1,0 +1,156 @@
+"""Where nobody measured, nothing is compared: whatever stands there, every error and every verdict is the same."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.support.swings import FRAMES, LIKE, SEGMENTS, TIP, experiment, swing, trial
+from trunkline.identification.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation import Prediction, errors_of, scores
+from trunkline.identification.fit import Fit
+from trunkline.identification.loss import (
+    RESIDUALS,
+    LossWeights,
+    internal_error,
+    loss_of,
+    position_error,
+    velocity_error,
+)
+from trunkline.identification.null_model import hanging_still
+from trunkline.identification.repeatability import end_shape
+from trunkline.identification.scoring import fingerprint
+from trunkline.identification.suspicion import exchanged_labels, started_off
+
+WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
+FIT = Fit(SEGMENTS, {}, (), "positions", WEIGHTS, None)  # type: ignore[arg-type]
+SIMULATED = swing(0.04, 3.5, 12.3)
+
+
+def hidden(rows: slice, segments: slice) -> np.ndarray:
+    measured = np.ones((FRAMES, 3), bool)
+    measured[rows, segments] = False
+    return measured
+
+
+HIDDEN = {
+    "a segment for a while": hidden(slice(20, 60), slice(1, 2)),
+    "the tip for a while": hidden(slice(10, 45), slice(TIP, TIP + 1)),
+    "all for a while": hidden(slice(30, 40), slice(None)),
+    "a segment never": hidden(slice(None), slice(0, 1)),
+    "the tip at the end": hidden(slice(-20, None), slice(TIP, TIP + 1)),
+    "the first frames": hidden(slice(0, 12), slice(None)),
+    "here and there": np.random.default_rng(1).random((FRAMES, 3)) > 0.3,
+}
+
+
+def of_trial(positions, measured):
+    row = errors_of(SIMULATED, experiment(positions, measured), LIKE, "positions", WEIGHTS)
+    assert {"e_internal_mm", "e_position_mm", "e_tip_mm", "e_velocity_mm_s", "loss"} <= set(row)
+    return [row[name] for name in sorted(row)]
+
+
+def of_path(positions, measured):
+    path = experiment(positions, measured, "static_path", frame_step=0.0)
+    row = scores(replace(LIKE, positions=[SIMULATED]), [path], "distances", WEIGHTS)["identify"]
+    assert {"e_tip_rms_mm", "e_tip_centred_rms_mm", "loss"} <= set(row)
+    return [row[name] for name in sorted(row) if name != "by_experiment"]
+
+
+def table(make):
+    def found(positions, measured):
+        prediction = Prediction(replace(LIKE, positions=[SIMULATED]), [experiment(positions, measured)])
+        return make({"model": prediction}).select_dtypes("number").to_numpy()
+
+    return found
+
+
+def last_shape(kind: str):
+    def found(positions, measured):
+        ended = [experiment(positions, measured, kind)]
+        return hanging_still(ended, LIKE, ended).positions[0][0]
+
+    return found
+
+
+def sentence(judge):
+    def found(positions, measured):
+        return judge(SIMULATED, experiment(positions, measured), FIT)
+
+    return found
+
+
+def exchanged(positions, measured):
+    """As if the labels of the second segment and the tip were exchanged."""
+    order = [0, 2, 1]
+    return exchanged_labels(SIMULATED, experiment(positions[:, order], measured[:, order]), FIT)
+
+
+def late(positions, measured):
+    """As if it began a quarter of a second later."""
+    return started_off(np.concatenate([SIMULATED[25:], SIMULATED[:25]]), experiment(positions, measured), FIT)
+
+
+# by what they give, from positions (T, S, 3) and where they were measured (T, S)
+COMPARED = {
+    "E_internal": lambda p, seen: internal_error(SIMULATED, p, seen),
+    "the position error": lambda p, seen: position_error(SIMULATED, p, seen),
+    "the velocity error": lambda p, seen: velocity_error(SIMULATED, p, seen, 100.0),
+    "the loss of distances": lambda p, seen: loss_of(RESIDUALS["distances"](SIMULATED[None], p, seen, WEIGHTS)),
+    "the loss of positions": lambda p, seen: loss_of(RESIDUALS["positions"](SIMULATED[None], p, seen, WEIGHTS)),
+    "the errors of a swing": of_trial,
+    "the errors of a path": of_path,
+    "the table of trials": table(trial_table),
+    "the table along the arm": table(lambda predictions: segment_table(predictions, SEGMENTS)),
+    "the null model of a swing": last_shape("release"),
+    "the null model of a path": last_shape("static_path"),
+    "where a trial ends": lambda p, seen: np.array(end_shape(trial(p, seen)), dtype=float),
+    "what tells a trial from another": lambda p, seen: fingerprint(trial(p, seen)),
+    "whether it starts otherwise": sentence(started_off),
+    "whether labels are exchanged": sentence(exchanged_labels),
+    "that it starts otherwise": late,
+    "that labels are exchanged": exchanged,
+}
+
+
+@pytest.mark.filterwarnings("ignore:Mean of empty slice")
+@pytest.mark.parametrize("measured", HIDDEN.values(), ids=HIDDEN)
+@pytest.mark.parametrize("compared", COMPARED.values(), ids=COMPARED)
+@pytest.mark.parametrize("filler", [0.5, -40.0, np.nan])
+def test_what_nobody_measured_counts_nowhere(compared, measured, filler):
+    real = swing()
+    expected = compared(real, measured)
+    filled = np.where(measured[..., None], real, filler)
+    if compared in (late, exchanged) and measured is HIDDEN["the first frames"]:
+        assert expected
+    if isinstance(expected, str):
+        assert compared(filled, measured) == expected
+    else:
+        np.testing.assert_allclose(compared(filled, measured), expected, rtol=1e-9)
+
+
+MEASURES = {
+    "E_internal": lambda s, p, seen: internal_error(s, p, seen),
+    "position": lambda s, p, seen: position_error(s, p, seen),
+    "velocity": lambda s, p, seen: velocity_error(s, p, seen, 1.0),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"), [("E_internal", (1 + 2 + 6) / 3), ("position", (1 + 2 + 6) / 3), ("velocity", 1.0)]
+)
+def test_each_error_is_the_mean_over_what_was_measured(name, expected):
+    """By hand: of two segments in three frames, those samples are off by 50 m that were not measured."""
+    real = np.zeros((3, 2, 3))
+    real[..., 2] = -100.0
+    off = np.array([[1.0, 50.0], [2.0, 50.0], [50.0, 6.0]])
+    measured = np.array([[True, False], [True, False], [False, True]])
+    simulated = real - np.stack([0 * off, 0 * off, off], axis=-1)
+    assert MEASURES[name](simulated, real, measured) == pytest.approx(expected)
+    assert MEASURES[name](np.stack([simulated, real]), real, measured).tolist() == pytest.approx([expected, 0.0])
+
+
+def test_a_tip_that_nobody_saw_has_no_error():
+    row = errors_of(SIMULATED, experiment(swing(), hidden(slice(None), slice(TIP, TIP + 1))), LIKE, None, None)
+    assert {name for name in row if "tip" in name or "swing" in name or "late" in name} == set()
+    assert row["e_position_mm"] > 0

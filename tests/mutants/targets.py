@@ -1,0 +1,62 @@
+"""Which mutants there are, which of them a run is of, and the reasons why some may survive."""
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import yaml
+
+from tests.mutants.operators import Mutant, mutants
+
+TARGETS, EQUIVALENT = "targets.yaml", "equivalent.yaml"
+
+
+def read_targets(folder: Path, root: Path) -> list[Mutant]:
+    """The mutants of all targets that `folder` lists, of files in `root`.
+
+    Raises:
+        ValueError: a target names what is not there, the old text of an edit is not there exactly once, or a mutant
+            comes twice.
+    """
+    document = yaml.safe_load((folder / TARGETS).read_text(encoding="utf-8"))
+    every = [*_made(document["targets"], root), *_edited(document["edits"], root)]
+    keys: set[str] = set()
+    for mutant in every:
+        if mutant.key in keys:
+            raise ValueError(f"{folder / TARGETS}: found twice: {mutant.key}")
+        keys.add(mutant.key)
+    return every
+
+
+def read_reasons(folder: Path) -> dict[str, str]:
+    """By the keys of mutants that may survive, why."""
+    reasons: dict[str, str] = {}
+    for why, keys in (yaml.safe_load((folder / EQUIVALENT).read_text(encoding="utf-8")) or {}).items():
+        reasons |= dict.fromkeys(keys, why)
+    return reasons
+
+
+def drawn(every: list[Mutant], reasons: dict[str, str], count: int, seed: str) -> list[Mutant]:
+    """A sample of those that have to be killed, the same for the same seed, in their order."""
+    others = [mutant for mutant in every if mutant.key not in reasons]
+    numbers = random.Random(seed).sample(range(len(others)), min(count, len(others)))
+    return [others[number] for number in sorted(numbers)]
+
+
+def _made(targets: dict[str, list[dict]], root: Path) -> Iterator[Mutant]:
+    for path, groups in targets.items():
+        text = (root / path).read_text(encoding="utf-8")
+        for group in groups:
+            for mutant in mutants(path, text, group["of"]):
+                yield replace(mutant, tests=tuple(group["tests"]))
+
+
+def _edited(edits: list[dict], root: Path) -> Iterator[Mutant]:
+    for edit in edits:
+        path, old, new = edit["file"], edit["old"], edit["new"]
+        text = (root / path).read_text(encoding="utf-8")
+        if text.count(old) != 1:
+            raise ValueError(f"{path}: {edit['id']}: found {text.count(old)} times, expected once: {old!r}")
+        line = text.count("\n", 0, text.index(old)) + 1
+        yield Mutant(path, edit["id"], edit["bug"], line, text.replace(old, new), tuple(edit["tests"]))

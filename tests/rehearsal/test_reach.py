@@ -1,0 +1,132 @@
+"""Who is said to have reached: the first contact decides; and where the tip is said to end."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from rehearsal.experiments.reach import failure, tell_end, tips_after
+from rehearsal.experiments.result import Result
+from rehearsal.operator.scripts import Ending
+from rehearsal.session import Session
+from tests.rehearsal.seen import FORCE, TIP, UNITS, frame
+from trunkline.hybrid.preview import Stated
+
+RADIUS = 0.03
+NAN = (np.nan, 0.0, 0.0)
+FREE, TOUCHES = frame(), frame(thing={TIP: FORCE})
+SHAFT, WORLD = frame(thing={TIP - 1: FORCE}), frame(world={UNITS - 1: FORCE})
+BOTH = frame(thing={TIP - 1: FORCE, TIP: FORCE})
+WORLD_TOO = frame(thing={TIP: FORCE}, world={0: FORCE})
+
+
+def done(aimed: float = 0.0) -> Ending:
+    return Ending(True, aimed=aimed)
+
+
+STOPPED = Ending(False, "stopped: the robot is in fault", aimed=0.0)
+NAMELESS = Ending(False, "", aimed=0.0)
+
+
+@pytest.mark.parametrize(("ending", "frames", "cause"), [
+    # the tip's units, each, and all of them at once
+    (done(), [FREE, TOUCHES], ""),
+    (done(), [TOUCHES], ""),
+    (done(), [FREE, frame(thing={UNITS - 1: FORCE})], ""),
+    (done(), [FREE, frame(thing={TIP: FORCE, UNITS - 1: FORCE})], ""),
+    (done(), [FREE, frame(thing={TIP: (0.0, 0.0, -1e-12)})], ""),
+    (done(), [FREE, frame(thing={TIP: (1e-12, 0.0, 0.0)})], ""),
+    # what follows does not count
+    (done(), [TOUCHES, SHAFT, WORLD], ""),
+    (done(), [TOUCHES, frame(thing={TIP: NAN})], ""),
+    (done(aimed=1.0), [TOUCHES], ""),
+    # another unit first, or at once
+    (done(), [FREE, SHAFT], f"collision: unit {TIP} touched it first"),
+    (done(), [SHAFT, TOUCHES], f"collision: unit {TIP} touched it first"),
+    (done(), [frame(thing={0: FORCE}), TOUCHES], "collision: unit 1 touched it first"),
+    (done(), [BOTH], f"collision: unit {TIP} touched it first"),
+    # the world first, or at once
+    (done(), [FREE, WORLD], "collision: the arm touched the world"),
+    (done(), [WORLD, TOUCHES], "collision: the arm touched the world"),
+    (done(), [WORLD_TOO], "collision: the arm touched the world"),
+    (done(), [frame(thing={0: FORCE}, world={0: FORCE})], "collision: the arm touched the world"),
+    # a script that ended badly
+    (STOPPED, [FREE, TOUCHES], "stopped: the robot is in fault"),
+    (STOPPED, [FREE], "stopped: the robot is in fault"),
+    (STOPPED, [SHAFT], f"collision: unit {TIP} touched it first"),
+    (STOPPED, [WORLD], "collision: the arm touched the world"),
+    (NAMELESS, [TOUCHES], "stopped: the operator gave up"),
+    # no contact at all: the aim, from both sides of the border
+    (done(aimed=RADIUS), [FREE], "missed: the preview's tip was on the object, the robot's was not"),
+    (done(aimed=0.0), [FREE], "missed: the preview's tip was on the object, the robot's was not"),
+    (done(aimed=np.nextafter(RADIUS, 1)), [FREE], "aim: the tip target was beside the object"),
+    (done(aimed=np.nan), [FREE], "aim: the tip target was beside the object"),
+    # forces that are no numbers
+    (done(), [frame(thing={TIP: NAN})], "error: the force of a contact is no number"),
+    (done(), [frame(thing={TIP: FORCE}, world={0: NAN})], "error: the force of a contact is no number"),
+    (done(), [frame(thing={TIP: (np.inf, 0.0, 0.0)})], "error: the force of a contact is no number"),
+    # a robot that never moved
+    (Ending(False, "aim: no preview came to the object"), [], "aim: no preview came to the object"),
+    (Ending(False, "out of reach: none"), [], "out of reach: none"),
+    (Ending(False, "stopped: at once"), [], "stopped: at once"),
+    (Ending(False, "no path"), [], "plan refused: no path"),
+    (NAMELESS, [], "stopped: the operator gave up"),
+    (done(), [], "stopped: the operator gave up"),
+])  # fmt: skip
+def test_the_first_contact_decides_who_has_reached(ending, frames, cause):
+    assert failure(ending, frames, TIP, RADIUS) == cause
+
+
+def test_how_far_the_tip_ends_from_where_it_was_said_to_is_told_in_mm():
+    """By the last of what was stated."""
+    stated = Stated(np.array([0.0, 0.1]), np.array([[9.0, 9.0, 9.0], [0.1, 0.2, 0.3]]), np.array([0.5, 0.004]))
+    tips = {
+        "at_end": np.array([0.1, 0.2, 0.303]),
+        "after_2s": np.array([0.1, 0.204, 0.303]),
+        "after_10s": stated.tips[1],
+    }
+    result = Result("reach", 0, True)
+    tell_end(result, stated, tips)
+    told = (result.radius_mm, result.at_end_mm, result.after_2s_mm, result.after_10s_mm)
+    np.testing.assert_allclose(told, (4, 3, 5, 0), atol=1e-9)
+
+
+class Drifting:
+    """A robot whose tip moves on along x by 1 m/s."""
+
+    def __init__(self, time: float) -> None:
+        self.x = time
+        self.instruments = SimpleNamespace(
+            turn=Rotation.from_rotvec([0.0, 0.0, np.pi / 2]), shift=np.array([0.0, 0.0, 5.0])
+        )
+
+    def advance(self, dt: float) -> None:
+        assert dt >= 0
+        self.x += dt
+
+    def truth(self):
+        return SimpleNamespace(tip=np.array([self.x, 0.0, 0.0]))
+
+
+def run(last: float) -> tuple[Session, list]:
+    """Frames until `last` s, the plan run from 1 to 2 s, and the session then."""
+    session = object.__new__(Session)
+    session.robot, session.now = Drifting(last), last  # type: ignore[assignment]
+    modes = [(t, "execute" if 1.0 <= t <= 2.0 else "aim") for t in np.arange(0.0, last + 1e-9, 0.25)]
+    return session, [frame(now, mode, tip=np.array([now, 0.0, 0.0])) for now, mode in modes]
+
+
+@pytest.mark.parametrize("last", [2.25, 3.0, 4.25, 12.25, 20.0])
+def test_the_tip_is_looked_at_as_long_after_the_end_as_is_said_and_as_the_client_sees_it(last):
+    """By frames as far as there are any, then by the robot that holds; in the client's frame."""
+    tips = tips_after(*run(last))
+    assert list(tips) == ["at_end", "after_2s", "after_10s"]
+    for tip, at in zip(tips.values(), (2.25, 4.25, 12.25), strict=True):
+        np.testing.assert_allclose(tip, (0.0, at, 5.0), atol=1e-9)
+
+
+@pytest.mark.parametrize("frames", [[], [frame(0.0, "execute")], [frame(0.0, "aim"), frame(1.0, "execute")]])
+def test_nothing_is_told_of_an_execution_that_did_not_end(frames):
+    session, _ = run(1.0)
+    assert tips_after(session, frames) == {}

@@ -1,0 +1,109 @@
+"""What previews stated against what came: agreement, Brier scores, and how often the tip ended inside the radius."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from rehearsal.experiments.result import LATER, Result
+from rehearsal.experiments.stated import covered, scores
+from rehearsal.rehearse import metrics_of
+from rehearsal.runs import Source
+from trunkline.hybrid.shares import wilson
+
+NAN = float("nan")
+
+
+def grasp(success: bool, probability: float, agreed: float, path: float = NAN, **more) -> Result:
+    return Result("grasp", 0, success, probability=probability, agreed=agreed, path_pct=path, **more)
+
+
+def reach(radius: float, at_end: float, after_2s: float = 0.0, after_10s: float = 0.0, **more) -> Result:
+    fields = {"radius_mm": radius, "at_end_mm": at_end, "after_2s_mm": after_2s, "after_10s_mm": after_10s}
+    return Result("reach", 0, True, **fields, **more)
+
+
+@pytest.mark.parametrize(("off", "radius", "inside"), [
+    (0.0, 2.0, True), (2.0, 2.0, True), (np.nextafter(2.0, 3), 2.0, False), (9.0, 2.0, False), (0.0, 0.0, True),
+    (NAN, 2.0, False), (1.0, NAN, False), (np.inf, 2.0, False),
+])  # fmt: skip
+def test_a_tip_is_inside_the_radius_or_on_it(off, radius, inside):
+    assert covered(np.array([off]), np.array([radius])).tolist() == [inside]
+
+
+TRUE, FALSE = grasp(True, 0.9, 1.0, 1.0), grasp(False, 0.8, 0.0, 3.0)
+
+
+@pytest.mark.parametrize(("rows", "previews", "agreed"), [
+    ([TRUE], 1, 1),
+    ([FALSE], 1, 0),
+    ([TRUE, TRUE, FALSE], 3, 2),
+    ([TRUE, replace(TRUE, experiment="handle"), replace(FALSE, experiment="handle")], 3, 2),
+    ([TRUE, replace(TRUE, experiment="reach"), replace(FALSE, experiment="follow")], 1, 1),
+    ([TRUE, replace(FALSE, variant="single")], 1, 1),
+    ([TRUE, grasp(False, NAN, NAN)], 1, 1),
+    ([TRUE, grasp(True, 0.9, NAN)], 2, 1),  # what was never judged did not agree
+])  # fmt: skip
+def test_agreement_is_of_grasps_and_hand_overs_that_had_a_probability(rows, previews, agreed):
+    told = scores(rows)
+    assert (told["previews"], told["agreed"], told["agreement"]) == (previews, agreed, agreed / previews)
+    assert (told["low"], told["high"]) == wilson(agreed, previews)
+
+
+def test_brier_scores_and_the_paths_median_are_of_the_same_runs():
+    told = scores(
+        [TRUE, FALSE, replace(TRUE, path_pct=NAN), replace(FALSE, path_pct=8.0), replace(TRUE, variant="cad")]
+    )
+    assert told["brier"] == pytest.approx((2 * 0.1**2 + 2 * 0.8**2) / 4)
+    assert told["brier_base"] == pytest.approx(0.25)
+    assert told["path_pct_median"] == 3.0
+
+
+@pytest.mark.parametrize(("name", "rows", "inside"), [
+    ("at_end", [reach(2.0, 1.0), reach(2.0, 2.0), reach(2.0, 3.0)], 2),
+    ("after_2s", [reach(2.0, 9.0, 1.0), reach(2.0, 9.0, 3.0)], 1),
+    ("after_10s", [reach(2.0, 9.0, 9.0, 1.0), reach(2.0, 9.0, 9.0, 3.0)], 1),
+    ("at_end", [reach(2.0, NAN), reach(2.0, 1.0)], 1),  # a tip that is nowhere is outside
+    ("at_end", [reach(2.0, NAN)], 0),
+    ("at_end", [reach(2.0, 1.0), reach(NAN, 0.0)], 1),  # nothing was stated
+    ("at_end", [reach(2.0, 1.0), reach(2.0, 1.0, variant="cad")], 1),
+    ("at_end", [reach(2.0, 1.0), replace(reach(2.0, 1.0), experiment="follow")], 1),
+    ("at_end", [replace(reach(2.0, 1.0), success=False)], 1),  # whether it touched is another matter
+])  # fmt: skip
+def test_coverage_is_of_reaches_with_a_radius_at_each_time(name, rows, inside):
+    runs = sum(bool(row.radius_mm > 0) and not row.variant and row.experiment == "reach" for row in rows)
+    low, high = wilson(inside, runs)
+    expected = {"runs": runs, "inside": inside, "share": inside / runs, "low": low, "high": high}
+    assert scores(rows)["coverage"][name] == expected
+
+
+def test_how_many_radii_the_tip_is_off_is_told_at_each_time():
+    rows = [reach(2.0, 4.0, 6.0, 8.0), reach(1.0, 3.0, 3.0, 9.0), reach(4.0, 4.0, NAN, 4.0)]
+    told = scores(rows)
+    assert list(told["tip_error_radii"]) == list(LATER) == ["at_end", "after_2s", "after_10s"]
+    assert {name: one["median"] for name, one in told["tip_error_radii"].items()} == {
+        "at_end": 2.0, "after_2s": 3.0, "after_10s": 4.0
+    }  # fmt: skip
+    assert told["radius_mm"]["median"] == 2.0
+
+
+@pytest.mark.parametrize(("rows", "keys"), [
+    ([], set()),
+    ([grasp(True, NAN, NAN)], set()),
+    ([reach(NAN, NAN)], set()),
+    ([grasp(True, 0.9, 1.0)], {"previews", "agreed", "agreement", "low", "high", "brier", "brier_base"}),
+    ([reach(2.0, 1.0)], {"radius_mm", "coverage", "tip_error_radii"}),
+])  # fmt: skip
+def test_nothing_is_said_of_what_no_run_has(rows, keys):
+    assert set(scores(rows)) == keys
+
+
+def test_the_metrics_name_package_code_experiments_and_previews():
+    rows = [TRUE, FALSE, replace(TRUE, experiment="handle"), reach(2.0, 4.0)]
+    told = json.loads(json.dumps(metrics_of(Source("abc", "def"), rows)))
+    assert (told["package"], told["code"]) == ("abc", "def")
+    assert set(told) == {"package", "code", "grasp", "handle", "reach", "preview"}
+    for key in ("agreement", "path_pct_median", "brier", "brier_base"):
+        assert np.isfinite(told["preview"][key])
+    assert "preview" not in metrics_of(Source("abc", "def"), [Result("follow", 0, True)])
