@@ -92,6 +92,7 @@ def joined(monkeypatch):
     arm.close()
 
 
+@pytest.mark.realtime
 def test_a_controller_hears_where_the_joints_shall_be(joined):
     arm, controller = joined
     np.testing.assert_array_equal(arm.sent, READY)
@@ -112,6 +113,7 @@ def test_a_controller_hears_where_the_joints_shall_be(joined):
     )
 
 
+@pytest.mark.realtime
 def test_silence_and_a_joint_astray_are_faults(joined):
     arm, controller = joined
     controller.turn()
@@ -124,6 +126,7 @@ def test_silence_and_a_joint_astray_are_faults(joined):
     assert arm.fault == "panda_joint4: found 0.2 rad from where it is sent, expected at most 0.1"
 
 
+@pytest.mark.realtime
 def test_no_controller_is_one_line(monkeypatch):
     monkeypatch.setenv("CYCLONEDDS_URI", f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>")
     monkeypatch.setattr(ros_arm, "CONNECTING", 0.05)
