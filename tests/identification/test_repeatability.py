@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.support.folders import SHARED, with_recordings
 from tests.support.matched_plant import release, small_model, tilt
 from trunkline.filtering.filter import filter_take
 from trunkline.frames import gravity_in_base
@@ -23,7 +24,6 @@ from trunkline.sessions.session import read_session
 from trunkline.takes.intake import take_in
 
 ROOT = Path(__file__).parents[2]
-SHARED = ROOT.parent / "shared" / "data" / "asl_trunk"
 
 
 @pytest.fixture(scope="module")
@@ -126,9 +126,9 @@ def test_an_arm_that_still_moves_has_not_ended(still):
     assert np.isfinite(shape[[0, 2, 3]]).all()
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/data/asl_trunk")
+@with_recordings
 def test_a_real_hose_comes_to_rest_elsewhere_each_time(tmp_path):
-    for log in SHARED.glob("*.mcap"):
+    for log in (SHARED / "asl_trunk").glob("*.mcap"):
         (tmp_path / log.name).symlink_to(log)
     (tmp_path / "session.yaml").write_text((ROOT / "examples/asl_trunk/session.yaml").read_text())
     limits, settings = settings_of("ingest", ROOT).limits, settings_of("filter", ROOT / "examples/asl_trunk")
