@@ -6,6 +6,7 @@ other processes that do not come from this one by a fork does not see the mutant
 """
 
 import contextlib
+import functools
 import gc
 import importlib
 import json
@@ -263,14 +264,27 @@ class _Runner:
 
 def _exchanged(mutant: Mutant) -> Iterator[tuple[FunctionType, CodeType]]:
     """The functions of the file whose code differs in the mutant, with that."""
-    path = os.path.realpath(mutant.path)
-    codes = {(code.co_qualname, code.co_firstlineno): code for code in _codes(compile(mutant.text, path, "exec"))}
+    codes = {
+        (code.co_qualname, code.co_firstlineno): code for code in _codes(compile(mutant.text, mutant.path, "exec"))
+    }
+    for function in _functions(os.path.realpath(mutant.path)):
+        old = function.__code__
+        new = codes.get((old.co_qualname, old.co_firstlineno))
+        if new is not None and new.co_freevars == old.co_freevars and new.replace(co_filename=old.co_filename) != old:
+            yield function, new
+
+
+@functools.cache
+def _functions(path: str) -> list[FunctionType]:
+    """Those that were loaded from the file."""
+    names: dict[str, str] = {}
+    functions = []
     for function in gc.get_objects():
-        if isinstance(function, FunctionType) and os.path.realpath(function.__code__.co_filename) == path:
-            old = function.__code__
-            new = codes.get((old.co_qualname, old.co_firstlineno))
-            if new is not None and new != old and new.co_freevars == old.co_freevars:
-                yield function, new
+        if isinstance(function, FunctionType):
+            name = function.__code__.co_filename
+            if (names.get(name) or names.setdefault(name, os.path.realpath(name))) == path:
+                functions.append(function)
+    return functions
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:
