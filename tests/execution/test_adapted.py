@@ -1,5 +1,5 @@
-"""A limb seen from the machine's process, before an adapter that is a test, on a clock that it turns: what is a fault of
-it, from both sides of each border, and what is none."""
+"""A limb seen from the machine's process, before an adapter that is a test, on a clock that it turns: what is a fault
+of it, from both sides of each border, and what is none."""
 
 import os
 import socket
@@ -23,7 +23,7 @@ READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 
 
 class Process:
-    """An adapter as `subprocess` has it. `line`: its end of the socket. `ends`: whether it does once nobody is there."""
+    """An adapter as `subprocess` has it. `line`: its end of the socket. `ends`: whether it does as nobody is there."""
 
     def __init__(self, command, pass_fds, **how):
         self.command, self.ends, self.waited, self.killed = command, True, [], False

@@ -79,6 +79,12 @@ def test_what_did_not_rest_is_counted_as_a_share():
     assert "seconds_to_rest" not in found
 
 
+def test_of_rest_that_nobody_looked_at_nothing_is_said():
+    """As of an arm on which a rig sends commands and gives back tips."""
+    found = Reached(np.zeros(2), np.zeros(2, bool), np.full(2, np.nan)).metrics(LENGTH)
+    assert not {"rested", "seconds_to_rest"} & set(found)
+
+
 @pytest.mark.parametrize(
     ("seconds", "median", "late"),
     [

@@ -100,8 +100,8 @@ def test_where_none_pays_out_the_others_stay(chain):
 
 
 def test_the_score_asks_for_nearly_all_that_the_samples_reach(model, chain, monkeypatch):
-    """Pulls up to four fifths of their deepest, from where two of them are near the motors' limits; where all motors
-    """Up to four fifths of the deepest pulls, from where two of them are near the motors' limits; where all motors
+    """Pulls up to four fifths of their deepest, where two of them are near the motors' limits; where all motors pull, a
+    fifth, and no motor pays out. With less, targets would be near the straight arm, and the score better."""
     asked = []
 
     def settle(model, commands, *rest):

@@ -38,13 +38,13 @@ def test_a_held_out_angle_counts_what_its_signal_calls_within_reach(monkeypatch,
 
 
 @pytest.mark.parametrize(("at_tips", "outside", "reachable", "beyond"), SIGNALS)
-def test_sheets_are_checked_with_tips_within_reach_and_points_beyond(monkeypatch, at_tips, outside, reachable, beyond):
+def test_sheets_are_checked_with_tips_and_points_beyond(monkeypatch, at_tips, outside, reachable, beyond):
     """At as many directions as are asked for, none farther aside than those of the sheets."""
     tips, away = np.zeros((len(at_tips), 3)), np.ones((len(outside), 3))
     found_there = SimpleNamespace(equilibrium=SimpleNamespace(position=tips))
     for name, value in (
-        ("finer", np.zeros((3, 3))), ("sheet_at", None), ("soft_lattice", None), ("soft_field", None), ("overlap", 0.75),
-        ("points_beyond", away), ("sample_at", found_there),
+        ("finer", np.zeros((3, 3))), ("sheet_at", None), ("soft_lattice", None), ("soft_field", None),
+        ("overlap", 0.75), ("points_beyond", away), ("sample_at", found_there),
     ):  # fmt: skip
         monkeypatch.setattr(sheet_check, name, lambda *_, value=value: value)
     sheets = SimpleNamespace(

@@ -40,7 +40,7 @@ class Limit:
     goal: beside `better`, what is asked for and was missed when the row was written. It holds as max or min do as soon
         as the baseline meets it.
     factor: how many times worse than the baseline it may be; for a share (from 0 to 1) of which more is better, how
-        many times as much may be missing from 1.
+        many times as much may be missing from 1, if that is nearer.
     slack: how much worse than the baseline, in the metric's own unit; the larger of the two counts.
     below, reaches: the other metric of the same stage that it must be below, and that it must at least be.
     trials: how many a share must be of, or a few of them would do.
@@ -87,7 +87,9 @@ class Limit:
         """The worst value that `before`, of the baseline, leaves."""
         if self.rises:
             return before + max((self.factor - 1) * abs(before), self.slack)
-        room = (self.factor - 1) * (1 - before) if 0 <= before <= 1 else (1 - 1 / self.factor) * abs(before)
+        room = (1 - 1 / self.factor) * abs(before)
+        if 0 <= before <= 1:
+            room = min(room, (self.factor - 1) * (1 - before))
         return before - max(room, self.slack)
 
     def demanded(self, before: float | None) -> float | None:
