@@ -39,7 +39,7 @@ WRONG = "no result"  # the tests say nothing
 UNSEEN = "shows at import"
 PLUGINS = ("cacheprovider", "faulthandler", "xdist", "looponfail", "junitxml", "pastebin")
 SOONEST, LONGEST = 10.0, 60.0  # s that a mutant has beside five times what the original takes; without having tried it
-POLL = 0.01  # s
+POLL = 0.02  # s
 
 Tests = tuple[str, ...]
 
@@ -162,7 +162,7 @@ def _collect(mutants: list[Mutant], tried: bool, anew: bool, folder: Path, resul
         loaded = _loaded_from(mutants[0]) if anew else lambda: True
         runner = _Runner([] if anew else mutants, tried, results)
         tests = [f"--basetemp={folder / 'pytest'}", *mutants[0].tests]
-        code = pytest.main(["-xq", *(f"-pno:{name}" for name in PLUGINS), *tests], plugins=[runner])
+        code = pytest.main(["-xq", "--tb=no", *(f"-pno:{name}" for name in PLUGINS), *tests], plugins=[runner])
         if runner.alone or anew:
             _tell(results, _verdict(code, runner, anew, loaded()))
         elif runner.uncollected:
@@ -218,6 +218,9 @@ class _Runner:
         """True where all is done; None lets pytest run the tests."""
         if not self._mutants or self.uncollected:
             return None
+        for path in {mutant.path for mutant in self._mutants}:
+            _functions(os.path.realpath(path))  # before they are frozen: the collector lists none of those
+        gc.freeze()  # else it writes to all memory that the processes share
         limit = LONGEST
         if self._tried:
             original = self._outcome(None, 10 * LONGEST)
