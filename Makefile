@@ -11,8 +11,8 @@ PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 unexport PYTHONDONTWRITEBYTECODE  # where that is set, every process of a stage compiles all its libraries: 9 s each
 
-.PHONY: demo small_demo rehearse live client browser mono test types gate baseline lock readme pull push setup stale \
-  mutants_sample requirements clean
+.PHONY: demo small_demo rehearse live client browser mono test types gate baseline lock release readme pull push setup stale \
+  mutants mutants_sample requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
@@ -41,6 +41,9 @@ test: setup $(TOOLS) browser mono  ## run every test, then lint
 	ruff check --output-format concise . || status=1; \
 	exit $$status
 
+mutants: setup       ## whether the tests notice wrong edits of what judges, scores, previews, decides and stops: half an hour
+	python -m tests.mutants
+
 mutants_sample: setup  ## whether the tests notice 40 wrong edits of the code, drawn anew each week
 	python -m tests.mutants --sample 40
 
@@ -55,6 +58,9 @@ baseline: setup      ## make the committed metrics the gate's baseline: make bas
 
 lock: setup          ## check that dvc.lock belongs to the code, params.yaml, the libraries and the metrics
 	python -m trunkline.pipeline.lock
+
+release: setup       ## hold the split test against tests/release.yaml; nothing is chosen by it
+	python -m trunkline.pipeline.release
 
 readme: setup        ## regenerate the README's graph, table and picture
 	python -m trunkline.pipeline.readme
