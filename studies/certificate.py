@@ -10,21 +10,18 @@ import argparse
 import json
 import sys
 from contextlib import redirect_stdout
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, Plant
-from demo.plants.choice import plant_of
-from demo.rig import ROOT, Config
+from demo.rig import ROOT, bring
 from stages.report import ARTIFACTS, MODEL, STAGES, TRIALS
 from stages.report import Config as Report
 from studies.rows import Rows, digest
-from trunkline.arm.spiral import spiral_chain
 from trunkline.certificate.budget import Budget, budget
 from trunkline.certificate.certificate import inputs_of
-from trunkline.certificate.poses import Poses, conditions_of, draw_poses
+from trunkline.certificate.coverage import is_inside, pulls_of
+from trunkline.certificate.poses import conditions_of, draw_poses
 from trunkline.errors import in_one_line
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.inputs import read_model
@@ -34,62 +31,17 @@ from trunkline.trials.splits import DECIDING
 from trunkline.trials.trial import read_trials
 
 COUNT, SEED, BATCH = 500, 20, 20
-LOOK = 0.1  # s, for which the arm is looked at
-
-
-@dataclass
-class Slow:
-    """How a pose is reached, as the lab's settings of its slow pulls and tilts: s, and times the pull or damping."""
-
-    settle: float
-    steady_factor: float
-    pull_ramp: float
-    pull_beyond: float
-    pull_turn: float
-    pull_back: float
-    pull_settle: float
-
-
-def true_tips(
-    plant: Plant, units: int, tip: np.ndarray, slow: Slow, poses: Poses, pulls: np.ndarray, back: np.ndarray
-) -> np.ndarray:
-    """Where the tip of the lab's arm rests, m, in the frame of its base. Shape (N, 3).
-
-    Args:
-        units: that the arm has. tip: from the centre of the last one, in its frame, m. Shape (3,).
-        pulls: of the motors, m, less than 0 where one is loose. Shape (N, K).
-        back: whether they come from beyond. Shape (N,).
-    """
-    tips = np.empty((len(poses), 3))
-    for pulled in (True, False):  # an arm that only hangs is steadied by a hand, as the lab does it
-        chosen = np.flatnonzero((pulls > 0).any(axis=1) == pulled)
-        if not len(chosen):
-            continue
-        moved = np.cumsum([0, slow.pull_ramp, slow.pull_turn, slow.pull_back]) * pulled
-        rest = moved[-1] + (slow.pull_settle if pulled else slow.settle)
-        time = np.arange(round((rest + LOOK) * COMMAND_RATE)) / COMMAND_RATE
-        beyond = np.where(back[chosen], slow.pull_beyond, 1.0)
-        profiles = np.array([np.interp(time, moved, [0, far, far, 1]) for far in beyond])
-        sent = pulls[chosen, None]
-        commands = np.where(sent > 0, profiles[..., None] * sent, -LOOSE)
-        bench = Bench(
-            poses.gravity[chosen], commands, np.zeros_like(commands), np.zeros(len(chosen)),
-            steady=0.0 if pulled else slow.settle, steady_factor=slow.steady_factor, since=rest,
-        )  # fmt: skip
-        seen = plant.run("poses", bench, [units - 1])
-        tips[chosen] = seen.positions[:, -1, 0] + seen.rotations[:, -1, 0] @ tip
-    return tips
 
 
 def told_lines(tips: np.ndarray, found: Budget, loose: np.ndarray, back: np.ndarray) -> list[str]:
     """A table of how often the tips (N, 3), m, lie inside, over all poses and over kinds of them."""
-    off = np.linalg.norm(tips - found.tips, axis=1)
+    off, inside = np.linalg.norm(tips - found.tips, axis=1), is_inside(tips, found)
     lines = ["| poses | inside | of | radius, median | distance: median / 95th percentile | largest, in radii |"]
     lines.append("|---|---:|---:|---:|---:|---:|")
     kinds = {"all": np.ones(len(off), bool), "pulled, from straight": ~loose & ~back}
     for words, chosen in (kinds | {"pulled, from beyond": ~loose & back, "no pull, tilted": loose}).items():
         own, radius = off[chosen], found.radius[chosen]
-        cells = [f"{100 * np.mean(own <= radius):.1f} %", str(chosen.sum()), f"{1e3 * np.median(radius):.1f} mm"]
+        cells = [f"{100 * np.mean(inside[chosen]):.1f} %", str(chosen.sum()), f"{1e3 * np.median(radius):.1f} mm"]
         cells.append(f"{1e3 * np.median(own):.1f} / {1e3 * np.quantile(own, 0.95):.1f} mm")
         lines.append(f"| {words} | {' | '.join(cells)} | {np.max(own / radius):.1f} |")
     return lines
@@ -102,20 +54,15 @@ def main() -> int:
     arguments = parser.parse_args()
     model, trials = read_model(MODEL), read_trials(TRIALS, DECIDING)
     chain, conditions = read_chain(model), conditions_of(trials)
-    settings = load_config(Config, "record", ROOT)
-    slow = Slow(**{name: settings.experiments[name] for name in Slow.__annotations__})
-    plant, drawn = plant_of(settings), settings.arm
-    last = spiral_chain(drawn.length, drawn.base_width, drawn.tip_width, drawn.units).lengths[-1]
-    tip = np.array([0.0, 0.0, -last / 2])
     rng = np.random.default_rng(SEED)
     poses = draw_poses(chain, conditions, COUNT, rng)
-    pulls, back = chain.straight_lengths - poses.commands, rng.random(COUNT) < 0.5
+    pulls, back = pulls_of(chain, poses), rng.random(COUNT) < 0.5
     lab = [*sorted(Path("demo/plants").glob("*.py")), ROOT / "conf"]
     rows = Rows("certificate", digest((SEED, conditions), *lab), "pose")
     with redirect_stdout(sys.stderr):
         for first in range(len(rows.read()), arguments.poses, BATCH):
             chosen = slice(first, min(first + BATCH, arguments.poses))
-            tips = true_tips(plant, drawn.units, tip, slow, poses[chosen], pulls[chosen], back[chosen])
+            tips = bring(pulls[chosen], poses.gravity[chosen], back[chosen])
             for index, place in enumerate(tips.tolist(), start=first):
                 rows.add(str(index), **dict(zip("xyz", place, strict=True)))
     asked = load_config(Report, "report")

@@ -4,10 +4,11 @@ Marks `xdist_group` would be the way to say so, but pytest 9.2 hides them from x
 every file over all workers, so that each of them makes every fixture and compiles every kernel for itself.
 """
 
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 import pytest
 
+from tests.support.skips import Skips, read_rows
 from trunkline.arithmetic import hold_arithmetic
 
 hold_arithmetic()  # before anything imports NumPy
@@ -18,6 +19,7 @@ KERNELS = ("ik", "reachability", "statics", "test_capstan.py", "test_library.py"
 
 
 def pytest_configure(config):
+    config.pluginmanager.register(Skips(read_rows(Path(__file__).with_name("skips.yaml"))))
     if not config.pluginmanager.hasplugin("xdist"):
         return
     from xdist.scheduler import LoadScopeScheduling

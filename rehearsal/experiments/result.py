@@ -2,7 +2,7 @@
 
 import csv
 import os
-from dataclasses import asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -57,34 +57,43 @@ class Result:
 
 
 COLUMNS = [field.name for field in fields(Result)]
+REQUIRED = [field.name for field in fields(Result) if field.default is MISSING]
 _READ = {"str": str, "int": int, "float": float, "bool": "True".__eq__}
 
 
 def read_results(path: Path) -> list[Result]:
-    """The runs that a table has, none where there is no table.
+    """The runs that a table has, none where there is no table. A column that an older table lacks has its default.
 
     Raises:
-        InputError: it has other columns.
+        InputError: it has other columns, or lacks one that has no default.
     """
     if not path.exists():
         return []
     with path.open(newline="", encoding="utf-8") as file:
         reader = csv.DictReader(file)
-        if reader.fieldnames != COLUMNS:
-            raise InputError(f"{path}: found columns {reader.fieldnames}, expected {COLUMNS}: delete it to begin anew")
+        columns = list(reader.fieldnames or [])
+        if not set(REQUIRED) <= set(columns) <= set(COLUMNS):
+            raise InputError(f"{path}: found columns {columns}, expected {COLUMNS}: delete it to begin anew")
         kinds = {field.name: _READ[str(getattr(field.type, "__name__", field.type))] for field in fields(Result)}
         return [Result(**{name: kinds[name](text) for name, text in row.items()}) for row in reader]
 
 
 def append_result(path: Path, result: Result) -> None:
-    """One more row, on the disk when this returns."""
+    """One more row, on the disk when this returns; a table of fewer columns is written anew before."""
     new = not path.exists()
+    if not new and _header(path) != COLUMNS:
+        rewrite_results(path, read_results(path))
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.open("a", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         if new:
             writer.writeheader()
         writer.writerow(as_row(result))
+
+
+def _header(path: Path) -> list[str]:
+    with path.open(newline="", encoding="utf-8") as file:
+        return next(csv.reader(file), [])
 
 
 def as_row(result: Result) -> dict[str, str]:

@@ -24,10 +24,11 @@ def scores(results: list[Result]) -> dict:
     """
     plain = [result for result in results if not result.variant]
     told = [row for row in plain if row.experiment in PROBABLE and np.isfinite(row.probability)]
-    return {**_probabilities(told), **_radii([row for row in plain if row.experiment == REACH])}
+    return {**probabilities(told), **_radii([row for row in plain if row.experiment == REACH])}
 
 
-def _probabilities(rows: list[Result]) -> dict:
+def probabilities(rows: list[Result]) -> dict:
+    """Of runs that all have a probability; nothing of none. What was never judged did not agree."""
     if not rows:
         return {}
     agreed, (probability, outcome) = int(sum(row.agreed == 1 for row in rows)), stated(rows)

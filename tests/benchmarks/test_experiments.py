@@ -1,13 +1,17 @@
 """What machines did, done again from a session's log by another robot, and the page's hands."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from benchmarks.experiments.__main__ import counted, others
 from benchmarks.experiments.at_page import hand_of
 from benchmarks.experiments.judging import BEFORE, done_again
+from rehearsal.experiments.result import Result, as_row
 from rehearsal.session import RATE, REFERENCE
+from studies.rows import Rows
 from tests.live.test_hindsight import Clocked
 from tests.rehearsal.test_session import THING, Sent
 from tests.support.operator import Operator
@@ -15,8 +19,10 @@ from tests.teleop.test_plan import START, STRAIGHT
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz
 from trunkline.live.robot import Standing
+from trunkline.pipeline.origin import Origin, code_of, reads_of
 from trunkline.teleop.messages import Controller
 
+ROOT = Path(__file__).parents[2]
 BEGUN, MOVES, LASTS = 100.0, 2.0, 3.0  # s
 
 
@@ -81,3 +87,52 @@ def test_a_hand_goes_to_the_page_in_the_base_frame():
     np.testing.assert_allclose(ray, turn.apply([0.0, 0.0, -1.0]), atol=1e-12)
     assert told["trigger"]
     assert not told["grip"]
+
+
+def table(folder, code):
+    return Rows("experiments", "package", "run", folder, Origin("aaaaaaa", "", {"trunkline/live": code}))
+
+
+def add(rows, name, seed, success):
+    result = as_row(Result(name, seed, success, "" if success else "slip: out of the coil", tip_mm=2.5))
+    rows.add(f"{name} {seed}", **{key: cell for key, cell in result.items() if key != "code"})
+
+
+def test_a_run_that_is_repeated_does_not_replace_the_one_that_failed(tmp_path):
+    rows = table(tmp_path, "now")
+    for seed, success in ((0, True), (1, False), (1, True)):
+        add(rows, "handle", seed, success)
+    add(rows, "reach", 0, True)
+    add(rows, "handle", 2, True)
+    runs = counted(rows, "handle", 2)
+    assert [(seed, run.success, run.cause) for seed, run in runs.items()] == [
+        (0, True, ""), (1, False, "slip: out of the coil"),
+    ]  # fmt: skip
+    assert runs[0].tip_mm == 2.5
+    assert np.isnan(runs[0].nearest_mm)
+    line, told = others(rows, ["reach", "handle"])
+    assert line == "4 rows, and 1 further attempts, which do not count"
+    assert told == "successes of those that do not count: handle 1 of 1"
+
+
+def test_runs_of_other_code_than_live_and_execution_have_now_do_not_count(tmp_path):
+    for seed in range(4):
+        add(table(tmp_path, "before"), "handle", seed, seed > 0)
+    rows = table(tmp_path, "now")
+    assert counted(rows, "handle", 20) == {}
+    add(rows, "handle", 0, True)
+    assert list(counted(rows, "handle", 20)) == [0]
+    assert others(rows, ["handle"])[1] == "successes of those that do not count: handle 3 of 4"
+
+
+def test_the_code_of_a_run_is_that_of_server_robot_and_benchmark():
+    code = code_of(ROOT, ["benchmarks.experiments"], reads_of(ROOT, "experiments"))
+    folders = {
+        "benchmarks/experiments",
+        "trunkline/live",
+        "trunkline/execution",
+        "rehearsal/robot",
+        "conf/live",
+        "package",
+    }
+    assert folders <= set(code)

@@ -72,6 +72,7 @@ def state(mode):
     return WSMessage(WSMsgType.TEXT, json.dumps({"type": "state", "mode": mode}), None)
 
 
+@pytest.mark.realtime
 def test_a_press_lasts_until_the_state_shows_it(monkeypatch):
     monkeypatch.setattr("benchmarks.watching.AIMED", 0.05)
 

@@ -21,7 +21,7 @@ from trunkline.trials.splits import DECIDING, IDENTIFY, TEST
 from trunkline.trials.trial import Trial
 
 ASKED = Asked(
-    arm="small arm <of tests>", session="sample", seed=1, poses=12, arms=6, each=20, frames=40, factor=3.0,
+    arm="small arm <of tests>", session="sample", seed=1, poses=12, arms=6, each=20, covered=12, frames=40, factor=3.0,
     uses=[Use(1.0, "previewing reaches"), Use(3.0, "showing how it moves")],
 )  # fmt: skip
 INGESTED = {"trials": 9, "coverage": 0.99, "position_noise_mm": 0.3, "repairs": {"total": 0}}

@@ -1,31 +1,32 @@
 """What `ingest` and `filter` find in the recorded demo session, against its truth, which tests alone may read."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tests.support.folders import demo_with
 from trunkline.filtering.filter import Filter, filter_take
 from trunkline.sessions.session import read_session
 from trunkline.takes.agreement import align_clocks
 from trunkline.takes.checks import Limits
 from trunkline.takes.intake import take_in
 
-RAW = Path(__file__).parents[2] / "data/raw"
 TRIALS = ("curl_1_040", "curl_2_3_060", "motion_15_20_m2", "motion_5_40_1")
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
-pytestmark = pytest.mark.skipif(
-    not (RAW / "demo/session.yaml").is_file(), reason="data/raw/demo is not recorded here: `make demo`"
-)
 
 
 @pytest.fixture(scope="module")
-def found():
-    truth, session = json.loads((RAW / "demo.truth.json").read_text()), read_session(RAW / "demo")
+def raw():
+    return demo_with("data/raw/demo/session.yaml") / "data/raw"
+
+
+@pytest.fixture(scope="module")
+def found(raw):
+    truth, session = json.loads((raw / "demo.truth.json").read_text()), read_session(raw / "demo")
     chosen = [trial for trial in session.trials if trial.name in TRIALS]
-    taken = list(take_in(RAW / "demo", session.model_copy(update={"trials": chosen}), LIMITS))
+    taken = list(take_in(raw / "demo", session.model_copy(update={"trials": chosen}), LIMITS))
     takes, findings = [take for _, take, _ in taken], [findings for *_, findings in taken]
     assert {take.split for take in takes} == {"identify"}
     return truth, takes, findings, align_clocks(takes, findings, 0.1)
@@ -48,10 +49,10 @@ def test_curls_and_motions_begin_when_their_commands_do(found):
         assert abs(trial.start - truth["starts_s"][take.name]) < 3 * trial.start_sigma < 1 / 120
 
 
-def test_releases_begin_when_the_arm_is_let_go():
+def test_releases_begin_when_the_arm_is_let_go(raw):
     """The arm of the lab leaves as a long beam does, not as a mass on a spring."""
-    truth, session = json.loads((RAW / "demo.truth.json").read_text()), read_session(RAW / "demo")
+    truth, session = json.loads((raw / "demo.truth.json").read_text()), read_session(raw / "demo")
     chosen = [t for t in session.trials if t.experiment == "release" and t.split == "identify"]
-    for _, take, _ in take_in(RAW / "demo", session.model_copy(update={"trials": chosen}), LIMITS):
+    for _, take, _ in take_in(raw / "demo", session.model_copy(update={"trials": chosen}), LIMITS):
         trial, _ = filter_take(take, FILTER)
         assert abs(trial.start - truth["starts_s"][take.name]) < 2 * trial.start_sigma < 1 / 120

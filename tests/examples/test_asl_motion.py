@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from examples.asl_motion.session import COMMANDS, LOADS, OBSERVED, make_session
+from tests.support.folders import SHARED, with_recordings
 from trunkline.errors import InputError
 from trunkline.sessions.session import read_session
 from trunkline.sessions.source import open_log
 
-SHARED = Path(__file__).parents[3] / "shared" / "data" / "asl_trunk" / "actuated"
+RECORDED = SHARED / "asl_trunk/actuated"
 ROWS = 15_000
 
 
@@ -57,7 +58,6 @@ def test_files_that_do_not_belong_together_are_refused(source, tmp_path):
         make_session(tmp_path / "nowhere", tmp_path / "session")
 
 
+@with_recordings
 def test_the_public_recordings_are_as_expected(tmp_path):
-    if not SHARED.is_dir():
-        pytest.skip("needs the recordings in ../shared/data/asl_trunk/actuated")
-    assert make_session(SHARED, tmp_path / "session") == 12
+    assert make_session(RECORDED, tmp_path / "session") == 12

@@ -1,17 +1,16 @@
 """The example on real recordings: its session from logs or from the public CSV, and what the stages make of it."""
 
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from examples.asl_trunk.session import COLUMNS, SESSION, make_loaded_session, make_session, read_releases
+from examples.asl_trunk.session import COLUMNS, make_loaded_session, make_session, read_releases
+from tests.support.folders import SHARED, with_recordings
 from trunkline.errors import InputError
 from trunkline.sessions.session import read_session
 from trunkline.takes.checks import Limits
 from trunkline.takes.intake import take_in
 
-SHARED = Path(__file__).parents[3] / "shared" / "data" / "asl_trunk"
 LIMITS = Limits(0.5, 0.3, 0.1, 1.0)
 
 
@@ -89,15 +88,13 @@ def test_a_source_that_is_not_there_is_refused(tmp_path):
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
-    """The real recordings, from ../shared or from where the session was made."""
-    source = next((folder for folder in (SHARED, SESSION) if any(folder.glob("*.mcap"))), None)
-    if source is None:
-        pytest.skip("needs the recordings in ../shared/data/asl_trunk or examples/asl_trunk/data/raw/asl_trunk")
+    """The real recordings."""
     folder = tmp_path_factory.mktemp("asl") / "session"
-    make_session(source, folder)
+    make_session(SHARED / "asl_trunk", folder)
     return folder
 
 
+@with_recordings
 def test_the_csv_gives_the_very_logs_that_are_shared(recorded, tmp_path):
     session = read_session(recorded)
     lines = [",".join(COLUMNS)]
@@ -111,6 +108,7 @@ def test_the_csv_gives_the_very_logs_that_are_shared(recorded, tmp_path):
         assert (tmp_path / "session" / log.name).read_bytes() == log.read_bytes()
 
 
+@with_recordings
 def test_frames_that_the_recorder_lost_are_found_in_two_logs_of_thirteen(recorded):
     repairs = {take.name: found.repairs for _, take, found in take_in(recorded, read_session(recorded), LIMITS)}
     assert len(repairs) == 13

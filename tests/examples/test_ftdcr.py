@@ -8,6 +8,7 @@ import pytest
 
 from examples.ftdcr.session import COLUMNS, make_session, read_csv
 from stages.build_mjcf import Config, cad_arm
+from tests.support.folders import SHARED, with_recordings
 from trunkline.errors import InputError
 from trunkline.filtering.filter import Filter, filter_take
 from trunkline.pipeline.config import load_config
@@ -16,7 +17,6 @@ from trunkline.takes.checks import Limits
 from trunkline.takes.intake import take_in
 
 ROOT = Path(__file__).parents[2]
-SHARED = ROOT.parent / "shared" / "data" / "ftdcr_v4"
 LIMITS = Limits(0.5, 0.3, 0.1, 1.0)
 FILTER = Filter(rate=120.0, cutoff=20.0, order=4, longest_bridge=0.06, outlier_deviations=8.0, release="onset")
 
@@ -93,7 +93,6 @@ def test_tendons_end_where_the_description_says(monkeypatch):
     assert model.nu == 9
 
 
+@with_recordings
 def test_the_real_poses_are_read_whole():
-    if not SHARED.is_dir():
-        pytest.skip(f"no recordings in {SHARED}")
-    assert [len(read_csv(SHARED / f"{name}.csv")) for name in ("train", "val")] == [1620, 443]
+    assert [len(read_csv(SHARED / f"ftdcr_v4/{name}.csv")) for name in ("train", "val")] == [1620, 443]

@@ -5,7 +5,6 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -92,6 +91,7 @@ def joined(monkeypatch):
     arm.close()
 
 
+@pytest.mark.realtime
 def test_a_controller_hears_where_the_joints_shall_be(joined):
     arm, controller = joined
     np.testing.assert_array_equal(arm.sent, READY)
@@ -112,6 +112,7 @@ def test_a_controller_hears_where_the_joints_shall_be(joined):
     )
 
 
+@pytest.mark.realtime
 def test_silence_and_a_joint_astray_are_faults(joined):
     arm, controller = joined
     controller.turn()
@@ -124,6 +125,7 @@ def test_silence_and_a_joint_astray_are_faults(joined):
     assert arm.fault == "panda_joint4: found 0.2 rad from where it is sent, expected at most 0.1"
 
 
+@pytest.mark.realtime
 def test_no_controller_is_one_line(monkeypatch):
     monkeypatch.setenv("CYCLONEDDS_URI", f"<CycloneDDS><Domain>{LOOPBACK}</Domain></CycloneDDS>")
     monkeypatch.setattr(ros_arm, "CONNECTING", 0.05)
@@ -132,7 +134,6 @@ def test_no_controller_is_one_line(monkeypatch):
     assert arm.fault == "/joint_states: found no state of panda_joint1 and others within 0 s"
 
 
-@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="the names of threads are Linux's")
 def test_one_thread_receives_so_that_a_process_ends():
     """With one for each socket each reads until it has sent itself a packet, which never comes where a firewall drops
     it (eclipse-cyclonedds/cyclonedds, issue 1916). One for all is woken by a pipe: the default since pull request 1920.

@@ -5,7 +5,7 @@ import pytest
 
 from tests.support.matched_plant import FRAME, curl, release, segments_of, small_model, tilt
 from tests.support.small_arm import small_spec
-from tests.support.swings import FRAMES, LIKE, STEP, TIP, TIME, experiment, swing
+from tests.support.swings import FRAMES, LIKE, STEP, TIME, TIP, experiment, swing
 from trunkline.arm.holes import Holes, add_holes
 from trunkline.arm.joints import Branch, Joints, Slider, add_elements
 from trunkline.elements import arm_hinges, cables

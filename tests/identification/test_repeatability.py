@@ -6,16 +6,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.support.matched_plant import release, small_model
+from tests.support.folders import SHARED, with_recordings
+from tests.support.matched_plant import release, small_model, tilt
 from trunkline.filtering.filter import filter_take
 from trunkline.frames import gravity_in_base
-from trunkline.identification.repeatability import end_shape, repeatability
+from trunkline.identification.repeatability import (
+    SAME_GRAVITY,
+    SAME_LOAD,
+    SAME_PULL,
+    _same,
+    end_shape,
+    repeatability,
+)
+from trunkline.identification.resting import LAST
 from trunkline.pipeline.config import settings_of
 from trunkline.sessions.session import read_session
 from trunkline.takes.intake import take_in
 
 ROOT = Path(__file__).parents[2]
-SHARED = ROOT.parent / "shared" / "data" / "asl_trunk"
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +70,50 @@ def test_only_trials_that_end_alike_are_compared(still):
     assert "release" in repeatability([*three[:2], slack], tip=3)
 
 
+@pytest.mark.parametrize(
+    ("change", "alike"),
+    [
+        ({}, True),
+        ({"gravity": np.array([SAME_GRAVITY * 0.99, 0, 0])}, True),
+        ({"gravity": np.array([0, -SAME_GRAVITY * 1.01, 0])}, False),
+        ({"load": 0.99 * SAME_LOAD}, True),
+        ({"load": 1.01 * SAME_LOAD}, False),
+        ({"session": "another"}, False),
+        ({"commands": np.array([[0, 0, 0.0], [0, 0.99 * SAME_PULL, 0]])}, True),
+        ({"commands": np.array([[0, 0, 0.0], [0, 1.01 * SAME_PULL, 0]])}, False),
+        ({"commands": np.array([[0, 0, 0.02], [0, 0, 0.0]])}, True),  # what was pulled before is over
+        ({"commands": np.array([[0, 0, 0.0], [0, -0.3, -0.1]])}, True),  # slack is slack
+        ({"tendons": ("a", "b", "other")}, False),
+        ({"tendons": ()}, False),
+    ],
+)
+@pytest.mark.parametrize("turned", [False, True])
+def test_each_of_what_acts_on_the_arm_tells_ends_apart(change, alike, turned):
+    """By itself, up to its own tolerance, whichever of two trials comes first."""
+    at_rest = tilt(small_model(4), 0)
+    plain = replace(at_rest, tendons=("a", "b", "c"), commands=np.zeros((2, 3)), gravity=np.zeros(3))
+    other = replace(plain, **change)
+    assert _same(*((other, plain) if turned else (plain, other))) is alike
+
+
+def test_without_tendons_trials_that_are_otherwise_alike_are(still):
+    bare = replace(still, tendons=(), commands=np.zeros((2, 0)))
+    assert _same(bare, replace(bare, name="another"))
+
+
+@pytest.mark.parametrize(
+    ("range_mm", "long", "ended"),
+    [(0.0, LAST, True), (1.99, LAST, True), (2.01, LAST, False), (0.0, 0.98 * LAST, False)],
+)
+def test_a_trial_has_ended_that_was_still_for_long_enough(still, range_mm, long, ended):
+    """Every coordinate of every segment within 2 mm in its last half second, all of it after the start."""
+    positions = still.positions.copy()
+    positions[-30, 2, 1] += range_mm / 1e3
+    positions[: len(positions) // 2, 0, 0] += 0.1
+    found = end_shape(replace(still, positions=positions, start=still.time[-1] - long - 1e-9))
+    assert (found is not None) is ended
+
+
 def test_an_arm_that_still_moves_has_not_ended(still):
     swing = still.positions.copy()
     swing[:, -1, 0] += 0.0015 * np.sin(20 * still.time)
@@ -74,9 +126,9 @@ def test_an_arm_that_still_moves_has_not_ended(still):
     assert np.isfinite(shape[[0, 2, 3]]).all()
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="needs ../shared/data/asl_trunk")
+@with_recordings
 def test_a_real_hose_comes_to_rest_elsewhere_each_time(tmp_path):
-    for log in SHARED.glob("*.mcap"):
+    for log in (SHARED / "asl_trunk").glob("*.mcap"):
         (tmp_path / log.name).symlink_to(log)
     (tmp_path / "session.yaml").write_text((ROOT / "examples/asl_trunk/session.yaml").read_text())
     limits, settings = settings_of("ingest", ROOT).limits, settings_of("filter", ROOT / "examples/asl_trunk")

@@ -60,6 +60,7 @@ def test_least_squares_takes_the_best_of_its_starts(problem):
 def test_the_linearisation_where_a_descent_ends_is_that_of_central_differences(problem):
     found = descend(problem, problem.start() + [0.3, -0.2], 10, 1e-9, quiet)
     assert found.converged
+    assert not descend(problem, problem.start() + [0.3, -0.2], 1, 1e-9, quiet).converged
     linear = linearise(problem, found.vector)
     step = 3e-4
     for column in range(2):

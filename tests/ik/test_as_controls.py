@@ -103,6 +103,10 @@ def test_the_score_has_the_rig_beside_the_model(model, chain):
     taut = on_model["all_taut"]
     assert taut["targets"] + sum(taut["left_out"].values()) == 12 // 8
     assert on_plant["targets"] == 4
+    assert "rested" not in on_plant, "nobody looked whether the rig's arm was at rest"
+    assert set(on_plant["position_error_mm"]) == {"median", "p95", "max"}
+    assert {"beyond_1pct", "beyond_1pct_unsaid"} <= set(on_plant)
+    assert "rested" in on_model["friction"], "of the model it is known"
     assert 0.5 < on_plant["position_error_mm"]["median"] < 1.5
     assert on_model["frictionless"]["position_error_mm"]["max"] < 0.02
     assert on_model["friction"]["dry_friction"]["tendons_n"] == model.tendon_frictionloss.max() > 0

@@ -79,6 +79,12 @@ def test_what_did_not_rest_is_counted_as_a_share():
     assert "seconds_to_rest" not in found
 
 
+def test_of_rest_that_nobody_looked_at_nothing_is_said():
+    """As of an arm on which a rig sends commands and gives back tips."""
+    found = Reached(np.zeros(2), np.zeros(2, bool), np.full(2, np.nan)).metrics(LENGTH)
+    assert not {"rested", "seconds_to_rest"} & set(found)
+
+
 @pytest.mark.parametrize(
     ("seconds", "median", "late"),
     [
@@ -142,14 +148,14 @@ def test_lengths_beyond_the_motors_force_are_those_of_any_tendon_at_an_equilibri
 
 @pytest.mark.parametrize("end", [np.nan, np.inf])
 def test_a_drive_that_ends_nowhere_is_a_miss_not_a_hit(end, monkeypatch):
-    """From the simulator to the metric: the first of two arms is lost on its way."""
-    targets = np.tile([0.0, 0, 0, -0.4, 1, 0, 0, 0], (2, 1))
-    tips = np.array([[end, end, end], [0.0, 0.0, -0.401]])
-    model = SimpleNamespace(actuator_trnid=np.zeros((3, 1), int) + np.arange(3)[:, None])
-    answer = {"commands": np.zeros((2, 3)), "doubtful": np.zeros(2, bool)}
-    rested = np.isfinite(tips[:, 0])
-    driven = SimpleNamespace(end=tips, seconds_to_rest=np.where(rested, 2.0, np.nan), rested=rested)
-    monkeypatch.setattr(as_controls, "drive", lambda *_, **__: driven)
+    """From the simulator to the metric: of three arms the first is lost on its way, the last still moves."""
+    targets = np.tile([0.0, 0, 0, -0.4, 1, 0, 0, 0], (3, 1))
+    tips = np.array([[end, end, end], [0.0, 0.0, -0.401], [0.0, 0.0, -0.402]])
+    model = SimpleNamespace(actuator_trnid=np.arange(3)[:, None])
+    answer = {"commands": np.zeros((3, 3)), "doubtful": np.zeros(3, bool)}
+    rested = np.array([False, True, False])
+    ends = SimpleNamespace(end=tips, seconds_to_rest=np.where(rested, 2.0, np.nan), rested=rested)
+    monkeypatch.setattr(as_controls, "drive", lambda *_, **__: ends)
     monkeypatch.setattr(as_controls, "settle", lambda *_: SimpleNamespace(position=tips, rested=rested))
     for found in (
         as_controls.driven(model, lambda _: answer, targets, 5.0),
@@ -158,4 +164,4 @@ def test_a_drive_that_ends_nowhere_is_a_miss_not_a_hit(end, monkeypatch):
         metrics = found.metrics(LENGTH)
         assert metrics["position_error_mm"]["max"] == 500
         assert metrics["beyond_1pct_unsaid"] == 1
-        assert metrics["rested"] == 0.5
+        assert metrics["rested"] == pytest.approx(1 / 3)

@@ -35,8 +35,9 @@ def drawn(model, chain, count):
 
 
 @pytest.mark.parametrize(
-    ("share", "kept"), [(0.0, True), (0.5, True), (0.9, True), (0.94, True), (0.96, False), (1.0, False), (1.2, False),
-                        (np.nan, False)]
+    ("share", "kept"),
+    [(0.0, True), (0.5, True), (0.9, True), (0.94, True), (as_controls.NEAR_LIMIT, False), (0.96, False), (1.0, False),
+     (1.2, False), (np.nan, False)],
 )  # fmt: skip
 @pytest.mark.parametrize("motor", range(3))
 def test_only_poses_in_which_a_motor_is_all_but_at_its_limit_are_left_out(model, chain, rests, share, kept, motor):
@@ -100,8 +101,8 @@ def test_where_none_pays_out_the_others_stay(chain):
 
 
 def test_the_score_asks_for_nearly_all_that_the_samples_reach(model, chain, monkeypatch):
-    """Pulls up to four fifths of their deepest, from where two of them are near the motors' limits; where all motors
-    pull, a fifth, and no motor pays out. With less, the targets would be near the straight arm, and the score better."""
+    """Pulls up to four fifths of their deepest, where two of them are near the motors' limits; where all motors pull, a
+    fifth, and no motor pays out. With less, targets would be near the straight arm, and the score better."""
     asked = []
 
     def settle(model, commands, *rest):

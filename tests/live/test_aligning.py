@@ -441,6 +441,7 @@ class Headset(Hands):
         return next(told for told in reversed(self.said) if told["type"] == "aligning")
 
 
+@pytest.mark.realtime
 def test_a_headset_is_aligned_over_the_network_and_its_anchor_brings_it_back(tmp_path):
     async def session():
         anchors = Anchors(tmp_path / "anchors.json")
@@ -488,6 +489,7 @@ def test_a_headset_is_aligned_over_the_network_and_its_anchor_brings_it_back(tmp
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_an_alignment_that_is_not_good_enough_executes_nothing():
     async def session():
         async with laid() as here:
@@ -506,6 +508,7 @@ def test_an_alignment_that_is_not_good_enough_executes_nothing():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_browser_is_asked_for_none_of_it():
     async def session():
         async with laid() as here:

@@ -57,6 +57,7 @@ def test_the_lock_names_no_host_and_its_packages_are_pinned():
     assert all("integrity" in package for name, package in packages.items() if name)
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("file", sorted(CLIENT.glob("test/*.test.mjs")), ids=lambda file: Path(file.stem).stem)
 def test_in_node_and_in_a_browser(file):
     name = Path(file.stem).stem

@@ -12,7 +12,7 @@ from tests.teleop.test_plan import OFFSET, START, STRAIGHT
 from trunkline.foresight.believing import make_world
 from trunkline.live import talk
 from trunkline.live.book import Book
-from trunkline.live.hindsight import executions, lines, main
+from trunkline.live.hindsight import Execution, _end, _held, _holds, executions, lines, main
 from trunkline.live.journal import Journal
 from trunkline.live.logbook import read_logbook
 from trunkline.live.robot import Standing
@@ -156,3 +156,100 @@ def test_where_nothing_was_executed_nothing_is_said(tmp_path):
     book.events[:] = refused
     assert list(executions(book)) == []
     assert lines([]) == ["0 executed"]
+
+
+# --- verdicts by themselves
+
+
+def world_of(*supports):
+    return {"event": "world", "world": {"things": [{"support": support} for support in supports]}}
+
+
+REQUEST, OTHER = {"event": "request"}, {"event": "mode"}
+
+HELD = [
+    ([], [], False),
+    ([world_of("hanging")], [], False),
+    ([world_of("hanging")], [world_of("held")], True),
+    ([world_of("hanging")], [OTHER, world_of("held")], True),
+    ([world_of("hanging")], [world_of("hanging", "held")], True),
+    ([world_of("hanging")], [world_of("standing")], False),
+    ([world_of("hanging")], [world_of("held"), world_of("hanging")], False),  # it fell
+    ([world_of("hanging")], [REQUEST, world_of("held")], False),  # by the next plan
+    ([world_of("hanging")], [world_of("held"), REQUEST, world_of("hanging")], True),
+    ([world_of("held")], [], True),
+    ([world_of("held")], [world_of("standing")], False),
+    ([world_of("hanging"), world_of("held")], [OTHER], True),
+    ([world_of("held"), world_of("hanging")], [], False),
+    ([world_of()], [world_of()], False),
+]
+
+
+@pytest.mark.parametrize(("before", "later", "expected"), HELD)
+def test_what_came_of_a_grasp(before, later, expected):
+    assert _held(before, later) == expected
+
+
+@pytest.mark.parametrize(
+    ("events", "expected"),
+    [([], False), ([OTHER], False), ([world_of("held")], True), ([world_of("held"), world_of("hanging")], False),
+     ([world_of("hanging"), world_of("held"), OTHER], True), ([world_of("standing", "hanging")], False)],
+)  # fmt: skip
+def test_whether_the_arm_holds_anything(events, expected):
+    assert _holds(events) == expected
+
+
+def executed(probability, held, within=None, seen=True):
+    return Execution(DIGEST, 1.0, "done", 0.0, np.nan, np.nan, np.nan, within, probability, held, seen)
+
+
+@pytest.mark.parametrize(
+    ("probability", "held", "said"),
+    [
+        (1.0, True, "outcome as foreseen in 1 of 1, Brier score 0.000"),
+        (1.0, False, "outcome as foreseen in 0 of 1, Brier score 1.000"),
+        (0.0, True, "outcome as foreseen in 0 of 1, Brier score 1.000"),
+        (0.0, False, "outcome as foreseen in 1 of 1, Brier score 0.000"),
+        (0.5, True, "outcome as foreseen in 1 of 1, Brier score 0.250"),
+        (0.5, False, "outcome as foreseen in 0 of 1, Brier score 0.250"),
+        (0.499, True, "outcome as foreseen in 0 of 1, Brier score 0.251"),
+        (0.499, False, "outcome as foreseen in 1 of 1, Brier score 0.249"),
+        (None, True, ""),
+        (0.9, None, ""),
+    ],
+)
+def test_whether_the_outcome_agreed_with_what_was_foreseen(probability, held, said):
+    """An execution that nothing was foreseen of, or that was not tried to its end, is not judged, beside others."""
+    last = lines([executed(probability, held), executed(None, None), executed(0.7, None)])[-1]
+    assert last == "3 executed" + ("; " + said if said else "")
+
+
+def test_scores_are_of_all_that_are_judged():
+    last = lines([executed(0.9, True, True), executed(0.2, True, False), executed(0.1, False), executed(0.6, True)])[-1]
+    assert last == ("4 executed; 1 of 2 tips ended within the spread; outcome as foreseen in 3 of 4, Brier score 0.205")
+
+
+RAN = {"event": "robot", "time": 1.0, "robot": {"mode": "running", "digest": DIGEST, "fault": ""}}
+
+
+def robot(mode, digest=DIGEST, fault="", time=2.0):
+    return RAN | {"time": time, "robot": {"mode": mode, "digest": digest, "fault": fault}}
+
+
+@pytest.mark.parametrize(
+    ("later", "end", "until"),
+    [
+        ([], "the log ends", 9.0),
+        ([RAN], "the log ends", 9.0),
+        ([RAN, robot("done")], "done", 9.0),
+        ([RAN, robot("idle")], "held", 2.0),
+        ([robot("idle", ""), RAN, robot("done")], "done", 9.0),  # on its way, a start reads as idle, of no plan
+        ([RAN, robot("fault", fault="reflex")], "reflex", 2.0),
+        ([RAN, robot("fault")], "fault", 2.0),
+        ([RAN, robot("idle"), robot("fault", fault="reflex", time=3.0)], "held", 2.0),
+        ([RAN, {"event": "execute", "time": 4.0}, robot("done")], "the log ends", 4.0),
+        ([RAN, robot("done"), {"event": "execute", "time": 4.0}], "done", 4.0),
+    ],
+)
+def test_how_a_plan_ended(later, end, until):
+    assert _end(later, DIGEST, 9.0) == (end, until)

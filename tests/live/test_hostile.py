@@ -14,6 +14,7 @@ from tests.teleop.test_plan import MOUNT, TIP
 from trunkline.live.access import CODE_SECONDS, HEADERS, Origins, PairingCode
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "", "http://127.0.0.1:1", "https://127.0.0.1"])
 def test_another_origin_does_not_come_in(origin):
     async def session():
@@ -27,6 +28,7 @@ def test_another_origin_does_not_come_in(origin):
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_no_origin_and_another_host_do_not_come_in():
     async def session():
         async with laid() as here:
@@ -42,6 +44,7 @@ def test_no_origin_and_another_host_do_not_come_in():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize(
     ("hello", "word"),
     [
@@ -62,6 +65,7 @@ def test_a_wrong_hello_ends_the_connection_and_says_why(hello, word):
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_who_says_nothing_is_shown_out():
     async def session():
         async with laid() as here:
@@ -87,6 +91,7 @@ def test_a_pairing_code_opens_once_and_ends_by_tries_and_time():
     assert code.fault(code.renew(0.0), CODE_SECONDS + 1.0)
 
 
+@pytest.mark.realtime
 def test_a_pairing_code_lets_in_and_gives_the_token():
     async def session():
         async with laid() as here:
@@ -97,6 +102,7 @@ def test_a_pairing_code_lets_in_and_gives_the_token():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("message", [
     bytes(10_000_000), b"\x10", b"", struct.pack("<BBHId", 99, 0, 0, 0, 0.0), "x" * 10_000_000, "{", '{"type": "go"}',
     '{"type": "execute", "digest": "' + "a" * 64 + '"}',
@@ -119,6 +125,7 @@ def test_what_is_no_message_ends_the_connection_and_nothing_else(message):
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("number", [math.nan, math.inf, 3e38])
 def test_poses_that_are_no_numbers_hold_the_robot(number):
     async def session():
@@ -138,6 +145,7 @@ def test_poses_that_are_no_numbers_hold_the_robot(number):
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_confirmation_that_is_sent_again_is_refused_and_moves_nothing():
     async def session():
         async with laid() as here:
@@ -165,6 +173,7 @@ def test_a_confirmation_that_is_sent_again_is_refused_and_moves_nothing():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_an_input_that_is_sent_again_at_once_counts_once():
     async def session():
         async with laid() as here:
@@ -178,6 +187,7 @@ def test_an_input_that_is_sent_again_at_once_counts_once():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_preview_that_was_not_shown_is_not_taken_for_shown():
     async def session():
         async with laid() as here:
@@ -199,6 +209,7 @@ def test_a_preview_that_was_not_shown_is_not_taken_for_shown():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_preview_lasts_as_long_as_it_lasts():
     async def session():
         async with laid() as here:
@@ -212,6 +223,7 @@ def test_a_preview_lasts_as_long_as_it_lasts():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_second_client_moves_nothing():
     async def session():
         async with laid() as here:
@@ -230,6 +242,7 @@ def test_a_second_client_moves_nothing():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_clock_that_jumps_holds_the_robot():
     async def session():
         async with laid() as here:
@@ -243,6 +256,7 @@ def test_a_clock_that_jumps_holds_the_robot():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_input_does_not_count_before_the_clock_is_known():
     async def session():
         async with laid() as here:
@@ -254,6 +268,7 @@ def test_input_does_not_count_before_the_clock_is_known():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_only_the_page_s_own_files_are_served_with_every_header(tmp_path):
     page = tmp_path / "page"
     page.mkdir()
@@ -281,6 +296,7 @@ def test_only_the_page_s_own_files_are_served_with_every_header(tmp_path):
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_without_a_page_there_is_one_line():
     async def session():
         async with laid() as here:

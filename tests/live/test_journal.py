@@ -108,6 +108,7 @@ def core(**changes):
     return Teleoperation(replace(UNHURRIED, **changes), Everywhere(), PACKAGE, OFFSET)
 
 
+@pytest.mark.realtime
 def test_the_core_goes_through_a_log_again_to_the_same_bytes(log):
     logbook = read_logbook(log)
     assert logbook.damage == []
@@ -117,6 +118,7 @@ def test_the_core_goes_through_a_log_again_to_the_same_bytes(log):
     assert replay.replay(logbook.steps, found) is None
 
 
+@pytest.mark.realtime
 def test_the_first_difference_is_named_by_time_and_field(log):
     steps = read_logbook(log).steps
     aiming = next(n for n, step in enumerate(steps) if b'"mode":"aim"' in step.intent and b'"targets":{' in step.intent)
@@ -132,6 +134,7 @@ def test_the_first_difference_is_named_by_time_and_field(log):
     assert (found.field, found.found, found.expected) == ("countdown", 0.25, 0.5)
 
 
+@pytest.mark.realtime
 def test_a_log_of_another_package_or_of_no_session_is_refused_by_name(log, tmp_path):
     with pytest.raises(InputError, match="package: found digest bbbbbbbbbbbb, expected aaaaaaaaaaaa"):
         replay.core_of(read_logbook(log), "b" * 64, Everywhere())
@@ -141,6 +144,7 @@ def test_a_log_of_another_package_or_of_no_session_is_refused_by_name(log, tmp_p
         read_logbook(path)
 
 
+@pytest.mark.realtime
 def test_ingest_sees_the_arm_whole_and_takes_no_hand_for_it(log, capsys):
     assert inspect([str(log)]) == 0
     said, proposed = capsys.readouterr().out.split("Proposed session.yaml:\n")
@@ -259,6 +263,7 @@ def test_with_motion_capture_merged_into_it_a_real_session_is_one_to_identify_fr
     np.testing.assert_allclose(far[there], true[: len(far)][there], atol=1e-3)
 
 
+@pytest.mark.realtime
 def test_a_log_says_what_of_its_robot_is_real(log):
     assert read_logbook(log).begin["hardware"] == "simulated"
     found = hardware_of("fr3", "simulated", "", "", load_folder(Execution, PROJECT / "conf/execution"))
@@ -267,6 +272,7 @@ def test_a_log_says_what_of_its_robot_is_real(log):
     assert subject_of(simulation()).poses == POSES
 
 
+@pytest.mark.realtime
 def test_events_tell_who_controlled_what_was_planned_and_how_it_ended(log):
     events = read_logbook(log).events
     kinds = [event["event"] for event in events]
@@ -281,6 +287,7 @@ def test_events_tell_who_controlled_what_was_planned_and_how_it_ended(log):
     assert [e["robot"]["mode"] for e in events if e["event"] == "robot"] == ["idle", "running", "done"]
 
 
+@pytest.mark.realtime
 def test_others_read_it_as_ros_2(log):
     with open(log, "rb") as file:
         found = {}
@@ -341,6 +348,7 @@ def until(happens, seconds=20.0):
         time.sleep(0.01)
 
 
+@pytest.mark.realtime
 def test_a_process_that_is_killed_loses_less_than_a_second_and_says_so(tmp_path):
     path = tmp_path / "run.mcap"
     journal = JournalProcess(path, SUBJECT, PERIOD)
@@ -375,6 +383,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.realtime
 def test_a_process_that_hangs_is_a_fault_before_more_than_a_second_is_lost(tmp_path):
     path = tmp_path / "run.mcap"
     journal = JournalProcess(path, SUBJECT, 0.5)
@@ -402,6 +411,7 @@ def test_a_process_that_hangs_is_a_fault_before_more_than_a_second_is_lost(tmp_p
     assert longest < 0.05
 
 
+@pytest.mark.realtime
 def test_a_process_that_stalls_for_a_moment_is_no_fault(tmp_path):
     path = tmp_path / "run.mcap"
     journal = JournalProcess(path, SUBJECT, 0.5)
@@ -433,6 +443,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.realtime
 def test_a_machine_that_stands_still_as_a_whole_is_no_fault(tmp_path):
     script = tmp_path / "session.py"
     script.write_text(STILL)
@@ -463,6 +474,7 @@ def test_a_session_waits_until_its_log_has_begun(tmp_path, monkeypatch):
     hangs.close()
 
 
+@pytest.mark.realtime
 def test_where_the_session_itself_is_killed_its_log_is_ended_as_it_should(tmp_path):
     path, script = tmp_path / "run.mcap", tmp_path / "session.py"
     script.write_text(SESSION)
@@ -483,6 +495,7 @@ def test_a_session_that_ends_leaves_a_whole_file(tmp_path):
     assert not journal.fault
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("opened", [full, filling])
 def test_a_full_disk_is_said_in_one_line_and_what_was_written_stays(tmp_path, opened):
     path = tmp_path / "run.mcap"
@@ -503,6 +516,7 @@ def test_a_full_disk_is_said_in_one_line_and_what_was_written_stays(tmp_path, op
         assert damage != []
 
 
+@pytest.mark.realtime
 def test_a_disk_that_does_not_answer_delays_nobody(tmp_path, monkeypatch):
     monkeypatch.setattr("trunkline.live.journal.MOST", 200)
     monkeypatch.setattr("trunkline.live.journal.PATIENCE", 0.1)
@@ -525,6 +539,7 @@ class Failing(Journal):
     fault = ""
 
 
+@pytest.mark.realtime
 def test_where_the_log_ends_nothing_new_is_executed_and_all_are_told():
     async def session():
         journal = Failing()
@@ -546,6 +561,7 @@ def test_where_the_log_ends_nothing_new_is_executed_and_all_are_told():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_where_the_log_ends_a_robot_under_way_holds():
     async def session():
         journal = Failing()

@@ -127,7 +127,9 @@ def test_without_a_permit_it_brakes_after_so_long_and_goes_on_by_none(played):
     assert played.robot._pace < 1.0
     held = played.told[0][HELD]
     assert DEAD_MAN <= held - (BEGINS + 0.5) + NEAR < DEAD_MAN + 2 * TICK
-    played.turn(BRAKE + TICK)  # permitted again
+    played.turn(BRAKE / 2, permits=False)
+    assert played.told[0][HELD] == held  # when it was told to hold, not since when it rests
+    played.turn(BRAKE)  # permitted again
     assert played.mode == "idle"
     assert played.told[0][HELD] == held
     assert played.rests()
@@ -276,7 +278,8 @@ def tell(robot, clock, mode="idle", serial=0, ago=0.0, ready=True, fault="", joi
         ({"mode": "fault", "fault": "reflex"}, True, ExecutorReport("fault", "", "reflex")),
         ({"mode": "idle", "fault": "reflex"}, True, ExecutorReport("idle", "")),
         ({"mode": "running", "ago": STALE - NEAR}, True, ExecutorReport("running", "")),
-        ({"mode": "running", "ago": STALE + NEAR}, True, ExecutorReport("fault", "", "its process is silent for 0.15 s")),
+        ({"mode": "running", "ago": STALE + NEAR}, True,
+         ExecutorReport("fault", "", "its process is silent for 0.15 s")),
         ({"mode": "running", "ago": 1.0}, True, ExecutorReport("fault", "", "its process is silent for 1.00 s")),
         ({"mode": "running", "ago": 1.0, "ready": False}, True, ExecutorReport("running", "")),
         ({"mode": "running"}, False, ExecutorReport("fault", "", "its process has ended")),

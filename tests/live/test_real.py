@@ -254,6 +254,7 @@ def robot():
     found.close()
 
 
+@pytest.mark.realtime
 def test_a_session_runs_a_plan_on_it_and_draws_it(robot):
     s, now = simulation(), robot.standing()
     here = np.append(now.joints, now.commands)
@@ -299,6 +300,7 @@ def test_a_pursuit_is_there_once_it_has_come_to_where_the_machine_stays():
     np.testing.assert_allclose(pursuit.here, rest + 0.05, atol=1e-9)
 
 
+@pytest.mark.realtime
 def test_a_twin_that_hangs_is_a_fault_while_it_does(robot):
     """Or a picture at rest would be taken for the robot's."""
     os.kill(robot._twin.pid, signal.SIGSTOP)
@@ -308,12 +310,14 @@ def test_a_twin_that_hangs_is_a_fault_while_it_does(robot):
     until(lambda: robot.state().mode != "fault")
 
 
+@pytest.mark.realtime
 def test_without_its_twin_nothing_is_permitted(robot):
     robot._twin.kill()
     until(lambda: robot.state().mode == "fault")
     assert robot.state().fault == "its process has ended"
 
 
+@pytest.mark.realtime
 def test_a_machine_that_is_not_there_ends_before_it_begins():
     named = hardware_of("simulated", "gm6020", "nowhere0", "", load_folder(Config, PROJECT / "conf/execution"))
     found = RealRobot(named, simulation())

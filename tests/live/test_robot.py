@@ -102,6 +102,7 @@ def until(happens, seconds=5.0, each=lambda: None):
         time.sleep(0.005)
 
 
+@pytest.mark.realtime
 def test_a_robot_whose_session_ends_comes_to_rest_on_its_way_first():
     s = simulation()
     found = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
@@ -127,6 +128,7 @@ def back(robot):
     return found
 
 
+@pytest.mark.realtime
 def test_it_runs_a_plan_to_its_end_while_it_is_permitted(robot):
     found = back(robot)
     until(lambda: robot.state().mode == "done", 20.0, robot.permit)
@@ -151,6 +153,7 @@ def test_a_log_is_about_the_simulated_robot():
     np.testing.assert_allclose(tip_path(np.append(body.xpos, body.xquat)[None], found.tip[1])[0], data.site("tip").xpos)
 
 
+@pytest.mark.realtime
 def test_it_holds_when_it_is_stopped_and_goes_on_by_no_permit(robot):
     back(robot)
     pressed = time.monotonic()
@@ -165,6 +168,7 @@ def test_it_holds_when_it_is_stopped_and_goes_on_by_no_permit(robot):
     np.testing.assert_array_equal(robot.standing().joints, kept)
 
 
+@pytest.mark.realtime
 def test_it_holds_when_nobody_says_that_it_may_go_on(robot):
     back(robot)
     silent = time.monotonic()
@@ -184,6 +188,7 @@ def hearing(robot, axes, seconds):
         time.sleep(0.01)
 
 
+@pytest.mark.realtime
 def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(robot):
     now = robot.standing()
     here = np.append(now.joints, now.commands)
@@ -209,6 +214,7 @@ def test_it_follows_what_it_hears_a_delay_later_and_brakes_when_it_is_stopped(ro
     np.testing.assert_array_equal(robot.standing().joints, kept)
 
 
+@pytest.mark.realtime
 def test_a_stop_before_a_plan_has_come_counts(robot):
     s, now = simulation(), robot.standing()
     here = np.append(now.joints, now.commands)
@@ -220,6 +226,7 @@ def test_a_stop_before_a_plan_has_come_counts(robot):
     np.testing.assert_allclose(robot.standing().joints, now.joints, atol=2e-3)
 
 
+@pytest.mark.realtime
 def test_another_digest_or_package_does_not_run(robot):
     now = robot.standing()
     rows = np.tile(now.joints, (3, 1)), np.tile(now.commands, (3, 1))
@@ -230,6 +237,7 @@ def test_another_digest_or_package_does_not_run(robot):
     assert robot.state().mode != "running"
 
 
+@pytest.mark.realtime
 def test_a_process_that_ends_is_a_fault():
     s = simulation()
     found = RobotProcess(simulated.run, (s,), len(s.commands), len(s.bodies), s.limits, s.package)
@@ -258,6 +266,7 @@ class Still:
         return np.zeros(3)
 
 
+@pytest.mark.realtime
 def test_where_its_server_is_gone_it_brakes_along_the_plan_before_it_ends():
     s, gone = simulation(), -1
     channel = Channel(multiprocessing.get_context("spawn"), 3, 0)

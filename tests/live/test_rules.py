@@ -12,10 +12,13 @@ from hypothesis import strategies as st
 from tests.support.links import clock_error
 from trunkline.errors import InputError
 from trunkline.live.__main__ import parsed
+from trunkline.live.access import CODE_SECONDS, CODE_TRIES, PairingCode
 from trunkline.live.certificate import fingerprint, make_certificate, tls_context
-from trunkline.live.clock import JUMP, LATEST, PINGS, ClientClock
+from trunkline.live.clock import FORWARD, JUMP, LATEST, PINGS, ClientClock
 from trunkline.live.lease import SILENCE, Control
 from trunkline.live.outbox import MOST_SAID, WINDOW, Outbox
+
+NEAR = 1e-6  # s, to either side of a border
 
 
 def test_the_offset_is_that_of_the_smallest_round_trip():
@@ -48,6 +51,77 @@ def test_what_comes_late_does_not_count_nor_anything_over_a_link_that_is_slow():
     for now in range(PINGS):
         clock.pong(clock.ping(float(now)), now + 0.4, now + 0.8)
     assert clock.fault(100.0, 100.0) == "input: there and back takes 0.80 s, expected at most 0.25 s"
+
+
+def told(round_trip=0.0) -> ClientClock:
+    """A clock whose offset is known, 0 s."""
+    clock = ClientClock()
+    for now in range(PINGS):
+        clock.pong(clock.ping(float(now)), now + round_trip / 2, now + round_trip)
+    return clock
+
+
+@pytest.mark.parametrize(
+    ("late", "said"),
+    [
+        (0.0, ""),
+        (-FORWARD + NEAR, ""),
+        (-FORWARD - NEAR, "input: its stamp is 0.05 s ahead; the clock has jumped"),
+        (LATEST - NEAR, ""),
+        (LATEST + NEAR, "input: it comes 0.25 s late, expected at most 0.25 s"),
+        (JUMP - NEAR, "input: it comes 1.00 s late, expected at most 0.25 s"),
+        (JUMP + NEAR, "input: its stamp is 1 s old; the clock has jumped"),
+    ],
+)
+def test_how_late_or_ahead_an_input_may_be(late, said):
+    assert told().fault(100.0 - late, 100.0) == said
+
+
+@pytest.mark.parametrize(("trip", "counts"), [(LATEST - NEAR, True), (LATEST + NEAR, False)])
+def test_how_long_the_way_there_and_back_may_be(trip, counts):
+    assert (told(trip).fault(100.0, 100.0) == "") == counts
+
+
+def test_before_a_round_is_over_no_input_counts():
+    clock = ClientClock()
+    for now in range(PINGS):
+        assert clock.fault(100.0, 100.0) == "input: the clock's offset is not known yet"
+        clock.pong(clock.ping(float(now)), float(now), float(now))
+    assert clock.fault(100.0, 100.0) == ""
+
+
+@pytest.mark.parametrize(("silent", "ends"), [(SILENCE - NEAR, False), (SILENCE + NEAR, True)])
+def test_a_lease_ends_by_its_holders_silence_alone(silent, ends):
+    """Counted from its last input, or from when the lease began; of nobody's nothing ends."""
+    control = Control()
+    assert not control.silent(1e9)
+    control.ask("a", 100.0)
+    assert control.silent(100.0 + silent) == ends
+    control = Control()
+    control.ask("a", 90.0)
+    assert control.hear("a", 100.0)
+    assert not control.hear("b", 105.0)
+    assert not control.hear("", 105.0)
+    assert control.silent(100.0 + silent) == ends
+    assert control.holder == ("" if ends else "a")
+
+
+@pytest.mark.parametrize(("late", "opens"), [(CODE_SECONDS - NEAR, True), (CODE_SECONDS + NEAR, False)])
+def test_a_pairing_code_opens_once_within_its_time(late, opens):
+    code = PairingCode()
+    assert code.fault("", 0.0).startswith("code: it is over")
+    digits = code.renew(100.0)
+    assert (code.fault(digits, 100.0 + late) == "") == opens
+    assert code.fault(digits, 100.0).startswith("code: it is over") == opens
+
+
+def test_a_pairing_code_bears_so_many_tries():
+    for wrong in (CODE_TRIES - 1, CODE_TRIES):
+        code = PairingCode()
+        digits = code.renew(100.0)
+        for left in range(1, wrong + 1):
+            assert code.fault("x", 100.0) == f"code: wrong, {CODE_TRIES - left} tries left"
+        assert (code.fault(digits, 100.0) == "") == (wrong < CODE_TRIES)
 
 
 STEP = st.tuples(

@@ -59,6 +59,7 @@ async def executing(here, guest):
     return found
 
 
+@pytest.mark.realtime
 def test_from_hands_to_a_robot_that_has_arrived():
     async def session():
         async with laid() as here:
@@ -77,6 +78,7 @@ def test_from_hands_to_a_robot_that_has_arrived():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_robot_follows_moving_targets_until_both_grips_are_let_go():
     async def session():
         async with laid() as here:
@@ -99,6 +101,7 @@ def test_a_robot_follows_moving_targets_until_both_grips_are_let_go():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_robot_that_follows_stops_where_the_process_that_plans_is_silent_and_does_not_go_on():
     async def session():
         async with laid() as here:
@@ -133,6 +136,7 @@ def test_a_start_that_is_on_its_way_is_stopped_by_what_comes_after_it():
     assert len(here.robot.stops) == 1
 
 
+@pytest.mark.realtime
 def test_nobody_is_told_that_nobody_who_controls_is_silent():
     async def session():
         async with laid() as here:
@@ -144,6 +148,7 @@ def test_nobody_is_told_that_nobody_who_controls_is_silent():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_button_is_not_left_to_wait_for_the_next_tick():
     async def press():
         async with laid(rate=0.02) as here:  # a tick in 50 s
@@ -157,6 +162,7 @@ def test_a_button_is_not_left_to_wait_for_the_next_tick():
     asyncio.run(press())
 
 
+@pytest.mark.realtime
 def test_frames_tell_bodies_and_both_targets():
     async def session():
         async with laid() as here:
@@ -171,6 +177,7 @@ def test_frames_tell_bodies_and_both_targets():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("way", ["watcher", "secondary", "grips", "gone", "released", "untracked", "hidden"])
 def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(way):
     async def session():
@@ -210,6 +217,7 @@ def test_a_robot_under_way_is_told_to_hold_and_does_not_go_on(way):
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_silent_holder_loses_the_lease_to_whoever_asked_and_the_robot_holds():
     async def session():
         async with laid() as here:
@@ -226,6 +234,7 @@ def test_a_silent_holder_loses_the_lease_to_whoever_asked_and_the_robot_holds():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_the_lease_is_given_away_and_taken_by_nobody():
     async def session():
         async with laid() as here:
@@ -240,6 +249,7 @@ def test_the_lease_is_given_away_and_taken_by_nobody():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_watcher_that_does_not_read_holds_three_frames_and_delays_nobody():
     async def session():
         async with laid() as here:
@@ -256,6 +266,7 @@ def test_a_watcher_that_does_not_read_holds_three_frames_and_delays_nobody():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_who_comes_later_sees_the_plan_that_is_previewed():
     async def session():
         async with laid() as here:
@@ -279,6 +290,7 @@ def test_who_comes_later_sees_the_plan_that_is_previewed():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_the_same_client_again_ends_the_older_connection_and_the_lease():
     async def session():
         async with laid() as here:
@@ -292,6 +304,7 @@ def test_the_same_client_again_ends_the_older_connection_and_the_lease():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 def test_a_stop_is_heard_beyond_the_rate_limit_too():
     async def session():
         async with laid() as here:
@@ -306,6 +319,7 @@ def test_a_stop_is_heard_beyond_the_rate_limit_too():
     asyncio.run(session())
 
 
+@pytest.mark.realtime
 @pytest.mark.parametrize("told", ENDS)
 def test_a_session_that_is_told_to_end_is_closed_in_order(monkeypatch, capsys, told):
     """As by Ctrl-C, so by `kill`, by whatever else ends a service, and by a terminal that is closed."""

@@ -1,12 +1,12 @@
 """Tests run against mutants: each in a process of its own, forked from one that has collected the tests.
 
-There the functions of the file get the mutant's code. What shows only as a module is imported (a constant, a default),
-and whatever survives, has its tests collected anew, with the module made from the mutant's text. On the disk nothing is
-changed: what runs in other processes that do not come from this one by a fork does not see the mutant, so tests that
-need those kill nothing.
+There the functions of the file get the mutant's code. What shows only as a module is imported (a constant, a default)
+has its tests collected anew, with the module made from the mutant's text. On the disk nothing is changed: what runs in
+other processes that do not come from this one by a fork does not see the mutant, so tests that need those kill nothing.
 """
 
 import contextlib
+import functools
 import gc
 import importlib
 import json
@@ -30,15 +30,16 @@ from tests.mutants.operators import Mutant
 # Before the first fork, so that no group of tests waits for them; nothing of this repository.
 LIBRARIES = (
     "aiohttp", "can", "cryptography.x509", "daqp", "hydra", "hypothesis.extra.numpy", "mink", "mujoco", "numba",
-    "numpy", "omegaconf", "onnxruntime", "pandas", "pyarrow", "pydantic.dataclasses", "rich.console", "ruckig", "scipy.ndimage",
-    "scipy.optimize", "scipy.signal", "scipy.spatial.transform", "scipy.stats", "skimage.measure", "threadpoolctl",
+    "omegaconf", "onnxruntime", "pandas", "pyarrow", "pydantic.dataclasses", "rich.console", "ruckig", "scipy.optimize",
+    "scipy.ndimage", "scipy.signal", "scipy.spatial.transform", "scipy.stats", "skimage.measure", "threadpoolctl",
     "trimesh", "yaml",
 )  # fmt: skip
 KILLED, BROKEN, LATE, SURVIVED = "killed", "cannot be imported", "timeout", "survived"
 WRONG = "no result"  # the tests say nothing
+UNSEEN = "shows at import"
 PLUGINS = ("cacheprovider", "faulthandler", "xdist", "looponfail", "junitxml", "pastebin")
 SOONEST, LONGEST = 10.0, 60.0  # s that a mutant has beside five times what the original takes; without having tried it
-POLL = 0.01  # s
+POLL = 0.02  # s
 
 Tests = tuple[str, ...]
 
@@ -70,7 +71,7 @@ def outcomes(mutants: list[Mutant], workers: int, tell: Callable[[Mutant, Outcom
                 running.append(jobs.pop(0).begin())
             for group in list(running):
                 for mutant, outcome in group.news():
-                    if outcome.kind == SURVIVED and not group.anew:
+                    if outcome.kind == UNSEEN:
                         jobs.insert(0, _Group([mutant], tried=False, anew=True))
                     else:
                         results[mutant.key] = outcome
@@ -161,7 +162,7 @@ def _collect(mutants: list[Mutant], tried: bool, anew: bool, folder: Path, resul
         loaded = _loaded_from(mutants[0]) if anew else lambda: True
         runner = _Runner([] if anew else mutants, tried, results)
         tests = [f"--basetemp={folder / 'pytest'}", *mutants[0].tests]
-        code = pytest.main(["-xq", *(f"-pno:{name}" for name in PLUGINS), *tests], plugins=[runner])
+        code = pytest.main(["-xq", "--tb=no", *(f"-pno:{name}" for name in PLUGINS), *tests], plugins=[runner])
         if runner.alone or anew:
             _tell(results, _verdict(code, runner, anew, loaded()))
         elif runner.uncollected:
@@ -217,12 +218,15 @@ class _Runner:
         """True where all is done; None lets pytest run the tests."""
         if not self._mutants or self.uncollected:
             return None
+        for path in {mutant.path for mutant in self._mutants}:
+            _functions(os.path.realpath(path))  # before they are frozen: the collector lists none of those
+        gc.freeze()  # else it writes to all memory that the processes share
         limit = LONGEST
         if self._tried:
             original = self._outcome(None, 10 * LONGEST)
             if self.alone:
                 return None
-            if original and original.kind != SURVIVED:
+            if original.kind != SURVIVED:
                 wrong = Outcome(WRONG, f"{original.by}, unchanged")
                 for _ in self._mutants:
                     _tell(self._results, wrong)
@@ -239,7 +243,7 @@ class _Runner:
         """Of its run in a process of its own, in which this one is `alone` from here on."""
         exchanged = [] if mutant is None else list(_exchanged(mutant))
         if mutant is not None and not exchanged:
-            return Outcome(SURVIVED, "of what is there after the import nothing differs")
+            return Outcome(UNSEEN, "no function differs")
         results, own = os.pipe()
         pid, begun = _forked(), time.monotonic()
         if not pid:
@@ -263,14 +267,27 @@ class _Runner:
 
 def _exchanged(mutant: Mutant) -> Iterator[tuple[FunctionType, CodeType]]:
     """The functions of the file whose code differs in the mutant, with that."""
-    path = os.path.realpath(mutant.path)
-    codes = {(code.co_qualname, code.co_firstlineno): code for code in _codes(compile(mutant.text, path, "exec"))}
+    codes = {
+        (code.co_qualname, code.co_firstlineno): code for code in _codes(compile(mutant.text, mutant.path, "exec"))
+    }
+    for function in _functions(os.path.realpath(mutant.path)):
+        old = function.__code__
+        new = codes.get((old.co_qualname, old.co_firstlineno))
+        if new is not None and new.co_freevars == old.co_freevars and new.replace(co_filename=old.co_filename) != old:
+            yield function, new
+
+
+@functools.cache
+def _functions(path: str) -> list[FunctionType]:
+    """Those that were loaded from the file."""
+    names: dict[str, str] = {}
+    functions = []
     for function in gc.get_objects():
-        if isinstance(function, FunctionType) and os.path.realpath(function.__code__.co_filename) == path:
-            old = function.__code__
-            new = codes.get((old.co_qualname, old.co_firstlineno))
-            if new is not None and new != old and new.co_freevars == old.co_freevars:
-                yield function, new
+        if isinstance(function, FunctionType):
+            name = function.__code__.co_filename
+            if (names.get(name) or names.setdefault(name, os.path.realpath(name))) == path:
+                functions.append(function)
+    return functions
 
 
 def _codes(code: CodeType) -> Iterator[CodeType]:

@@ -9,7 +9,7 @@ import yaml
 
 from tests.mutants.operators import Mutant, mutants
 
-TARGETS, EQUIVALENT = "targets.yaml", "equivalent.yaml"
+TARGETS, EDITS, EQUIVALENT = "targets.yaml", "edits.yaml", "equivalent.yaml"
 
 
 def read_targets(folder: Path, root: Path) -> list[Mutant]:
@@ -19,8 +19,8 @@ def read_targets(folder: Path, root: Path) -> list[Mutant]:
         ValueError: a target names what is not there, the old text of an edit is not there exactly once, or a mutant
             comes twice.
     """
-    document = yaml.safe_load((folder / TARGETS).read_text(encoding="utf-8"))
-    every = [*_made(document["targets"], root), *_edited(document["edits"], root)]
+    targets, edits = (yaml.safe_load((folder / name).read_text(encoding="utf-8")) for name in (TARGETS, EDITS))
+    every = [*_made(targets, root), *_edited(edits, root)]
     keys: set[str] = set()
     for mutant in every:
         if mutant.key in keys:
@@ -52,11 +52,14 @@ def _made(targets: dict[str, list[dict]], root: Path) -> Iterator[Mutant]:
                 yield replace(mutant, tests=tuple(group["tests"]))
 
 
-def _edited(edits: list[dict], root: Path) -> Iterator[Mutant]:
-    for edit in edits:
-        path, old, new = edit["file"], edit["old"], edit["new"]
+def _edited(groups: list[dict], root: Path) -> Iterator[Mutant]:
+    for group in groups:
+        path, tests = group["file"], tuple(group["tests"])
         text = (root / path).read_text(encoding="utf-8")
-        if text.count(old) != 1:
-            raise ValueError(f"{path}: {edit['id']}: found {text.count(old)} times, expected once: {old!r}")
-        line = text.count("\n", 0, text.index(old)) + 1
-        yield Mutant(path, edit["id"], edit["bug"], line, text.replace(old, new), tuple(edit["tests"]))
+        for edit in group["edits"]:
+            name, old, new = edit["id"], edit["old"], edit["new"]
+            if text.count(old) != 1:
+                raise ValueError(f"{path}: {name}: found {text.count(old)} times, expected once: {old!r}")
+            bug = edit.get("bug") or f"{' '.join(old.split())} -> {' '.join(new.split()) or 'nothing'}"
+            line = text.count("\n", 0, text.index(old)) + 1
+            yield Mutant(path, name, bug, line, text.replace(old, new), tests)

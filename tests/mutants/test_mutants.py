@@ -64,7 +64,8 @@ def judged(tmp_path):
 
 
 def write(folder: Path, groups: list, reasons: dict, edits: list | None = None) -> None:
-    (folder / "targets.yaml").write_text(yaml.safe_dump({"targets": {"judge.py": groups}, "edits": edits or []}))
+    (folder / "targets.yaml").write_text(yaml.safe_dump({"judge.py": groups}))
+    (folder / "edits.yaml").write_text(yaml.safe_dump(edits or []))
     (folder / "equivalent.yaml").write_text(yaml.safe_dump(reasons))
 
 
@@ -129,11 +130,13 @@ def test_tests_that_say_nothing_kill_nothing(judged, tests, expected):
 
 
 def test_an_edit_by_hand_is_of_one_place(judged):
-    edit = {"id": "B1", "file": "judge.py", "old": "distance", "new": "", "bug": "none", "tests": ["test_judge.py"]}
-    write(judged, [], {}, [edit])
+    def edited(**edit: str) -> list:
+        return [{"file": "judge.py", "tests": ["test_judge.py"], "edits": [{"id": "B1", **edit}]}]
+
+    write(judged, [], {}, edited(old="distance", new=""))
     code, printed = run(judged)
     assert (code, printed) == (1, "mutants: error: judge.py: B1: found 3 times, expected once: 'distance'\n")
-    write(judged, [], {}, [edit | {"old": "distance <= limit", "new": "True", "bug": "all arrives"}])
+    write(judged, [], {}, edited(old="distance <= limit", new="True", bug="all arrives"))
     assert run(judged, "--like", "all arrives")[0] == 0
 
 

@@ -9,7 +9,7 @@ from trunkline.errors import InputError
 from trunkline.panda import labels
 from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
 from trunkline.panda.kinematics import Q_MAX, Q_MIN, mount_pose
-from trunkline.panda.labels import agreement, beyond_links, label
+from trunkline.panda.labels import _reached, agreement, beyond_links, label
 
 OFFSET = 0.05  # m
 SEED, STARTS, FURTHER = 7, 40, 100
@@ -66,6 +66,18 @@ def test_every_point_not_reached_gets_the_same_further_starts(asked, needed, x, 
     assert calls == [(SEED, STARTS, first), (SEED + 1, FURTHER, second)]
 
 
+@pytest.mark.parametrize(
+    ("numbers", "says"), [([0, 1, 2], [True, False, True]), ([1], [False]), ([2, 0], [True, True])]
+)
+def test_a_worker_says_of_its_own_points_what_the_solver_does(asked, numbers, says):
+    """In their order, whichever of all the points are its own."""
+    asked([1, NEVER, STARTS])
+    points = np.array([[0.4, 0, 0.2], [0.4, 1, 0.2], [0.4, 2, 0.2]])
+    how = {"seed": SEED, "starts": STARTS, "mount_offset": OFFSET, "avoid_collisions": True}
+    (reached,) = _reached((points, how), (np.array(numbers),))
+    assert reached.tolist() == says
+
+
 def test_of_points_that_the_links_rule_out_nothing_is_asked(asked):
     calls = asked([1, 1])
     assert labelled([[1.5, 0, 0.2], [1.6, 1, 0.2]]) == [False, False]
@@ -74,7 +86,7 @@ def test_of_points_that_the_links_rule_out_nothing_is_asked(asked):
 
 
 def test_the_links_reach_to_the_triangle_s_end_and_no_further():
-    """Along x at the height of the stretched wrist, by bisection: the border is sharp, and beyond it all is ruled out."""
+    """Along x at the height of the stretched wrist, by bisection: beyond a sharp border all is ruled out."""
     height = 0.2
     low, high = 0.3, 2.0
     for _ in range(60):

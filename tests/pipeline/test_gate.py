@@ -124,6 +124,8 @@ def test_slack_counts_near_zero(project):
         ({"min": 0.88}, 0.9, 0.88),
         ({"better": "higher", "slack": 0.2}, 1.0, 0.8),
         ({"better": "higher"}, 1300, 1000),
+        ({"better": "higher"}, 0.13, 0.1),  # not what is missing from 1, which would pass 0
+        ({"better": "higher", "slack": 0.05}, 0.0, -0.05),
         ({"better": "lower", "goal": 1.5}, 1.7, 2.21),
         ({"better": "lower", "goal": 1.5}, 1.4, 1.5),
         ({"better": "higher", "goal": 0.95}, 0.95, 0.95),
@@ -257,9 +259,12 @@ def test_a_row_without_a_baseline_fails_and_the_command_adds_it(project):
         ("fit:\n  a: {min: 1, trials: {key: b, least: 0}}", "limits.yaml: fit: a.trials.least: found 0"),
         ("fit:\n  identified.test.a: {max: 1}", "limits.yaml: fit: identified.test.a: found a metric of `test`"),
         ("fit:\n  test: {max: 1}", "limits.yaml: fit: test: found a metric of `test`"),
-        ("fit:\n  a: {max: 1, below: {key: null.test.a, factor: 1}}", "limits.yaml: fit: a: found a metric of `test`"),
-        ("fit:\n  a: {min: 1, reaches: b.test}", "limits.yaml: fit: a: found a metric of `test`"),
-        ("fit:\n  a: {min: 1, trials: {key: test.n, least: 1}}", "limits.yaml: fit: a: found a metric of `test`"),
+        (
+            "fit:\n  a: {max: 1, below: {key: null.test.a, factor: 1}}",
+            "limits.yaml: fit: null.test.a: found a metric of `test`",
+        ),
+        ("fit:\n  a: {min: 1, reaches: b.test}", "limits.yaml: fit: b.test: found a metric of `test`"),
+        ("fit:\n  a: {min: 1, trials: {key: test.n, least: 1}}", "limits.yaml: fit: test.n: found a metric of `test`"),
         ("score:\n  identified.late: {max: 1}", "limits.yaml: score: identified.late: found a metric of `test`"),
         ("- a", "limits.yaml: "),
     ],
@@ -467,3 +472,12 @@ def test_a_bound_is_an_input_error(tmp_path):
     (tmp_path / "limits.yaml").write_text("fit:\n  a: {max: .nan}")
     with pytest.raises(InputError, match="a.max: found nan"):
         read_limits(tmp_path / "limits.yaml")
+
+
+def test_a_headline_of_another_code_fails(project, monkeypatch, capsys):
+    """Which is: test_provenance.py."""
+    monkeypatch.setattr(gate, "stale", lambda root: [f"README: rehearsal of {root.name}: of code abc"])
+    assert gate.main(project) == 1
+    out = capsys.readouterr().out
+    assert "gate: FAIL README: rehearsal of project: of code abc" in out
+    assert "5 metrics in 1 stages, 1 problems" in out

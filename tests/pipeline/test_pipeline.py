@@ -21,6 +21,7 @@ from tests.support.bucket import bucket
 from tests.support.stub_pipeline import StubPipeline
 from trunkline.pipeline import lock, versions
 from trunkline.pipeline.config import SHARED, check_settings, group_options
+from trunkline.pipeline.origin import imported
 from trunkline.pipeline.versions import LIBRARIES
 
 ROOT = Path(__file__).parents[2]
@@ -31,13 +32,6 @@ EXAMPLES = sorted(
     for file in ROOT.glob("examples/*/dvc.yaml")
     for stage in yaml.safe_load(file.read_text())["stages"]
 )
-
-# What surrounds every stage (load, show, refuse, write) and never changes a number: no reason to run again.
-INERT = ("trunkline/arithmetic.py", "trunkline/errors.py", "trunkline/loading.py", "trunkline/progress.py")
-INERT += ("trunkline/settings.py", "trunkline/threads.py", "demo/__init__.py", "rehearsal/__init__.py")
-INERT += ("trunkline/cluster.py", "trunkline/likeness.py", "trunkline/scheduler.py")  # where it runs: the same bits
-INERT += ("trunkline/figures/", "trunkline/pipeline/", "rehearsal/report.py")
-ACTIVE = ("trunkline/pipeline/identify.py",)
 
 REHEARSE = "rehearsal/dvc.yaml:rehearse"  # takes hours: runs when it is asked for
 
@@ -480,7 +474,7 @@ def test_another_version_in_the_requirements_is_refused_until_its_stages_ran(pip
 
 def test_continuous_integration_fails_where_one_of_its_commands_does(clone):
     """.ci/run over the clone's own `make lock`; the other commands pass."""
-    targets = {name: "true" for name in ("types", "test", "gate")}
+    targets = {name: "true" for name in ("types", "test", "mutants_sample", "gate")}
     targets["lock"] = f"{sys.executable} -m trunkline.pipeline.lock"
     (clone / "Makefile").write_text("".join(f"{name}:\n\t@{command}\n" for name, command in targets.items()))
 
@@ -528,41 +522,9 @@ def _tree(file: str) -> ast.Module:
     return ast.parse((ROOT / file).read_text())
 
 
-def _inert(name: str) -> bool:
-    return name.startswith(INERT) and name not in ACTIVE
-
-
 def _code(stage) -> set[str]:
     """Files of this project that a stage's module imports, directly or not, and the rig that its settings name."""
     folder, name = _folder_and_name(stage.addressing)
     section = OmegaConf.load(ROOT / folder / "params.yaml")[name] or {}
     begins = [module for module in (stage.cmd.split()[-1], section.get("rig")) if module]
-    return set().union(*(_imported(f"{module.replace('.', '/')}.py") for module in begins))
-
-
-@cache
-def _imported(file: str) -> set[str]:
-    """Files of this project that `file` imports, directly or not, itself included."""
-    found, todo = set(), [file]
-    while todo:
-        name = todo.pop()
-        if name in found or _inert(name) or not (ROOT / name).is_file():
-            continue
-        tree = _tree(name)
-        if [type(node) for node in tree.body] == [ast.Expr]:  # a docstring alone, as in most __init__.py
-            continue
-        found.add(name)
-        if name == "trunkline/arm/kinds.py":  # it imports every file beside it
-            todo += [f"trunkline/arm/{file.name}" for file in (ROOT / "trunkline/arm").glob("*.py")]
-        for node in ast.walk(tree):
-            modules = []
-            if isinstance(node, ast.Import):
-                modules = [alias.name for alias in node.names]
-            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-                modules = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-            for module in modules:
-                parts = module.split(".")
-                if parts[0] in ("trunkline", "demo", "rehearsal"):
-                    todo += ["/".join(parts) + ".py"]
-                    todo += ["/".join([*parts[:n], "__init__.py"]) for n in range(1, len(parts) + 1)]
-    return found
+    return imported(ROOT, [f"{module.replace('.', '/')}.py" for module in begins])

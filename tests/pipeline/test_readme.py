@@ -1,6 +1,5 @@
 """The README: its generated blocks are current. What it points to: test_docs.py."""
 
-import hashlib
 import json
 from pathlib import Path
 
@@ -221,23 +220,25 @@ def _has(rows, key):
     return any(f"{name}{unit}" in rows for name in keys for unit in ("", "_mm", "_pct"))
 
 
-def test_the_rehearsal_s_block_says_with_which_package_it_was_or_that_nothing_is_committed(tmp_path):
+def test_the_rehearsal_s_block_says_of_what_it_is_and_which_goals_are_missed_or_that_nothing_is_committed(
+    tmp_path, monkeypatch
+):
+    """Whether it is stale: test_provenance.py."""
     assert rehearsal_block(tmp_path, variants=False) == "(no runs are committed yet)"
+    monkeypatch.setattr("trunkline.pipeline.readme.source_words", lambda root, metrics: f"of `{metrics['package']}`")
     told = {"runs": 200, "rate": 0.975, "low": 0.943, "high": 0.989, "causes": {"aim": 5}}
     told |= {"nearest_mm": {"median": 12.0, "p95": 21.0}, "variants": {"no preview": {**told, "runs": 40}}}
-    files = {"tests/limits.yaml": "rehearse:\n  reach.rate: {min: 0.98}\n"}
-    files["artifacts/package_unity/manifest.json"] = "{}"
-    package = hashlib.sha256(b"{}").hexdigest()[:12]
-    files["artifacts/rehearse/metrics.json"] = json.dumps({"package": package, "reach": told})
-    for name, text in files.items():
+    goals = "rehearse:\n  reach.rate: {min: 0.97}\n  follow.rate: {better: higher, goal: 0.98}\n"
+    metrics = {"package": "abc", "reach": told, "follow": told, "grasp": told}
+    for name, text in {"tests/limits.yaml": goals, "artifacts/rehearse/metrics.json": json.dumps(metrics)}.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    head, _, row = rehearsal_block(tmp_path, variants=False).splitlines()
-    assert head.startswith(f"| experiment, with this package, `{package}` |")
-    assert row == "| reach | 200 | 97.5 % | 94.3 to 98.9 % | ≥ 98 % | 12 / 21 | aim 5 |"
+    head, _, reach, follow, grasp = rehearsal_block(tmp_path, variants=False).splitlines()
+    assert head.startswith("| experiment, of `abc` |")
+    assert reach == "| reach | 200 | 97.5 % | 94.3 to 98.9 % | ≥ 97 % | 12 / 21 | aim 5 |"
+    assert follow.startswith("| follow | 200 | 97.5 % | 94.3 to 98.9 % | ≥ 98 % (missed) |")
+    assert grasp.startswith("| grasp | 200 | 97.5 % | 94.3 to 98.9 % |  |")
     assert rehearsal_block(tmp_path, variants=True).splitlines()[3].startswith("| … no preview | 40 |")
-    (tmp_path / "artifacts/package_unity/manifest.json").write_text("{ }")
-    assert f"with another package, `{package}`" in rehearsal_block(tmp_path, variants=False)
 
 
 def test_errors_of_starts_and_of_the_clock_are_against_the_truth(judged):

@@ -10,6 +10,7 @@ from rehearsal.experiments.bench import executed
 from rehearsal.experiments.grasp import TABLE, agreed, failure, in_arm, tell, tip_difference
 from rehearsal.experiments.handle import BORNE, STILL, why_not
 from rehearsal.experiments.result import Result
+from rehearsal.first_grasp import LIFT, SLIP, holds
 from rehearsal.operator.scripts import Ending
 from rehearsal.robot.scene import Object, Scene, Surface
 from tests.rehearsal.seen import FORCE, UNITS, frame
@@ -90,6 +91,21 @@ def test_what_lies_before_it_is_lifted_does_not_count():
     frames = run()
     frames[0].truth.thing_world = np.array(lying())
     assert failure(DONE, frames, S) == ""
+
+
+@pytest.mark.parametrize(("lifted", "slipped", "hanging", "held"), [
+    (LIFT, 0.0, False, True),
+    (np.nextafter(LIFT / 2, 1), 0.0, False, True),
+    (LIFT / 2, 0.0, False, False),
+    (np.nan, 0.0, False, False),
+    (LIFT, np.nextafter(SLIP, 0), False, True),
+    (LIFT, SLIP, False, False),
+    (LIFT, np.nan, False, False),
+    (LIFT, np.inf, False, False),
+    (LIFT, 0.0, True, False),
+])  # fmt: skip
+def test_the_first_grasps_hold_what_is_lifted_does_not_slip_and_does_not_hang(lifted, slipped, hanging, held):
+    assert bool(holds(lifted, slipped, hanging)) is held
 
 
 def centres(**moved) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rehearsal.experiments.follow import Path as Way
-from rehearsal.experiments.result import Result, append_result, causes, rate, read_results, summary
+from rehearsal.experiments.result import COLUMNS, Result, append_result, causes, rate, read_results, summary
 from trunkline.errors import InputError
 from trunkline.pipeline.rehearsal_table import rehearsal_table
 
@@ -53,9 +53,26 @@ def test_kinds_of_objects_are_told_apart_where_there_are_several(tmp_path):
     assert [line.split(" | ")[0] for line in table.splitlines()[2:]] == ["| reach", "| grasp", "| … a", "| … b"]
 
 
-def test_a_table_of_other_columns_is_refused(tmp_path):
+def test_a_row_is_added_to_a_table_of_fewer_columns_without_a_change_of_its_others(tmp_path):
+    """A column that is new has its default in older rows; what they have stays, digit by digit."""
+    file, old = tmp_path / "runs.csv", "experiment,seed,success,nearest_mm,package\nreach,3,False,12.25,abc\n"
+    file.write_text(old)
+    (before,) = read_results(file)
+    assert (before.experiment, before.seed, before.nearest_mm, before.package) == ("reach", 3, 12.25, "abc")
+    assert np.isnan(before.radius_mm)
+    append_result(file, Result("reach", 4, True, radius_mm=2.5))
+    rows = read_results(file)
+    assert [(row.seed, row.nearest_mm, row.radius_mm, row.package) for row in rows[:1]] == [
+        (3, 12.25, pytest.approx(np.nan, nan_ok=True), "abc")
+    ]  # fmt: skip
+    assert (rows[1].seed, rows[1].radius_mm) == (4, 2.5)
+    assert file.read_text().splitlines()[0].split(",") == COLUMNS
+
+
+@pytest.mark.parametrize("header", ["seed,success", "experiment,seed", "experiment,seed,success,weight", ""])
+def test_a_table_that_is_none_of_runs_is_refused(tmp_path, header):
     file = tmp_path / "runs.csv"
-    file.write_text("seed,success\n1,True\n")
+    file.write_text(f"{header}\n")
     with pytest.raises(InputError, match="found columns"):
         read_results(file)
 

@@ -121,6 +121,7 @@ def test_an_operator_who_does_not_judge_confirms_the_first_plan():
     assert any(view.intent.mode == "execute" for view in views)
 
 
+@pytest.fixture(scope="module")
 def ran() -> tuple[Session, list, list]:
     """A reach whose client takes another frame for the base, with a foresight that counts what it is asked."""
     found, operator = session([])

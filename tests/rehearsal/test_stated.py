@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from rehearsal.experiments.result import LATER, Result
-from rehearsal.experiments.stated import covered, scores
+from rehearsal.experiments.stated import covered, probabilities, scores
 from rehearsal.rehearse import metrics_of
 from rehearsal.runs import Source
 from trunkline.hybrid.shares import wilson
@@ -49,6 +49,14 @@ def test_agreement_is_of_grasps_and_hand_overs_that_had_a_probability(rows, prev
     told = scores(rows)
     assert (told["previews"], told["agreed"], told["agreement"]) == (previews, agreed, agreed / previews)
     assert (told["low"], told["high"]) == wilson(agreed, previews)
+
+
+@pytest.mark.parametrize(("agreed", "count"), [
+    ([], None), ([1.0], 1), ([0.0], 0), ([NAN], 0), ([1.0, 1.0, 0.0, NAN], 2), ([0.5], 0),
+])  # fmt: skip
+def test_only_what_was_judged_to_agree_counts_as_such(agreed, count):
+    told = probabilities([replace(TRUE, agreed=one) for one in agreed])
+    assert told.get("agreed") == count
 
 
 def test_brier_scores_and_the_paths_median_are_of_the_same_runs():

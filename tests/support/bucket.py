@@ -31,7 +31,7 @@ def bucket() -> Iterator[dict[str, str]]:
                 return False
             return True
 
-        until(made)
+        until(made, seconds=60.0)
         yield {"url": f"s3://{NAME}/store"} | there
     finally:
         server.terminate()

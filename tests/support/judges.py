@@ -11,7 +11,7 @@ from pathlib import Path
 
 WORDS = ("success", "agreed", "held", "reachable", "converged", "at_bound")
 ROOMS = ("trunkline", "rehearsal", "demo", "stages")
-CAUSES = "rehearsal/experiments"  # here a verdict is a cause in words, "" for success
+CAUSES = "rehearsal.experiments."  # here a verdict is a cause in words, "" for success
 LOGICAL = ("all", "any", "bool", "isfinite", "isnan", "isclose", "allclose", "array_equal", "logical_and",
            "logical_or", "logical_not", "isin")  # fmt: skip
 CHOOSING = ("where", "flatnonzero", "nonzero")  # their first argument chooses among values
@@ -35,9 +35,17 @@ class Read:
     imports: dict[str, str]
 
 
-def judges(root: Path, rooms: tuple[str, ...] = ROOMS) -> set[Judge]:
-    """All that decide in these folders below `root`."""
-    read = [_read(root, path) for room in rooms for path in sorted((root / room).rglob("*.py"))]
+def read_folder(root: Path, rooms: tuple[str, ...] = ROOMS) -> list[tuple[str, ast.Module]]:
+    """Modules in these folders below `root`, and their trees."""
+    paths = [path for room in rooms for path in sorted((root / room).rglob("*.py"))]
+    return [
+        (".".join(path.relative_to(root).with_suffix("").parts), ast.parse(path.read_text("utf-8"))) for path in paths
+    ]
+
+
+def judges(modules: list[tuple[str, ast.Module]]) -> set[Judge]:
+    """All that decide in these modules."""
+    read = [Read(module, tree, _imports(tree)) for module, tree in modules]
     functions = {f"{one.module}:{name}": function for one in read for name, function in _functions(one.tree)}
     built: dict[str, list[list[str]]] = {}
     for name, fields in (pair for one in read for pair in _built(one.tree)):
@@ -46,22 +54,18 @@ def judges(root: Path, rooms: tuple[str, ...] = ROOMS) -> set[Judge]:
     for one in read:
         for name, function in [("<module>", one.tree), *_functions(one.tree)]:
             own = f"{one.module}:{name}"
-            found |= {Judge(own, word) for word in WORDS if name.rpartition(".")[2].strip("_") == word
-                      and _computes(function)}  # fmt: skip
+            if (word := name.rpartition(".")[2].strip("_")) in WORDS and _computes(function):
+                found.add(Judge(own, word))
             for word, value in _bound(function, built):
                 found |= {Judge(decider, word) for decider in _deciders(value, own, one, functions)}
-            if one.module.startswith(CAUSES.replace("/", ".")) and _says_why(function):
+            if one.module.startswith(CAUSES) and _says_why(function):
                 found.add(Judge(own, "success"))
     return found
 
 
-def _read(root: Path, path: Path) -> Read:
-    tree, module = ast.parse(path.read_text("utf-8")), ".".join(path.relative_to(root).with_suffix("").parts)
-    imports = {}
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module:
-            imports |= {name.asname or name.name: f"{node.module}:{name.name}" for name in node.names}
-    return Read(module, tree, imports)
+def _imports(tree: ast.Module) -> dict[str, str]:
+    froms = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module]
+    return {alias.asname or alias.name: f"{node.module}:{alias.name}" for node in froms for alias in node.names}
 
 
 def _functions(node: ast.AST, before: str = "") -> Iterator[tuple[str, Function]]:
@@ -192,12 +196,13 @@ def _computes(function: ast.AST) -> bool:
 
 
 def _says_why(function: ast.AST) -> bool:
-    """Whether a function returns words, none for success."""
+    """Whether a function returns words, and goes one way or another: with none for success, or with others' words."""
     words = isinstance(function, Function) and isinstance(function.returns, ast.Name) and function.returns.id == "str"
-    returned = [node.value for node in _within(function) if isinstance(node, ast.Return)]
-    empty = [node for value in returned if value is not None for node in ast.walk(value)
-             if isinstance(node, ast.Constant) and node.value == ""]  # fmt: skip
-    return words and bool(empty)
+    returned = [node.value for node in _within(function) if isinstance(node, ast.Return) and node.value is not None]
+    empty = [
+        node for value in returned for node in ast.walk(value) if isinstance(node, ast.Constant) and not node.value
+    ]
+    return words and (bool(empty) or len(returned) > 1)
 
 
 def _last(name: ast.expr) -> str:

@@ -2,13 +2,13 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from demo.instruments import measure
 from demo.recorder import write_log, write_session
+from tests.support.folders import SHARED, with_recordings
 from tests.support.sessions import SEGMENTS, curl_truth, instruments, record, release_truth, static_truth
 from trunkline.errors import InputError
 from trunkline.filtering.filter import Filter, filter_take
@@ -19,7 +19,7 @@ from trunkline.takes.intake import take_in
 
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
-REAL = Path(__file__).parents[3] / "shared/data/asl_trunk"
+REAL = SHARED / "asl_trunk"
 
 
 def taken(folder):
@@ -238,7 +238,7 @@ def test_zero_stamps_need_another_clock(tmp_path):
     assert len(taken(tmp_path)[0][0].time) > 250
 
 
-@pytest.mark.skipif(not REAL.is_dir(), reason="the real recordings are not here")
+@with_recordings
 def test_real_recordings_without_orientations_or_base_body(tmp_path):
     """Thirteen releases of a hose with three discs; y is up, and the mount is known to a few millimetres."""
     names = sorted(path.name for path in REAL.glob("*.mcap"))

@@ -2,13 +2,13 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from demo.instruments import measure
 from demo.recorder import write_log, write_session
+from tests.support.folders import SHARED, with_recordings
 from tests.support.sessions import (
     SEGMENTS,
     TENDONS,
@@ -30,7 +30,6 @@ from trunkline.takes.plausible import Plausible, check_plausible
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 PLAUSIBLE = Plausible(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
 NO_TEST = "splits: no trial of the split test: no error is of trials that nothing was decided on"
-SHARED = Path(__file__).parents[3] / "shared" / "data" / "asl_trunk"
 
 
 def truths():
@@ -91,10 +90,9 @@ def test_a_sound_session_has_no_fault_and_no_warning(folder, sound):
     assert [found.repairs + found.warnings for found in gathered.findings] == [[NO_TEST]] * len(sound)
 
 
+@with_recordings
 def test_real_recordings_have_no_fault(tmp_path):
-    if not SHARED.is_dir():
-        pytest.skip("needs the recordings in ../shared/data/asl_trunk")
-    logs = sorted(SHARED.glob("*.mcap"))
+    logs = sorted((SHARED / "asl_trunk").glob("*.mcap"))
     for log in logs:
         (tmp_path / log.name).symlink_to(log)
     lines = [f"  - {{file: {log.name}, experiment: release, split: identify}}" for log in logs]

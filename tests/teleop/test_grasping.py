@@ -11,7 +11,7 @@ from trunkline.arm.spiral import spiral_chain
 from trunkline.errors import InputError
 from trunkline.hybrid.placements import SideGrip
 from trunkline.panda.kinematics import mount_pose
-from trunkline.teleop.grasping import Grasping
+from trunkline.teleop.grasping import Grasping, _require_ground
 from trunkline.teleop.messages import (
     Box,
     Input,
@@ -28,6 +28,7 @@ from trunkline.teleop.messages import (
 )
 from trunkline.teleop.planner import Planner
 from trunkline.teleop.rigid_ik import RigidIK
+from trunkline.teleop.tendons import Network, bend
 from trunkline.teleop.things import below_grip, grip_of
 from trunkline.teleop.trajectory import gentle
 from trunkline.teleop.vectors import DOWN, subtract
@@ -258,3 +259,67 @@ def test_messages_with_things_are_read_back_and_replayed():
         assert from_json(Intent, to_json(intent)) == intent
         state, again = operator.core.step(state, from_json(Input, to_json(given)), DT)
         assert to_json(again) == to_json(intent)
+
+
+# --- borders
+
+
+NEAR = 1e-6
+
+
+def refused(call) -> str:
+    try:
+        call()
+    except InputError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("row", [("cylinder", 0.03, 0.4), ("cylinder", 0.05, 0.25), ("box", 0.05, 0.2)])
+@pytest.mark.parametrize("beyond", [-NEAR, NEAR])
+def test_what_is_heavier_than_the_chart_has_is_not_grasped(planner, row, beyond):
+    """Between its rows, too, for each shape."""
+    shape, diameter, most = row
+    assert HANDLING.heaviest(shape, diameter) == pytest.approx(most)
+    thing = replace(BALL, shape=shape, diameter=diameter, mass=HANDLING.heaviest(shape, diameter) + beyond)
+    asked = Targets(Target(MOUNT), Target(thing.position), DOWN, 0.0, 0, 0.0, thing="the ball")
+    found = refused(lambda: planner.grasping.grasp(asked, thing, START))
+    assert found.startswith("payload: the ball weighs ") == (beyond > 0)
+
+
+@pytest.mark.parametrize(("shape", "diameter"), [("cylinder", 0.08 + NEAR), ("sphere", 0.05), ("box", 0.5)])
+def test_of_what_the_chart_does_not_have_nothing_is_grasped(shape, diameter):
+    assert HANDLING.heaviest(shape, diameter) == 0.0
+    assert HANDLING.heaviest("cylinder", 0.08) == 0.15
+    assert HANDLING.heaviest("cylinder", 0.001) == 0.5
+
+
+@pytest.mark.parametrize(("gap", "said"), [(0.0, ""), (-NEAR, ""), (NEAR, "release: found 60 mm between the ball")])
+def test_a_thing_is_let_go_no_higher_than_it_may_fall(gap, said):
+    place = (0.5, 0.1, 0.3)
+    top = place[2] - below_grip(BALL) - (HANDLING.beneath + gap if gap else 0.0)
+    floor = Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, top))
+    found = refused(lambda: _require_ground(BALL, place, World("world", (floor,)), HANDLING.beneath))
+    assert found.startswith(said)
+    assert bool(found) == bool(said)
+
+
+def test_a_thing_is_not_let_go_over_nothing_or_within_a_solid():
+    place = (0.5, 0.1, 0.3)
+    for boxes in ((), (Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, place[2] - below_grip(BALL) + NEAR)),)):
+        found = refused(lambda boxes=boxes: _require_ground(BALL, place, World("world", boxes), HANDLING.beneath))
+        assert found.startswith("release: found nothing between the ball and what is beneath it")
+
+
+@pytest.mark.parametrize("beyond", [-NEAR, NEAR])
+def test_a_tip_may_be_foreseen_as_far_from_its_target_as_the_tolerance(beyond):
+    """A network that has one bend, whatever it is asked for."""
+    tip = np.array([0.1, 0.0, -0.4])
+
+    def ask(poses):
+        return {"commands": np.tile(STRAIGHT, (len(poses), 1)), "lengths": np.tile(STRAIGHT, (len(poses), 1)),
+                "tip": np.tile(tip, (len(poses), 1))}  # fmt: skip
+
+    wanted = tuple(map(float, tip + [0.0, 0.0, 0.02 + beyond]))
+    found = refused(lambda: bend(Network(ask, 8), wanted, (0.0, 0.0, -1.0), 0.02))
+    assert found == ("out of reach: the soft arm's tip comes no nearer to its target than 20 mm" if beyond > 0 else "")

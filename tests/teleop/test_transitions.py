@@ -95,11 +95,12 @@ VOIDS = {
 }
 
 
-@pytest.mark.parametrize("change", VOIDS)
-@pytest.mark.parametrize("mode", ["preview", "ready", "delay"])
+# A grip is what keeps the delay running; the targets are those of the plan.
+@pytest.mark.parametrize(
+    ("mode", "change"),
+    [(mode, one) for mode in ("preview", "ready", "delay") for one in VOIDS if (mode, one) != ("delay", "target")],
+)
 def test_any_change_of_target_world_alignment_or_package_voids_the_plan(mode, change):
-    if (mode, change) == ("delay", "target"):
-        pytest.skip("a grip is what keeps the delay running; the targets are those of the plan")
     operator = Operator()
     operator.to(mode)
     intent = VOIDS[change](operator)

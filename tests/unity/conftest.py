@@ -1,17 +1,14 @@
 """Small packages of balls, with shared vectors and without, and the one that the stage made last."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from tests.support.folders import package
 from tests.support.operator import config
 from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, grids, sheets_of_a_ball, sources_in
 from trunkline.unity.package import read_tarball
 from trunkline.unity.shared_vectors import with_shared_vectors
 from trunkline.unity.twin import assemble
-
-BUILT = sorted((Path(__file__).parents[2] / "artifacts/package_unity").glob("*.tgz"))
 
 
 @pytest.fixture(scope="session")
@@ -39,6 +36,4 @@ def files(request):
     """Packages with shared vectors."""
     if request.param != "built":
         return with_shared_vectors(request.getfixturevalue(request.param), config().core)
-    if not BUILT:
-        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
-    return read_tarball(BUILT[0])
+    return read_tarball(package())

@@ -12,8 +12,8 @@ import pytest
 from onnx import TensorProto, helper
 
 from studies.reaching import EXAMPLES, reach, reach_by_ros
+from tests.support.folders import package
 from tests.support.small_arm import small_spec
-from tests.unity.conftest import BUILT
 from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, sources_in
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
@@ -84,15 +84,13 @@ def small(tmp_path_factory) -> Path:
 
 @pytest.fixture
 def built() -> Path:
-    if not BUILT:
-        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
-    return BUILT[0]
+    return package()
 
 
 @pytest.mark.parametrize("example", [name for name in FILES if not name.startswith("ros2")])
 def test_an_example_takes_a_small_arm_to_where_it_settles(example, small, tmp_path):
     if example in HEAVY and find_spec(HEAVY[example]) is None:
-        pytest.skip(f"{HEAVY[example]} is not installed; docs/consumers.md says how, and what was measured with it")
+        pytest.skip(f"no {HEAVY[example]} for its example; docs/consumers.md says how it is installed")
     reached = reach(example, small, tmp_path)
     assert reached.missed < 0.05
     target = np.array(json.loads(read_tarball(small)[VECTORS])["cases"][1]["question"]["pose"][3:6])

@@ -3,13 +3,13 @@ are drawn from the same doubts."""
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
 from tests.hybrid.conftest import rubbing_arm
+from tests.support.folders import package
 from tests.unity.test_twin import LABEL, PARAMETERS, ROBOT, sources  # noqa: F401
 from trunkline.arm.spiral import spiral_chain
 from trunkline.elements import capstan_friction
@@ -27,7 +27,6 @@ from trunkline.unity.sources import IDENTIFIED
 from trunkline.unity.twin import Trajectory, assemble
 from trunkline.unity.unpacked import arm_of, doubts_of, package_digest, read_package, robot_of
 
-ARTIFACTS = Path(__file__).parents[2] / "artifacts"
 SECONDS, LET_GO, PULL, CURL = 0.6, 0.25, 0.02, Trajectory(0.2, 0.02, [0.0])
 
 
@@ -126,17 +125,15 @@ def test_a_package_without_them_is_one_line(files):
 @pytest.fixture(scope="module")
 def built() -> dict[str, bytes]:
     """The package that the stage made last."""
-    found = sorted((ARTIFACTS / "package_unity").glob("*.tgz"))
-    if not found:
-        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
-    return read_package(found[0])
+    return read_package(package())
 
 
 @pytest.mark.parametrize("scene", [free, grasping])
 def test_the_arm_of_the_package_that_was_built_moves_as_the_identified_one(built, scene):
-    identified = mujoco.MjSpec.from_file(str(ARTIFACTS / "identify_control/arm.xml"))
+    arm = package().parents[1] / "identify_control/arm.xml"
+    identified = mujoco.MjSpec.from_file(str(arm))
     np.testing.assert_array_equal(moved(scene(arm_of(built))), moved(scene(identified)))
-    assert built[CALIBRATED] == (ARTIFACTS / "identify_control/arm.xml").read_bytes()
+    assert built[CALIBRATED] == arm.read_bytes()
 
 
 def test_a_preview_needs_the_package_that_was_built_alone(built):

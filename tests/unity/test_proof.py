@@ -94,7 +94,9 @@ def package(monkeypatch):
         monkeypatch.setattr(proof, "manifest_of", lambda files: SimpleNamespace(actuators=[]))
         monkeypatch.setattr(proof, "at_rest", lambda model, turn, rest: None if errors[turn] is None else turn)
         monkeypatch.setattr(
-            proof, "scene_of", lambda files, turn, step, without=False: SimpleNamespace(turn=turn, step=step, off=without)
+            proof,
+            "scene_of",
+            lambda files, turn, step, without=False: SimpleNamespace(turn=turn, step=step, off=without),
         )
         slowest = max(steps_taken())
 

@@ -1,8 +1,6 @@
 """The finished package, opened by readers that had no part in making it; and that they refuse what is wrong."""
 
-import shutil
 import subprocess
-from pathlib import Path
 
 import mujoco
 import numpy as np
@@ -10,6 +8,7 @@ import onnx
 import pytest
 import torch
 
+from tests.support.folders import package
 from tests.unity.mono import compiled
 from tests.unity.test_twin import files, sources  # noqa: F401
 from trunkline.ik.network import InverseKinematics
@@ -18,7 +17,6 @@ from trunkline.unity import readers
 from trunkline.unity.package import MANIFEST, MODEL, NETWORK, read_tarball, write_tarball
 from trunkline.unity.readers import ENGINES, refusals
 
-BUILT = sorted((Path(__file__).parents[2] / "artifacts/package_unity").glob("*.tgz"))
 OBJ = "Runtime/Reachability/soft_030.obj"
 CORE = "Runtime/Core/"
 GRID = "Runtime/Reachability/soft_030.bytes"
@@ -29,7 +27,6 @@ def test_no_reader_refuses_a_file_of_the_package(files, tmp_path):  # noqa: F811
     assert refusals(read_tarball(tmp_path / "twin.tgz")) == {}
 
 
-@pytest.mark.skipif(shutil.which("tar") is None, reason="no tar here")
 def test_tar_unpacks_the_same_files_and_the_model_loads_from_there(files, tmp_path):  # noqa: F811
     write_tarball(tmp_path / "twin.tgz", files)
     subprocess.run(["tar", "xzf", "twin.tgz"], cwd=tmp_path, check=True)
@@ -41,10 +38,7 @@ def test_tar_unpacks_the_same_files_and_the_model_loads_from_there(files, tmp_pa
 @pytest.fixture(scope="module")
 def built():
     """The files of the package that the stage made last."""
-    if not BUILT:
-        pytest.skip("needs the package that `make demo` writes into artifacts/package_unity")
-    (path,) = BUILT
-    return read_tarball(path)
+    return read_tarball(package())
 
 
 def test_no_reader_refuses_a_file_of_the_package_that_was_built(built):

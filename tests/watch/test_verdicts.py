@@ -110,9 +110,7 @@ def test_a_chart_that_begins_anew_after_an_alarm_takes_two_again(restart, alarms
 def standing(levels: list[dict[int, float]], limits=(LIMIT, LIMIT)) -> Chart:
     """A chart that stood at these levels after its trials; alarms where they are beyond the limits."""
     lines = {p: Line(limit, 1.0) for p, limit in enumerate(limits)}
-    trials = [
-        Charted(score(), {}, row, [p for p, level in row.items() if abs(level) > limits[p]]) for row in levels
-    ]
+    trials = [Charted(score(), {}, row, [p for p, level in row.items() if abs(level) > limits[p]]) for row in levels]
     return Chart(None, lines, trials=trials)  # type: ignore[arg-type]
 
 

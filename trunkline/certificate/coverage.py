@@ -60,6 +60,6 @@ def is_inside(tips: np.ndarray, stated: Budget) -> np.ndarray:
 def covered(chain: Chain, poses: Poses, stated: Budget, bring: Bring, rng: np.random.Generator) -> Coverage:
     """What comes of it when the arm is brought to `poses`, for which `stated` is the budget."""
     pulls = pulls_of(chain, poses)
-    pulled = (pulls > 0).any(axis=1)
+    pulled = np.max(pulls, axis=1, initial=0.0) > 0
     tips = bring(pulls, poses.gravity, from_beyond(pulled, rng))
     return Coverage(is_inside(tips, stated), pulled)

@@ -104,14 +104,18 @@ class Foresight:
         return Foreseen(preview(twin, way, doubts, resting, s.futures, seed, go_on=go_on), begins)
 
     def reach(self, plan: Plan, world: World, seed: int) -> Foreseen:
-        """Futures of a plan that grasps nothing, from its beginning to its end, beside nothing that may be touched."""
-        way = whole(plan)
+        """Futures of a plan that grasps nothing, beside nothing that may be touched."""
+        way = self.whole(plan)
         twin = compose_twin(self.known, world, None, way.joints[0], way.commands[0], self.settings)
         return self.free(twin, way, seed)
 
     def free(self, twin: Twin, way: Way, seed: int, go_on: Callable[[], None] = lambda: None) -> Foreseen:
         """Futures of which nothing is asked but where the tip goes. `go_on`: as `preview`."""
         return Foreseen(preview(twin, way, self.known.doubts, None, self.settings.futures, seed, go_on=go_on), 0.0)
+
+    def whole(self, plan: Plan) -> Way:
+        """All of a plan, held for a while at its end where it has phases."""
+        return self.way(plan, plan.phases[0][0])[0] if plan.phases else Way(plan.step, plan.joints, plan.commands)
 
     def carrying(self, thing: Thing, world: World, way: Way, hangs: np.ndarray | None, before: Foreseen) -> Twin:
         """The twin with the thing in its arm, as the nominal preview of its grasp left both."""
@@ -146,11 +150,6 @@ class Foresight:
             return None
         x, y, z = (float(value) for value in centre + places[chosen])
         return Offer(thing.name, (x, y, z), targets.pointing, float(shares[chosen]))
-
-
-def whole(plan: Plan) -> Way:
-    """A plan from its beginning to its end."""
-    return Way(plan.step, plan.joints, plan.commands)
 
 
 def _rotation(targets: Targets) -> np.ndarray:

@@ -99,8 +99,8 @@ def loss_of(residuals: np.ndarray) -> np.ndarray:
 def _residuals(simulated, real, scale, step_scale, measured, weights: LossWeights) -> np.ndarray:
     """Position and velocity terms of (C, T, S, K) against (T, S, K), K = 1 for distances, 3 for positions.
 
-    They are relative to `scale` (T, S) and to `step_scale`, (T - 1, S) or (S,). What was not measured may be NaN: frames
-    of a path are not filled in.
+    They are relative to `scale` (T, S) and to `step_scale`, (T - 1, S) or (S,). What was not measured may be NaN: of a
+    path, nothing is filled in.
     """
     offset = np.where(measured[..., None], (simulated - real) / (scale + weights.epsilon)[..., None], 0.0)
     frames = measured.any(axis=-1).sum()

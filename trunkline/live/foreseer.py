@@ -18,7 +18,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from trunkline.errors import InputError
-from trunkline.foresight.foresight import Foreseen, Foresight, whole
+from trunkline.foresight.foresight import Foreseen, Foresight
 from trunkline.foresight.package import Package, read_package
 from trunkline.foresight.settings import Previewing
 from trunkline.foresight.twin import at_rest, believed, compose_twin
@@ -149,7 +149,7 @@ class Foreseer:
             return
         digest = plan.digest()
         yield Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan)
-        way, _ = self.foresight.way(plan, plan.phases[0][0]) if plan.phases else (whole(plan), 0.0)
+        way = self.foresight.whole(plan)
         held = _held(order)
         if held is not None and self._grasped is not None:
             twin = self.foresight.carrying(held, order.world, way, None, self._grasped)

@@ -28,13 +28,12 @@ from trunkline.pipeline.limits import (
     limit_files,
     lookup,
     metrics_folder,
-    of_test,
     read_limits,
     read_metrics,
+    refuse_test,
 )
 from trunkline.pipeline.stage import write_json
 from trunkline.settings import settings
-from trunkline.trials.splits import TEST
 
 Words = Annotated[str, Field(min_length=1)]
 
@@ -180,8 +179,7 @@ def renewed(before: Baseline | None, limits: Limits, folder: Path, commit: str, 
             continue
         metrics = read_metrics(folder, stage)
         for key, limit in rows.items():
-            if of_test(stage, key):
-                raise InputError(f"{stage}: {key}: found a metric of `{TEST}`, expected one of a split that decides")
+            refuse_test(stage, key)
             if problems := limit.problems(metrics, key, None):
                 raise InputError(f"{stage}: {key}: {problems[0]}")
             if limit.equals is not None:
@@ -233,6 +231,7 @@ def main(root: Path = Path("."), words: list[str] | None = None) -> int:
     if changed:
         first = changed.splitlines()[0].split()[-1]
         raise InputError(f"{first}: found changes that are not committed, expected none: a baseline has its own commit")
+    written = {}
     for file in limit_files(root):
         path = baseline_file(file)
         before = read_baseline(path) if path.is_file() else None
@@ -240,6 +239,8 @@ def main(root: Path = Path("."), words: list[str] | None = None) -> int:
         if before is not None and not _wanted(before, after, file):
             print(f"baseline: {path.relative_to(root)}: nothing changed")
             continue
+        written[path] = after
+    for path, after in written.items():  # all or none
         write_json(path, TypeAdapter(Baseline).dump_python(after))
         print(f"baseline: wrote {path.relative_to(root)}")
         for line in after.changes[-1].worse:

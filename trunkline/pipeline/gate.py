@@ -4,9 +4,10 @@ A row is held to its goal, where it has one, and to a bound near its value in `b
 `make baseline` changes. The gate needs no history, and fails closed: what is missing, null, not a number or not finite
 fails, and so does a row without a baseline, and a baseline that was edited. With Git it also asks that the baseline's
 commit is in the history, and changed nothing else; where Git cannot say, that is told. No row is of the split `test`:
-`python -m trunkline.pipeline.release` holds that against goals, and decides nothing. Metrics that no row names are let
-alone. A stage that has no row in the baseline and no metrics has never run, as the rehearsal before its first: that is
-told, and no failure.
+`python -m trunkline.pipeline.release` holds that against goals, and decides nothing. A headline whose runs are of
+another code than the tree's fails too (trunkline/pipeline/provenance.py). Metrics that no row names are let alone. A
+stage that has no row in the baseline and no metrics has never run, as the rehearsal before its first: that is told, and
+no failure.
 """
 
 import sys
@@ -24,6 +25,7 @@ from trunkline.pipeline.baseline import (
     unrun,
 )
 from trunkline.pipeline.limits import Limits, limit_files, metrics_folder, read_limits, read_metrics
+from trunkline.pipeline.provenance import stale
 
 
 def failures(limits: Limits, baseline: Baseline, folder: Path) -> list[str]:
@@ -67,6 +69,9 @@ def main(root: Path = Path(".")) -> int:
         held = [rows for stage, rows in limits.items() if stage not in never]
         count, stages = count + sum(map(len, held)), stages + len(held)
         found += len(problems)
+    for problem in stale(root):
+        print(f"gate: FAIL {problem}")
+        found += 1
     print(f"gate: {count} metrics in {stages} stages, {found} problems")
     return 1 if found else 0
 

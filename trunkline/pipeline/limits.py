@@ -40,7 +40,7 @@ class Limit:
     goal: beside `better`, what is asked for and was missed when the row was written. It holds as max or min do as soon
         as the baseline meets it.
     factor: how many times worse than the baseline it may be; for a share (from 0 to 1) of which more is better, how
-        many times as much may be missing from 1.
+        many times as much may be missing from 1, if that is nearer.
     slack: how much worse than the baseline, in the metric's own unit; the larger of the two counts.
     below, reaches: the other metric of the same stage that it must be below, and that it must at least be.
     trials: how many a share must be of, or a few of them would do.
@@ -74,6 +74,12 @@ class Limit:
         """The goal, met or missed."""
         return next((goal for goal in (self.max, self.min, self.goal) if goal is not None), None)
 
+    @property
+    def others(self) -> list[str]:
+        """Keys of metrics that it compares with."""
+        keys = [self.below and self.below.key, self.reaches, self.trials and self.trials.key]
+        return [key for key in keys if key]
+
     def misses(self, value: float, goal: float) -> bool:
         return value > goal if self.rises else value < goal
 
@@ -81,7 +87,9 @@ class Limit:
         """The worst value that `before`, of the baseline, leaves."""
         if self.rises:
             return before + max((self.factor - 1) * abs(before), self.slack)
-        room = (self.factor - 1) * (1 - before) if 0 <= before <= 1 else (1 - 1 / self.factor) * abs(before)
+        room = (1 - 1 / self.factor) * abs(before)
+        if 0 <= before <= 1:
+            room = min(room, (self.factor - 1) * (1 - before))
         return before - max(room, self.slack)
 
     def demanded(self, before: float | None) -> float | None:
@@ -164,15 +172,8 @@ def read_limits(path: Path) -> Limits:
     limits = read_rows(path, TypeAdapter(Limits))
     for stage, rows in limits.items():
         for key, limit in rows.items():
-            others = [
-                limit.below.key if limit.below else "",
-                limit.reaches or "",
-                limit.trials.key if limit.trials else "",
-            ]
-            if any(of_test(stage, name) for name in (key, *others)):
-                raise InputError(
-                    f"{path}: {stage}: {key}: found a metric of `{TEST}`, expected one of a split that decides"
-                )
+            for name in (key, *limit.others):
+                refuse_test(stage, name, f"{path}: ")
     return limits
 
 
@@ -186,6 +187,12 @@ def read_rows(path: Path, adapter: TypeAdapter) -> Any:
 def of_test(stage: str, key: str) -> bool:
     """Whether a metric is of the split `test`, as all of `score` are."""
     return stage == SCORING or TEST in key.split(".")
+
+
+def refuse_test(stage: str, key: str, where: str = "") -> None:
+    """Raise InputError, which begins with `where`, for a metric of the split `test`, by which nothing is decided."""
+    if of_test(stage, key):
+        raise InputError(f"{where}{stage}: {key}: found a metric of `{TEST}`, expected one of a split that decides")
 
 
 def checked(path: Path, text: str, adapter: TypeAdapter) -> Any:

@@ -3,7 +3,6 @@
 Generated blocks stand between `<!-- name -->` and `<!-- /name -->`.
 """
 
-import hashlib
 import json
 import re
 import shutil
@@ -25,7 +24,7 @@ from trunkline.pipeline.baseline import baseline_file, read_baseline
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.limits import Limit, lookup, metrics_folder, read_limits
-from trunkline.pipeline.rehearsal_table import rehearsal_table
+from trunkline.pipeline.rehearsal_table import rehearsal_table, source_words
 from trunkline.pipeline.results import block
 from trunkline.pipeline.truth_table import KINDS, STAGES, error_table, truth_table
 from trunkline.trials.experiments import EXPERIMENTS
@@ -231,14 +230,12 @@ def score_table(root: Path) -> str:
 
 
 def rehearsal_block(root: Path, variants: bool) -> str:
-    """What the committed runs of the rehearsal came to, and whether with the package of these results."""
+    """What the committed runs of the rehearsal came to, and of which code and package."""
     metrics = _metrics(root, "rehearse")
     if metrics is None:
         return "(no runs are committed yet)"
-    manifest = (root / "artifacts" / "package_unity" / "manifest.json").read_bytes()
-    now = hashlib.sha256(manifest).hexdigest().startswith(metrics["package"])
-    package = f"with {'this' if now else 'another'} package, `{metrics['package']}`"
-    return rehearsal_table(metrics, read_limits(root / "tests" / "limits.yaml")["rehearse"], package, variants)
+    goals = read_limits(root / "tests" / "limits.yaml")["rehearse"]
+    return rehearsal_table(metrics, goals, source_words(root, metrics), variants)
 
 
 def example_table(folder: Path, all_splits: bool = True) -> str:

@@ -29,7 +29,7 @@ def rehearsal_table(metrics: Mapping[str, Any], goals: Mapping[str, Limit], pack
         told = metrics[name]
         goal = goals.get(f"{name}.rate")
         if "runs" in told:
-            lines.append(_row(name, name, told, "" if goal is None or goal.min is None else f"≥ {_percent(goal.min)}"))
+            lines.append(_row(name, name, told, _goal(goal, told["rate"])))
         if variants:
             lines += [_row(name, f"… {kind}", row, "") for kind, row in told.get("objects", {}).items()]
             lines += [_row(name, f"… {variant}", row, "") for variant, row in told.get("variants", {}).items()]
@@ -41,6 +41,13 @@ def source_words(root: Path, metrics: Mapping[str, Any]) -> str:
     for line in stale(root):
         return f"**STALE**: {line.removeprefix('README: rehearsal: ')}"
     return f"with this code, `{metrics['code']}`, and this package, `{metrics['package']}`"
+
+
+def _goal(limit: Limit | None, rate: float) -> str:
+    """The goal of a rate, with a word where it is missed."""
+    if limit is None or limit.asked is None:
+        return ""
+    return f"≥ {_percent(limit.asked)}{' (missed)' if limit.misses(rate, limit.asked) else ''}"
 
 
 def _row(experiment: str, words: str, told: Mapping[str, Any], goal: str) -> str:

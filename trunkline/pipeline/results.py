@@ -11,6 +11,7 @@ import re
 import shlex
 import subprocess
 import sys
+import textwrap
 from collections.abc import Iterator
 from dataclasses import asdict
 from itertools import groupby
@@ -98,7 +99,8 @@ def block(path: Path) -> str:
     for is_table, group in groupby(lines, key=lambda line: line.startswith("|")):
         text = "\n".join(group)
         parts.append(re.sub(r"\n(.+\n\|-)", r"\n\n\1", text) if is_table else f"```\n{text}\n```")  # a second header
-    return "\n\n".join([*parts, f"`{command}`\n({words})"])
+    told = textwrap.fill(f"({words})", 118, break_long_words=False, break_on_hyphens=False)
+    return "\n\n".join([*parts, f"`{command}`\n{told}"])
 
 
 def origin_words(root: Path, name: str, content: dict) -> str:
@@ -108,8 +110,11 @@ def origin_words(root: Path, name: str, content: dict) -> str:
     if "stale" in content:
         return f"{words}; **STALE**: {content['stale']}"
     origin = Origin(content["commit"], content["date"], content["code"])
-    if changed := origin.changed(code_of(root, modules_of(content["command"]), reads_of(root, name))):
-        return f"{words}; **STALE**, changed since: {', '.join(changed)}"
+    now = code_of(root, modules_of(content["command"]), reads_of(root, name))
+    if changed := origin.changed(now):
+        names, left = [name for name in changed if name in now], sum(name not in now for name in changed)
+        names += [f"{left} that it no longer goes through"] if left else []
+        return f"{words}; **STALE**, changed since: {', '.join(names)}"
     return f"{words}; nothing that it goes through has changed since"
 
 

@@ -1,0 +1,134 @@
+"""The figures of docs/execution.md and docs/safety.md are those of the code: each is read from its sentence and
+compared with what the code has, and none is left out."""
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from trunkline.execution import adapted, bank, gm6020, hosting, limb, machine, motors, pace, reel, ros_arm, stream
+from trunkline.execution.reel import ReelSettings
+from trunkline.execution.settings import Config
+from trunkline.live import access, client, clock, journal, lease, real, robot, seeking, server
+from trunkline.live.settings import Config as Live
+from trunkline.panda.limits import ACCELERATION, VELOCITY
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.teleop.config import Config as Teleop
+from trunkline.teleop.executor import BRAKE
+
+ROOT = Path(__file__).parents[2]
+EXECUTION, SAFETY = "docs/execution.md", "docs/safety.md"
+SET, TELEOP = load_folder(Config, PROJECT / "conf/execution"), load_folder(Teleop, PROJECT / "conf/teleop")
+LIVE, CORE = load_folder(Live, PROJECT / "conf/live"), TELEOP.core
+ms, mm, Hz = 1e-3, 1e-3, 1.0
+FASTEST_CROSSOVER = next(part.le for part in ReelSettings.__annotations__["crossover"].__metadata__[0].metadata
+                         if hasattr(part, "le"))  # fmt: skip
+PLANNED = TELEOP.motors.share * VELOCITY[1]  # rad/s
+DELAYED = machine.LEAD + (machine.SMOOTH - 1) * limb.TICK  # s that limbs are behind a plan
+
+# In the order of the page: a sentence with each figure in brackets, and what the code has, in the sentence's own units.
+# A row of a sentence that stands there twice holds both.
+FIGURES = {
+    EXECUTION: [
+        (r"every ms it sends both limbs where they shall be (30) ms later", [machine.LEAD / ms]),
+        (r"without a permit for (80) ms it slows", [robot.DEAD_MAN / ms]),
+        (r"run out \((30) ms\), do not come \((50) ms\) or are played late \((0\.3) s\)",
+         [machine.LEAD / ms, limb.SILENT / ms, stream.BEHIND]),
+        (r"plays their setpoints, (1000) times a second", [1 / limb.TICK]),
+        (r"or it is late itself \((50) ms\): the cables", [limb.SILENT / ms]),
+        (r"A motor silent for (20) ms: no current", [motors.SILENT / ms]),
+        (r"or it is late itself \((50) ms\), a point", [limb.SILENT / ms]),
+        (r"late by less than the (30) ms moves nothing", [machine.LEAD / ms]),
+        (r"again (30) ms ahead", [machine.LEAD / ms]),
+        (r"silent for (0\.1) s, or ends, is a fault of the machine", [adapted.SILENT]),
+        (r"no permit for (80) ms", [robot.DEAD_MAN / ms]),
+        (r"where the process is gone, for (0\.2) s, then no current", [hosting.SETTLES]),
+        (r"a joint (0\.05) rad off", [SET.arm.astray]),
+        (r"a motor silent for (20) ms, too hot, or a cable (20) mm off", [motors.SILENT / ms, SET.motors.astray / mm]),
+        (r"It takes (0\.1) s where the Panda's", [BRAKE]),
+        (r"joint 2 at its planned speed of (1\.09) rad/s needs (0\.15) s",
+         [round(PLANNED, 2), round(PLANNED / (pace.SHARE * ACCELERATION[1]), 2)]),
+        (r"min\(1 / (0\.1) s, \((0\.95) a", [BRAKE, pace.SHARE]),
+        (r"is (39) ms behind that: (30) ms ahead of time, and two means over (10) ms",
+         [DELAYED / ms, machine.LEAD / ms, machine.SMOOTH * limb.TICK / ms]),
+        (r"Every (5) ms the machine's process seeks its way", [pace.STRIDE / ms]),
+        (r"±(16384) = ±(3) A; feedback 0x204", [gm6020.FULL, gm6020.MOST_AMPERES]),
+        (r"falls to 1 at\s+(8) Hz: below", [SET.motors.reel.crossover / Hz]),
+        (r"up to\s+(6\.4) mrad/A, nine times a turn", [bank.RIPPLE / 1e-3]),
+        (r"(10) Hz is the most that settings may ask for", [FASTEST_CROSSOVER]),
+        (r"from feedback at (1) kHz", [gm6020.RATE / 1e3]),
+        (r"commands joint positions (1000) times", [1 / stream.CYCLE]),
+        (r"comes back to the plan within (0\.1) s with the least", [stream.BRIDGED]),
+        (r"one point every (10) ms", [ros_arm.PERIOD / ms]),
+        (r"(0\.2) s of silence, or\s+a joint (0\.1) rad off", [ros_arm.SILENT, SET.ros.astray]),
+        (r"at most (30) ms of the way ahead", [machine.LEAD / ms]),
+        (r"to within the (0\.1) rad", [SET.ros.astray]),
+        (r"is sent (0\.15) s behind", [real.DELAY]),
+    ],
+    SAFETY: [
+        (r"the motion begins (0\.5) s later", [CORE.delay]),
+        (r"the next input, then (0\.1) s of braking", [BRAKE]),
+        (r"(0\.12) s of silence \(`silence`\), (0\.1) s of a lost controller",
+         [CORE.safety.silence, CORE.safety.grace]),
+        (r"(0\.25) s, by its stamp or there and back", [clock.LATEST]),
+        (r"sends nothing for (1) s", [lease.SILENCE]),
+        (r"at once, or (1) s", [lease.SILENCE]),
+        (r"along the plan \| (0\.08) s \|", [robot.DEAD_MAN]),
+        (r"its process ends \| (0\.08) s \|", [robot.DEAD_MAN]),
+        (r"the same as a stop \| (1) s \|", [seeking.SILENT]),
+        (r"permits nothing \| (0\.15) s \|", [robot.STALE]),
+        (r"as soon as a write fails; (1) s in which nothing", [LIVE.journal.period + journal.LATE]),
+        (r"A token of (128) bits", [8 * access.TOKEN_BYTES]),
+        (r"for (2) minutes and (5) tries", [access.CODE_SECONDS / 60, access.CODE_TRIES]),
+        (r"longer than (64) KiB, more than (400) a second", [server.LARGEST / 1024, client.PER_SECOND]),
+    ],
+}  # fmt: skip
+# Not of the code: what others measured or published, and what was done to a session as it was timed.
+OTHERS = {
+    EXECUTION: ["14 to 17 Hz"],
+    SAFETY: ["holds the grips for 1 s"],
+}
+UNITS = r"(?:ms|s|rad|N|mm|Hz|kHz|A|°C|m/s|KiB|bits|rad/s|mrad/A|times|minutes|tries)\b"
+
+
+@cache
+def written(page: str) -> str:
+    """What people wrote: without generated blocks and code."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    text = re.sub(r"<!-- results/(\w+) -->.*?<!-- /results/\1 -->", "", text, flags=re.DOTALL)
+    return re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+
+
+ROWS = [(page, sentence, figures) for page, rows in FIGURES.items() for sentence, figures in rows]
+
+
+@pytest.mark.parametrize(("page", "sentence", "figures"), ROWS, ids=[row[1][:40] for row in ROWS])
+def test_a_figure_is_that_of_the_code(page, sentence, figures):
+    matches = list(re.finditer(sentence, written(page)))
+    assert matches, "the sentence is not there"
+    for match in matches:
+        assert [float(figure) for figure in match.groups()] == pytest.approx(figures, rel=1e-9)
+
+
+@pytest.mark.parametrize("page", FIGURES)
+def test_no_figure_with_a_unit_is_left_out(page):
+    text = written(page)
+    spans = [match.span() for sentence, _ in FIGURES[page] for match in re.finditer(sentence, text)]
+    spans += [(at, at + len(words)) for words in OTHERS[page] for at in (text.find(words),) if at >= 0]
+    left = [
+        text[max(found.start() - 40, 0) : found.end() + 10]
+        for found in re.finditer(rf"\d[\d.]*\s{UNITS}", text)
+        if not any(low <= found.start() < high for low, high in spans)
+    ]
+    assert left == []
+
+
+def test_words_for_figures_are_true_too():
+    assert motors.HOMING == 60.0  # "for a minute at most"
+    assert bank.PER_TURN == 9  # "nine times a turn"
+    assert reel.MOST_AMPERES == gm6020.MOST_AMPERES
+    assert access.CODE_DIGITS == 6  # "six digits"
+    assert gm6020.FEEDBACK == 0x204
+    assert set(gm6020.GROUPS) == {0x1FE, 0x2FE}
+    assert client.BURST == client.PER_SECOND

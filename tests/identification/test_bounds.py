@@ -1,0 +1,116 @@
+"""What ended on a bound, what the trials leave open, and which poses a fit has reached."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.support.matched_plant import release, segments_of, small_model
+from trunkline.identification.certainty import ALONE, certainty
+from trunkline.identification.identify import BOUND_TOLERANCE, _at_bound, _factors_at_bound
+from trunkline.identification.linearisation import Linearisation
+from trunkline.identification.parameter_table import undetermined
+from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.pose_fit import PoseProblem, _descend, fit_pose
+from trunkline.identification.problem import Bounds
+
+LOW, HIGH = 2.0, 4.0
+MARGIN = BOUND_TOLERANCE * (HIGH - LOW)
+A_LITTLE = 1e-9
+
+
+@pytest.mark.parametrize(
+    ("z", "at_bound"),
+    [
+        (LOW, True),
+        (LOW + MARGIN - A_LITTLE, True),
+        (LOW + MARGIN + A_LITTLE, False),
+        (3.0, False),
+        (HIGH - MARGIN - A_LITTLE, False),
+        (HIGH - MARGIN + A_LITTLE, True),
+        (HIGH, True),
+        (LOW - 1, True),
+        (HIGH + 1, True),
+    ],
+)
+def test_a_parameter_is_at_a_bound_within_a_share_of_its_own_range(z, at_bound):
+    """Between two others, one of them far from its wide bounds, one at the lower."""
+    low, high = np.array([-100.0, LOW, 0.0]), np.array([100.0, HIGH, 1.0])
+    found = _at_bound(["kp", "damping", "stiffness"], np.array([0.0, z, 0.0]), low, high)
+    assert found == (["damping", "stiffness"] if at_bound else ["stiffness"])
+
+
+@pytest.mark.parametrize(
+    ("factor", "at_bound"),
+    [
+        (1.0, False),
+        (1.1, True),
+        (0.9, True),
+        (1.0 + 0.1 * (1 - 2 * BOUND_TOLERANCE) - A_LITTLE, False),
+        (1.0 + 0.1 * (1 - 2 * BOUND_TOLERANCE) + A_LITTLE, True),
+        (1.0 - 0.1 * (1 - 2 * BOUND_TOLERANCE) + A_LITTLE, False),
+        (1.0 - 0.1 * (1 - 2 * BOUND_TOLERANCE) - A_LITTLE, True),
+    ],
+)
+def test_a_factor_at_a_bound_is_named_with_its_unit(factor, at_bound):
+    found = _factors_at_bound({"stiffness": np.array([1.0, factor]), "damping": np.array([1.0, 1.0])}, 0.1)
+    assert found == (["stiffness of unit 2"] if at_bound else [])
+
+
+@pytest.mark.parametrize(
+    ("half", "is_open"), [(0.0, False), (0.999, False), (1.0, False), (1.001, True), (np.inf, True)]
+)
+def test_what_has_an_interval_wider_than_its_range_is_open(half, is_open):
+    """A range of 2 on the axis of the search; beside a parameter that is told."""
+    result = SimpleNamespace(
+        values={"mount_tilt_x": 0.0, "mount_tilt_y": 0.0},
+        certainty=SimpleNamespace(half_width=np.array([half, 1e-6])),
+    )
+    scale = PARAMETERS["mount_tilt_x"].scale
+    bounds = {name: Bounds(-scale, scale) for name in result.values}
+    found = undetermined(result, bounds)  # type: ignore[arg-type]
+    assert found == (["mount_tilt_x"] if is_open else [])
+
+
+@pytest.mark.parametrize(
+    ("others", "alone"), [(0.0, True), (0.9e-9, True), (1.1e-9, False), (1e-6, False), (1.0, False)]
+)
+def test_what_one_trial_alone_tells_has_no_interval(others, alone):
+    """The other trials have a share `others` of the information on the first parameter, and half of that on the
+    second."""
+    first = np.sqrt([1.0, others / 2, others / 2])
+    jacobians = [np.diag([share, 1.0]) for share in first]
+    linear = Linearisation(np.zeros(2), [np.array([0.1, 0.1 * k]) for k in range(3)], jacobians)
+    found = certainty(linear)
+    assert np.isinf(found.half_width).tolist() == [alone, False]
+    assert ALONE == 1e-9
+
+
+@pytest.fixture(scope="module")
+def bent():
+    model = small_model(4)
+    return model, release(model, 0.3, frames=1)
+
+
+def test_a_pose_is_found_where_the_descent_ended_before_its_iterations_did(bent):
+    """At the very number that it takes, one fewer and one more."""
+    model, trial = bent
+    problem = PoseProblem(model, trial.segments, trial.positions[0])
+    free, start = np.ones(problem.angles, bool), np.zeros(problem.angles)
+    needed = _descend(problem, start, problem.seen, free, 300)
+    assert needed.converged
+    assert 2 < needed.iterations < 30
+    for iterations, converged in ((1, False), (needed.iterations - 1, False), (needed.iterations, False),
+                                  (needed.iterations + 1, True)):  # fmt: skip
+        assert _descend(problem, start, problem.seen, free, iterations).converged is converged
+
+
+@pytest.mark.parametrize("hidden", [(0,), (2,), (3,), (0, 1)])
+def test_a_pose_says_how_far_seen_segments_are_and_nothing_of_hidden_ones(bent, hidden):
+    model, trial = bent
+    positions = trial.positions[0].copy()
+    positions[list(hidden)] = np.nan
+    found = fit_pose(model, segments_of(model), positions)
+    assert np.flatnonzero(np.isnan(found.residuals)).tolist() == list(hidden)
+    assert np.nanmax(found.residuals) < 1e-3
+    assert found.converged

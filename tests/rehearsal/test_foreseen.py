@@ -1,0 +1,19 @@
+"""What is scored of a reach is what a page tells of it."""
+
+import numpy as np
+
+from tests.live.test_foreseer import made, order
+from trunkline.live.foreseer import Told, told
+
+
+def test_a_reach_is_foreseen_as_on_a_page():
+    """The same plan in the same world with the same seed: the same circle about the tip's end, to the last digit."""
+    page, asked = made(), order(7)
+    plan = page.planner.plan(asked.request, asked.world, asked.joints, asked.commands)
+    foreseen = page.foresight.reach(plan, asked.world, asked.request.serial)
+    (heard,) = [answer.foreseen for answer in page.answers(asked) if isinstance(answer, Told)]
+    assert told(plan.digest(), foreseen) == heard
+    stated = foreseen.preview.stated
+    assert stated.radii[-1] == heard.spread[-1]
+    np.testing.assert_array_equal(stated.tips[-1], heard.tip[-1])
+    assert stated.times[-1] > plan.duration

@@ -1,0 +1,26 @@
+"""Where tests find what is not in Git: the package and the session of `make demo`, and recordings of others' arms."""
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SHARED = ROOT.parent / "shared/data"
+SMALL_DEMO = ROOT / "build/small_demo"
+
+with_recordings = pytest.mark.skipif(not SHARED.is_dir(), reason="no ../shared/data, the recordings of others' arms")
+
+
+def demo_with(pattern: str) -> Path:
+    """The project whose `make demo` made what matches: this one, or that in little which `make test` makes."""
+    for root in (ROOT, SMALL_DEMO):
+        if any(root.glob(pattern)):
+            return root
+    pytest.fail(f"found no {pattern}: `make demo` makes it, or `make small_demo` in little", pytrace=False)
+
+
+def package() -> Path:
+    """The Unity package that the stage made last."""
+    pattern = "artifacts/package_unity/*.tgz"
+    (found,) = demo_with(pattern).glob(pattern)
+    return found
