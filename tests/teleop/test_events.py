@@ -235,3 +235,10 @@ def test_what_is_out_of_reach_is_neither_asked_for_nor_followed(reach, turned):
     asking = state("aim", right=trigger(), stamp=100.0, history=((99.0, beyond),))
     assert not event("ask", asking, heard(), TARGETS)
     assert not event("follow", state("aim", right=replace(OPEN, pressed=("stick_pressed",))), heard(), beyond)
+
+
+@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize("button", ["trigger", "stick_pressed"])
+def test_what_is_asked_for_in_vain_is_said_as_one_aims_alone(mode, button):
+    before = state(mode, left=HELD, right=replace(OPEN, pressed=(button,), held=(button,)))
+    assert bool(happened(before, heard(), None, ENDS, SETTINGS)[1]) == (mode == "aim")
