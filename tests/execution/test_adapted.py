@@ -26,7 +26,7 @@ class Process:
     """An adapter as `subprocess` has it. `line`: its end of the socket. `ends`: whether it does as nobody is there."""
 
     def __init__(self, command, pass_fds, **how):
-        self.command, self.ends, self.waited, self.killed = command, True, [], False
+        self.command, self.how, self.ends, self.waited, self.killed = command, how, True, [], False
         self.socket = socket.socket(fileno=os.dup(pass_fds[0]))
         self.line = Line(self.socket, Setpoint.size(7))
 
@@ -194,6 +194,11 @@ def test_an_adapter_that_does_not_end_is_killed_after_a_while(clock, ends):
     assert not limb.process.line.open
     assert limb.process.waited[0] == CLOSING
     assert limb.process.killed == (not ends)
+
+
+def test_ctrl_c_is_for_whoever_sends_and_not_for_the_adapter(limb):
+    assert limb.process.how["start_new_session"] is True
+    assert limb.process.how["stdin"] == subprocess.DEVNULL
 
 
 def test_a_robots_joint_may_be_as_far_off_as_the_settings_say(clock):

@@ -38,7 +38,13 @@ def changed(name: str, frame: int | slice, by) -> Piece:
     return made
 
 
-CARRIED = np.broadcast_to(np.outer(TIME, [1.0, -2.0, 0.0]), (1, FRAMES, 3))  # from SINCE on by more than it may sag
+def carried(by) -> Piece:
+    """That piece, its mount and what the arm wraps moved alike, `by` m in the end."""
+    made = changed("grip", -1, by)
+    made.mount[:, -1] += by
+    return made
+
+
 HELD = {
     "as it is": (piece(), True),
     "moved against the mount by less than it may": (changed("grip", -1, [HOLDING.sag - NEAR, 0, 0]), True),
@@ -46,8 +52,7 @@ HELD = {
     "by more, upwards": (changed("grip", -1, [0, 0, HOLDING.sag + NEAR]), False),
     "moved by more before it lost its support": (changed("grip", slice(1, FIRST), [1.0, 0, 0]), True),
     "moved by more on the way, and back": (changed("grip", slice(FIRST + 1, -1), [1.0, 0, 0]), True),
-    "carried about with the mount": (piece(mount=CARRIED, grip=piece().grip + CARRIED), True),
-    "moved the other way than the mount": (piece(mount=CARRIED, grip=piece().grip - CARRIED), False),
+    "carried about with the mount": (carried([1.0, 0.5, 0.2]), True),
     "left behind by the mount": (changed("mount", -1, [HOLDING.sag + NEAR, 0, 0]), False),
     "slipped by less than it may": (changed("away", -1, HOLDING.slip - NEAR), True),
     "slipped by more": (changed("away", -1, HOLDING.slip + NEAR), False),
@@ -68,6 +73,18 @@ HELD = {
 def test_what_counts_as_held(name):
     motion, holds = HELD[name]
     assert HOLDING.holds(motion).tolist() == [holds]
+
+
+EXACT = Holding(SINCE, sag=0.5, slip=0.25, lifted=0.125)  # numbers that are exact
+
+
+@pytest.mark.parametrize(("name", "by"), [("mount", [0.5, 0, 0]), ("away", 0.25), ("grip", [0, 0, -0.125])])
+def test_at_a_border_itself_nothing_is_held(name, by):
+    made = piece(away=np.zeros((1, FRAMES)), grip=np.zeros((1, FRAMES, 3)))
+    made.grip[:, FIRST:, 2] = 0.25
+    assert EXACT.holds(made).tolist() == [True]
+    getattr(made, name)[:, -1 if name != "grip" else slice(FIRST, None)] += by
+    assert EXACT.holds(made).tolist() == [False]
 
 
 def test_each_future_is_judged_by_itself():
@@ -99,6 +116,12 @@ def tried(dropped=0.0, further=0.0) -> Tried:
 )  # fmt: skip
 def test_what_counts_as_held_in_a_trial(dropped, further, held):
     assert tried(dropped, further).held(sag=0.08, slip=0.02).tolist() == [held]
+
+
+def test_at_a_border_itself_nothing_is_held_in_a_trial_either():
+    path, distance = np.zeros((2, 5, 3)), np.zeros((2, 5))
+    path[0, -1, 2], distance[1, -1] = -0.5, 0.25
+    assert Tried(path, distance, 2, np.zeros((2, 3)), np.zeros((2, 1))).held(0.5, 0.25).tolist() == [False, False]
 
 
 def of_futures(tips, sound, held=None) -> Preview:

@@ -89,3 +89,16 @@ BORDERS = {
 def test_what_rests_from_both_sides_of_each_border(name):
     path, rests = BORDERS[name]
     assert RESTING.holds(motion(path)).tolist() == [rests]
+
+
+@pytest.mark.parametrize(
+    ("place", "last", "rests"),
+    [([0.0, 0.0, -0.05], None, True), ([-0.3, 0.3, -0.05], None, True), ([0.3, -0.3, -0.05], None, True),
+     ([0.0, 0.0, -0.1], None, False), ([0.0, 0.0, -0.05], [STILL, 0.0, -0.05], False)],
+)  # fmt: skip
+def test_at_a_border_itself(place, last, rests):
+    """Over the board's edge it rests; in its surface, or moved by just as much as it may, it does not."""
+    path = np.tile(place, (len(TIME), 1))
+    if last is not None:
+        path[-1] = last
+    assert RESTING.holds(motion(path)).tolist() == [rests]

@@ -237,8 +237,42 @@ def test_what_is_out_of_reach_is_neither_asked_for_nor_followed(reach, turned):
     assert not event("follow", state("aim", right=replace(OPEN, pressed=("stick_pressed",))), heard(), beyond)
 
 
+NEEDED = "both targets are needed: hold a grip to set each"
+
+
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("button", ["trigger", "stick_pressed"])
-def test_what_is_asked_for_in_vain_is_said_as_one_aims_alone(mode, button):
-    before = state(mode, left=HELD, right=replace(OPEN, pressed=(button,), held=(button,)))
-    assert bool(happened(before, heard(), None, ENDS, SETTINGS)[1]) == (mode == "aim")
+@pytest.mark.parametrize(
+    ("button", "hand", "targets", "said"),
+    [
+        ("trigger", HELD, None, NEEDED),
+        ("stick_pressed", HELD, None, NEEDED),
+        ("stick_pressed", OPEN, TARGETS, "hold a grip to follow"),
+        ("stick_pressed", HELD, TARGETS, ""),
+        ("primary", HELD, None, ""),
+    ],
+)
+def test_what_was_asked_for_in_vain_is_said_as_one_aims_and_only_then(mode, button, hand, targets, said):
+    before = state(mode, left=hand, right=replace(OPEN, pressed=(button,)), pinned=None, stamp=100.0, waited=0.0)
+    _, line = happened(before, heard(), targets, ENDS, SETTINGS)
+    usual = {"grips let go; holding", "robot: no reason given; stopped"}
+    assert line == (said if mode == "aim" else "") or (mode != "aim" and line in usual)
+
+
+@pytest.mark.parametrize(
+    ("mode", "given", "changes", "said"),
+    [
+        ("execute", {"executor": ExecutorReport("fault", PLAN, "reflex")}, RUNS, "robot: reflex; stopped"),
+        ("execute", {"executor": ExecutorReport("fault", PLAN)}, RUNS, "robot: no reason given; stopped"),
+        ("execute", {}, {"waited": 9.0}, "robot: did not start within 1 s; stopped"),
+        ("execute", {"world": World("other")}, RUNS, "world changed; the plan is void"),
+        ("execute", {}, RUNS | LET_GO, "grips let go; holding"),
+        ("plan", {"plan": PlanReport(3, "", "out of reach")}, {}, "no plan: out of reach"),
+        ("execute", {"left": Controller((0.0, 0.0, 0.0), FORWARD, secondary=True)}, RUNS,
+         "stopped; primary button goes on"),
+        ("execute", {"left": Controller((0.0, 0.0, 0.0), FORWARD, secondary=True),
+                     "executor": ExecutorReport("fault", PLAN, "reflex")}, RUNS, "stopped; primary button goes on"),
+    ],
+)  # fmt: skip
+def test_what_is_said_of_what_happened(mode, given, changes, said):
+    changes = {name: value for name, value in changes.items() if name != "mode"}
+    assert happened(state(mode, **changes), heard(**given), TARGETS, ENDS, SETTINGS)[1] == said
