@@ -35,8 +35,9 @@ def drawn(model, chain, count):
 
 
 @pytest.mark.parametrize(
-    ("share", "kept"), [(0.0, True), (0.5, True), (0.9, True), (0.94, True), (0.96, False), (1.0, False), (1.2, False),
-                        (np.nan, False)]
+    ("share", "kept"),
+    [(0.0, True), (0.5, True), (0.9, True), (0.94, True), (as_controls.NEAR_LIMIT, False), (0.96, False), (1.0, False),
+     (1.2, False), (np.nan, False)],
 )  # fmt: skip
 @pytest.mark.parametrize("motor", range(3))
 def test_only_poses_in_which_a_motor_is_all_but_at_its_limit_are_left_out(model, chain, rests, share, kept, motor):
