@@ -12,7 +12,7 @@ export PATH := $(CURDIR)/.venv/bin:$(PATH)
 unexport PYTHONDONTWRITEBYTECODE  # where that is set, every process of a stage compiles all its libraries: 9 s each
 
 .PHONY: demo small-demo rehearse live client browser mono test types gate baseline lock readme pull push setup stale \
-  mutants-sample requirements clean
+  mutants mutants-sample requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
