@@ -41,11 +41,11 @@ test: setup $(TOOLS) browser mono  ## run every test, then lint
 	ruff check --output-format concise . || status=1; \
 	exit $$status
 
-mutants: setup       ## whether the tests notice wrong edits of what judges, scores, previews, decides and stops: half an hour
-	python -m tests.mutants
-
 mutants_sample: setup  ## whether the tests notice 40 wrong edits of the code, drawn anew each week
 	python -m tests.mutants --sample 40
+
+mutants: setup       ## change what judges, scores and stops by small faults, and see its tests fail: tests/mutants/table.md
+	python -m tests.mutants
 
 types: setup         ## check the types of all but the tests and the stand-in lab
 	pyright

@@ -194,6 +194,7 @@ def test_an_adapter_that_does_not_end_is_killed_after_a_while(clock, ends):
     assert not limb.process.line.open
     assert limb.process.waited[0] == CLOSING
     assert limb.process.killed == (not ends)
+    assert len(limb.process.waited) == (1 if ends else 2)  # none is left behind that has ended
 
 
 def test_ctrl_c_is_for_whoever_sends_and_not_for_the_adapter(limb):

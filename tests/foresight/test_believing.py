@@ -78,3 +78,16 @@ def test_a_world_is_of_its_digest():
     others = [make_world(()), make_world((TABLE,)), make_world((TABLE,), (CUP,)), make_world((), (CUP,))]
     assert len({world.digest for world in others}) == len(others)
     assert make_world((TABLE,), (CUP,)) == make_world((TABLE,), (CUP,))
+
+
+@pytest.mark.parametrize(("aside", "moved"), [(0.0049, False), (0.005, False), (0.0051, True)])
+def test_half_a_centimetre_is_elsewhere(aside, moved):
+    before = make_world((), (Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.0, 0.0, 0.0)),))
+    assert (believe(before, np.array([aside, 0, 0, 1, 0, 0, 0]), (), LIFT) is not before) == moved
+
+
+@pytest.mark.parametrize(("raised", "support"), [(0.25, "hanging"), (np.nextafter(0.25, 1), "held")])
+def test_a_thing_is_lifted_by_more_than_half_of_what_a_grasp_lifts(raised, support):
+    before = make_world((), (Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.0, 0.0, 0.0)),))
+    now = believe(before, np.array([0, 0, raised, 1, 0, 0, 0]), GRASP, 0.5)
+    assert now.things[0].support == support

@@ -178,3 +178,33 @@ def test_it_is_asked_before_each_piece_and_after_the_last_whether_to_go_on(after
 )
 def test_the_assistant_takes_the_surest_place_and_of_equals_the_nearest(offsets, shares, place):
     assert best(np.outer(offsets, [0.0, 0.01, 0.0]), np.array(shares)) == place
+
+
+@pytest.mark.parametrize(("off", "holds"), [(0.5, False), (np.nextafter(0.5, 0), True)])
+@pytest.mark.parametrize("name", ["grip", "away"])
+def test_what_moves_by_as_much_as_it_may_is_not_held(name, off, holds):
+    made = piece(grip=np.zeros((1, FRAMES, 3)), away=np.zeros((1, FRAMES)))
+    getattr(made, name)[:, -1:] = off if name == "away" else [off, 0.0, 0.0]
+    assert Holding(SINCE, sag=0.5, slip=0.5).holds(made).tolist() == [holds]
+
+
+@pytest.mark.parametrize(
+    ("name", "by", "holds"),
+    [("grip", [0.079, 0, 0], True), ("grip", [0.081, 0, 0], False), ("away", 0.019, True), ("away", 0.021, False)],
+)
+def test_unless_it_is_said_otherwise_8_cm_against_the_mount_and_2_from_the_arm_are_held(name, by, holds):
+    assert Holding(SINCE).holds(changed(name, -1, by)).tolist() == [holds]
+
+
+def test_a_spread_is_about_the_median_wherever_that_is_and_so_is_what_is_shown():
+    tips = np.zeros((3, FRAMES, 3)) + [5.0, -2.0, 1.0]
+    tips[:, :, 0] += np.array([-0.2, 0.0, 0.1])[:, None]
+    found = of_futures(tips, (True, True, True))
+    assert found.middle == 1
+    np.testing.assert_allclose(found.spread, np.quantile([0.2, 0.0, 0.1], 0.9))
+
+
+def test_a_spread_is_stated_every_tenth_of_a_second_of_sixtieth_frames():
+    stated = of_futures(None, (True,)).stated
+    np.testing.assert_array_equal(stated.times, TIME[[0, 6]])
+    assert len(stated.tips) == len(stated.radii) == 2

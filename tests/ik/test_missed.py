@@ -128,6 +128,12 @@ def test_errors_are_of_position_and_the_shorter_turn_and_of_nothing_without_an_e
     assert errors.beyond_force is None
 
 
+def test_a_quaternion_a_digit_too_long_is_no_turn(monkeypatch):
+    monkeypatch.setattr(scoring, "actuated", lambda *_: found_at([[0, 0, -0.4]], [[1 + 1e-15, 0, 0, 0]], [True]))
+    errors = scoring.tip_errors(None, np.array([[0.0, 0, 0, -0.4, 1, 0, 0, 0]]), np.zeros((1, 3)))
+    assert errors.orientation == [0.0]
+
+
 def test_lengths_beyond_the_motors_force_are_those_of_any_tendon_at_an_equilibrium(monkeypatch):
     most = np.array([10.0, 20.0, 20.0])
     rounding = 1 + FORCE_ROUNDING

@@ -128,6 +128,7 @@ def standing(levels: list[dict[int, float]], limits=(LIMIT, LIMIT)) -> Chart:
         ([{0: 0.0}, {0: 5.0}, {0: 9.0}], (1, 1)),  # up to the first alarm
         ([{0: 0.0, 1: 2.0}, {0: 4.5, 1: 6.0}], (0, 1)),  # the chart that is furthest beyond
         ([{0: 0.0, 1: 2.0}, {0: 7.0, 1: 6.0}], (1, 1)),
+        ([{0: 0.0, 1: -2.0}, {0: 4.5, 1: -6.0}], (0, 1)),  # to whichever side
     ],
 )
 def test_suspects_begin_where_the_furthest_chart_was_last_near_its_middle(levels, suspects):
@@ -201,3 +202,21 @@ def test_a_change_of_one_shows_in_the_estimate_of_another_that_moves_the_arm_ali
     assert found.best.parameter == 0
     assert found.best.size == pytest.approx(6.0)
     assert found.whole
+
+
+def test_the_best_explanation_need_not_be_asked_first():
+    found = of_changes({0: 1.0, 1: 6.0})
+    assert (found.best.parameter, found.best.size) == (1, pytest.approx(6.0))
+    assert [one.parameter for one in found.alike] == []
+
+
+def test_a_parameter_that_no_trial_tells_of_explains_nothing():
+    trial = Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, group())}, {}, [])
+    found = explain([trial], PLAIN, [1, 0])  # type: ignore[arg-type]
+    assert (found.best.parameter, found.alike) == (0, [])
+
+
+@pytest.mark.parametrize(("spread", "information", "deviation"), [(3.0, 1.0, 3.0), (1.0, 4.0, 0.5), (3.0, 4.0, 1.5)])
+def test_chance_is_the_reference_s_spread_over_the_root_of_what_a_trial_tells(spread, information, deviation):
+    found = of_changes({0: 5.0}, curvature=np.eye(2) * information, own=group(spread=spread))
+    assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * deviation)
