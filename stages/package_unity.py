@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
+import mujoco
 import numpy as np
 from pydantic import Field
 
@@ -46,13 +47,14 @@ def main(config: Config) -> None:
         for path, reason in refused.items():
             print(f"package_unity: another reader refuses {path}: {reason}")
         (out / "manifest.json").write_bytes(packed[MANIFEST])
-        models = read_models(sources.mjcf, packed)
+        models, whole = read_models(sources.mjcf, packed), mujoco.MjModel.from_xml_string(sources.mjcf)
         motion = curled(models, config.roundtrip)
         motion.table().to_csv(out / "roundtrip.csv", index=False, float_format="%.6g")
         save_figure(roundtrip_figure(motion.time, motion.tips, motion.gaps_mm()), out / "roundtrip.png")
         metrics = {
             "rule_violations": len(violations),
             "roundtrip_max_deviation_mm": compare(models["calibrated"], models["packed"], config.roundtrip)[0],
+            "dropped_max_deviation_mm": compare(whole, models["packed"], config.roundtrip)[0],
             "foreign_readers_failed": len(refused),
             "files": len(packed),
             "bytes": tarball.stat().st_size,

@@ -164,7 +164,11 @@ def chain(choice: Choice, is_quick: bool, known: dict[str, Chain]) -> Chain:
 
 
 def next_link(
-    model: mujoco.MjModel, before: list[float], stage: str, config: IdentificationSettings, trials: list[Trial],
+    model: mujoco.MjModel,
+    before: list[float],
+    stage: str,
+    config: IdentificationSettings,
+    trials: list[Trial],
     is_quick: bool,
 ) -> Chain:
     """One stage more, from `model`; `before`: CPU seconds of the stages that led to it."""

@@ -16,7 +16,7 @@ def demo_with(pattern: str) -> Path:
     for root in (ROOT, SMALL_DEMO):
         if any(root.glob(pattern)):
             return root
-    pytest.fail(f"found no {pattern}: `make demo` makes it, or `make small-demo` in little", pytrace=False)
+    pytest.fail(f"found no {pattern}: `make demo` makes it, or `make small_demo` in little", pytrace=False)
 
 
 def package() -> Path:

@@ -434,6 +434,7 @@ def test_the_stage_writes_package_manifest_and_metrics(project, change):
     steps = json.loads(files["Tests/Vectors/steps.json"])["sequences"]
     cases = [data for path, data in files.items() if path.startswith("Tests/Vectors/") and path.endswith(".json")]
     start, recreated = metrics.pop("start_error_mm"), metrics.pop("recreated_error_mm")
+    dropped = metrics.pop("dropped_max_deviation_mm")
     assert metrics == {
         "rule_violations": 0,
         "foreign_readers_failed": 0,
@@ -446,6 +447,7 @@ def test_the_stage_writes_package_manifest_and_metrics(project, change):
     assert start["turns"] >= 2
     assert max(start["max"], recreated["max"]) < 0.1  # mm
     assert min(start["without"], recreated["without"]) > 10
+    assert dropped == 0.0, "this arm has neither dead time nor rubbing cables"
     assert (out / "manifest.json").read_bytes() == files[MANIFEST]
     assert onnx.load_model_from_string(files[NETWORK]).graph.name == "ik"
     assert json.loads(files["package.json"])["version"] in tarball.name

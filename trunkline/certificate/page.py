@@ -63,8 +63,8 @@ def _errors(facts: dict) -> str:
     every = [_error_row(row, whole=row["kind"] is None) for row in facts["errors"]]
     caption = "Position error over all segments / of the tip, mm (the former in % of length), mean over trials"
     note = (
-        "<p class=\"quiet\">Nothing was fitted to the trials of test, and nothing chosen on them; on those of validate "
-        "choices were made. The noise floor is what noise and the fit of a pose leave by themselves.</p>\n"
+        "<p class=\"quiet\">Nothing was fitted to the trials of test; choices are made on those of validate. The noise "
+        "floor is what noise and the fit of a pose leave by themselves.</p>\n"
     )
     return (
         f"<h2>Errors</h2>\n{_table(caption, head, table)}{note}"

@@ -108,6 +108,12 @@ RESULTS = {
             (Shown("smooth.validate.e_position_mm", "mm"), Shown("smooth.validate.e_tip_mm", "mm")),
         ),
     ],
+    "package_unity": [
+        (
+            "Packed model against the identified one with all that the importer drops, in a curl: largest deviation",
+            (Shown("dropped_max_deviation_mm", "mm"),),
+        ),
+    ],
 }
 GOAL = {"e_internal": 0.2, "e_position": 0.6, "e_tip": 2.0}  # % of the arm's length, of every kind of experiment
 
