@@ -111,7 +111,8 @@ def test_what_is_begun_is_noted_and_targets_are_sought_where_it_is_not_refused(m
     noted, sought = [], []
     robot = ToldRobot("idle")
     robot.start = robot.follow = lambda *_: refused
-    desk = desk_of(robot, journal=SimpleNamespace(event=lambda name, **more: noted.append((name, more["refused"]))))
+    journal = SimpleNamespace(fault="", event=lambda name, **more: noted.append((name, more["refused"])))
+    desk = desk_of(robot, journal=journal)
     desk.plan = some_plan()
     desk._seeking = SimpleNamespace(fault="", begin=lambda: sought.append(motion))
     desk._begin(intent(motion, desk.plan.digest() if motion == "execute" else "", motion))
