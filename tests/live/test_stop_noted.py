@@ -1,12 +1,18 @@
-"""What is noted of a stop, and what a robot's process tells before anything was started."""
+"""What is noted of stops and answers, and what a robot's process tells of stops, before anything was started too."""
 
+from dataclasses import fields
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
-from tests.live.test_desk import ToldRobot, desk_of, intent
-from tests.live.test_permits import Played
-from trunkline.live.robot import HELD, MODE, MODES, READY, SERIAL
+from tests.live.test_desk import DIGEST, PACKAGE, STRAIGHT, ToldRobot, desk_of, intent, some_plan
+from tests.live.test_permits import LIMITS, Played, plan_of
+from trunkline.live import foreseer, talk
+from trunkline.live.robot import HELD, MODE, MODES, READY, SERIAL, STOPS
+from trunkline.teleop.messages import ExecutorReport, PlanReport
+from trunkline.teleop.plan import Plan
+from trunkline.teleop.trajectory import gentle
 
 
 @pytest.mark.parametrize(("before", "noted"), [(None, ["stop"]), ("execute", ["stop"]), ("stopped", [])])
@@ -23,3 +29,101 @@ def test_before_anything_was_started_a_robot_tells_so():
     numbers, fault = Played().told
     assert (numbers[SERIAL], numbers[HELD], numbers[READY], fault) == (0, 0, 1, "")
     assert MODES[int(numbers[MODE])] == "idle"
+
+
+def test_an_answer_of_who_seeks_is_of_no_plan():
+    """Whatever number it has."""
+    desk, handed = desk_of(ToldRobot()), []
+    desk._seeking = SimpleNamespace(found=handed.append)
+    answer = foreseer.Found(*[desk._asked] * len(fields(foreseer.Found)))
+    assert desk.answered(answer, 0.0) is False
+    assert handed == [answer]
+
+
+def test_what_was_planned_previewed_and_foreseen_is_noted():
+    noted: list[str] = []
+    journal = SimpleNamespace(event=lambda name, **_: noted.append(name), piece=lambda *_: noted.append("piece"))
+    desk, plan = desk_of(ToldRobot(), journal=journal), some_plan()
+    for answer in (
+        foreseer.Planned(PlanReport(desk._asked, plan.digest(), "", PACKAGE, "world"), plan),
+        foreseer.Begun(desk._asked, talk.Preview(DIGEST, 0.02, 0.3, 0.02, ())),
+        foreseer.Shown(desk._asked, 0, 0.0, np.zeros((1, 1, 7)), True),
+        foreseer.Told(desk._asked, talk.Foreseen(DIGEST, None, None, None, (), (), (), 0.9, 12)),
+    ):
+        assert desk.answered(answer, 0.0)
+    assert noted == ["planned", "preview", "piece", "foreseen"]
+
+
+def test_a_robot_that_rests_needs_no_permit_and_is_held_by_none():
+    played = Played()
+    played.turn(0.5, permits=False)
+    assert played.told[0][HELD] == 0
+    assert played.begin(plan_of()).turn(0.1).mode == "running"
+
+
+def test_a_stop_is_over_once_it_was_obeyed():
+    played = Played().begin(plan_of()).turn(0.1)
+    played.channel.asked[STOPS] += 1
+    played.turn(1.0)
+    assert played.mode == "idle"
+    here = played.robot.joints
+    rows = gentle(np.append(here, STRAIGHT), np.append(here, STRAIGHT) + 0.1 * np.eye(10)[0], LIMITS, 0.002, 2.0)
+    again = Plan(0.002, rows[:, :7], rows[:, 7:], (("approach", 0),), PACKAGE, "world")
+    assert played.begin(again).turn(again.duration + 0.1).mode == "done"
+
+
+def test_of_several_stops_the_last_is_told():
+    """However long it has been held then."""
+    played = Played().begin(plan_of()).turn(0.1)
+    for _ in range(2):
+        played.channel.asked[STOPS] += 1
+        played.turn(2 * played.plant.tick)
+        assert played.told[0][HELD] == played.now - played.plant.tick
+
+
+def test_what_was_held_is_started_anew_and_has_not_come_to_rest_by_itself():
+    robot = ToldRobot("idle")
+    desk = desk_of(robot)
+    desk.plan = some_plan()
+    goes = intent("execute", desk.plan.digest())
+    desk._drive(goes)
+    robot.report = ExecutorReport("running", desk.plan.digest())
+    desk._drive(goes)
+    desk._drive(intent("hold"))
+    robot.report = ExecutorReport("idle", desk.plan.digest())
+    robot.calls.clear()
+    desk._drive(goes)
+    assert (robot.calls, desk._fault) == (["start", "permit"], "")
+
+
+@pytest.mark.parametrize(("motion", "fault"), [("execute", ""), ("follow", "nobody seeks")])
+def test_who_seeks_counts_as_it_follows_alone(motion, fault):
+    desk = desk_of(ToldRobot("running"))
+    desk.plan = some_plan()
+    desk._seeking = SimpleNamespace(fault="nobody seeks", begin=lambda: None)
+    desk._drive(intent(motion, desk.plan.digest() if motion == "execute" else "", motion))
+    assert desk._fault == fault
+
+
+@pytest.mark.parametrize("refused", ["", "busy"])
+@pytest.mark.parametrize("motion", ["execute", "follow"])
+def test_what_is_begun_is_noted_and_targets_are_sought_where_it_is_not_refused(motion, refused):
+    noted, sought = [], []
+    robot = ToldRobot("idle")
+    robot.start = robot.follow = lambda *_: refused
+    journal = SimpleNamespace(fault="", event=lambda name, **more: noted.append((name, more["refused"])))
+    desk = desk_of(robot, journal=journal)
+    desk.plan = some_plan()
+    desk._seeking = SimpleNamespace(fault="", begin=lambda: sought.append(motion))
+    desk._begin(intent(motion, desk.plan.digest() if motion == "execute" else "", motion))
+    assert noted == [(motion, refused)]
+    assert sought == (["follow"] if motion == "follow" and not refused else [])
+
+
+def test_a_fault_of_what_it_follows_is_told_and_lasts():
+    played = Played()
+    played.robot._report = ExecutorReport("fault", "", "no way to brake")
+    numbers, fault = played.told
+    assert (MODES[int(numbers[MODE])], fault) == ("fault", "no way to brake")
+    played.robot._report = ExecutorReport("idle", "")
+    assert played.told[1] == "no way to brake"

@@ -166,10 +166,17 @@ def _below(node: ast.AST, parents: list) -> Iterator[tuple[ast.AST, list]]:
                 continue
             if isinstance(child, ast.keyword) and child.arg in NO_MATTER:
                 continue
-            if isinstance(node, ast.Subscript) and child is node.slice and isinstance(child, INDICES):
+            index = isinstance(node, ast.Subscript) and child is node.slice
+            if isinstance(child, INDICES) and (index or _in_index(node, parents)):
                 continue
             yield child, parents
             yield from _below(child, [*parents, child])
+
+
+def _in_index(node: ast.AST, parents: list) -> bool:
+    """Whether it is the tuple of an index."""
+    around = parents[-2] if len(parents) > 1 else None
+    return isinstance(node, ast.Tuple) and isinstance(around, ast.Subscript) and node is around.slice
 
 
 def _of(source: Source, node: ast.AST, parents: list) -> Iterator[Change]:

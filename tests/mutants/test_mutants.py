@@ -168,7 +168,8 @@ def test_a_mutant_keeps_its_name_whatever_stands_before_it():
         ("''", {'"mutant"'}),
         ("'why'", {'""'}),
         ("f'{a:.2f} of {b + 1}'", {'""'}),
-        ("a[0] + a[1:2]", {"a[0] - a[1:2]"}),
+        ("a[0] + a[:, 1:2, -1]", {"a[0] - a[:, 1:2, -1]"}),
+        ("a[b + 1]", {"a[b - 1]", "a[b + 2]"}),
         ("'é' + a if b < c else d", {"'é' + a if False else d", "'é' + a if True else d", "'é' + a if b <= c else d"}),
     ],
 )
