@@ -9,12 +9,13 @@ from pydantic import TypeAdapter
 
 from trunkline.identification.parameters import PARAMETERS
 from trunkline.pipeline.baseline import Baseline, baseline_file, renewed
-from trunkline.pipeline.limits import limit_files, lookup, read_limits
+from trunkline.pipeline.limits import Limit, limit_files, lookup, read_limits
 from trunkline.pipeline.readme import (
     EXAMPLES,
     RESULTS,
     Shown,
     generate,
+    preview_table,
     rehearsal_block,
     results_table,
     score_table,
@@ -239,6 +240,24 @@ def test_the_rehearsal_s_block_says_of_what_it_is_and_which_goals_are_missed_or_
     assert follow.startswith("| follow | 200 | 97.5 % | 94.3 to 98.9 % | ≥ 98 % (missed) |")
     assert grasp.startswith("| grasp | 200 | 97.5 % | 94.3 to 98.9 % |  |")
     assert rehearsal_block(tmp_path, variants=True).splitlines()[3].startswith("| … no preview | 40 |")
+
+
+def test_what_previews_state_stands_beside_what_came_true_and_its_goal():
+    times = {"at_end": 3, "after_2s": 1, "after_10s": 0}
+    preview = {
+        "agreed": 39, "previews": 40, "agreement": 0.975, "path_pct_median": 1.9, "radius_mm": {"median": 2.3},
+        "coverage": {name: {"runs": 42, "inside": inside, "share": inside / 42} for name, inside in times.items()},
+        "tip_error_radii": {name: {"median": 4.0 - inside} for name, inside in times.items()},
+    }  # fmt: skip
+    goals = {"preview.coverage.at_end.share": Limit(better="higher", goal=0.9)}
+    goals |= {"preview.agreement": Limit(min=0.95), "preview.path_pct_median": Limit(better="lower", goal=1.5)}
+    _, _, at_end, later, latest, holds, path = preview_table(preview, goals).splitlines()
+    assert at_end.endswith("9 of 10 cases: at the end | 3 of 42; it is 1 radii off, median | ≥ 0.9 (missed) |")
+    assert later.endswith("2 s later | 1 of 42; it is 3 radii off, median |  |")
+    assert latest.endswith("10 s later | 0 of 42; it is 4 radii off, median |  |")
+    assert holds.endswith("| 39 of 40 as the likelier | ≥ 0.95 |")
+    assert path.endswith("| 1.9 % of length off, median | ≤ 1.5 (missed) |")
+    assert preview_table(None, goals) == ""
 
 
 def test_errors_of_starts_and_of_the_clock_are_against_the_truth(judged):

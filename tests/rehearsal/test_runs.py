@@ -125,7 +125,7 @@ def test_the_code_of_runs_is_what_the_stage_depends_on(checkout, monkeypatch):
         (checkout / name).write_text(text.replace(old, new, 1))
         return source_of(Path("package.tgz"))
 
-    assert after("rehearsal/params.yaml", "reach: ", "reach: 1") == before, "how many runs there are changes none of them"
+    assert after("rehearsal/params.yaml", "reach: ", "reach: 1") == before, "how many runs there are changes none"
     assert after("rehearsal/report.py", "success", "successes") == before
     assert after("rehearsal/conf/rehearse/robot/stand_in.yaml", "\n", "\n# a comment\n") == before
     settings = after("rehearsal/conf/rehearse/robot/stand_in.yaml", "azimuth: 0.0", "azimuth: 0.1")

@@ -1,4 +1,4 @@
-"""What is trusted, by number: each reason alone, both sides of each border, the border itself, and which comes first."""
+"""What is trusted, by number: each reason alone, each border and its sides, and which comes first."""
 
 import math
 from dataclasses import replace

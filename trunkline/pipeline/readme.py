@@ -241,7 +241,32 @@ def rehearsal_block(root: Path, variants: bool) -> str:
     if metrics is None:
         return "(no runs are committed yet)"
     goals = read_limits(root / "tests" / "limits.yaml")["rehearse"]
-    return rehearsal_table(metrics, goals, source_words(root, metrics), variants)
+    table = rehearsal_table(metrics, goals, source_words(root, metrics), variants)
+    stated = preview_table(metrics.get("preview"), goals)
+    return "\n\n".join([table, stated] if stated else [table])
+
+
+def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
+    """Whether what previews state came true, beside the goals; "" where no run had a preview."""
+    coverage = lookup(preview, "coverage.at_end")
+    if not coverage:
+        return ""
+    times = {"at_end": "at the end", "after_2s": "2 s later", "after_10s": "10 s later"}
+    lines = ["| what previews state | came true | goal |", "|---|---:|---:|"]
+    radius = f"{_number(lookup(preview, 'radius_mm.median'))} mm"
+    for name, words in times.items():
+        share, runs = (lookup(preview, f"coverage.{name}.{key}") for key in ("inside", "runs"))
+        off = _number(lookup(preview, f"tip_error_radii.{name}.median"))
+        goal = _goal(goals.get(f"preview.coverage.{name}.share"), lookup(preview, f"coverage.{name}.share"))
+        what = f"reach: the tip ends within a radius ({radius}, median) in 9 of 10 cases: {words}"
+        lines.append(f"| {what} | {share} of {runs}; it is {off} radii off, median | {goal} |")
+    agreed, previews = lookup(preview, "agreed"), lookup(preview, "previews")
+    goal = _goal(goals.get("preview.agreement"), lookup(preview, "agreement"))
+    lines.append(f"| grasp, hand-over: whether it holds | {agreed} of {previews} as the likelier | {goal} |")
+    path = lookup(preview, "path_pct_median")
+    goal = _goal(goals.get("preview.path_pct_median"), path)
+    lines.append(f"| grasp, hand-over: where the tip goes | {_number(path)} % of length off, median | {goal} |")
+    return "\n".join(lines)
 
 
 def example_table(folder: Path, all_splits: bool = True) -> str:
