@@ -123,6 +123,6 @@ def test_the_row_of_all_terms_has_all_of_them():
 def test_without_the_demo_it_says_what_to_run(monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "dvc.yaml").touch()  # the top of a checkout
-    monkeypatch.setattr("sys.argv", ["identification"])
+    monkeypatch.setattr("sys.argv", ["identification", "--quick"])  # nothing of it is kept
     assert benchmark.main() == 1
     assert "make demo" in capsys.readouterr().err

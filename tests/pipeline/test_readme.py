@@ -251,10 +251,10 @@ def test_what_previews_state_stands_beside_what_came_true_and_its_goal():
     }  # fmt: skip
     goals = {"preview.coverage.at_end.share": Limit(better="higher", goal=0.9)}
     goals |= {"preview.agreement": Limit(min=0.95), "preview.path_pct_median": Limit(better="lower", goal=1.5)}
-    _, _, at_end, later, latest, holds, path = preview_table(preview, goals).splitlines()
-    assert at_end.endswith("9 of 10 cases: at the end | 3 of 42; it is 1 radii off, median | ≥ 0.9 (missed) |")
-    assert later.endswith("2 s later | 1 of 42; it is 3 radii off, median |  |")
-    assert latest.endswith("10 s later | 0 of 42; it is 4 radii off, median |  |")
+    _, _, radius, holds, path = preview_table(preview, goals).splitlines()
+    assert radius.startswith("| reach: the tip ends within a radius (2.3 mm, median) in 9 of 10 cases: at the end, 2 ")
+    came = "3 of 42 / 1 of 42 / 0 of 42; it is 1 / 3 / 4 radii off, median"
+    assert radius.endswith(f"10 s later | {came} | ≥ 0.9 (missed) / – / – |")
     assert holds.endswith("| 39 of 40 as the likelier | ≥ 0.95 |")
     assert path.endswith("| 1.9 % of length off, median | ≤ 1.5 (missed) |")
     assert preview_table(None, goals) == ""

@@ -67,7 +67,7 @@ def project(tmp_path_factory):
         for stage, metrics in (("ingest", INGESTED), ("filter", {"gap_share": 0.01})):
             (root / "artifacts" / stage).mkdir()
             write_json(root / "artifacts" / stage / "metrics.json", metrics)
-        report_stage.main(report_stage.Config(**vars(ASKED)))
+        report_stage.main(report_stage.Config(**vars(ASKED), rig=None))
     return root, true
 
 

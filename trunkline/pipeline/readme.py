@@ -122,7 +122,7 @@ BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")  # an iden
 
 
 def pipeline_graph(root: Path) -> str:
-    """The stages of dvc.yaml as a mermaid flowchart and a table; edges that follow from others are left out."""
+    """The stages of dvc.yaml as a mermaid flowchart; edges that follow from others are left out."""
     with Repo(str(root)) as repo:
         others = ("examples/", "rehearsal/")  # `dvc repro` alone runs neither
         stages = {s.addressing: s for s in repo.index.stages if not s.addressing.startswith(others)}
@@ -139,9 +139,7 @@ def pipeline_graph(root: Path) -> str:
         path = networkx.dag_longest_path(reduced, topo_order=order)
         lines.append(f"    {' --> '.join(names[stage] for stage in path)}")
         reduced.remove_edges_from(pairwise(path))
-    lines += ["```", "", "| stage | what it does |", "|---|---|"]
-    lines += [f"| `{names[a]}` | {stages[a].desc} |" for a in order]
-    return "\n".join(lines)
+    return "\n".join([*lines, "```"])
 
 
 def results_table(file: Path, results: Mapping[str, Sequence[tuple[str, Sequence[Shown]]]]) -> str:
@@ -254,12 +252,13 @@ def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
     times = {"at_end": "at the end", "after_2s": "2 s later", "after_10s": "10 s later"}
     lines = ["| what previews state | came true | goal |", "|---|---:|---:|"]
     radius = f"{_number(lookup(preview, 'radius_mm.median'))} mm"
-    for name, words in times.items():
-        share, runs = (lookup(preview, f"coverage.{name}.{key}") for key in ("inside", "runs"))
-        off = _number(lookup(preview, f"tip_error_radii.{name}.median"))
-        goal = _goal(goals.get(f"preview.coverage.{name}.share"), lookup(preview, f"coverage.{name}.share"))
-        what = f"reach: the tip ends within a radius ({radius}, median) in 9 of 10 cases: {words}"
-        lines.append(f"| {what} | {share} of {runs}; it is {off} radii off, median | {goal} |")
+    counts = [[lookup(preview, f"coverage.{name}.{key}") for key in ("inside", "runs")] for name in times]
+    inside = [f"{count} of {runs}" for count, runs in counts]
+    off = [_number(lookup(preview, f"tip_error_radii.{name}.median")) for name in times]
+    asked = [_goal(goals.get(f"preview.coverage.{n}.share"), lookup(preview, f"coverage.{n}.share")) for n in times]
+    what = f"reach: the tip ends within a radius ({radius}, median) in 9 of 10 cases: {', '.join(times.values())}"
+    came = f"{' / '.join(inside)}; it is {' / '.join(off)} radii off, median"
+    lines.append(f"| {what} | {came} | {_joined(asked)} |")
     agreed, previews = lookup(preview, "agreed"), lookup(preview, "previews")
     goal = _goal(goals.get("preview.agreement"), lookup(preview, "agreement"))
     lines.append(f"| grasp, hand-over: whether it holds | {agreed} of {previews} as the likelier | {goal} |")
