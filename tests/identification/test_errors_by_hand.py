@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.swings import LIKE, STEP, STRAIGHT, experiment
-from trunkline.identification.evaluation import errors_of
+from trunkline.identification.evaluation import _mean, errors_of
 from trunkline.identification.loss import LossWeights
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
@@ -61,3 +61,12 @@ def test_the_error_of_a_period_is_its_share_along_whichever_axis_it_swings():
     )
     row = errors_of(slow, experiment(fast), LIKE, None, None)
     assert abs(row["e_swing_period_pct"]) == pytest.approx(5.0, abs=0.7)
+
+
+def test_of_several_trials_errors_are_the_mean_over_those_that_have_them_and_the_worst():
+    rows = [{"e_position_mm": 1.0, "e_tip_mm": 4.0}, {"e_position_mm": 3.0, "loss": 0.5}, {"e_position_mm": 5.0}]
+    assert _mean(rows) == {
+        "e_position_mm": 3.0, "e_tip_mm": 4.0, "loss": 0.5, "e_position_worst_mm": 5.0, "e_tip_worst_mm": 4.0,
+        "trials": 3,
+    }  # fmt: skip
+    assert _mean(rows[1:]) == {"e_position_mm": 4.0, "loss": 0.5, "e_position_worst_mm": 5.0, "trials": 2}
