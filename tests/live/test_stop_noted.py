@@ -9,7 +9,7 @@ import pytest
 from tests.live.test_desk import DIGEST, PACKAGE, STRAIGHT, ToldRobot, desk_of, intent, some_plan
 from tests.live.test_permits import LIMITS, Played, plan_of
 from trunkline.live import foreseer, talk
-from trunkline.live.robot import HELD, MODE, MODES, READY, SERIAL, STOPS
+from trunkline.live.robot import DEAD_MAN, HELD, MODE, MODES, READY, SERIAL, STOPS
 from trunkline.teleop.messages import ExecutorReport, PlanReport
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import gentle
@@ -127,3 +127,13 @@ def test_a_fault_of_what_it_follows_is_told_and_lasts():
     assert (MODES[int(numbers[MODE])], fault) == ("fault", "no way to brake")
     played.robot._report = ExecutorReport("idle", "")
     assert played.told[1] == "no way to brake"
+
+
+def test_a_stop_of_what_nobody_permits_any_more_is_told_as_the_later():
+    played = Played().begin(plan_of()).turn(0.05)
+    played.turn(DEAD_MAN + 3 * played.plant.tick, permits=False)
+    ended = played.told[0][HELD]
+    played.channel.asked[STOPS] += 1
+    played.turn(played.plant.tick, permits=False)
+    assert played.mode == "running"  # it brakes still
+    assert played.told[0][HELD] == played.now > ended

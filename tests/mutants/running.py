@@ -10,14 +10,16 @@ import functools
 import gc
 import importlib
 import json
+import math
 import os
+import resource
 import shutil
 import signal
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.machinery import SourceFileLoader
 from pathlib import Path
 from types import CodeType, FunctionType
@@ -39,6 +41,7 @@ WRONG = "no result"  # the tests say nothing
 UNSEEN = "shows at import"
 PLUGINS = ("cacheprovider", "faulthandler", "xdist", "looponfail", "junitxml", "pastebin")
 SOONEST, LONGEST = 10.0, 60.0  # s that a mutant has beside five times what the original takes; without having tried it
+PATIENCE = 10.0  # times as long as that by the clock: limits are of a processor's time, which others' work leaves alone
 POLL = 0.02  # s
 
 Tests = tuple[str, ...]
@@ -46,7 +49,7 @@ Tests = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Outcome:
-    """`kind` as above. `by`: the test that failed first, or what went wrong. `seconds`: that it took."""
+    """`kind` as above. `by`: the test that failed first, or what went wrong. `seconds`: of a processor."""
 
     kind: str
     by: str
@@ -110,20 +113,17 @@ class _Group:
 
     def news(self) -> Iterator[tuple[Mutant, Outcome]]:
         """What has come since; what was not said when the process ended goes by why it ended."""
-        over = bool(os.waitpid(self._pid, os.WNOHANG)[0])
+        over, status, _ = os.wait4(self._pid, os.WNOHANG)
         with contextlib.suppress(BlockingIOError):
             while part := os.read(self._results, 1 << 16):
                 self._text += part
         *lines, self._text = self._text.split(b"\n")
         for line in lines:
             yield self._left.pop(0), Outcome(*json.loads(line))
-        late = self.anew and time.monotonic() - self._begun > 2 * LONGEST
-        if over or late:
-            if late and not over:
+        if over or (self.anew and time.monotonic() - self._begun > PATIENCE * LONGEST):
+            if not over:
                 self.end()
-            why = (
-                Outcome(LATE, "its import or a test") if late else Outcome(KILLED if self.anew else WRONG, "all ended")
-            )
+            why = _why(status if over else None) if self.anew else Outcome(WRONG, "all ended")
             yield from ((mutant, why) for mutant in self._left)
             self._left.clear()
             self._close()
@@ -151,6 +151,18 @@ def _kill(pid: int) -> None:
         os.killpg(pid, signal.SIGKILL)
 
 
+def _why(status: int | None) -> Outcome:
+    """Why a process ended that said nothing; None where it did not end."""
+    late = status is None or (os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGXCPU)
+    return Outcome(LATE, "the tests do not end") if late else Outcome(KILLED, "the process ended")
+
+
+def _limit(seconds: float) -> None:
+    """Of a processor's time that this process has from here on."""
+    most = resource.getrlimit(resource.RLIMIT_CPU)[1]
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(time.process_time() + seconds), most))
+
+
 def _collect(mutants: list[Mutant], tried: bool, anew: bool, folder: Path, results: int) -> NoReturn:
     """The process of a group, and of each of its mutants."""
     try:
@@ -160,9 +172,13 @@ def _collect(mutants: list[Mutant], tried: bool, anew: bool, folder: Path, resul
         os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
         tempfile.tempdir = os.environ["TMPDIR"] = str(folder)
         loaded = _loaded_from(mutants[0]) if anew else lambda: True
+        if anew:
+            _limit(LONGEST)
         runner = _Runner([] if anew else mutants, tried, results)
         tests = [f"--basetemp={folder / 'pytest'}", *mutants[0].tests]
-        code = pytest.main(["-xq", "--tb=no", *(f"-pno:{name}" for name in PLUGINS), *tests], plugins=[runner])
+        code = pytest.main(
+            ["-xq", "--tb=no", "-mnot realtime", *(f"-pno:{name}" for name in PLUGINS), *tests], plugins=[runner]
+        )
         if runner.alone or anew:
             _tell(results, _verdict(code, runner, anew, loaded()))
         elif runner.uncollected:
@@ -178,7 +194,7 @@ def _tell(results: int, outcome: Outcome) -> None:
 
 def _verdict(code: int, runner: "_Runner", anew: bool, loaded: bool) -> Outcome:
     """Of the one run that a process was for."""
-    seconds = time.monotonic() - runner.begun
+    seconds = time.process_time()
     if not loaded:
         return Outcome(WRONG, "its tests do not import the file", seconds)
     if runner.uncollected:
@@ -196,7 +212,7 @@ class _Runner:
 
     def __init__(self, mutants: list[Mutant], tried: bool, results: int) -> None:
         self.alone, self.passed, self.failed, self.uncollected = False, 0, "", ""
-        self.begun, self._mutants, self._tried, self._results = time.monotonic(), mutants, tried, results
+        self._mutants, self._tried, self._results = mutants, tried, results
 
     def pytest_configure(self, config) -> None:
         from hypothesis import Phase, settings
@@ -248,21 +264,21 @@ class _Runner:
         pid, begun = _forked(), time.monotonic()
         if not pid:
             os.setsid()
-            self.alone, self.begun = True, begun
+            _limit(limit)
+            self.alone = True
             os.dup2(own, self._results)
             for function, code in exchanged:
                 function.__code__ = code
             return Outcome(WRONG, "")
         os.close(own)
-        while not (over := os.waitpid(pid, os.WNOHANG)[0]) and time.monotonic() - begun < limit:
+        while not (ended := os.wait4(pid, os.WNOHANG))[0] and time.monotonic() - begun < PATIENCE * limit:
             time.sleep(POLL)
         _kill(pid)
+        over, status, usage = ended if ended[0] else (0, None, os.wait4(pid, 0)[2])
         with os.fdopen(results) as file:
             text = file.read() if over else ""
-        if not over:
-            os.waitpid(pid, 0)
-            return Outcome(LATE, f"after {limit:.0f} s", limit)
-        return Outcome(*json.loads(text)) if text else Outcome(KILLED, "the process ended", time.monotonic() - begun)
+        outcome = Outcome(*json.loads(text)) if text else _why(status)
+        return replace(outcome, seconds=usage.ru_utime + usage.ru_stime)
 
 
 def _exchanged(mutant: Mutant) -> Iterator[tuple[FunctionType, CodeType]]:

@@ -1,5 +1,6 @@
 """When a chart raises an alarm, which trials it suspects, and how far an explanation is to be trusted: by hand."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -220,3 +221,17 @@ def test_a_parameter_that_no_trial_tells_of_explains_nothing():
 def test_chance_is_the_reference_s_spread_over_the_root_of_what_a_trial_tells(spread, information, deviation):
     found = of_changes({0: 5.0}, curvature=np.eye(2) * information, own=group(spread=spread))
     assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * deviation)
+
+
+@pytest.mark.parametrize(("more", "alike"), [(3.7, [1]), (4.0, [])])
+def test_two_are_told_apart_at_the_95th_percentile_of_one_degree_of_freedom(more, alike):
+    found = of_changes({0: np.sqrt(1 + more), 1: 1.0})
+    assert [one.parameter for one in found.alike] == alike
+
+
+def test_groups_of_another_condition_share_no_error():
+    """Beside two means, each uncertain by 1/2, two trials have a variance of (1 + 1/4) / 2."""
+    groups = [replace(group(error=0.5), key=("release", level)) for level in (1, 2)]
+    trials = [Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, own)}, {}, []) for own in groups]
+    found = explain(trials, PLAIN, [0])  # type: ignore[arg-type]
+    assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * np.sqrt(1.25 / 2))
