@@ -13,7 +13,7 @@ from trunkline.filtering.filter import average_static, filter_take
 def test_whichever_sign_quaternions_have_they_are_filtered_alike(every):
     plain, mixed = take(oriented=True), take(oriented=True)
     for source in (plain, mixed):
-        angle = 0.2 * np.sin(6 * TIME)
+        angle = np.pi / 2 + 0.2 * np.sin(6 * TIME)  # to both sides of half a turn, where the sign that is usual changes
         source.quaternions[:, 1] = np.stack([np.cos(angle), np.sin(angle), 0 * angle, 0 * angle], axis=1)
     mixed.quaternions[::every, 1] *= -1
     expected, effect = filter_take(plain, SETTINGS)

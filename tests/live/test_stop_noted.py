@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from tests.live.test_desk import DIGEST, PACKAGE, STRAIGHT, ToldRobot, desk_of, intent, some_plan
-from tests.live.test_permits import LIMITS, Played, plan_of
+from tests.live.test_permits import FOLLOWING, LIMITS, Played, plan_of
 from trunkline.live import foreseer, talk
-from trunkline.live.robot import DEAD_MAN, HELD, MODE, MODES, READY, SERIAL, STOPS
+from trunkline.live.robot import DEAD_MAN, HELD, MODE, MODES, READY, SERIAL, STOPS, Goal
+from trunkline.teleop.executor import FOLLOWS
 from trunkline.teleop.messages import ExecutorReport, PlanReport
 from trunkline.teleop.plan import Plan
 from trunkline.teleop.trajectory import gentle
@@ -137,3 +138,11 @@ def test_a_stop_of_what_nobody_permits_any_more_is_told_as_the_later():
     played.turn(played.plant.tick, permits=False)
     assert played.mode == "running"  # it brakes still
     assert played.told[0][HELD] == played.now > ended
+
+
+def test_how_old_targets_are_is_told_with_them():
+    played, heard = Played().begin(FOLLOWING), []
+    played.robot.hear = lambda age, axes: heard.append((age, axes))  # type: ignore[method-assign]
+    played.channel.plans.put((played.serial, FOLLOWS, Goal(played.now - 0.25, None), 0))
+    played.loop.turn(played.now)
+    assert heard == [(0.25, None)]
