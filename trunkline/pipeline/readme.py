@@ -259,9 +259,9 @@ def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
     what = f"reach: the tip ends within a radius ({radius}, median) in 9 of 10 cases: {', '.join(times.values())}"
     came = f"{' / '.join(inside)}; it is {' / '.join(off)} radii off, median"
     lines.append(f"| {what} | {came} | {_joined(asked)} |")
-    agreed, previews = lookup(preview, "agreed"), lookup(preview, "previews")
+    likelier, previews = lookup(preview, "agreed"), lookup(preview, "previews")
     goal = _goal(goals.get("preview.agreement"), lookup(preview, "agreement"))
-    lines.append(f"| grasp, hand-over: whether it holds | {agreed} of {previews} as the likelier | {goal} |")
+    lines.append(f"| grasp, hand-over: whether it holds | {likelier} of {previews} as the likelier | {goal} |")
     path = lookup(preview, "path_pct_median")
     goal = _goal(goals.get("preview.path_pct_median"), path)
     lines.append(f"| grasp, hand-over: where the tip goes | {_number(path)} % of length off, median | {goal} |")
