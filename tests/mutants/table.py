@@ -2,15 +2,16 @@
 
 from collections import Counter
 
-from tests.mutants.running import BROKEN, LATE, SURVIVED, Pairs
+from tests.mutants.running import BROKEN, LATE, SURVIVED, WRONG, Pairs
 
 HEAD = """# Mutants
 
 Written by `make mutants`, which `python -m tests.mutants --help` says more of. Killed are also those that the tests do
-not end with in time (late) or that cannot be imported.
+not end with in time (late) or that cannot be imported. One whose tests do not pass without it has no result, and counts
+as not killed.
 
-| file | mutants | killed | of these late | not imported | survive |
-|---|---:|---:|---:|---:|---:|
+| file | mutants | killed | of these late | not imported | survive | no result |
+|---|---:|---:|---:|---:|---:|---:|
 """
 
 
@@ -30,9 +31,10 @@ def table(pairs: Pairs, reasons: dict[str, str]) -> str:
 
 def killed(pairs: Pairs) -> float:
     """The share of them, 1 of none."""
-    return 1 - sum(outcome.kind == SURVIVED for _, outcome in pairs) / max(len(pairs), 1)
+    return 1 - sum(outcome.kind in (SURVIVED, WRONG) for _, outcome in pairs) / max(len(pairs), 1)
 
 
 def _row(name: str, row: Counter) -> str:
-    numbers = row.total(), row.total() - row[SURVIVED], row[LATE], row[BROKEN], row[SURVIVED]
+    dead = row.total() - row[SURVIVED] - row[WRONG]
+    numbers = row.total(), dead, row[LATE], row[BROKEN], row[SURVIVED], row[WRONG]
     return f"| {name} | {' | '.join(map(str, numbers))} |"
