@@ -14,7 +14,7 @@ import pytest
 from tests.support.gated import GOOD, LIMITS, METRICS, changed, commit, found, made, renew, stored, write
 from trunkline.errors import InputError
 from trunkline.pipeline import baseline, gate
-from trunkline.pipeline.limits import Limit, limit_files, lookup, metrics_folder, read_limits
+from trunkline.pipeline.limits import Limit, is_finite, limit_files, lookup, metrics_folder, read_limits
 from trunkline.pipeline.stage import write_json
 
 ROOT = Path(__file__).parents[2]
@@ -102,6 +102,20 @@ def test_many_commits_of_a_little_worse_fail_as_soon_as_they_sum_up(project):
     assert refused == list(range(3, 16))  # 1.099² = 1.21, 1.099³ = 1.33
 
 
+def test_an_error_that_is_just_so_many_times_below_the_other_passes(project):
+    write(project, changed(cad=5.0))
+    assert found(project) == []
+
+
+@pytest.mark.parametrize(
+    ("value", "finite"),
+    [(0, True), (-1.5, True), (math.nan, False), (math.inf, False), (-math.inf, False), (True, False), ("1", False),
+     (None, False), ([1.0], False)],
+)  # fmt: skip
+def test_what_is_a_finite_number(value, finite):
+    assert is_finite(value) is finite
+
+
 def test_slack_counts_near_zero(project):
     write(project, changed(validate=0.001))
     commit(project)
@@ -124,6 +138,8 @@ def test_slack_counts_near_zero(project):
         ({"min": 0.88}, 0.9, 0.88),
         ({"better": "higher", "slack": 0.2}, 1.0, 0.8),
         ({"better": "higher"}, 1300, 1000),
+        ({"better": "higher"}, 1.3, 1.0),
+        ({"better": "higher"}, -1.0, -1.0 - 0.3 / 1.3),
         ({"better": "higher"}, 0.13, 0.1),  # not what is missing from 1, which would pass 0
         ({"better": "higher", "slack": 0.05}, 0.0, -0.05),
         ({"better": "lower", "goal": 1.5}, 1.7, 2.21),

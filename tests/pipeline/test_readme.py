@@ -14,6 +14,7 @@ from trunkline.pipeline.readme import (
     EXAMPLES,
     RESULTS,
     Shown,
+    as_sent,
     generate,
     preview_table,
     rehearsal_block,
@@ -187,6 +188,7 @@ def test_commands_are_told_by_the_same_statistics_of_whatever_arm():
         names = [f"{arm}.position_error_mm.median", f"{arm}.position_error_mm.p95", f"{arm}.beyond_1pct_unsaid"]
         assert [figure.key for figure in figures] == names
         assert figures[-1].of.endswith("targets")
+        assert figures == as_sent(arm, figures[-1].of)
     bands = {figure.key for _, figures in RESULTS["fk_dataset"] for figure in figures}
     assert bands >= {"friction_band_mm.median", "friction_band_mm.p95"}
 
