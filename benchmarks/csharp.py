@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from trunkline.pipeline.results import recorded
 from trunkline.unity.package import read_tarball
 from trunkline.unity.twin import CSHARP
+from upkeep.results import recorded
 
 PROGRAM = Path("tests/unity/csharp")
 SHARED = [CSHARP / "Tests" / name for name in ("Comparison.cs", "Messages.cs", "SharedVectors.cs")]

@@ -21,10 +21,10 @@ from rosbags.rosbag2.storage_mcap import McapReader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from trunkline.errors import InputError
-from trunkline.logs.definitions import RIGID_BODIES
-from trunkline.logs.log import read_log
-from trunkline.logs.pose_stream import pose_stream
-from trunkline.pipeline.results import recorded
+from trunkline.recordings.logs.definitions import RIGID_BODIES
+from trunkline.recordings.logs.log import read_log
+from trunkline.recordings.logs.pose_stream import pose_stream
+from upkeep.results import recorded
 
 SCHEMA, BODIES, RATE = "mocap4r2_msgs/msg/RigidBodies", 19, 120
 START = 1_760_000_000_000_000_000  # ns

@@ -11,15 +11,15 @@ from pathlib import Path
 
 import numpy as np
 
-from trunkline.dataset.sampling import pull_directions, sample_at
+from trunkline.compute.threads import thread_count
 from trunkline.frames import gravity_in_base
-from trunkline.ik.polish import polish
+from trunkline.kinematics.dataset.sampling import pull_directions, sample_at
+from trunkline.kinematics.ik.refine import polish
+from trunkline.model.simulation.rest import settle
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import equilibrium, forward
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.results import recorded
-from trunkline.simulation.rest import settle
-from trunkline.statics.chain import read_chain
-from trunkline.statics.equilibria import equilibrium, forward
-from trunkline.threads import thread_count
+from upkeep.results import recorded
 
 SETTLED, SOLVED, DIRECTIONS, STEPS = 48, 1000, 72, 100
 

@@ -12,18 +12,18 @@ import time
 
 import numpy as np
 
+from trunkline.ar.drivers.driver import TICK
+from trunkline.ar.drivers.driver_client import Adapted, ArmSettings, panda
+from trunkline.ar.drivers.driver_process import TELL
+from trunkline.ar.drivers.robot import Machine
+from trunkline.ar.drivers.setpoint_filter import LIMITS
+from trunkline.ar.drivers.time_scaling import PacedRobot
+from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.trajectory import gentle, limits_of
 from trunkline.errors import InputError, in_one_line
-from trunkline.execution.adapted import Adapted, ArmSettings, panda
-from trunkline.execution.adapter import TELL
-from trunkline.execution.limb import TICK
-from trunkline.execution.machine import Machine
-from trunkline.execution.pace import PacedRobot
-from trunkline.execution.stream import LIMITS
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.results import recorded
-from trunkline.teleop.config import Config as Teleop
-from trunkline.teleop.plan import Plan
-from trunkline.teleop.trajectory import gentle, limits_of
+from upkeep.results import recorded
 
 TURN, SECONDS = 0.3, 4.0  # rad and s of each way
 RESTS = 2.0  # s

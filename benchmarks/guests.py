@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 from aiohttp import ClientSession, WSMessage, WSMsgType
 
-from trunkline.live import wire
+from trunkline.ar.session import binary
 
 HZ = 72.0  # of inputs
 Place = tuple[float, float, float]  # m, in the base frame
@@ -50,14 +50,14 @@ class Guest:
 
     async def greet(self, token: str) -> None:
         """Come in, and learn the clock."""
-        await self.say(type="hello", version=wire.VERSION, token=token)
+        await self.say(type="hello", version=binary.VERSION, token=token)
         await self.knows.wait()
 
     async def say(self, **message) -> None:
         await self.socket.send_json(message)
 
     async def send(self, kind: str, rows: bytes = b"", flags: int = 0, count: int = 0) -> None:
-        head = struct.pack("<BBHId", wire.FROM_CLIENT[kind].number, flags, count, self.received, self.now())
+        head = struct.pack("<BBHId", binary.FROM_CLIENT[kind].number, flags, count, self.received, self.now())
         await self.socket.send_bytes(head + rows)
 
     async def leave(self) -> None:
@@ -107,8 +107,8 @@ class Hands:
 def hands_at(rigid: Place, tip: Place, held: dict[str, float]) -> bytes:
     """Of an input: both hands above their targets, their rays straight down, in the base frame."""
     rows = [
-        [(dict.fromkeys(wire.HAND, 0.0) | {"x": x, "y": y, "z": z + LENGTH, "qw": 1.0} | held)[name]
-         for name in wire.HAND]
+        [(dict.fromkeys(binary.HAND, 0.0) | {"x": x, "y": y, "z": z + LENGTH, "qw": 1.0} | held)[name]
+         for name in binary.HAND]
         for x, y, z in (rigid, tip)
     ]  # fmt: skip
     return np.array(rows, dtype="<f4").tobytes()

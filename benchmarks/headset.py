@@ -23,11 +23,11 @@ import onnxruntime
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT
-from trunkline.pipeline.results import recorded
 from trunkline.unity.package import NETWORK, read_tarball
 from trunkline.unity.proof import scene_of, turns
 from trunkline.unity.start import Twin
 from trunkline.unity.unpacked import model_of
+from upkeep.results import recorded
 
 LONGEST = 0.004  # s
 RATES = (60, 72, 90, 120)  # Hz

@@ -26,25 +26,25 @@ from typing import cast
 
 import numpy as np
 
+from trunkline.ar.drivers.settings import Config as Execution
+from trunkline.ar.drivers.simulated_motors import SIMULATED
+from trunkline.ar.preview.package import only_package
+from trunkline.ar.session import lease
+from trunkline.ar.session.alignment import mark_at
+from trunkline.ar.session.composition import Made
+from trunkline.ar.session.controller import Robot
+from trunkline.ar.session.hardware import hardware_of
+from trunkline.ar.session.server import Server
+from trunkline.ar.session.session import Address, opened
+from trunkline.ar.session.settings import Alignment, Config
+from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.executor import AT_START
+from trunkline.ar.teleop.messages import ExecutorReport
+from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.trajectory import Limits, gentle
 from trunkline.errors import InputError, in_one_line
-from trunkline.execution.bank import SIMULATED
-from trunkline.execution.settings import Config as Execution
-from trunkline.foresight.package import only_package
-from trunkline.live import lease
-from trunkline.live.aligning import mark_at
-from trunkline.live.desk import Robot
-from trunkline.live.hardware import hardware_of
-from trunkline.live.house import Made
-from trunkline.live.server import Server
-from trunkline.live.session import Address, opened
-from trunkline.live.settings import Alignment, Config
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.results import recorded
-from trunkline.teleop.config import Config as Teleop
-from trunkline.teleop.executor import AT_START
-from trunkline.teleop.messages import ExecutorReport
-from trunkline.teleop.plan import Plan
-from trunkline.teleop.trajectory import Limits, gentle
+from upkeep.results import recorded
 
 ADDRESS = Address(18450)
 SCRIPT = PROJECT / "client/bench/cycles.mjs"

@@ -3,8 +3,8 @@
     python -m benchmarks.hostile [PACKAGE]
 
 The session is the real one on the simulated robot. Each attempt comes over its own connection to the port; what it is
-told is quoted. A row counts what the robot's process began since: nothing, if all is well. tests/live/test_hostile.py
-has the same and more, without physics.
+told is quoted. A row counts what the robot's process began since: nothing, if all is well.
+tests/ar/session/test_hostile.py has the same and more, without physics.
 """
 
 import argparse
@@ -20,12 +20,12 @@ import numpy as np
 from aiohttp import ClientSession, WSServerHandshakeError
 
 from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock
+from trunkline.ar.preview.package import only_package
+from trunkline.ar.session.composition import Made
+from trunkline.ar.session.server import Server
+from trunkline.ar.session.session import Address, opened
 from trunkline.errors import InputError, in_one_line
-from trunkline.foresight.package import only_package
-from trunkline.live.house import Made
-from trunkline.live.server import Server
-from trunkline.live.session import Address, opened
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 ADDRESS = Address(18447)
 PATIENCE = 60.0  # s for a plan and its preview

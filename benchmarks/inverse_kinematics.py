@@ -17,15 +17,15 @@ import numpy as np
 import onnxruntime
 from scipy.optimize import lsq_linear
 
-from trunkline.dataset.sampling import pull_directions
 from trunkline.frames import STANDARD_GRAVITY, downwards
-from trunkline.ik.ask import ask
-from trunkline.ik.bounded_least_squares import bounded_least_squares
-from trunkline.ik.polish import polish
+from trunkline.kinematics.dataset.sampling import pull_directions
+from trunkline.kinematics.ik.bounded_least_squares import bounded_least_squares
+from trunkline.kinematics.ik.inference import ask
+from trunkline.kinematics.ik.refine import polish
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import equilibrium
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.results import recorded
-from trunkline.statics.chain import read_chain
-from trunkline.statics.equilibria import equilibrium
+from upkeep.results import recorded
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 TARGETS, SINGLE, PROBLEMS = 400, 5000, 4000

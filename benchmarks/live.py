@@ -20,14 +20,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.watching import Door, Span, alone, attended, crowd, pressed, stopping
+from trunkline.ar.preview.package import only_package
+from trunkline.ar.session import binary
+from trunkline.ar.session.certificate import make_certificate, tls_context
+from trunkline.ar.session.composition import Made
+from trunkline.ar.session.server import Server
+from trunkline.ar.session.session import Address, opened
 from trunkline.errors import in_one_line
-from trunkline.foresight.package import only_package
-from trunkline.live import wire
-from trunkline.live.certificate import make_certificate, tls_context
-from trunkline.live.house import Made
-from trunkline.live.server import Server
-from trunkline.live.session import Address, opened
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 ADDRESS = Address(18444)
 CROWD = 10  # watchers, of whom one does not read in the end
@@ -136,7 +136,7 @@ async def plainly(package: Path, watchers: int, stops: int) -> tuple[list[Row], 
 
         span, sent = await attended(look, CLOSELY, door, stopping, watchers, stops)
         plans, took = made.desk.state.serial - asked, holds.after(sent)
-        size = wire.HEAD_BYTES + 28 * (len(made.scene["bodies"]) + len(wire.MARKERS))
+        size = binary.HEAD_BYTES + 28 * (len(made.scene["bodies"]) + len(binary.MARKERS))
     told = 1e3 * np.quantile(took, (0.5, 0.95, 0.99, 1.0))
     rows += [
         (f"frames a second that each of {watchers} receives", f"{span.rate:.1f}", ""),

@@ -2,16 +2,16 @@
 
     python -m benchmarks.motors
 
-`trunkline/execution/check.py` says what is measured.
+`trunkline/ar/drivers/self_test.py` says what is measured.
 """
 
 import sys
 
+from trunkline.ar.drivers.self_test import measures, table
+from trunkline.ar.drivers.settings import Config
 from trunkline.errors import in_one_line
-from trunkline.execution.check import measures, table
-from trunkline.execution.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 
 @in_one_line

@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.browser import Page, browsing
+from trunkline.ar.preview.package import only_package
 from trunkline.errors import InputError, in_one_line
-from trunkline.foresight.package import only_package
 from trunkline.pipeline.config import PROJECT
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 PORT, SIZE = 18454, (1280, 800)
 KEYS = ("Digit1", *["ArrowRight"] * 5, "Digit2", *["ArrowRight"] * 5)  # both targets 5 cm to the side
@@ -80,7 +80,7 @@ async def once(package: Path) -> list[float]:
 
     with tempfile.TemporaryDirectory() as folder:  # in which the log is
         server = await asyncio.create_subprocess_exec(
-            sys.executable, "-m", "trunkline.live", package, "--port", str(PORT), cwd=folder,
+            sys.executable, "-m", "trunkline.ar.session", package, "--port", str(PORT), cwd=folder,
             stdout=asyncio.subprocess.PIPE, stdin=asyncio.subprocess.DEVNULL, env=_environment(),
         )  # fmt: skip
         try:

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import yaml
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 ROOT = Path(__file__).parents[1]
 

@@ -15,22 +15,22 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from trunkline.hybrid.compose import Placed, compose
-from trunkline.hybrid.doubts import read_doubts
-from trunkline.hybrid.futures import Twin, Way
-from trunkline.hybrid.grasps import CABLES, Grasp, object_in_base
-from trunkline.hybrid.objects import Thing
-from trunkline.hybrid.payload import HOOK_ABOVE, LEVEL
-from trunkline.hybrid.preview import Holding, nominal, preview
-from trunkline.hybrid.robots import PandaRobot
-from trunkline.hybrid.settings import HybridSettings
-from trunkline.hybrid.touch import read_geometry
-from trunkline.hybrid.worlds import World
-from trunkline.panda.kinematics import mount_pose
+from trunkline.ar.hybrid.compose import Placed, compose
+from trunkline.ar.hybrid.grasps import CABLES, Grasp, object_in_base
+from trunkline.ar.hybrid.objects import Thing
+from trunkline.ar.hybrid.payload import HOOK_ABOVE, LEVEL
+from trunkline.ar.hybrid.posterior import read_doubts
+from trunkline.ar.hybrid.preview import Holding, nominal, preview
+from trunkline.ar.hybrid.rollouts import Twin, Way
+from trunkline.ar.hybrid.settings import HybridSettings
+from trunkline.ar.hybrid.worlds import World
+from trunkline.compute.threads import thread_count
+from trunkline.kinematics.panda.kinematics import mount_pose
+from trunkline.kinematics.panda.mounts import PandaRobot
+from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.results import recorded
-from trunkline.threads import thread_count
+from upkeep.results import recorded
 
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 STEPS = (1 / 480, 1 / 240, 1 / 200)  # s; joint limits and contacts, of 0.01 s, allow no longer one than 5 ms

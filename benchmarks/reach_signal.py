@@ -7,9 +7,9 @@ import time
 
 import numpy as np
 
-from trunkline.fields.grid import Lattice, blend
-from trunkline.pipeline.results import recorded
-from trunkline.reachability.reach_signal import packed, reach_signal
+from trunkline.kinematics.reachability.reach_signal import packed, reach_signal
+from trunkline.kinematics.sdf.grid import Lattice, blend
+from upkeep.results import recorded
 
 POINTS, ROUNDS = 64, 200
 ANGLES = np.radians([0.0, 5.0])

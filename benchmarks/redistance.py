@@ -8,8 +8,8 @@ from importlib import import_module
 
 import numpy as np
 
-from trunkline.fields.grid import Lattice, redistance
-from trunkline.pipeline.results import recorded
+from trunkline.kinematics.sdf.grid import Lattice, redistance
+from upkeep.results import recorded
 
 SPACING, RADIUS = 0.012, 0.4  # m, of the lattice and of a ball, whose distances are known
 

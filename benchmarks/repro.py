@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.pipeline import ROOT, environment
 from trunkline.errors import InputError, in_one_line
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 NOTHING = "Data and pipelines are up to date."
 

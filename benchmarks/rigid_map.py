@@ -16,14 +16,14 @@ import numpy as np
 from mujoco.batch import Batch
 
 from stages.reachability import Config
-from trunkline.panda.collision import CHUNK, clearance
-from trunkline.panda.downward import sample_downward
-from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
-from trunkline.panda.kinematics import Q_MAX, Q_MIN, mount_pose
-from trunkline.panda.mjcf import panda_spec
+from trunkline.kinematics.panda.collision import CHUNK, clearance
+from trunkline.kinematics.panda.downward import sample_downward
+from trunkline.kinematics.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
+from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
+from trunkline.kinematics.panda.mjcf import panda_spec
+from trunkline.kinematics.reachability.maps import build_rigid
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.results import recorded
-from trunkline.reachability.maps import build_rigid
+from upkeep.results import recorded
 
 STARTS = 60
 MINK_STARTS = 10

@@ -13,14 +13,14 @@ import numba
 import numpy as np
 
 from trunkline.frames import gravity_in_base
+from trunkline.model.statics.cables import solve_small
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.energy import Pull, evaluate, find_hessian
+from trunkline.model.statics.factor import factorize, solve
+from trunkline.model.statics.newton import new_work
+from trunkline.model.statics.vectors import cross, product, vector
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.results import recorded
-from trunkline.statics.cables import solve_small
-from trunkline.statics.chain import read_chain
-from trunkline.statics.energy import Pull, evaluate, find_hessian
-from trunkline.statics.factor import factorize, solve
-from trunkline.statics.newton import new_work
-from trunkline.statics.vectors import cross, product, vector
+from upkeep.results import recorded
 
 CALLS, ROUNDS = 20_000, 7
 

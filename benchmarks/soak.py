@@ -21,25 +21,25 @@ import numpy as np
 from aiohttp import ClientSession
 
 from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, hands_at, knock
+from trunkline.ar.preview.package import Package, only_package, read_package
+from trunkline.ar.preview.world_model import make_world
+from trunkline.ar.session import messages, preview_process
+from trunkline.ar.session.auth import make_token
+from trunkline.ar.session.composition import SEARCH
+from trunkline.ar.session.controller import Desk
+from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.server import House, Server
+from trunkline.ar.session.session import Address, listening
+from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.core import Teleoperation
+from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.following import Following
+from trunkline.ar.teleop.messages import ExecutorReport, PlanReport
+from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.trajectory import JOINTS, gentle, limits_of
 from trunkline.errors import InputError, in_one_line
-from trunkline.foresight.believing import make_world
-from trunkline.foresight.package import Package, only_package, read_package
-from trunkline.live import foreseer, talk
-from trunkline.live.access import make_token
-from trunkline.live.desk import Desk
-from trunkline.live.house import SEARCH
-from trunkline.live.robot import Standing
-from trunkline.live.server import House, Server
-from trunkline.live.session import Address, listening
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.results import recorded
-from trunkline.teleop.config import Config as Teleop
-from trunkline.teleop.core import Teleoperation
-from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.following import Following
-from trunkline.teleop.messages import ExecutorReport, PlanReport
-from trunkline.teleop.plan import Plan
-from trunkline.teleop.trajectory import JOINTS, gentle, limits_of
+from upkeep.results import recorded
 
 ADDRESS, BODIES = Address(18445), 26
 VISIT, STAY, HAND_OVER = 20.0, 8.0, 300.0  # s between visitors, of a visit, between hand-overs of the lease
@@ -79,8 +79,8 @@ class Planning:
         self.robot, self.limits, self.made = robot.robot, robot.limits, 0
         self.server: Server | None = None
 
-    def order(self, order: foreseer.Order | foreseer.Seek) -> None:
-        assert isinstance(order, foreseer.Order)
+    def order(self, order: preview_process.Order | preview_process.Seek) -> None:
+        assert isinstance(order, preview_process.Order)
         assert self.server is not None
         request, robot = order.request, self.robot
         self.made += 1
@@ -89,13 +89,13 @@ class Planning:
         rows = gentle(here, there, self.limits, 0.01)
         plan = Plan(0.01, rows[:, :JOINTS], rows[:, JOINTS:], (("approach", 0),), request.package, request.world)
         digest, poses = plan.digest(), np.zeros((15, BODIES, 7), dtype=np.float32)
-        told = talk.Foreseen(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
+        told = messages.Foreseen(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
         for answer in (
-            foreseer.Planned(PlanReport(request.serial, digest, "", plan.package, plan.world), plan),
-            foreseer.Begun(request.serial, talk.Preview(digest, 0.02, 0.3, 0.02, (("approach", 0.0),))),
-            foreseer.Shown(request.serial, 0, 0.02, poses, False),
-            foreseer.Shown(request.serial, 15, 0.32, poses, True),
-            foreseer.Told(request.serial, told),
+            preview_process.Planned(PlanReport(request.serial, digest, "", plan.package, plan.world), plan),
+            preview_process.Begun(request.serial, messages.Preview(digest, 0.02, 0.3, 0.02, (("approach", 0.0),))),
+            preview_process.Shown(request.serial, 0, 0.02, poses, False),
+            preview_process.Shown(request.serial, 15, 0.32, poses, True),
+            preview_process.Told(request.serial, told),
         ):
             self.server.foreseen(answer)
 

@@ -25,13 +25,13 @@ import mujoco
 import numpy as np
 
 from benchmarks.browser import browsing
+from trunkline.ar.preview.package import only_package, read_package
+from trunkline.ar.session.composition import SEARCH, simulation_of
+from trunkline.ar.session.settings import Config
+from trunkline.ar.teleop.config import Config as Teleop
 from trunkline.errors import InputError, in_one_line
-from trunkline.foresight.package import only_package, read_package
-from trunkline.live.house import SEARCH, simulation_of
-from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.results import recorded
-from trunkline.teleop.config import Config as Teleop
+from upkeep.results import recorded
 
 PORTS, SIZE = (18448, 18449), (1280, 720)
 COMES, SETTLES = 120.0, 5.0  # s for a server to come, s after a page's first picture
@@ -116,7 +116,7 @@ async def measured(title: str, url: str, pid: int, begun: float, seconds: float,
 
 
 async def compared(package: Path, seconds: float, pictures: Path | None) -> dict[str, Found]:
-    ours = ["-m", "trunkline.live", str(package), "--port", str(PORTS[0])]
+    ours = ["-m", "trunkline.ar.session", str(package), "--port", str(PORTS[0])]
     found = {}
     begun = time.monotonic()
     async with served(ours, "#token=") as (pid, line):

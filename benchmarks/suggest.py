@@ -1,11 +1,11 @@
 """What suggestions are worth, on the stand-in lab: `python -m benchmarks.suggest [--seeds N]`
 
 Every seed is another arm of the lab, with noise of its own, and the same three trials to begin with. Then trials are
-added one after the other: those that `trunkline.suggest` names after every fit, for the widest intervals and for the
-tip; as many drawn at random from the same candidates; and the rest of the paper's list in its order. After each, the
-stages `identify_stiffness` and `identify_damping` are fitted as params.yaml says, by least squares from the CAD model,
-and the twin is held against trials that no one may choose. A seed is a row of docs/results/suggest.csv as soon as it is
-done; stopped, the benchmark goes on from there.
+added one after the other: those that `trunkline.tools.design` names after every fit, for the widest intervals and for
+the tip; as many drawn at random from the same candidates; and the rest of the paper's list in its order. After each,
+the stages `identify_stiffness` and `identify_damping` are fitted as params.yaml says, by least squares from the CAD
+model, and the twin is held against trials that no one may choose. A seed is a row of docs/results/suggest.csv as soon
+as it is done; stopped, the benchmark goes on from there.
 """
 
 import argparse
@@ -24,25 +24,25 @@ from benchmarks.suggest_lab import Lab, fixed_list, held_out, started
 from demo.plants.choice import plant_of
 from demo.rig import ROOT, Config
 from studies.rows import Rows, digest
-from trunkline.arm.kinds import described_arm
 from trunkline.errors import in_one_line
-from trunkline.identification.certainty import certainty
-from trunkline.identification.evaluation import replay
-from trunkline.identification.experiment import Experiment, prepare
-from trunkline.identification.identify import values_of, with_parameters
-from trunkline.identification.loss import position_error
-from trunkline.identification.search import descend
-from trunkline.identification.settings import IdentificationSettings
-from trunkline.identification.setup import set_up, with_every
+from trunkline.identification.evaluation.evaluation import replay
+from trunkline.identification.fit.certainty import certainty
+from trunkline.identification.fit.identify import values_of, with_parameters
+from trunkline.identification.fit.search import descend
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.fit.setup import set_up, with_every
+from trunkline.identification.simulate.experiment import Experiment, prepare
+from trunkline.identification.simulate.loss import position_error
+from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import load_config, load_folder, settings_of
-from trunkline.pipeline.results import recorded
-from trunkline.suggest.candidates import Candidate, candidates
-from trunkline.suggest.goals import Goal, weights_for
-from trunkline.suggest.information import stage_information
-from trunkline.suggest.ranking import suggest
-from trunkline.suggest.settings import Recordable
-from trunkline.trials.experiments import is_static
-from trunkline.trials.trial import Trial
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.trial import Trial
+from trunkline.tools.design.candidates import Candidate, candidates
+from trunkline.tools.design.goals import Goal, weights_for
+from trunkline.tools.design.information import stage_information
+from trunkline.tools.design.ranking import suggest
+from trunkline.tools.design.settings import Recordable
+from upkeep.results import recorded
 
 STAGES = ("identify_stiffness", "identify_damping")
 KINDS = ("static_tilt", "release", "static_pull")

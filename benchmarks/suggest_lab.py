@@ -12,13 +12,13 @@ from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
 from demo.plants.bench import COMMAND_RATE, LOOSE, SAMPLE_RATE, Bench, Plant
-from trunkline.arm.mjcf import unit_name
-from trunkline.elements import actuators
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
-from trunkline.suggest.candidates import UPRIGHT, Candidate
-from trunkline.trials.experiments import is_static
-from trunkline.trials.splits import IDENTIFY
-from trunkline.trials.trial import Trial
+from trunkline.model.arm.mjcf import unit_name
+from trunkline.model.elements import actuators
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.splits import IDENTIFY
+from trunkline.recordings.trials.trial import Trial
+from trunkline.tools.design.candidates import UPRIGHT, Candidate
 
 RATE = 120.0  # Hz, of the cameras
 NOISE, TURNED = 3e-4, np.radians(0.3)  # m and rad, standard deviation of each coordinate

@@ -5,8 +5,8 @@ import time
 import numpy as np
 from scipy.optimize import minimize
 
-from trunkline.identification.surrogate import Surrogate, bends_of, features_at, slopes_at
-from trunkline.pipeline.results import recorded
+from trunkline.identification.fit.surrogate import Surrogate, bends_of, features_at, slopes_at
+from upkeep.results import recorded
 
 TRIALS, PARAMETERS, RESIDUALS, FITS, ONE_BY_ONE = 11, 4, 200, 20_000, 100
 

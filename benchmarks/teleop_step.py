@@ -13,13 +13,13 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.core import Teleoperation
+from trunkline.ar.teleop.messages import Controller, Input, Pose, World, to_json
+from trunkline.ar.teleop.reach import MapReach
 from trunkline.frames import downwards
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.results import recorded
-from trunkline.teleop.config import Config
-from trunkline.teleop.core import Teleoperation
-from trunkline.teleop.messages import Controller, Input, Pose, World, to_json
-from trunkline.teleop.reach import MapReach
+from upkeep.results import recorded
 
 STEPS, DT = 1200, 1 / 60
 JOINTS = (0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785)

@@ -17,8 +17,8 @@ import numpy as np
 from aiohttp import ClientSession, TCPConnector, WSMessage, WSMsgType
 
 from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, hands_at, knock
+from trunkline.ar.session import binary
 from trunkline.errors import InputError
-from trunkline.live import wire
 
 QUIET = 5.0  # s in which frames and processor are counted
 SETTLED = 1.0  # s before it: who has come is told much at first
@@ -50,8 +50,8 @@ class Frames:
     rows: list[tuple[float, float]] = field(default_factory=list)
 
     def __call__(self, message: WSMessage) -> None:
-        if message.type is WSMsgType.BINARY and message.data[0] == wire.FROM_SERVER["robot"].number:
-            self.rows.append((struct.unpack_from("<d", message.data, wire.HEAD_BYTES - 8)[0], time.monotonic()))
+        if message.type is WSMsgType.BINARY and message.data[0] == binary.FROM_SERVER["robot"].number:
+            self.rows.append((struct.unpack_from("<d", message.data, binary.HEAD_BYTES - 8)[0], time.monotonic()))
 
 
 @dataclass(frozen=True)

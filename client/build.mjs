@@ -1,7 +1,7 @@
 // Builds the page of live sessions, one script, one HTML file and an icon, and what a certificate's page has inside, a
 // script and a style sheet. They are committed, so that users need no Node.
 //
-//   node build.mjs            writes trunkline/live/page/ and trunkline/certificate/page/
+//   node build.mjs            writes trunkline/ar/session/page/ and trunkline/report/certificate/page/
 //   node build.mjs --check    compares it with what is there; ends with 1 where a byte differs
 //
 // The same sources give the same bytes: versions are those of package-lock.json, and nothing of the machine goes in.

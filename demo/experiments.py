@@ -6,8 +6,8 @@ from typing import Annotated
 
 from pydantic import Field
 
-from trunkline.trials.recording import Planned
-from trunkline.trials.splits import IDENTIFY, VALIDATE
+from trunkline.recordings.trials.recording import Planned
+from trunkline.recordings.trials.splits import IDENTIFY, VALIDATE
 
 Tilt = Annotated[float, Field(ge=0, le=180)]
 Azimuth = Annotated[float, Field(ge=0, lt=360)]

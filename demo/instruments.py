@@ -9,7 +9,7 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from demo.truth import Truth
-from trunkline.trials.recording import Planned
+from trunkline.recordings.trials.recording import Planned
 
 BASE = "base"
 

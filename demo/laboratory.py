@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from demo.experiments import Experiments, curl_trials, motion_trials, pull_trials, release_trials, tilt_trials
 from demo.plants.bench import COMMAND_RATE, LOOSE, SAMPLE_RATE, Bench, Plant, Seen
 from demo.truth import Truth
-from trunkline.arm.mjcf import unit_name
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
-from trunkline.trials.recording import Planned
-from trunkline.trials.splits import TEST
+from trunkline.model.arm.mjcf import unit_name
+from trunkline.recordings.trials.recording import Planned
+from trunkline.recordings.trials.splits import TEST
 
 
 def record(

@@ -11,11 +11,11 @@ from demo.instruments import InstrumentSettings, measure
 from demo.laboratory import record
 from demo.plants.choice import Choice, distinct, expect, plant_of
 from demo.recorder import write_log, write_session
+from trunkline.compute.progress import progress
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.progress import progress
+from trunkline.recordings.trials.recording import Planned
+from trunkline.recordings.trials.splits import IDENTIFY, VALIDATE
 from trunkline.settings import settings
-from trunkline.trials.recording import Planned
-from trunkline.trials.splits import IDENTIFY, VALIDATE
 
 SESSION = Path("data/raw/demo")
 ANSWERS = SESSION.with_name("demo.truth.json")  # beside the session, not in it: no stage depends on it

@@ -6,7 +6,7 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from demo.instruments import BASE, InstrumentSettings, Measurement
-from trunkline.logs.definitions import JOINT_STATE, RIGID_BODIES
+from trunkline.recordings.logs.definitions import JOINT_STATE, RIGID_BODIES
 
 POSES, COMMANDS, TENDON_POSITIONS = "/rigid_bodies", "/tendon_commands", "/tendon_states"
 CHUNK_SIZE = 64 * 1024  # bytes; what a crash of the recorder costs

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from trunkline.trials.recording import Recording
+from trunkline.recordings.trials.recording import Recording
 
 
 @dataclass(kw_only=True)

@@ -10,9 +10,9 @@ import numpy as np
 import onnxruntime
 
 from trunkline.frames import STANDARD_GRAVITY, downwards
-from trunkline.ik.ask import ask
-from trunkline.statics.chain import read_chain
-from trunkline.statics.equilibria import actuated, equilibrium
+from trunkline.kinematics.ik.inference import ask
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import actuated, equilibrium
 
 model, network = sys.argv[1:]
 chain = read_chain(mujoco.MjModel.from_xml_path(model)).smooth  # the network's arm, its tendons without friction

@@ -17,12 +17,12 @@ from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import summary
 from rehearsal.report import draw
 from rehearsal.runs import make, source_of, wanted
+from trunkline.ar.preview.package import only_package
+from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
-from trunkline.foresight.package import only_package
 from trunkline.pipeline.checkout import require_checkout
-from trunkline.pipeline.limits import read_limits
-from trunkline.pipeline.rehearsal_table import rehearsal_table
-from trunkline.threads import thread_count
+from upkeep.limits import read_limits
+from upkeep.rehearsal_table import rehearsal_table
 
 
 @in_one_line

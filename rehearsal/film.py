@@ -7,7 +7,7 @@ import numpy as np
 from rehearsal.robot.scene import Object, Surface
 from rehearsal.session import RATE, Session
 from trunkline.frames import rotation_from_wxyz
-from trunkline.panda.kinematics import FLANGE, joint_frames
+from trunkline.kinematics.panda.kinematics import FLANGE, joint_frames
 
 EVERY = 5  # frames of the session from shot to shot
 SHOTS_PER_SECOND = RATE / EVERY

@@ -26,7 +26,7 @@ from demo.rig import Config as Lab
 from rehearsal.robot.scene import Object, Scene, Surface
 from rehearsal.robot.stand_in import SUBSTEPS, StandIn, StandInRobot, Truth
 from trunkline.frames import wxyz_from_rotation
-from trunkline.panda.kinematics import Q_MAX, Q_MIN, mount_pose
+from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
 from trunkline.pipeline.config import load_config
 from trunkline.settings import read_yaml
 

@@ -11,13 +11,13 @@ from rehearsal.experiments.result import Result, rewrite_results, summary
 from rehearsal.experiments.stated import scores
 from rehearsal.report import draw
 from rehearsal.runs import Source, make, source_of, wanted
+from trunkline.ar.preview.package import only_package
+from trunkline.compute.threads import thread_count
 from trunkline.errors import nearest
-from trunkline.foresight.package import only_package
-from trunkline.pipeline.limits import read_limits
-from trunkline.pipeline.rehearsal_table import rehearsal_table
 from trunkline.pipeline.stage import run_stage, write_json
 from trunkline.settings import settings
-from trunkline.threads import thread_count
+from upkeep.limits import read_limits
+from upkeep.rehearsal_table import rehearsal_table
 
 OUT = Path("artifacts/rehearse")
 

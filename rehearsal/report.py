@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from rehearsal.experiments.result import Result, causes, grouped, rate
-from trunkline.pipeline.rehearsal_table import DISTANCES
+from upkeep.rehearsal_table import DISTANCES
 
 
 def draw(results: list[Result], file: Path) -> None:

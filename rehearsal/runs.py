@@ -15,13 +15,13 @@ from rehearsal.experiments.ablations import VARIANTS, varied
 from rehearsal.experiments.bench import Bench, bench_of, perform
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import Result, append_result, read_results
-from trunkline.cluster import VARIABLE
+from trunkline.compute.cluster import VARIABLE
+from trunkline.compute.processes import end_with_parent
+from trunkline.compute.scheduler import arriving, elsewhere
 from trunkline.errors import InputError
-from trunkline.pipeline.provenance import REHEARSAL, SHOWN, stage_code
-from trunkline.processes import end_with_parent
-from trunkline.scheduler import arriving, elsewhere
 from trunkline.unity.unpacked import package_digest
 from trunkline.unity.unpacked import read_package as read_files
+from upkeep.provenance import REHEARSAL, SHOWN, stage_code
 
 
 @dataclass(frozen=True)

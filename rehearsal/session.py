@@ -13,19 +13,19 @@ import numpy as np
 from rehearsal.operator.hands import RayHand
 from rehearsal.robot.sensors import Seen
 from rehearsal.robot.stand_in import StandInRobot
+from trunkline.ar.preview.grasp_preview import Foreseen, Foresight
+from trunkline.ar.preview.package import Package
+from trunkline.ar.preview.world_model import believe
+from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.core import Teleoperation
+from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.following import Follower, Following, sought
+from trunkline.ar.teleop.messages import ExecutorReport, Input, Intent, Joints, Offer, PlanReport, Pose, World
+from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.targets import why_not
+from trunkline.ar.teleop.trajectory import JOINTS
 from trunkline.errors import InputError
-from trunkline.foresight.believing import believe
-from trunkline.foresight.foresight import Foreseen, Foresight
-from trunkline.foresight.package import Package
-from trunkline.panda.kinematics import mount_pose
-from trunkline.teleop.config import Config
-from trunkline.teleop.core import Teleoperation
-from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.following import Follower, Following, sought
-from trunkline.teleop.messages import ExecutorReport, Input, Intent, Joints, Offer, PlanReport, Pose, World
-from trunkline.teleop.plan import Plan
-from trunkline.teleop.targets import why_not
-from trunkline.teleop.trajectory import JOINTS
+from trunkline.kinematics.panda.kinematics import mount_pose
 
 RATE = 60.0  # Hz, of a headset's frames
 TICKS = 2  # in which the robot is commanded a frame

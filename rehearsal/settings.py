@@ -9,7 +9,7 @@ from pydantic import Field
 
 from rehearsal.operator.hands import Person
 from rehearsal.robot.stand_in import StandIn
-from trunkline.foresight.settings import Previewing
+from trunkline.ar.preview.settings import Previewing
 from trunkline.pipeline.config import validated
 from trunkline.settings import read_yaml
 

@@ -1,7 +1,7 @@
 """The stages of dvc.yaml, a file each: read, one call, write."""
 
-from trunkline.arithmetic import hold_arithmetic
-from trunkline.loading import say_loading
+from trunkline.compute.numerics import hold_arithmetic
+from trunkline.startup_notice import say_loading
 
 hold_arithmetic()
 say_loading("stages")

@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
-from trunkline.arm.cad import CadArm
-from trunkline.arm.kinds import Description, described_arm
-from trunkline.figures.arm import arm_figure
-from trunkline.figures.style import save_figure
+from trunkline.model.arm.cad import CadArm
+from trunkline.model.arm.kinds import Description, described_arm
+from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.config import own_or_project
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.statics.chain import read_chain
+from trunkline.report.figures.arm import arm_figure
+from trunkline.report.figures.style import save_figure
 
 ARTIFACTS = Path("artifacts/build_mjcf")
 

@@ -4,16 +4,16 @@ from pathlib import Path
 
 import numpy as np
 
-from trunkline.figures.data import filter_figure
-from trunkline.figures.style import save_figure
-from trunkline.filtering.effect import summary
-from trunkline.filtering.filter import Filter, filter_take
+from trunkline.compute.progress import progress
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.progress import progress
+from trunkline.recordings.filtering.effect import summary
+from trunkline.recordings.filtering.filter import Filter, filter_take
+from trunkline.recordings.trials.raw_trial import read_takes
+from trunkline.recordings.trials.splits import SPLITS
+from trunkline.recordings.trials.trial import write_trials
+from trunkline.report.figures.data import filter_figure
+from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
-from trunkline.trials.splits import SPLITS
-from trunkline.trials.take import read_takes
-from trunkline.trials.trial import write_trials
 
 INGEST, PROCESSED, ARTIFACTS = Path("data/processed/ingest"), Path("data/processed/filter"), Path("artifacts/filter")
 

@@ -2,15 +2,15 @@
 
 from pathlib import Path
 
-from trunkline.dataset.gather import Sampling, gather
-from trunkline.dataset.report import summary, unevenness_table
-from trunkline.figures.dataset import density_figure, deviation_figure
-from trunkline.figures.style import save_figure
+from trunkline.compute.progress import progress
+from trunkline.kinematics.dataset.gather import Sampling, gather
+from trunkline.kinematics.dataset.report import summary, unevenness_table
+from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.inputs import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.progress import progress
+from trunkline.report.figures.dataset import density_figure, deviation_figure
+from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
-from trunkline.statics.chain import read_chain
 
 DATA, ARTIFACTS = Path("data/processed/fk_dataset"), Path("artifacts/fk_dataset")
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.pipeline.identify import run
 from trunkline.pipeline.stage import run_stage
 

@@ -5,20 +5,20 @@ from dataclasses import field
 from functools import partial
 from pathlib import Path
 
+from trunkline.compute.progress import progress
 from trunkline.errors import InputError
-from trunkline.figures.data import quality_figure
-from trunkline.figures.style import save_figure
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.progress import progress
-from trunkline.sessions.session import OneFolder, Session, SomeSessions, session_folders
+from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.quality import by_sentence, clock_facts, judge, remarks, report, summary
+from trunkline.recordings.cleaning.same_arm import gather_each
+from trunkline.recordings.cleaning.sanity_checks import Plausible
+from trunkline.recordings.cleaning.session_checks import Gathered, Refusal, gather, require_enough, together
+from trunkline.recordings.session.session import OneFolder, Session, SomeSessions, session_folders
+from trunkline.recordings.trials.raw_trial import write_takes
+from trunkline.report.figures.data import quality_figure
+from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
-from trunkline.takes.checks import Limits
-from trunkline.takes.gathering import Gathered, Refusal, gather, require_enough, together
-from trunkline.takes.intake import take_in
-from trunkline.takes.one_arm import gather_each
-from trunkline.takes.plausible import Plausible
-from trunkline.takes.quality import by_sentence, clock_facts, judge, remarks, report, summary
-from trunkline.trials.take import write_takes
 
 RAW, PROCESSED, ARTIFACTS = Path("data/raw"), Path("data/processed/ingest"), Path("artifacts/ingest")
 

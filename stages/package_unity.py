@@ -7,17 +7,17 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from trunkline.figures.package import roundtrip_figure
-from trunkline.figures.style import save_figure
-from trunkline.hybrid.robots import Robot
+from trunkline.ar.conformance.vectors import vectors, with_shared_vectors
+from trunkline.ar.teleop.settings import Teleop
+from trunkline.kinematics.panda.mounts import Robot
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.report.figures.package import roundtrip_figure
+from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
-from trunkline.teleop.settings import Teleop
 from trunkline.unity.comparison import curled, read_models
 from trunkline.unity.package import MANIFEST, read_tarball, write_tarball
 from trunkline.unity.proof import started
 from trunkline.unity.readers import refusals
-from trunkline.unity.shared_vectors import vectors, with_shared_vectors
 from trunkline.unity.sources import read_sources
 from trunkline.unity.twin import Label, Trajectory, assemble, compare
 

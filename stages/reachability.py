@@ -4,18 +4,18 @@ from pathlib import Path
 
 import numpy as np
 
-from trunkline.fields.mesh import write_obj
-from trunkline.figures.maps import heldout_figure, maps_figure, slices_figure
-from trunkline.figures.style import save_figure
-from trunkline.panda.mjcf import panda_spec
+from trunkline.compute.progress import progress
+from trunkline.kinematics.panda.mjcf import panda_spec
+from trunkline.kinematics.reachability.report import heldout_table, summary
+from trunkline.kinematics.reachability.sampled import read_tips
+from trunkline.kinematics.reachability.survey import Survey, survey
+from trunkline.kinematics.sdf.mesh import write_obj
+from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.inputs import read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.progress import progress
-from trunkline.reachability.report import heldout_table, summary
-from trunkline.reachability.sampled import read_tips
-from trunkline.reachability.survey import Survey, survey
+from trunkline.report.figures.maps import heldout_figure, maps_figure, slices_figure
+from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
-from trunkline.statics.chain import read_chain
 
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
 ARTIFACTS = Path("artifacts/reachability")

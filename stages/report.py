@@ -3,16 +3,16 @@
 import json
 from pathlib import Path
 
-from trunkline.certificate.certificate import Asked, certify, digest_of_code, digests
-from trunkline.certificate.page import page
 from trunkline.errors import existing
-from trunkline.figures.certificate import pose_figure, uncertainty_figure
-from trunkline.figures.style import save_figure
 from trunkline.pipeline.inputs import load_rig, read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.recordings.trials.splits import DECIDING
+from trunkline.recordings.trials.trial import read_trials
+from trunkline.report.certificate.certificate import Asked, certify, digest_of_code, digests
+from trunkline.report.certificate.page import page
+from trunkline.report.figures.certificate import pose_figure, uncertainty_figure
+from trunkline.report.figures.style import save_figure
 from trunkline.settings import read_yaml, settings
-from trunkline.trials.splits import DECIDING
-from trunkline.trials.trial import read_trials
 
 ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
 MODEL = ARTIFACTS / "identify_control/arm.xml"

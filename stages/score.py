@@ -7,17 +7,17 @@ from typing import Annotated, Literal
 import pandas as pd
 from pydantic import Field
 
+from trunkline.compute.progress import progress
 from trunkline.errors import existing
-from trunkline.figures.scoring import segment_figure, trial_figure
-from trunkline.figures.style import save_figure
-from trunkline.identification.error_tables import segment_table, trial_table
-from trunkline.identification.scoring import Compared, score
+from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.results.scoring import Compared, score
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
-from trunkline.progress import progress
+from trunkline.recordings.trials.splits import IDENTIFY, TEST
+from trunkline.recordings.trials.trial import read_trials, sessions_of
+from trunkline.report.figures.scoring import segment_figure, trial_figure
+from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
-from trunkline.trials.splits import IDENTIFY, TEST
-from trunkline.trials.trial import read_trials, sessions_of
 
 ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
 Stage = Literal["identify_stiffness", "identify_damping", "identify_control"]

@@ -5,16 +5,16 @@ from pathlib import Path
 import onnx
 import torch
 
-from trunkline.dataset.samples import read_samples
-from trunkline.figures.network import error_map_figure, learning_figure, tip_error_figure
-from trunkline.figures.style import save_figure
-from trunkline.ik.inputs import inputs_of
-from trunkline.ik.learn import Learning, learn
-from trunkline.ik.report import histogram, summary
+from trunkline.kinematics.dataset.samples import read_samples
+from trunkline.kinematics.ik.inputs import inputs_of
+from trunkline.kinematics.ik.learn import Learning, learn
+from trunkline.kinematics.ik.report import histogram, summary
+from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.inputs import load_rig, read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.report.figures.network import error_map_figure, learning_figure, tip_error_figure
+from trunkline.report.figures.style import save_figure
 from trunkline.settings import settings
-from trunkline.statics.chain import read_chain
 
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")
 ARTIFACTS = Path("artifacts/train_ik")

@@ -1,5 +1,5 @@
 """Studies that choose: options, losses, real arms. They read the session and write tables; speed is in benchmarks/."""
 
-from trunkline.arithmetic import hold_arithmetic
+from trunkline.compute.numerics import hold_arithmetic
 
 hold_arithmetic()

@@ -22,15 +22,15 @@ import numpy as np
 
 from stages import identify_damping
 from trunkline.errors import in_one_line
-from trunkline.identification.evaluation import replay, survived
-from trunkline.identification.experiment import Experiment
-from trunkline.identification.null_model import hanging_still
-from trunkline.identification.setup import set_up
+from trunkline.identification.evaluation.evaluation import replay, survived
+from trunkline.identification.evaluation.null_model import hanging_still
+from trunkline.identification.fit.setup import set_up
+from trunkline.identification.simulate.experiment import Experiment
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.results import recorded
-from trunkline.trials.splits import DECIDING, IDENTIFY, VALIDATE
-from trunkline.trials.trial import read_trials
+from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
+from trunkline.recordings.trials.trial import read_trials
+from upkeep.results import recorded
 
 ROOTS = {"demo": Path("."), "asl_trunk": Path("examples/asl_trunk")}
 STEP = 1 / 30  # s, of the learnt models, about; an arm swings at 1 to 2 Hz

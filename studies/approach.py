@@ -18,18 +18,18 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from trunkline.dataset.columns import command_columns
-from trunkline.dataset.samples import read_samples
-from trunkline.elements import capstan_friction
+from trunkline.compute.progress import progress
 from trunkline.frames import gravity_in_base
-from trunkline.ik.as_controls import NEAR_LIMIT, PULL_SHARE, draw_commands
+from trunkline.kinematics.dataset.columns import command_columns
+from trunkline.kinematics.dataset.samples import read_samples
+from trunkline.kinematics.ik.as_controls import NEAR_LIMIT, PULL_SHARE, draw_commands
+from trunkline.model.elements import capstan_friction
+from trunkline.model.simulation.drive import LOOK, ROW, drive
+from trunkline.model.statics.chain import Chain, read_chain
+from trunkline.model.statics.equilibria import Equilibrium, actuated
+from trunkline.model.statics.hysteresis import friction_band, model_friction
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.results import recorded
-from trunkline.progress import progress
-from trunkline.simulation.drive import LOOK, ROW, drive
-from trunkline.statics.chain import Chain, read_chain
-from trunkline.statics.equilibria import Equilibrium, actuated
-from trunkline.statics.hysteresis import friction_band, model_friction
+from upkeep.results import recorded
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")

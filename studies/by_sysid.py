@@ -18,16 +18,16 @@ import numpy as np
 from benchmarks.identification.case import Case
 from benchmarks.identification.sysid import UNMOVED, by_sysid
 from trunkline.errors import existing, in_one_line
-from trunkline.identification.evaluation import replay, scores
-from trunkline.identification.identify import values_of, with_parameters
-from trunkline.identification.linearisation import DIFFERENCE
-from trunkline.identification.parameters import PARAMETERS
-from trunkline.identification.setup import set_up, with_every
+from trunkline.identification.evaluation.evaluation import replay, scores
+from trunkline.identification.fit.identify import values_of, with_parameters
+from trunkline.identification.fit.linearisation import DIFFERENCE
+from trunkline.identification.fit.setup import set_up, with_every
+from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.results import recorded
-from trunkline.trials.splits import DECIDING, IDENTIFY, VALIDATE
-from trunkline.trials.trial import read_trials
+from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
+from trunkline.recordings.trials.trial import read_trials
+from upkeep.results import recorded
 
 ARMS = {  # and the stages that identify each
     "asl_trunk": ("identify_stiffness", "identify_damping"),

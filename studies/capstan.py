@@ -5,8 +5,8 @@
 Needs filtered trials with slow pulls (`static_pull`); of those whose name ends in `_back` the motors came from beyond.
 The CAD model's stiffness, hardening, place of joints, motor gain, mount tilt and rest shape are fitted to tilts and
 pulls at rest of the split identify, with and without friction; `test` is never read. The law of friction is that of
-`trunkline/statics/capstan.py`. Pulls and backs may slide the same way, opposite ways (the law, if nothing but motors
-moves the tendons), or have a μ each, positive where tension falls to the tip.
+`trunkline/model/statics/capstan.py`. Pulls and backs may slide the same way, opposite ways (the law, if nothing but
+motors moves the tendons), or have a μ each, positive where tension falls to the tip.
 """
 
 import argparse
@@ -21,15 +21,15 @@ from stages.build_mjcf import Config as CadConfig
 from stages.build_mjcf import cad_arm
 from trunkline.errors import InputError, in_one_line
 from trunkline.frames import rotation_from_wxyz
-from trunkline.identification.experiment import check_names, commanded_lengths, measured_pose
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.pose_fit import fit_pose
+from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.simulate.experiment import check_names, commanded_lengths, measured_pose
+from trunkline.identification.simulate.pose_fit import fit_pose
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import actuated
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.results import recorded
-from trunkline.statics.chain import read_chain
-from trunkline.statics.equilibria import actuated
-from trunkline.trials.splits import DECIDING, IDENTIFY, VALIDATE
-from trunkline.trials.trial import Trial, read_trials
+from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
+from trunkline.recordings.trials.trial import Trial, read_trials
+from upkeep.results import recorded
 
 TRIALS = Path("data/processed/filter")
 KINDS = ("static_tilt", "static_pull")

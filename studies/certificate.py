@@ -18,17 +18,17 @@ from demo.rig import ROOT, bring
 from stages.report import ARTIFACTS, MODEL, STAGES, TRIALS
 from stages.report import Config as Report
 from studies.rows import Rows, digest
-from trunkline.certificate.budget import Budget, budget
-from trunkline.certificate.certificate import inputs_of
-from trunkline.certificate.coverage import is_inside, pulls_of
-from trunkline.certificate.poses import conditions_of, draw_poses
 from trunkline.errors import in_one_line
+from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.results import recorded
-from trunkline.statics.chain import read_chain
-from trunkline.trials.splits import DECIDING
-from trunkline.trials.trial import read_trials
+from trunkline.recordings.trials.splits import DECIDING
+from trunkline.recordings.trials.trial import read_trials
+from trunkline.report.certificate.budget import Budget, budget
+from trunkline.report.certificate.certificate import inputs_of
+from trunkline.report.certificate.coverage import is_inside, pulls_of
+from trunkline.report.certificate.poses import conditions_of, draw_poses
+from upkeep.results import recorded
 
 COUNT, SEED, BATCH = 500, 20, 20
 

@@ -26,22 +26,22 @@ from benchmarks.identification.case import STAGES, require_demo, spread
 from benchmarks.identification.timing import Stopwatch
 from studies.rows import Rows, digest
 from trunkline.errors import in_one_line
-from trunkline.identification.evaluation import replay, scores
-from trunkline.identification.experiment import Experiment
-from trunkline.identification.fit import Fit
-from trunkline.identification.identify import Identification, identify
-from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
-from trunkline.identification.problem import Bounds
-from trunkline.identification.settings import IdentificationSettings
-from trunkline.identification.setup import set_up
+from trunkline.identification.evaluation.evaluation import replay, scores
+from trunkline.identification.fit.fit import Fit
+from trunkline.identification.fit.identify import Identification, identify
+from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.fit.setup import set_up
+from trunkline.identification.simulate.experiment import Experiment
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, TRIALS, doubts, read_reported
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.results import recorded
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.splits import VALIDATE
+from trunkline.recordings.trials.trial import Trial
 from trunkline.settings import read_yaml
-from trunkline.trials.experiments import is_static
-from trunkline.trials.splits import VALIDATE
-from trunkline.trials.trial import Trial
+from upkeep.results import recorded
 
 LEAST_SQUARES = Path("conf/shared/optimizer/least_squares.yaml")
 JOINT_FRICTION = Bounds(low=1e-4, high=0.1)  # rad of a joint's own spring

@@ -25,8 +25,8 @@ from studies.reaching import SECONDS, beside_client, reach, reach_by_ros, refusa
 from trunkline.errors import InputError, in_one_line
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.pipeline.config import PROJECT
-from trunkline.pipeline.results import recorded
 from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, read_tarball
+from upkeep.results import recorded
 
 PLACES = PROJECT / "build/consumers"
 PACKAGES = PROJECT / "artifacts/package_unity"

@@ -20,20 +20,20 @@ from threadpoolctl import threadpool_limits
 
 from tests.support.matched_plant import FRAME, curl, motion, segments_of, small_model, static_pull, tilt
 from tests.support.noisy_trials import WEIGHTS, Stage, measured, releases, with_values
-from trunkline.arm.joints import Branch, Joints
+from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
-from trunkline.identification.certainty import certainty
-from trunkline.identification.experiment import prepare
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.parameters import PARAMETERS
-from trunkline.identification.problem import Bounds, Problem
-from trunkline.identification.search import descend, search
-from trunkline.identification.settings import IdentificationSettings
-from trunkline.identification.surrogate import surrogate
+from trunkline.identification.fit.certainty import certainty
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.problem import Bounds, Problem
+from trunkline.identification.fit.search import descend, search
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.fit.surrogate import surrogate
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.model.arm.joints import Branch, Joints
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.results import recorded
-from trunkline.progress import progress
-from trunkline.trials.trial import Trial
+from trunkline.recordings.trials.trial import Trial
+from upkeep.results import recorded
 
 REPETITIONS = 200
 UNITS, STEPS = 3, 4  # of the arm, of a frame: small, so that so many repetitions take minutes

@@ -1,5 +1,5 @@
 """What do cheaper contacts save a preview, and what do they change? Random grasps, with the contacts of the model
-itself, with `trunkline.hybrid.futures.eased` ones, and with a solver that is only more exact: so far chance goes.
+itself, with `trunkline.ar.hybrid.rollouts.eased` ones, and with a solver that is only more exact: so far chance goes.
 
     python -m studies.eased_previews [arm.xml] [--grasps 24] [--futures 3]
 
@@ -20,13 +20,13 @@ import mujoco
 import numpy as np
 
 from benchmarks.preview import LET_GO, STAGES, Placing, grasp
-from trunkline.hybrid import futures as room
-from trunkline.hybrid.doubts import draw, read_doubts
-from trunkline.hybrid.futures import Twin, Way, eased
-from trunkline.hybrid.preview import Holding, joined
-from trunkline.hybrid.touch import read_geometry
+from trunkline.ar.hybrid import rollouts as room
+from trunkline.ar.hybrid.posterior import draw, read_doubts
+from trunkline.ar.hybrid.preview import Holding, joined
+from trunkline.ar.hybrid.rollouts import Twin, Way, eased
+from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 STEP = 1 / 240  # s
 MASSES = (0.05, 0.1, 0.15, 0.25, 0.4, 0.6)  # kg

@@ -28,20 +28,20 @@ from stages.build_mjcf import Config as CadConfig
 from stages.build_mjcf import cad_arm
 from studies.choices import Chain, next_link
 from studies.rows import Rows, digest
-from trunkline.arm.holes import Holes
-from trunkline.arm.joints import Branch, Joints, Slider
 from trunkline.errors import in_one_line
-from trunkline.identification.cross_validation import errors_left_out
-from trunkline.identification.evaluation import Prediction, replay
-from trunkline.identification.experiment import own_starts
-from trunkline.identification.null_model import hanging_still, noise_floor
-from trunkline.identification.problem import Bounds
-from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.evaluation.evaluation import Prediction, replay
+from trunkline.identification.evaluation.null_model import hanging_still, noise_floor
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.simulate.experiment import own_starts
+from trunkline.identification.uncertainty.cross_validation import errors_left_out
+from trunkline.model.arm.guide_holes import Holes
+from trunkline.model.arm.joints import Branch, Joints, Slider
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported
-from trunkline.pipeline.results import recorded
-from trunkline.trials.splits import VALIDATE
-from trunkline.trials.trial import Trial
+from trunkline.recordings.trials.splits import VALIDATE
+from trunkline.recordings.trials.trial import Trial
+from upkeep.results import recorded
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from rehearsal.experiments.calibration import base_brier, brier, draw_reliabilit
 from rehearsal.experiments.result import Result, read_results
 from rehearsal.rehearse import OUT
 from trunkline.errors import existing, in_one_line
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 
 def row(name: str, results: list[Result]) -> str:

@@ -26,11 +26,11 @@ from rehearsal.experiments.follow import Path as Way
 from rehearsal.experiments.follow import on_path
 from rehearsal.operator.hands import Person
 from rehearsal.session import Session, View
-from trunkline.foresight.package import only_package
+from trunkline.ar.preview.package import only_package
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.panda.kinematics import mount_pose
-from trunkline.pipeline.results import recorded
-from trunkline.statics.equilibria import actuated
+from trunkline.kinematics.panda.kinematics import mount_pose
+from trunkline.model.statics.equilibria import actuated
+from upkeep.results import recorded
 
 RATE = 60.0  # frames, Hz
 EVERY = 6  # frames of which the twin's rest is looked up; linear between

@@ -1,4 +1,4 @@
-"""The Panda as its maker's URDF has it, for checks of `trunkline.panda` that share nothing with it.
+"""The Panda as its maker's URDF has it, for checks of `trunkline.kinematics.panda` that share nothing with it.
 
 Numbers of `franka_description/robots/panda_arm.xacro` and `robots/panda/joint_limits.yaml` of franka_ros: joint origins
 (xyz in m, roll about x in units of a quarter turn; the others are 0), limits, self-collision capsules as published, all

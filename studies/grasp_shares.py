@@ -22,9 +22,9 @@ from rehearsal.experiments.ablations import varied
 from rehearsal.experiments.bench import Bench, Seen, bench_of, rehearse
 from rehearsal.experiments.grasp import grasp
 from rehearsal.session import Session
-from trunkline.foresight.package import only_package
-from trunkline.panda.kinematics import mount_pose
-from trunkline.pipeline.results import recorded
+from trunkline.ar.preview.package import only_package
+from trunkline.kinematics.panda.kinematics import mount_pose
+from upkeep.results import recorded
 
 SHARES = ("whole", "alignment", "mount", "arm at rest", "curling", "in curl", "in lift")
 

@@ -16,14 +16,14 @@ from typing import get_args
 import numpy as np
 
 from studies.payload import MODEL, read_settings
+from trunkline.ar.hybrid.grasps import Pull
+from trunkline.ar.hybrid.objects import Shape
+from trunkline.ar.hybrid.payload import Cell, try_masses
+from trunkline.ar.hybrid.rates import wilson
+from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
-from trunkline.hybrid.grasps import Pull
-from trunkline.hybrid.objects import Shape
-from trunkline.hybrid.payload import Cell, try_masses
-from trunkline.hybrid.shares import wilson
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.results import recorded
-from trunkline.progress import progress
+from upkeep.results import recorded
 
 SHAPES, PULLS = get_args(Shape), get_args(Pull)
 DIAMETERS, MASSES, FRICTIONS = (0.02, 0.08), (0.05, 0.5), (0.3, 0.6)  # m, kg

@@ -8,9 +8,9 @@ against a measurement do. Intervals: the library's jackknife and bootstrap over 
 import numpy as np
 from scipy.stats import bootstrap as scipy_bootstrap
 
-from trunkline.identification.certainty import bootstrap, certainty
-from trunkline.identification.linearisation import Linearisation
-from trunkline.pipeline.results import recorded
+from trunkline.identification.fit.certainty import bootstrap, certainty
+from trunkline.identification.fit.linearisation import Linearisation
+from upkeep.results import recorded
 
 TRIALS, FRAMES, REPETITIONS = 6, 50, 400
 SCATTER, NOISE = 1.0, 0.3  # of trials, and of frames within one

@@ -14,18 +14,18 @@ from pathlib import Path
 
 from examples.asl_trunk.session import HERE, make_loaded_session
 from trunkline.errors import in_one_line
-from trunkline.evaluate.model import read_arm, written_beside
-from trunkline.evaluate.session import trials_of
-from trunkline.identification.error_tables import LABELS
-from trunkline.identification.scoring import evaluate
-from trunkline.pipeline.results import recorded
+from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.identification.results.scoring import evaluate
+from trunkline.tools.evaluate.model import read_arm, written_beside
+from trunkline.tools.evaluate.session import trials_of
+from upkeep.results import recorded
 
 MODEL = HERE / "artifacts" / "identify_damping" / "arm.xml"
 BESIDE = ("null", "null_straight", "noise_floor")
 
 
 def measured(source: Path, load: float) -> dict:
-    """Metrics of all releases of the CSV `source`, as `trunkline.evaluate` gives them."""
+    """Metrics of all releases of the CSV `source`, as `trunkline.tools.evaluate` gives them."""
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         session = Path(folder) / "session"
         make_loaded_session(source, load, session)

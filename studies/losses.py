@@ -21,21 +21,21 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.identification.case import STAGES, Case, Size, read_case, require_demo
 from stages.filter import Config as FilterConfig
+from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
 from trunkline.frames import wxyz_from_rotation
-from trunkline.identification.certainty import certainty
-from trunkline.identification.evaluation import replay
-from trunkline.identification.experiment import Experiment
-from trunkline.identification.loss import RESIDUALS
-from trunkline.identification.parameters import PARAMETERS
-from trunkline.identification.pose_fit import PoseFit, fit_pose
-from trunkline.identification.search import descend
-from trunkline.identification.surrogate import surrogate
+from trunkline.identification.evaluation.evaluation import replay
+from trunkline.identification.fit.certainty import certainty
+from trunkline.identification.fit.search import descend
+from trunkline.identification.fit.surrogate import surrogate
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.loss import RESIDUALS
+from trunkline.identification.simulate.pose_fit import PoseFit, fit_pose
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.results import recorded
-from trunkline.progress import progress
-from trunkline.signals.smoothing import low_pass
+from trunkline.recordings.signals.smoothing import low_pass
+from upkeep.results import recorded
 
 STAGE = "identify_damping"
 PLANT = Path("artifacts") / STAGE / "arm.xml"

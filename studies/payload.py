@@ -16,16 +16,16 @@ import pandas as pd
 from omegaconf import OmegaConf
 
 from studies.rows import Rows, digest
+from trunkline.ar.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
+from trunkline.ar.hybrid.payload import Cell, Outcome, PayloadSettings, cells, chart_rows
+from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
-from trunkline.figures.payload import payload_figure
-from trunkline.figures.style import save_figure
-from trunkline.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
-from trunkline.hybrid.payload import Cell, Outcome, PayloadSettings, cells, chart_rows
 from trunkline.pipeline.config import validated
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.results import recorded
-from trunkline.progress import progress
+from trunkline.report.figures.payload import payload_figure
+from trunkline.report.figures.style import save_figure
 from trunkline.settings import read_yaml
+from upkeep.results import recorded
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SETTINGS = Path("studies/payload.yaml")

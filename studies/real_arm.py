@@ -15,18 +15,18 @@ import mujoco
 import numpy as np
 
 from stages import build_mjcf, filter, identify_stiffness
-from trunkline.arm.joints import Slider
-from trunkline.arm.uniform import Uniform
 from trunkline.errors import in_one_line
-from trunkline.filtering.filter import filter_take
-from trunkline.identification.evaluation import replay, scores
-from trunkline.identification.identify import identify
-from trunkline.identification.problem import Bounds
-from trunkline.identification.setup import set_up
+from trunkline.identification.evaluation.evaluation import replay, scores
+from trunkline.identification.fit.identify import identify
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.fit.setup import set_up
+from trunkline.model.arm.joints import Slider
+from trunkline.model.arm.uniform import Uniform
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.results import recorded
-from trunkline.trials.splits import DECIDING, IDENTIFY, VALIDATE
-from trunkline.trials.take import Take, read_takes
+from trunkline.recordings.filtering.filter import filter_take
+from trunkline.recordings.trials.raw_trial import Take, read_takes
+from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, VALIDATE
+from upkeep.results import recorded
 
 EXAMPLE = Path("examples/asl_trunk")
 SLIDERS = [Slider(2.0, 0.002), Slider(0.7, 0.015), Slider(0.3, 0.06)]  # they slip one after the other

@@ -16,9 +16,9 @@ from pathlib import Path
 from omegaconf import OmegaConf
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.pipeline.readme import score_table
-from trunkline.pipeline.results import recorded
-from trunkline.pipeline.truth_table import truth_table
+from upkeep.readme import score_table
+from upkeep.results import recorded
+from upkeep.truth_table import truth_table
 
 ROOT = Path(__file__).parents[1]
 SETTINGS = Path(__file__).with_suffix(".yaml")

@@ -18,10 +18,10 @@ import numpy as np
 
 from examples.asl_trunk.session import HERE, make_loaded_session
 from trunkline.errors import in_one_line
-from trunkline.evaluate.session import trials_of
-from trunkline.pipeline.results import recorded
-from trunkline.trials.splits import DECIDING
-from trunkline.trials.trial import Trial, read_trials
+from trunkline.recordings.trials.splits import DECIDING
+from trunkline.recordings.trials.trial import Trial, read_trials
+from trunkline.tools.evaluate.session import trials_of
+from upkeep.results import recorded
 
 LAST = 30  # frames in which the arm rests
 

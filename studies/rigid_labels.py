@@ -16,13 +16,13 @@ import numpy as np
 
 from stages.reachability import Config
 from studies.franka_panda import panda
-from trunkline.fields.mesh import contains
-from trunkline.panda.collision import clearance
-from trunkline.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
-from trunkline.panda.labels import draw_points, label
+from trunkline.kinematics.panda.collision import clearance
+from trunkline.kinematics.panda.inverse import POSITION_TOLERANCE, ROTATION_TOLERANCE, solve
+from trunkline.kinematics.panda.labels import draw_points, label
+from trunkline.kinematics.reachability.maps import build_rigid
+from trunkline.kinematics.sdf.mesh import contains
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.results import recorded
-from trunkline.reachability.maps import build_rigid
+from upkeep.results import recorded
 
 STEPS = 60  # per start
 PATIENCE = 12  # steps without getting a tenth nearer, after which a start is given up

@@ -1,6 +1,6 @@
 """Rows of a study that takes long, each kept as soon as it is done: stopped, the study goes on from there.
 
-A row says what it was made of, and of which code (trunkline/pipeline/origin.py). Rows of another arm, other settings or
+A row says what it was made of, and of which code (upkeep/origin.py). Rows of another arm, other settings or
 other code stay in the table, and count for nothing. What is done once more is a further row: the first one counts.
 """
 
@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from trunkline.pipeline.origin import Origin, origin_of
-from trunkline.pipeline.results import FOLDER, command_line, modules_of
+from upkeep.origin import Origin, origin_of
+from upkeep.results import FOLDER, command_line, modules_of
 
 TEXTS = ("made_of", "commit", "code")  # columns
 

@@ -15,15 +15,15 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
-from trunkline.elements import BACKLASH, RATE_LIMIT, give_way, numeric
+from trunkline.ar.teleop.shaping import Kind, shaped, shaper_of
+from trunkline.ar.teleop.trajectory import Limits, point_to_point
+from trunkline.ar.teleop.vibration import Swings, slowest, swings
 from trunkline.frames import gravity_in_base
+from trunkline.model.elements import BACKLASH, RATE_LIMIT, give_way, numeric
+from trunkline.model.simulation.motion import batch_of, hold, move
+from trunkline.model.simulation.rest import base_frame, settle
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.results import recorded
-from trunkline.simulation.motion import batch_of, hold, move
-from trunkline.simulation.rest import base_frame, settle
-from trunkline.teleop.shaping import Kind, shaped, shaper_of
-from trunkline.teleop.swing import Swings, slowest, swings
-from trunkline.teleop.trajectory import Limits, point_to_point
+from upkeep.results import recorded
 
 PULLS_MM = (30.0, 60.0, 90.0)
 TILTS_DEG = (0.0, 30.0)

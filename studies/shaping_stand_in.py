@@ -22,14 +22,14 @@ from rehearsal.experiments.bench import FLOOR, START
 from rehearsal.robot.scene import Object, Scene
 from rehearsal.robot.stand_in import StandInRobot
 from studies.shaping import MOVED, PULLS_MM, SECONDS, lasting, shaped_ways, tell
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.vectors import DOWN
+from trunkline.ar.teleop.vibration import swings
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.results import recorded
-from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.swing import swings
-from trunkline.teleop.vectors import DOWN
+from upkeep.results import recorded
 
 BEFORE = 2.0  # s at rest before a way
 FAR = Object("sphere", 0.05, 0.05, 0.1, [5.0, 5.0, FLOOR + 0.025])  # there has to be one

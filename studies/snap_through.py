@@ -16,15 +16,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from trunkline.dataset.sampling import pull_directions
-from trunkline.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt, save_figure
+from trunkline.compute.progress import progress
 from trunkline.frames import gravity_in_base
+from trunkline.kinematics.dataset.sampling import pull_directions
+from trunkline.model.statics.chain import Chain, read_chain
+from trunkline.model.statics.equilibria import equilibrium, equilibrium_paths
+from trunkline.model.statics.restart import restart
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.results import recorded
-from trunkline.progress import progress
-from trunkline.statics.chain import Chain, read_chain
-from trunkline.statics.equilibria import equilibrium, equilibrium_paths
-from trunkline.statics.restart import restart
+from trunkline.report.figures.style import IDENTIFIED, INITIAL, MEASURED, VALIDATE, plt, save_figure
+from upkeep.results import recorded
 
 DRAWN_IN_MM = (0.0, 0.5, 1.0, 2.0, 3.0)  # of the slack tendon
 APART = 1e-3  # m; equilibria whose tips are nearer than this count as one

@@ -28,29 +28,29 @@ from scipy.spatial.transform import Rotation
 from benchmarks.identification.case import STAGES, require_demo, spread
 from stages import filter
 from studies.rows import Rows, digest
-from trunkline.elements import give_way
 from trunkline.errors import in_one_line
-from trunkline.filtering.filter import start_of
 from trunkline.frames import make_continuous
-from trunkline.identification.evaluation import replay, scores
-from trunkline.identification.experiment import Experiment, prepare
-from trunkline.identification.fit import Fit
-from trunkline.identification.identify import identify, values_of, with_parameters
-from trunkline.identification.loss import loss_of
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.problem import Problem
-from trunkline.identification.settings import IdentificationSettings
-from trunkline.identification.setup import set_up
-from trunkline.identification.suspicion import suspicions
+from trunkline.identification.evaluation.evaluation import replay, scores
+from trunkline.identification.fit.fit import Fit
+from trunkline.identification.fit.identify import identify, values_of, with_parameters
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.problem import Problem
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.fit.setup import set_up
+from trunkline.identification.simulate.experiment import Experiment, prepare
+from trunkline.identification.simulate.loss import loss_of
+from trunkline.identification.uncertainty.trial_diagnostics import suspicions
+from trunkline.model.elements import give_way
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import TRIALS as FILTERED
 from trunkline.pipeline.identify import read_reported
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.results import recorded
-from trunkline.signals.smoothing import low_pass
-from trunkline.trials.experiments import EXPERIMENTS
-from trunkline.trials.splits import IDENTIFY, VALIDATE
-from trunkline.trials.trial import Trial
+from trunkline.recordings.filtering.filter import start_of
+from trunkline.recordings.signals.smoothing import low_pass
+from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.recordings.trials.splits import IDENTIFY, VALIDATE
+from trunkline.recordings.trials.trial import Trial
+from upkeep.results import recorded
 
 SESSIONS = 20
 TRIALS, FRAMES = {"identify_stiffness": 20, "identify_damping": 6}, 120  # of a session, of a trial

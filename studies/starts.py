@@ -19,14 +19,14 @@ from threadpoolctl import threadpool_limits
 from studies.coverage import FRAMES, STAGES, STEPS, UNITS, bounds_of, mismatched, settings_of
 from tests.support.matched_plant import FRAME, segments_of, small_model
 from tests.support.noisy_trials import WEIGHTS, measured, with_values
+from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
-from trunkline.identification.experiment import prepare
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.parameters import PARAMETERS
-from trunkline.identification.problem import Problem
-from trunkline.identification.search import descend, search
-from trunkline.pipeline.results import recorded
-from trunkline.progress import progress
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.problem import Problem
+from trunkline.identification.fit.search import descend, search
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.simulate.experiment import prepare
+from upkeep.results import recorded
 
 SESSIONS = 20
 OFF = 3.0  # times, at most, either way

@@ -14,18 +14,18 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.ar.teleop.alignment import least_turn, wrist_of
+from trunkline.ar.teleop.reach import MapReach
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.tendons import Network, bend
+from trunkline.ar.teleop.vectors import DOWN
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, downwards
+from trunkline.model.simulation.rest import settle
+from trunkline.model.statics.chain import Chain, read_chain
 from trunkline.pipeline.inputs import read_model
-from trunkline.pipeline.results import recorded
-from trunkline.simulation.rest import settle
-from trunkline.statics.chain import Chain, read_chain
-from trunkline.teleop.alignment import least_turn, wrist_of
-from trunkline.teleop.reach import MapReach
-from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.tendons import Network, bend
-from trunkline.teleop.vectors import DOWN
 from trunkline.unity.unpacked import maps_of, model_of, network_of, read_package
+from upkeep.results import recorded
 
 ARTIFACTS = Path("artifacts")
 TILTS_DEG, TOLERANCE, OFFSET = (0.0, 30.0, 60.0), 0.02, 0.05

@@ -18,17 +18,17 @@ import numpy as np
 import pandas as pd
 import torch
 
-from trunkline.dataset.columns import command_columns, length_columns, tension_columns
-from trunkline.dataset.table import command_by_tension, tip_by_tension, turn_by_tension
 from trunkline.errors import in_one_line
-from trunkline.ik.inputs import inputs_of
-from trunkline.ik.learn import Unseen, known_gravities, unseen_targets
-from trunkline.ik.score import tip_errors
-from trunkline.ik.tip_loss import tip_loss
-from trunkline.ik.training import Training, train
+from trunkline.kinematics.dataset.columns import command_columns, length_columns, tension_columns
+from trunkline.kinematics.dataset.table import command_by_tension, tip_by_tension, turn_by_tension
+from trunkline.kinematics.ik.inputs import inputs_of
+from trunkline.kinematics.ik.learn import Unseen, known_gravities, unseen_targets
+from trunkline.kinematics.ik.score import tip_errors
+from trunkline.kinematics.ik.tip_loss import tip_loss
+from trunkline.kinematics.ik.training import Training, train
+from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.inputs import existing, read_model
-from trunkline.pipeline.results import recorded
-from trunkline.statics.chain import read_chain
+from upkeep.results import recorded
 
 MODEL = Path("artifacts/identify_control/arm.xml")
 SAMPLES = Path("data/processed/fk_dataset/samples.parquet")

@@ -2,8 +2,9 @@
 
 The pipeline's CAD arm is let go from a bend and, from rest, pulled at one tendon: a second each, as candidates of its
 parameters, all of them a batch in Warp, one after the other in MuJoCo. Identification lives on differences between
-candidates, so it is also told how far off these are, at both steps of `trunkline/identification/linearisation.py`, and
-what Warp cannot give to each simulation. On which device is Warp's choice. It takes what no extra of the project has:
+candidates, so it is also told how far off these are, at both steps of `trunkline/identification/fit/linearisation.py`,
+and what Warp cannot give to each simulation. On which device is Warp's choice. It takes what no extra of the project
+has:
 
     pip install mujoco-warp==4.0.0 warp-lang==1.19.0
 """
@@ -20,14 +21,14 @@ import mujoco
 import numpy as np
 
 from stages.build_mjcf import Config, cad_arm
-from trunkline.elements import arm_hinges, give_way
 from trunkline.errors import InputError, in_one_line
-from trunkline.identification.experiment import SLACK
-from trunkline.identification.linearisation import DIFFERENCE, RUBBING_DIFFERENCE
-from trunkline.identification.parameters import PARAMETERS, Fields, candidate_fields, set_fields
+from trunkline.identification.fit.linearisation import DIFFERENCE, RUBBING_DIFFERENCE
+from trunkline.identification.parameters.parameters import PARAMETERS, Fields, candidate_fields, set_fields
+from trunkline.identification.simulate.experiment import SLACK
+from trunkline.model.elements import arm_hinges, give_way
+from trunkline.model.simulation.motion import batch_of, hold
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.results import recorded
-from trunkline.simulation.motion import batch_of, hold
+from upkeep.results import recorded
 
 SECONDS, TOLD = 1.0, (0.1, 0.3, 1.0)  # s
 BEND, PULL, WINDING = 0.04, 0.03, 0.5  # rad of each y hinge, half as much of each x hinge; m, within so many s
@@ -158,7 +159,7 @@ def shared(mujoco_warp) -> list[str]:
     specs = {field.name: getattr(field.type, "shape", ()) for field in dataclasses.fields(mujoco_warp.Model)}
     own = {field for field, shape in specs.items() if shape and shape[0] == "*"} | {"numeric_data"}
     wanted = {name: set(parameter.fields) for name, parameter in PARAMETERS.items()}
-    wanted["capstan_friction"] |= {"tendon_frictionloss", "wrap_prm"}  # as trunkline/simulation/rubbing.py
+    wanted["capstan_friction"] |= {"tendon_frictionloss", "wrap_prm"}  # as trunkline/model/simulation/capstan.py
     return [f"{name} ({', '.join(sorted(fields - own))})" for name, fields in wanted.items() if fields - own]
 
 

@@ -1,10 +1,10 @@
 """In how many trials a watch finds a softer arm, and how often it cries wolf: `python -m studies.watch`
 
 The stand-in lab records the arm as it is and with all joints 5 % softer, under conditions that its session mostly
-does not have, each trial with noise of its own. `trunkline.watch` takes the logs in as a lab's and scores them. The
-unchanged arm's trials are put in another order for each chart: the first of each kind are its reference. Beside it
-stands the demo session's, which were planned and not drawn. Trials that are scored are kept in
-docs/results/watch.csv, as they take long; the charts are made anew from them.
+does not have, each trial with noise of its own. `trunkline.tools.monitor` takes the logs in as a lab's and scores them.
+The unchanged arm's trials are put in another order for each chart: the first of each kind are its reference. Beside it
+stands the demo session's, which were planned and not drawn. Trials that are scored are kept in docs/results/watch.csv,
+as they take long; the charts are made anew from them.
 """
 
 import argparse
@@ -33,19 +33,19 @@ from demo.recorder import write_log, write_session
 from demo.rig import ROOT
 from demo.truth import Truth
 from studies.rows import Rows, digest
+from trunkline.compute.progress import progress
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import load_config
-from trunkline.pipeline.results import recorded
-from trunkline.progress import progress
-from trunkline.trials.splits import DECIDING
-from trunkline.trials.trial import read_trials
-from trunkline.watch.baseline import Baseline
-from trunkline.watch.chart import Chart, chart_of
-from trunkline.watch.explanation import explain
-from trunkline.watch.intake import take
-from trunkline.watch.ledger import read_score, told
-from trunkline.watch.scores import Score, Scorer
-from trunkline.watch.watch import LEARN, scorer_of
+from trunkline.recordings.trials.splits import DECIDING
+from trunkline.recordings.trials.trial import read_trials
+from trunkline.tools.monitor.attribution import explain
+from trunkline.tools.monitor.baseline import Baseline
+from trunkline.tools.monitor.chart import Chart, chart_of
+from trunkline.tools.monitor.history import read_score, told
+from trunkline.tools.monitor.loading import take
+from trunkline.tools.monitor.monitor import LEARN, scorer_of
+from trunkline.tools.monitor.scores import Score, Scorer
+from upkeep.results import recorded
 
 MODEL, TRIALS = Path("artifacts/identify_control/arm.xml"), Path("data/processed/filter")
 SOFTER = 0.95  # of the stiffness

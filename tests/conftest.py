@@ -9,12 +9,12 @@ from pathlib import Path, PurePosixPath
 import pytest
 
 from tests.support.skips import Skips, read_rows
-from trunkline.arithmetic import hold_arithmetic
+from trunkline.compute.numerics import hold_arithmetic
 
 hold_arithmetic()  # before anything imports NumPy
 
-# Files and folders whose tests run the kernels of trunkline.statics. To compile them takes most of a minute the first
-# time, in every worker that needs them before the first has written them to the cache. So these share a worker.
+# Files and folders whose tests run the kernels of trunkline.model.statics. To compile them takes most of a minute the
+# first time, in every worker that needs them before the first has written them to the cache. So these share a worker.
 KERNELS = ("ik", "reachability", "statics", "test_capstan.py", "test_library.py", "test_scheduler.py")
 
 

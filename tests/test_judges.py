@@ -44,69 +44,69 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "rehearsal/test_held.py",
         "test_the_first_grasps_hold_what_is_lifted_does_not_slip_and_does_not_hang",
     ),
-    "trunkline.hybrid.preview:Holding.holds": ("hybrid/test_preview.py", "test_what_counts_as_held"),
-    "trunkline.hybrid.resting:Resting.holds": ("hybrid/test_resting.py", "test_what_rests"),
-    "trunkline.hybrid.trials:Tried.held": ("hybrid/test_preview.py", "test_what_counts_as_held_in_a_trial"),
-    "trunkline.identification.identify:_at_bound": (
+    "trunkline.ar.hybrid.preview:Holding.holds": ("hybrid/test_preview.py", "test_what_counts_as_held"),
+    "trunkline.ar.hybrid.released:Resting.holds": ("hybrid/test_resting.py", "test_what_rests"),
+    "trunkline.ar.hybrid.trials:Tried.held": ("hybrid/test_preview.py", "test_what_counts_as_held_in_a_trial"),
+    "trunkline.identification.fit.identify:_at_bound": (
         "identification/test_bounds.py",
         "test_a_parameter_is_at_a_bound_within_a_share_of_its_own_range",
     ),
-    "trunkline.identification.identify:_factors_at_bound": (
+    "trunkline.identification.fit.identify:_factors_at_bound": (
         "identification/test_bounds.py",
         "test_a_factor_at_a_bound_is_named_with_its_unit",
     ),
-    "trunkline.identification.pose_fit:_descend": (
+    "trunkline.identification.simulate.pose_fit:_descend": (
         "identification/test_bounds.py",
         "test_a_pose_is_found_where_the_descent_ended_before_its_iterations_did",
     ),
-    "trunkline.identification.search:_evolve": (
+    "trunkline.identification.fit.search:_evolve": (
         "identification/test_converged.py",
         "test_an_evolution_has_converged_where_its_losses_came_together",
     ),
-    "trunkline.identification.search:descend": (
+    "trunkline.identification.fit.search:descend": (
         "identification/test_converged.py",
         "test_a_descent_has_converged_where_it_ended_before_its_iterations_did",
     ),
-    "trunkline.identification.search:search": (
+    "trunkline.identification.fit.search:search": (
         "identification/test_converged.py",
         "test_only_a_search_whose_starts_agree_has_converged",
     ),
-    "trunkline.live.hindsight:_held": ("live/test_hindsight.py", "test_what_came_of_a_grasp"),
-    "trunkline.live.hindsight:_holds": ("live/test_hindsight.py", "test_whether_the_arm_holds_anything"),
-    "trunkline.live.hindsight:lines": (
+    "trunkline.ar.session.preview_validation:_held": ("live/test_hindsight.py", "test_what_came_of_a_grasp"),
+    "trunkline.ar.session.preview_validation:_holds": ("live/test_hindsight.py", "test_whether_the_arm_holds_anything"),
+    "trunkline.ar.session.preview_validation:lines": (
         "live/test_hindsight.py",
         "test_whether_the_outcome_agreed_with_what_was_foreseen",
     ),
-    "trunkline.panda.inverse:solve": ("panda/test_labels.py", "test_a_solution_is_within_both_tolerances_and_free"),
-    "trunkline.panda.labels:_reached": (
+    "trunkline.kinematics.panda.inverse:solve": ("panda/test_labels.py", "test_a_solution_is_within_both_tolerances_and_free"),
+    "trunkline.kinematics.panda.labels:_reached": (
         "panda/test_labels.py",
         "test_a_worker_says_of_its_own_points_what_the_solver_does",
     ),
-    "trunkline.panda.labels:label": (
+    "trunkline.kinematics.panda.labels:label": (
         "panda/test_labels.py",
         "test_every_point_not_reached_gets_the_same_further_starts",
     ),
-    "trunkline.reachability.reach_signal:held_out": (
+    "trunkline.kinematics.reachability.reach_signal:held_out": (
         "reachability/test_verdicts.py",
         "test_a_held_out_angle_counts_what_its_signal_calls_within_reach",
     ),
-    "trunkline.reachability.sheet_check:check_sheets": (
+    "trunkline.kinematics.reachability.surface_check:check_sheets": (
         "reachability/test_verdicts.py",
         "test_sheets_are_checked_with_tips_and_points_beyond",
     ),
-    "trunkline.statics.newton:find_equilibrium": ("statics/test_converged.py", "test_balance_alone_is_no_rest"),
+    "trunkline.model.statics.newton:find_equilibrium": ("statics/test_converged.py", "test_balance_alone_is_no_rest"),
 }
 OTHERWISE = {  # what the word stands for there: no verdict
-    "trunkline.identification.experiment:start_frames": "frames in which an arm is held before its release",
-    "trunkline.identification.parameter_table:parameter_table": "looks a name up among those that were at a bound",
-    "trunkline.ik.training:pieces": "rows that are held out",
-    "trunkline.live.controllers:_controller": "buttons that are held down",
-    "trunkline.live.foreseer:_held": "the thing that is in the arm, looked up in the world",
-    "trunkline.preparation.proposal:_experiment": "whether motors hold in a log; a user confirms what is proposed",
-    "trunkline.reachability.tips:held_by": "lengths of cables",
-    "trunkline.scheduler:spread_rows": "shares rows out to workers",
-    "trunkline.teleop.correction:_rest": "where an arm rests",
-    "trunkline.teleop.swing:swings": "which actuators have a state of their own",
+    "trunkline.identification.simulate.experiment:start_frames": "frames in which an arm is held before its release",
+    "trunkline.identification.results.parameter_table:parameter_table": "looks a name up among those that were at a bound",
+    "trunkline.kinematics.ik.training:pieces": "rows that are held out",
+    "trunkline.ar.session.controller_input:_controller": "buttons that are held down",
+    "trunkline.ar.session.preview_process:_held": "the thing that is in the arm, looked up in the world",
+    "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log; a user confirms what is proposed",
+    "trunkline.kinematics.reachability.tips:held_by": "lengths of cables",
+    "trunkline.compute.scheduler:spread_rows": "shares rows out to workers",
+    "trunkline.ar.teleop.correction:_rest": "where an arm rests",
+    "trunkline.ar.teleop.vibration:swings": "which actuators have a state of their own",
 }
 
 
@@ -189,5 +189,5 @@ def test_who_decides_is_read_off_the_code(source, words):
 
 def test_a_cause_in_words_is_a_verdict_among_the_experiments():
     source = ast.parse('def f(a) -> str:\n    return "" if a else "it fell"\n\ndef g(a) -> str:\n    return "it fell"')
-    for module, found in (("rehearsal.experiments.push", {"f"}), ("trunkline.teleop.targets", set())):
+    for module, found in (("rehearsal.experiments.push", {"f"}), ("trunkline.ar.teleop.targets", set())):
         assert {judge.function.partition(":")[2] for judge in judges([(module, source)])} == found

@@ -7,8 +7,8 @@ import sys
 from importlib import import_module
 from typing import NamedTuple
 
-from trunkline.called import COMMAND, set_called
 from trunkline.errors import InputError, in_one_line, nearest
+from trunkline.program import COMMAND, set_called
 from trunkline.version import __version__
 
 
@@ -21,19 +21,21 @@ class Verb(NamedTuple):
 
 
 VERBS = {
-    "inspect": Verb("trunkline.preparation.inspect", "what logs hold, and a session.yaml for them"),
-    "motive": Verb("trunkline.preparation.motive", "OptiTrack Motive's CSV exports as logs of a session"),
-    "describe": Verb("trunkline.describe.__main__", "what an arm's description gives, in words and drawn"),
-    "check": Verb("trunkline.check.__main__", "what a session will and will not tell, before hours of fits"),
-    "suggest": Verb("trunkline.suggest.__main__", "which experiments to record next"),
-    "evaluate": Verb("trunkline.evaluate.__main__", "how far a model is from a session, without a fit"),
+    "inspect": Verb("trunkline.recordings.preparation.inspect", "what logs hold, and a session.yaml for them"),
+    "motive": Verb("trunkline.recordings.preparation.motive", "OptiTrack Motive's CSV exports as logs of a session"),
+    "describe": Verb("trunkline.tools.describe.__main__", "what an arm's description gives, in words and drawn"),
+    "check": Verb("trunkline.tools.preflight.__main__", "what a session will and will not tell, before hours of fits"),
+    "suggest": Verb("trunkline.tools.design.__main__", "which experiments to record next"),
+    "evaluate": Verb("trunkline.tools.evaluate.__main__", "how far a model is from a session, without a fit"),
     "report": Verb("trunkline.pipeline.report", "the certificate: one page on how far the twin can be trusted"),
-    "watch": Verb("trunkline.watch.__main__", "whether the arm has changed since it was identified"),
-    "fleet": Verb("trunkline.fleet.__main__", "several arms beside each other"),
-    "randomise": Verb("trunkline.randomise.__main__", "what was identified, as domain randomisation for learning"),
-    "live": Verb("trunkline.live.__main__", "a session in a browser or a headset", "live,hybrid,teleop"),
+    "watch": Verb("trunkline.tools.monitor.__main__", "whether the arm has changed since it was identified"),
+    "fleet": Verb("trunkline.tools.batch.__main__", "several arms beside each other"),
+    "randomise": Verb(
+        "trunkline.tools.randomize.__main__", "what was identified, as domain randomisation for learning"
+    ),
+    "live": Verb("trunkline.ar.session.__main__", "a session in a browser or a headset", "live,hybrid,teleop"),
     "demonstrations": Verb(
-        "trunkline.demonstrations.__main__",
+        "trunkline.ar.dataset.__main__",
         "what operators did in live sessions, as a dataset for LeRobot",
         "live,teleop",
     ),

@@ -10,9 +10,9 @@ import argparse
 from pathlib import Path
 
 from benchmarks.acceptance import pressing, previewing, records, rules
+from trunkline.ar.preview.package import only_package
 from trunkline.errors import in_one_line
-from trunkline.foresight.package import only_package
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 
 @in_one_line

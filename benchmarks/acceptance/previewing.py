@@ -1,7 +1,7 @@
 """How soon a preview is there, and whether the simulated robot does what it shows: on a package, by the process that
 plans in a live session. Each plan begins at rest; the robot is the live session's, stepped without waiting. The thing
 of a live session's settings is there, and the arm may push it on its way: such plans are told apart, as contacts are
-softer in a preview (`trunkline/hybrid/futures.py`)."""
+softer in a preview (`trunkline/ar/hybrid/rollouts.py`)."""
 
 import queue
 import time
@@ -13,22 +13,22 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.acceptance.row import Row
+from trunkline.ar.preview.package import Package, read_package
+from trunkline.ar.preview.world_model import make_world
+from trunkline.ar.session import preview_process
+from trunkline.ar.session.composition import SEARCH, simulation_of, solids, subject_of
+from trunkline.ar.session.log_reader import tip_path
+from trunkline.ar.session.preview_process import Begun, ForeseerProcess, Order, Planned, Shown
+from trunkline.ar.session.settings import Config
+from trunkline.ar.session.simulated import Plant, Simulation
+from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.messages import Request, Target, Targets, Vector, World
+from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.vectors import DOWN
 from trunkline.errors import InputError
-from trunkline.foresight.believing import make_world
-from trunkline.foresight.package import Package, read_package
-from trunkline.live import foreseer
-from trunkline.live.foreseer import Begun, ForeseerProcess, Order, Planned, Shown
-from trunkline.live.house import SEARCH, simulation_of, solids, subject_of
-from trunkline.live.logbook import tip_path
-from trunkline.live.settings import Config
-from trunkline.live.simulated import Plant, Simulation
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.teleop.config import Config as Teleop
-from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.messages import Request, Target, Targets, Vector, World
-from trunkline.teleop.plan import Plan
-from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.vectors import DOWN
 
 PLANS, MOST = 12, 100  # that are previewed, and places that are tried for them
 ENOUGH = 3.6  # s of a preview
@@ -93,7 +93,7 @@ def planning(
     """The process once it is ready, and what it answers: (time at which it came, answer)."""
     heard: queue.Queue = queue.Queue()
     setup = path.resolve(), teleop, config.preview, simulation.bodies, world
-    process = ForeseerProcess(foreseer.run, setup, lambda answer: heard.put((time.monotonic(), answer)))
+    process = ForeseerProcess(preview_process.run, setup, lambda answer: heard.put((time.monotonic(), answer)))
     try:
         if not process.ready.wait(COMES):
             raise InputError(f"the process that plans: not ready after {COMES:g} s")

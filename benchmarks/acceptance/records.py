@@ -13,11 +13,11 @@ from rosbags.typesys import Stores, get_typestore
 from benchmarks.acceptance.row import Row
 from tests.support.ticking import fed, ticks
 from tests.support.waiting import until
+from trunkline.ar.drivers.ros_messages import trajectory
+from trunkline.ar.drivers.settings import Config as Execution
+from trunkline.ar.session.log_writer import NOTHING, JournalProcess
+from trunkline.ar.session.settings import Config
 from trunkline.errors import InputError
-from trunkline.execution.ros_messages import trajectory
-from trunkline.execution.settings import Config as Execution
-from trunkline.live.journal import NOTHING, JournalProcess
-from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
 
 KILLS, FED, POINTS = 10, (1.0, 2.0), 1000  # s for which the log is told something before each

@@ -7,9 +7,9 @@ import numpy as np
 from benchmarks.acceptance.row import Row, p95
 from tests.support.links import clock_error
 from tests.support.touches import PLACES, TRUE, at_reach, directions, seen
-from trunkline.live.access import HEADERS
-from trunkline.live.aligning import fit, in_base, inverse, suspect
-from trunkline.live.session import PAGE
+from trunkline.ar.session.alignment import fit, in_base, inverse, suspect
+from trunkline.ar.session.auth import HEADERS
+from trunkline.ar.session.session import PAGE
 
 TRIALS, SIGMA, OFF = 2000, 1e-3, 0.01  # m along each axis, of touches; m by which one is wrong
 

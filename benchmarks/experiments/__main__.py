@@ -34,14 +34,14 @@ from rehearsal.experiments.bench import FLOOR, Bench, Staged, bench_of
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.experiments.result import COLUMNS, Result, as_row, causes, rate
 from studies.rows import Rows
+from trunkline.ar.preview.package import only_package
+from trunkline.ar.session.session import Address, opened
+from trunkline.ar.session.settings import Config
+from trunkline.ar.teleop.config import Config as Teleop
 from trunkline.errors import InputError, in_one_line
-from trunkline.foresight.package import only_package
-from trunkline.live.session import Address, opened
-from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.pipeline.provenance import SHOWN
-from trunkline.pipeline.results import recorded
-from trunkline.teleop.config import Config as Teleop
+from upkeep.provenance import SHOWN
+from upkeep.results import recorded
 
 ADDRESS, WINDOW, YIELDS = Address(8899), (320, 240), 3  # of the page: pixels, and how nice its browser is
 FEWEST = 20  # runs of each that are kept

@@ -17,12 +17,12 @@ from pydantic import TypeAdapter
 from benchmarks.browser import Page
 from rehearsal.experiments.bench import LONGEST, Staged
 from rehearsal.session import REFERENCE, View
+from trunkline.ar.preview.world_model import make_world
+from trunkline.ar.session.log_reader import tip_path
+from trunkline.ar.teleop.messages import Controller, Intent, Offer, Targets, Vector, World
+from trunkline.ar.teleop.object_shapes import grip_of
 from trunkline.errors import InputError
-from trunkline.foresight.believing import make_world
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.live.logbook import tip_path
-from trunkline.teleop.messages import Controller, Intent, Offer, Targets, Vector, World
-from trunkline.teleop.things import grip_of
 
 EVERY = 1 / 60  # s between looks at the page
 OFFERED = 20.0  # s that the operator waits for an offer where the grasp is not sure

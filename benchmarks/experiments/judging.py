@@ -10,11 +10,11 @@ import numpy as np
 
 from rehearsal.experiments.bench import Seen
 from rehearsal.session import RATE, TICKS, Session
+from trunkline.ar.session.log_format import JOINTS, TENDONS, TYPES
+from trunkline.ar.session.log_reader import read_logbook
 from trunkline.errors import InputError
-from trunkline.live.book import JOINTS, TENDONS, TYPES
-from trunkline.live.logbook import read_logbook
-from trunkline.logs.joint_stream import joint_stream
-from trunkline.logs.log import read_log
+from trunkline.recordings.logs.joint_stream import joint_stream
+from trunkline.recordings.logs.log import read_log
 
 BEFORE = 0.5  # s of rest before the first motion
 MOVES = ("execute", "follow")

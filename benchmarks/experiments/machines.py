@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.ar.drivers.realtime_priority import URGENT
+from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.simulated_motors import SIMULATED
+from trunkline.ar.session.hardware import Hardware, hardware_of
 from trunkline.errors import InputError
-from trunkline.execution.bank import SIMULATED
-from trunkline.execution.settings import Config
-from trunkline.execution.urgency import URGENT
-from trunkline.live.hardware import Hardware, hardware_of
 from trunkline.pipeline.config import PROJECT, load_folder
 
 ADDRESS, PORT = "127.0.0.1", 1337  # franka-sim listens to every address: give it a network of its own

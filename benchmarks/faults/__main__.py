@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.faults.course import FAULTS, Suffered, session
+from trunkline.ar.preview.package import only_package
+from trunkline.ar.session.robot import DEAD_MAN
 from trunkline.errors import in_one_line
-from trunkline.foresight.package import only_package
-from trunkline.live.robot import DEAD_MAN
-from trunkline.pipeline.results import recorded
+from upkeep.results import recorded
 
 GOAL = 0.15  # s
 

@@ -13,8 +13,8 @@ import numpy as np
 from benchmarks.faults.hushed import HUSH
 from benchmarks.faults.operator import JUMP, PATIENCE
 from benchmarks.faults.scene import Scene, staged
+from trunkline.ar.session.log_reader import read_logbook
 from trunkline.errors import InputError
-from trunkline.live.logbook import read_logbook
 
 MOVING = 0.4  # s for which the robot has moved before anything is done
 HANG = 0.5  # s

@@ -4,7 +4,7 @@ import signal
 import sys
 import time
 
-from trunkline.execution import hosting, on_bus
+from trunkline.ar.drivers import driver_host, on_bus
 
 HUSH = 0.05  # s
 
@@ -26,4 +26,4 @@ def hush(*_) -> None:
 def main() -> int:
     signal.signal(signal.SIGUSR1, hush)
     on_bus.BankOnBus = Hushed
-    return hosting.main(sys.argv[1:])
+    return driver_host.main(sys.argv[1:])

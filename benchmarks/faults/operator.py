@@ -11,8 +11,8 @@ import numpy as np
 from aiohttp import ClientSession
 
 from benchmarks.guests import HZ, RIGID, SEEN, TIP, Guest, Hands, Place, hands_at, knock
+from trunkline.ar.session.session import Address
 from trunkline.errors import InputError
-from trunkline.live.session import Address
 
 ADDRESS = Address(18446)
 ASIDE = 0.15  # m to both sides, of the targets in turns

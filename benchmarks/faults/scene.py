@@ -15,12 +15,12 @@ from pathlib import Path
 
 from benchmarks.faults.operator import ADDRESS, PATIENCE, Operator
 from benchmarks.faults.witness import Watched, Witness, machine
+from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.simulated_motors import SIMULATED
+from trunkline.ar.session import real, robot
+from trunkline.ar.session.hardware import hardware_of
+from trunkline.ar.session.session import opened
 from trunkline.errors import InputError
-from trunkline.execution.bank import SIMULATED
-from trunkline.execution.settings import Config
-from trunkline.live import real, robot
-from trunkline.live.hardware import hardware_of
-from trunkline.live.session import opened
 from trunkline.pipeline.config import PROJECT, load_folder
 
 ENDS = 20.0  # s that a session has to end

@@ -8,13 +8,13 @@ from multiprocessing.context import SpawnContext
 
 import numpy as np
 
-from trunkline.execution.adapted import Adapted
-from trunkline.execution.hosting import hosted
-from trunkline.execution.motors import MotorsOnBus
-from trunkline.live import real
-from trunkline.live.hardware import Hardware
-from trunkline.live.robot import HELD, MODE, MODES, SERIAL, Channel
-from trunkline.teleop.trajectory import JOINTS
+from trunkline.ar.drivers.driver_client import Adapted
+from trunkline.ar.drivers.driver_host import hosted
+from trunkline.ar.drivers.motors import MotorsOnBus
+from trunkline.ar.session import real
+from trunkline.ar.session.hardware import Hardware
+from trunkline.ar.session.robot import HELD, MODE, MODES, SERIAL, Channel
+from trunkline.ar.teleop.trajectory import JOINTS
 
 LEAST = 1e-9  # rad or m between two tellings: it moves
 HEAD = 5  # numbers that a robot tells before its axes

@@ -12,9 +12,9 @@ import sys
 
 from benchmarks.identification import growth, physics, rate, recipe, sysid
 from benchmarks.identification.case import QUICK, Size, read_case
+from trunkline.compute.threads import thread_count
 from trunkline.errors import in_one_line
-from trunkline.pipeline.results import recorded
-from trunkline.threads import thread_count
+from upkeep.results import recorded
 
 PARTS = {
     "rate": rate.report,

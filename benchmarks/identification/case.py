@@ -13,19 +13,19 @@ import numpy as np
 from benchmarks.identification.rival import Rival
 from benchmarks.identification.timing import Spent
 from trunkline.errors import InputError
-from trunkline.identification.evaluation import replay, scores
-from trunkline.identification.experiment import Experiment
-from trunkline.identification.fit import Fit
-from trunkline.identification.identify import identify, values_of, with_parameters
-from trunkline.identification.loss import loss_of
-from trunkline.identification.parameter_table import undetermined
-from trunkline.identification.parameters import PARAMETERS
-from trunkline.identification.problem import Problem
-from trunkline.identification.setup import set_up
+from trunkline.identification.evaluation.evaluation import replay, scores
+from trunkline.identification.fit.fit import Fit
+from trunkline.identification.fit.identify import identify, values_of, with_parameters
+from trunkline.identification.fit.problem import Problem
+from trunkline.identification.fit.setup import set_up
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.results.parameter_table import undetermined
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.loss import loss_of
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import CAD_MODEL, TRIALS, read_reported
 from trunkline.pipeline.inputs import read_spec
-from trunkline.trials.splits import IDENTIFY, VALIDATE
+from trunkline.recordings.trials.splits import IDENTIFY, VALIDATE
 
 # every stage, and the model that it begins with
 STAGES = {

@@ -8,14 +8,14 @@ import numpy as np
 from benchmarks.identification.case import Case, ReadCase, Size
 from benchmarks.identification.timing import Spent, alternate
 from stages import build_mjcf
-from trunkline.arm.cad import Chain
-from trunkline.elements import arm_hinges, cables
 from trunkline.frames import gravity_in_base
-from trunkline.identification.experiment import SLACK, Experiment
-from trunkline.identification.pose_fit import PoseFit
+from trunkline.identification.simulate.experiment import SLACK, Experiment
+from trunkline.identification.simulate.pose_fit import PoseFit
+from trunkline.model.arm.cad import Chain
+from trunkline.model.elements import arm_hinges, cables
+from trunkline.model.statics.supported import unit_bodies
 from trunkline.pipeline.config import load_config
-from trunkline.statics.supported import unit_bodies
-from trunkline.trials.splits import IDENTIFY
+from trunkline.recordings.trials.splits import IDENTIFY
 
 CANDIDATES = 10
 BEND = np.radians(270)  # of the whole arm

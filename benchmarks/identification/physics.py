@@ -13,10 +13,10 @@ import numpy as np
 from benchmarks.identification.case import ReadCase, Size
 from benchmarks.identification.timing import alternate
 from stages.build_mjcf import Config, cad_arm
-from trunkline.arm.holes import Holes
-from trunkline.arm.joints import Branch, Joints, Slider
-from trunkline.identification.experiment import Experiment
-from trunkline.identification.population import Population
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.population import Population
+from trunkline.model.arm.guide_holes import Holes
+from trunkline.model.arm.joints import Branch, Joints, Slider
 from trunkline.pipeline.config import load_config
 
 CANDIDATES = 4

@@ -10,9 +10,9 @@ from mujoco.batch import Batch
 
 from benchmarks.identification.case import Case, ReadCase, Size
 from benchmarks.identification.timing import Spent, alternate
-from trunkline.identification.parameters import Fields
-from trunkline.identification.population import Population
-from trunkline.simulation.motion import batch_of, hold
+from trunkline.identification.parameters.parameters import Fields
+from trunkline.identification.simulate.population import Population
+from trunkline.model.simulation.motion import batch_of, hold
 
 CANDIDATES = 12
 

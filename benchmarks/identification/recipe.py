@@ -12,9 +12,9 @@ from scipy.optimize import differential_evolution
 from benchmarks.identification.case import SAME_LOSS, Case, ReadCase, Size, identified
 from benchmarks.identification.rival import Rival
 from benchmarks.identification.timing import Spent
-from trunkline.identification.loss import RESIDUALS, loss_of
-from trunkline.identification.parameters import set_fields
-from trunkline.identification.problem import DIVERGED_LOSS
+from trunkline.identification.fit.problem import DIVERGED_LOSS
+from trunkline.identification.parameters.parameters import set_fields
+from trunkline.identification.simulate.loss import RESIDUALS, loss_of
 
 
 def report(read_case: ReadCase, size: Size) -> None:

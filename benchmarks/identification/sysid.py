@@ -8,10 +8,10 @@ import numpy as np
 
 from benchmarks.identification.case import SAME_LOSS, STAGES, Case, Identified, ReadCase, Size, identified
 from benchmarks.identification.rival import Rival
-from trunkline.identification.linearisation import DIFFERENCE, linearise
-from trunkline.identification.loss import loss_of
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.fit.linearisation import DIFFERENCE, linearise
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.simulate.loss import loss_of
 
 UNMOVED = 0.01  # a value that changed by less than this share of itself was left where it was
 

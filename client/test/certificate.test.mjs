@@ -16,7 +16,7 @@ let browser, folder, address;
 before(async () => {
   folder = mkdtempSync(join(tmpdir(), "certificate-"));
   const file = process.env.TRUNKLINE_CERTIFICATE ?? join(folder, "certificate.html"); // one to look at, or a small arm's
-  if (!process.env.TRUNKLINE_CERTIFICATE) execFileSync(PYTHON, ["-m", "tests.certificate.sample", file], { cwd: root, stdio: "inherit" });
+  if (!process.env.TRUNKLINE_CERTIFICATE) execFileSync(PYTHON, ["-m", "tests.report.certificate.sample", file], { cwd: root, stdio: "inherit" });
   address = pathToFileURL(file).href;
   browser = await launch();
 });

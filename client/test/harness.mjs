@@ -23,7 +23,7 @@ const FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swift
 
 /** The server, round a plain robot: `url`, `tell(word)` which gives its log. */
 export async function serve() {
-  const child = spawn(PYTHON, ["-m", "tests.live.page_server", ...(PICTURES ? [] : ["--light"])], { cwd: root, stdio: ["pipe", "pipe", "inherit"] });
+  const child = spawn(PYTHON, ["-m", "tests.ar.session.page_server", ...(PICTURES ? [] : ["--light"])], { cwd: root, stdio: ["pipe", "pipe", "inherit"] });
   const lines = createInterface({ input: child.stdout })[Symbol.asyncIterator]();
   const first = (await lines.next()).value ?? "";
   const [word, port, token] = first.split(" ");

@@ -9,7 +9,7 @@ from pydantic import Field
 from demo.plants.bench import Plant
 from demo.plants.cousin import Cousin, CousinSettings
 from demo.plants.stranger import Stranger, StrangerSettings
-from trunkline.arm.spiral import spiral_chain
+from trunkline.model.arm.spiral import spiral_chain
 from trunkline.settings import Seed, settings
 
 PlantSettings = Annotated[CousinSettings | StrangerSettings, Field(discriminator="kind")]

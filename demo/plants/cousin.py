@@ -14,14 +14,14 @@ import numpy as np
 from pydantic import Field
 
 from demo.plants.bench import COMMAND_RATE, SAMPLE_RATE, Bench, PrintedArm, Seen, Share
-from trunkline.arm.geometry import ChainGeometry
-from trunkline.arm.material import unit_properties
-from trunkline.arm.mjcf import Solref, unit_name
+from trunkline.compute.progress import progress
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.progress import progress
-from trunkline.simulation.drive import drive
-from trunkline.simulation.load import hang
-from trunkline.simulation.motion import batch_of, move
+from trunkline.model.arm.geometry import ChainGeometry
+from trunkline.model.arm.material import unit_properties
+from trunkline.model.arm.mjcf import Solref, unit_name
+from trunkline.model.simulation.drive import drive
+from trunkline.model.simulation.load import hang
+from trunkline.model.simulation.motion import batch_of, move
 
 CALM = 8.0  # times the arm's damping: it comes to rest sooner, and in the same place
 LONGEST_REST = 8.0  # s

@@ -6,7 +6,7 @@ import numpy as np
 
 from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, Plant
 from demo.plants.choice import Arm
-from trunkline.arm.spiral import spiral_chain
+from trunkline.model.arm.spiral import spiral_chain
 
 LOOK = 0.1  # s, for which the arm is looked at
 SWINGING = 0.05  # m/s of the tip, from which on an arm does not rest: at its 1.3 Hz it swings by 6 mm to each side

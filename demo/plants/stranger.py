@@ -16,11 +16,11 @@ from scipy.spatial.transform import Rotation
 
 from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, PrintedArm, Seen
 from demo.plants.stranger_kernel import Links, State, come_to_rest, path_lengths, simulate, tip
-from trunkline.arm.geometry import ChainGeometry
-from trunkline.arm.material import unit_properties
+from trunkline.compute.progress import progress
+from trunkline.compute.threads import thread_count
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.progress import progress
-from trunkline.threads import thread_count
+from trunkline.model.arm.geometry import ChainGeometry
+from trunkline.model.arm.material import unit_properties
 
 UPRIGHT = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 CALM = 40.0  # times the joints' own damping, about what brings the arm to rest soonest

@@ -15,7 +15,7 @@ import numpy as np
 from examples.asl_trunk.session import BODIES, EPOCH, RATE, read_table, write_log, write_session
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.stage import output_folder
-from trunkline.trials.splits import IDENTIFY, TEST, VALIDATE
+from trunkline.recordings.trials.splits import IDENTIFY, TEST, VALIDATE
 
 HERE = Path(__file__).parent
 SESSION = HERE / "data" / "raw" / "asl_motion"

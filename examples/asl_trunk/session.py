@@ -20,9 +20,9 @@ import yaml
 from mcap_ros2.writer import Writer
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.logs.definitions import JOINT_STATE, TRUNK_RIGID_BODIES
 from trunkline.pipeline.stage import output_folder
-from trunkline.trials.splits import TEST
+from trunkline.recordings.logs.definitions import JOINT_STATE, TRUNK_RIGID_BODIES
+from trunkline.recordings.trials.splits import TEST
 
 HERE = Path(__file__).parent
 SESSION = HERE / "data" / "raw" / "asl_trunk"

@@ -18,7 +18,7 @@ from cyclonedds.pub import DataWriter
 from cyclonedds.sub import DataReader
 from cyclonedds.topic import Topic
 
-from trunkline.execution.ros_messages import Header, JointState, Time
+from trunkline.ar.drivers.ros_messages import Header, JointState, Time
 from trunkline.unity.package import read_tarball
 from trunkline.unity.unpacked import model_of
 

@@ -1,7 +1,7 @@
 """Rehearsed runs as logs of live sessions, for demonstrations: a simulated operator at the stand-in robot.
 
     python -m examples.demonstrations.rehearsed artifacts/package_unity/*.tgz --experiment reach --runs 5
-    python -m trunkline.demonstrations rehearsed/*.mcap --out dataset
+    python -m trunkline.ar.dataset rehearsed/*.mcap --out dataset
 
 A run is the rehearsal's own of that seed, to the last bit: it is only listened to.
 """
@@ -17,11 +17,11 @@ import numpy as np
 from rehearsal.experiments.bench import Bench, bench_of, perform
 from rehearsal.experiments.registry import EXPERIMENTS
 from rehearsal.session import RATE, Session
+from trunkline.ar.session.log_format import Book, Record, Subject
+from trunkline.ar.session.log_writer import Journal
+from trunkline.ar.session.robot import Standing
+from trunkline.ar.teleop.core import Teleoperation
 from trunkline.errors import InputError, in_one_line
-from trunkline.live.book import Book, Record, Subject
-from trunkline.live.journal import Journal
-from trunkline.live.robot import Standing
-from trunkline.teleop.core import Teleoperation
 
 ZERO = 1_700_000_000 * 10**9  # ns since 1970 at which every run begins
 JOINTS = tuple(f"joint_{number}" for number in range(1, 8))

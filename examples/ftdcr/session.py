@@ -16,9 +16,9 @@ import yaml
 from mcap_ros2.writer import Writer
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.logs.definitions import JOINT_STATE, MARKERS
 from trunkline.pipeline.stage import output_folder
-from trunkline.trials.splits import IDENTIFY, TEST, VALIDATE
+from trunkline.recordings.logs.definitions import JOINT_STATE, MARKERS
+from trunkline.recordings.trials.splits import IDENTIFY, TEST, VALIDATE
 
 HERE = Path(__file__).parent
 SESSION = HERE / "data" / "raw" / "ftdcr"

@@ -17,15 +17,15 @@ from scipy.spatial.transform import Rotation
 from demo.instruments import InstrumentSettings, measure
 from demo.recorder import write_log
 from demo.truth import Truth
-from trunkline.arm.kinds import Arm
 from trunkline.errors import in_one_line
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
-from trunkline.identification.winding import wound
+from trunkline.identification.parameters.spool_scale import wound
+from trunkline.model.arm.kinds import Arm
+from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.pipeline.config import PROJECT, settings_of, validated
 from trunkline.pipeline.stage import output_folder
+from trunkline.recordings.trials.splits import IDENTIFY, TEST, VALIDATE
 from trunkline.settings import read_yaml
-from trunkline.simulation.motion import batch_of, hold, move
-from trunkline.trials.splits import IDENTIFY, TEST, VALIDATE
 
 HERE = Path(__file__).parent
 SESSION = HERE / "data" / "raw" / "pairs"

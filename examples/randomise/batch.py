@@ -1,6 +1,6 @@
 """A batch of arms for learning, each drawn from what identification left open: how far apart are their tips?
 
-    python -m trunkline.randomise artifacts --out randomisation.json
+    python -m trunkline.tools.randomize artifacts --out randomisation.json
     python batch.py artifacts/identify_control/arm.xml randomisation.json [ARMS] [SECONDS]
 
 The first arm of the batch is the calibrated one. All are pulled by the same commands from the straight arm on.
@@ -13,9 +13,9 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from trunkline.randomise.fields import drawn_fields
-from trunkline.randomise.file import read_randomisation
-from trunkline.simulation.motion import batch_of, hold, move
+from trunkline.model.simulation.motion import batch_of, hold, move
+from trunkline.tools.randomize.fields import drawn_fields
+from trunkline.tools.randomize.file import read_randomisation
 
 path, told = Path(sys.argv[1]), Path(sys.argv[2])
 count, seconds = int(sys.argv[3]) if len(sys.argv) > 3 else 64, float(sys.argv[4]) if len(sys.argv) > 4 else 2.0

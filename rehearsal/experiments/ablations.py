@@ -18,13 +18,13 @@ import mujoco
 
 from rehearsal.experiments.bench import Bench
 from rehearsal.experiments.lookup import lookup
+from trunkline.ar.hybrid.friction import TPU_ON
+from trunkline.ar.hybrid.posterior import Contact, Doubts
 from trunkline.errors import InputError
-from trunkline.hybrid.doubts import Contact, Doubts
-from trunkline.hybrid.friction import TPU_ON
-from trunkline.hybrid.touch import read_geometry
+from trunkline.model.arm.contact_geometry import read_geometry
+from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.config import PROJECT
 from trunkline.pipeline.inputs import read_model, read_spec
-from trunkline.statics.chain import read_chain
 
 DRAWING = PROJECT / "artifacts/build_mjcf/arm.xml"
 NOWHERE = 5.0  # m; within it of its axis the arm has no bending plane: further than anything is

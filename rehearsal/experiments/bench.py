@@ -19,16 +19,16 @@ from rehearsal.robot.stand_in import StandIn, StandInRobot, Truth
 from rehearsal.session import REFERENCE, Place, Session, View
 from rehearsal.settings import Free
 from rehearsal.settings import previewing as read_previewing
+from trunkline.ar.preview.grasp_preview import Foresight
+from trunkline.ar.preview.package import Package, read_package
+from trunkline.ar.preview.preview_twin import Believed, believed
+from trunkline.ar.preview.settings import Previewing
+from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.messages import Box, World
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.vectors import DOWN
 from trunkline.errors import InputError
-from trunkline.foresight.foresight import Foresight
-from trunkline.foresight.package import Package, read_package
-from trunkline.foresight.settings import Previewing
-from trunkline.foresight.twin import Believed, believed
 from trunkline.pipeline.config import PROJECT, load_config, load_folder
-from trunkline.teleop.config import Config
-from trunkline.teleop.messages import Box, World
-from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.vectors import DOWN
 
 ORIGINS = np.array([[-0.2, -0.1, -0.3], [0.2, -0.1, -0.3]])  # m, of the left and right hand in the reference frame
 START = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])  # rad, where the search for the ready pose begins

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rehearsal.experiments.result import Result
-from trunkline.hybrid.shares import wilson
+from trunkline.ar.hybrid.rates import wilson
 
 BINS = 5
 

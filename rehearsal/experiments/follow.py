@@ -9,7 +9,7 @@ from rehearsal.experiments.bench import Bench, Seen, Staged
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import View
-from trunkline.teleop.core import STAYS
+from trunkline.ar.teleop.core import STAYS
 
 EASE = 2.0  # s in which the object begins to move
 

@@ -16,13 +16,13 @@ from rehearsal.operator.scripts import Ending, Operator
 from rehearsal.robot.scene import Object, Scene, Surface
 from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import Session
+from trunkline.ar.hybrid.grasps import object_in_base
+from trunkline.ar.preview.world_model import make_world
+from trunkline.ar.teleop.messages import Box, Thing
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.vectors import DOWN
 from trunkline.errors import InputError
-from trunkline.foresight.believing import make_world
 from trunkline.frames import wxyz_from_rotation
-from trunkline.hybrid.grasps import object_in_base
-from trunkline.teleop.messages import Box, Thing
-from trunkline.teleop.rigid_ik import RigidIK
-from trunkline.teleop.vectors import DOWN
 
 NAME, TABLE, STAND = "the object", "the table", "the stand"
 
@@ -42,7 +42,7 @@ class Offered:
 
     @property
     def way(self) -> str:
-        """By which it is grasped: `trunkline.teleop.things.way_of_grasping`."""
+        """By which it is grasped: `trunkline.ar.teleop.object_shapes.way_of_grasping`."""
         return "basket" if self.thing.shape == "basket" else "hanging"
 
 

@@ -9,8 +9,8 @@ from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.robot.scene import Scene, Surface
 from rehearsal.session import View
+from trunkline.ar.teleop.object_shapes import below_grip
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.teleop.things import below_grip
 
 STANDING: tuple[settings.Shape, ...] = ("basket",)
 STILL, BORNE = 0.03, 0.5  # m/s; of its weight, by the table

@@ -9,11 +9,11 @@ from itertools import combinations, product
 
 import numpy as np
 
+from trunkline.ar.teleop.tendons import Network
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.ik.inputs import DIRECTION
-from trunkline.statics.chain import Chain
-from trunkline.statics.equilibria import Equilibrium, equilibrium
-from trunkline.teleop.tendons import Network
+from trunkline.kinematics.ik.inputs import DIRECTION
+from trunkline.model.statics.chain import Chain
+from trunkline.model.statics.equilibria import Equilibrium, equilibrium
 
 LEVELS = 16  # tensions of each of two taut tendons, from none to the largest
 

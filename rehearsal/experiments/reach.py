@@ -10,7 +10,7 @@ from rehearsal.experiments.bench import Bench, Seen, Staged, executed
 from rehearsal.experiments.result import LATER, Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import Session
-from trunkline.hybrid.preview import Stated
+from trunkline.ar.hybrid.preview import Stated
 
 
 def reach(bench: Bench, seed: int) -> Staged:

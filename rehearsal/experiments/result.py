@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.ar.hybrid.rates import wilson
 from trunkline.errors import InputError
-from trunkline.hybrid.shares import wilson
 
 LATER = {"at_end": 0.0, "after_2s": 2.0, "after_10s": 10.0}  # s after an execution's end that its tip is looked at
 

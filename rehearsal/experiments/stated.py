@@ -8,7 +8,7 @@ import numpy as np
 
 from rehearsal.experiments.calibration import base_brier, brier, stated
 from rehearsal.experiments.result import LATER, Result
-from trunkline.hybrid.shares import wilson
+from trunkline.ar.hybrid.rates import wilson
 
 PROBABLE = ("grasp", "handle")  # whose previews state a probability
 REACH = "reach"  # whose previews state a radius

@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
+from trunkline.ar.teleop.messages import Controller, Pose
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz, wxyz_from_rotation
-from trunkline.teleop.messages import Controller, Pose
 
 AXES = 3  # of the tremor: two turns of the ray and one about it
 STICK_RAMP = 0.1  # m of missing length below which the stick is let back

@@ -11,8 +11,8 @@ import numpy as np
 
 from rehearsal.operator.hands import Person, RayHand
 from rehearsal.session import View
-from trunkline.teleop.reach import MapReach
-from trunkline.teleop.vectors import DOWN
+from trunkline.ar.teleop.reach import MapReach
+from trunkline.ar.teleop.vectors import DOWN
 
 Script = Generator[None, View, "Ending"]
 Part = Generator[None, View, View]

@@ -12,7 +12,7 @@ Hertz's exponent; P. A. Cundall and O. D. L. Strack, A discrete numerical model 
 import numpy as np
 
 from rehearsal.robot.compiled import kernel
-from trunkline.statics.vectors import dot, plus
+from trunkline.model.statics.vectors import dot, plus
 
 
 @kernel

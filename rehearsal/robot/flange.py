@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from rehearsal.robot.compiled import kernel
-from trunkline.panda.kinematics import DH_A, DH_ALPHA, DH_D
-from trunkline.statics.vectors import cross, plus
+from trunkline.kinematics.panda.kinematics import DH_A, DH_ALPHA, DH_D
+from trunkline.model.statics.vectors import cross, plus
 
 COS, SIN = np.round(np.cos(DH_ALPHA), 15), np.round(np.sin(DH_ALPHA), 15)
 IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))

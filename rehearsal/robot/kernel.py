@@ -17,7 +17,7 @@ from rehearsal.robot.compiled import kernel
 from rehearsal.robot.flange import accelerate_joints, carry, move_joints
 from rehearsal.robot.thing import move_thing, pull_string, rotation, spin_of, transposed
 from rehearsal.robot.touching import touch_all
-from trunkline.statics.vectors import cross, plus, turned
+from trunkline.model.statics.vectors import cross, plus, turned
 
 # columns of a row of what a tick ends with
 JOINTS, WOUND, TIP, TIP_AXES, THING = slice(0, 7), slice(7, 10), slice(10, 13), slice(13, 22), slice(22, 29)

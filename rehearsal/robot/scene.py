@@ -9,9 +9,9 @@ from pydantic import Field
 
 from rehearsal.robot.shapes import BOX, CYLINDER, distance
 from rehearsal.robot.thing import Motion, Thing
+from trunkline.ar.hybrid.basket import Basket, Part, parts_of, unit_inertia
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.hybrid.basket import Basket, Part, parts_of, unit_inertia
 
 Metres = Annotated[float, Field(ge=-10, le=10)]
 Size = Annotated[float, Field(gt=0, le=10)]

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rehearsal.robot.compiled import kernel
-from trunkline.statics.vectors import dot, plus
+from trunkline.model.statics.vectors import dot, plus
 
 BOX, CYLINDER = 0, 1
 NEARER = 6  # times a disc's nearest point is sought anew in a step; it begins where the step before has found it

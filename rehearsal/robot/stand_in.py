@@ -20,11 +20,11 @@ from rehearsal.robot.sensors import Instruments, Seen, Sensors
 from rehearsal.robot.shapes import nearest
 from rehearsal.robot.thing import rotation
 from rehearsal.robot.touch_settings import Touch, make_touch
-from trunkline.arm.mjcf import unit_name
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.panda.kinematics import FLANGE, Q_MAX, Q_MIN
-from trunkline.panda.limits import ACCELERATION, VELOCITY
+from trunkline.kinematics.panda.kinematics import FLANGE, Q_MAX, Q_MIN
+from trunkline.kinematics.panda.limits import ACCELERATION, VELOCITY
+from trunkline.model.arm.mjcf import unit_name
 
 TICK = 1e-3  # s
 SUBSTEPS = 6  # of a tick

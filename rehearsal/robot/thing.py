@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rehearsal.robot.compiled import kernel
-from trunkline.statics.vectors import cross, dot, plus, turned
+from trunkline.model.statics.vectors import cross, dot, plus, turned
 
 
 class Thing(NamedTuple):

@@ -10,7 +10,7 @@ from demo.plants.stranger_kernel import Links
 from rehearsal.robot.scene import Friction, Scene
 from rehearsal.robot.thing import Thing
 from rehearsal.robot.touching import Contacts, Discs, World
-from trunkline.arm.geometry import ChainGeometry
+from trunkline.model.arm.geometry import ChainGeometry
 
 LOWEST = 0.05  # of a coefficient's nominal value, below which scatter does not bring it
 

@@ -13,7 +13,7 @@ from rehearsal.robot.compiled import kernel
 from rehearsal.robot.contact import touch
 from rehearsal.robot.shapes import distance, nearest
 from rehearsal.robot.thing import rotation, spin_of, transposed
-from trunkline.statics.vectors import cross, plus, turned
+from trunkline.model.statics.vectors import cross, plus, turned
 
 
 class Discs(NamedTuple):

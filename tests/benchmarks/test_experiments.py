@@ -12,15 +12,15 @@ from benchmarks.experiments.judging import BEFORE, done_again
 from rehearsal.experiments.result import Result, as_row
 from rehearsal.session import RATE, REFERENCE
 from studies.rows import Rows
-from tests.live.test_hindsight import Clocked
+from tests.ar.session.test_hindsight import Clocked
+from tests.ar.teleop.test_plan import START, STRAIGHT
 from tests.rehearsal.test_session import THING, Sent
 from tests.support.operator import Operator
-from tests.teleop.test_plan import START, STRAIGHT
+from trunkline.ar.session.robot import Standing
+from trunkline.ar.teleop.messages import Controller
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz
-from trunkline.live.robot import Standing
-from trunkline.pipeline.origin import Origin, code_of, reads_of
-from trunkline.teleop.messages import Controller
+from upkeep.origin import Origin, code_of, reads_of
 
 ROOT = Path(__file__).parents[2]
 BEGUN, MOVES, LASTS = 100.0, 2.0, 3.0  # s
@@ -90,7 +90,7 @@ def test_a_hand_goes_to_the_page_in_the_base_frame():
 
 
 def table(folder, code):
-    return Rows("experiments", "package", "run", folder, Origin("aaaaaaa", "", {"trunkline/live": code}))
+    return Rows("experiments", "package", "run", folder, Origin("aaaaaaa", "", {"trunkline/ar/session": code}))
 
 
 def add(rows, name, seed, success):
@@ -129,8 +129,8 @@ def test_the_code_of_a_run_is_that_of_server_robot_and_benchmark():
     code = code_of(ROOT, ["benchmarks.experiments"], reads_of(ROOT, "experiments"))
     folders = {
         "benchmarks/experiments",
-        "trunkline/live",
-        "trunkline/execution",
+        "trunkline/ar/session",
+        "trunkline/ar/drivers",
         "rehearsal/robot",
         "conf/live",
         "package",

@@ -22,14 +22,14 @@ from benchmarks.identification.rate import bare_batch
 from benchmarks.identification.recipe import as_first_written, by_recipe
 from benchmarks.identification.sysid import by_sysid, stalled
 from tests.support.matched_plant import curl, release, segments_of, small_model
-from trunkline.elements import BRANCH, SLIDER, all_elements, capstan_friction, holes, numeric
-from trunkline.identification.experiment import prepare
-from trunkline.identification.fit import Fit, Method, Polish, Rough
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.parameters import candidate_fields, set_fields
-from trunkline.identification.population import Population
-from trunkline.identification.problem import Bounds
+from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.parameters.parameters import candidate_fields, set_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.loss import LossWeights
+from trunkline.identification.simulate.population import Population
+from trunkline.model.elements import BRANCH, SLIDER, all_elements, capstan_friction, holes, numeric
 
 TRUTH = np.log([0.09, 0.5])
 SIZE = Size(budget=0.5, seeds=2, repeats=1, units=(3, 5))

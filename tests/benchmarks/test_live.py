@@ -11,8 +11,8 @@ from aiohttp import WSMessage, WSMsgType
 
 from benchmarks.live import Holds, Looks, halves
 from benchmarks.watching import Asker, Frames, Span
+from trunkline.ar.session import binary
 from trunkline.errors import InputError
-from trunkline.live import wire
 
 
 def span(*frames):
@@ -33,7 +33,7 @@ def test_ages_are_from_the_time_that_is_told_until_a_frame_has_come():
 def test_frames_of_the_robot_alone_are_kept_with_the_time_they_tell():
     frames = Frames()
     for kind in ("robot", "shell"):
-        message = wire.frame(kind, set(), 0, 1, 3.25, np.empty(0))
+        message = binary.frame(kind, set(), 0, 1, 3.25, np.empty(0))
         frames(WSMessage(WSMsgType.BINARY, message, None))
     frames(WSMessage(WSMsgType.TEXT, "{}", None))
     assert [told for told, _ in frames.rows] == [3.25]
@@ -65,7 +65,7 @@ class Deaf:
         self.told, self.triggers = {"state": {"notice": "out of reach"}}, []
 
     async def send(self, kind, rows, flags, count):
-        self.triggers.append(struct.unpack_from("<f", rows, 4 * wire.HAND.index("trigger"))[0])
+        self.triggers.append(struct.unpack_from("<f", rows, 4 * binary.HAND.index("trigger"))[0])
 
 
 def state(mode):

@@ -8,7 +8,7 @@ from benchmarks.suggest_lab import HOLD, Lab, fixed_list, held_out, pull, releas
 from demo.plants.choice import plant_of
 from demo.rig import ROOT, Config
 from tests.support.small_arm import small_spec
-from trunkline.identification.experiment import SLACK
+from trunkline.identification.simulate.experiment import SLACK
 from trunkline.pipeline.config import load_config
 
 

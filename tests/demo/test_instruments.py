@@ -8,7 +8,7 @@ import pytest
 from demo.instruments import measure, rotation_mocap_world
 from demo.recorder import write_log
 from tests.support.sessions import curl_truth, instruments, static_truth
-from trunkline.signals.smoothing import noise_level
+from trunkline.recordings.signals.smoothing import noise_level
 
 CLEAN = instruments(
     position_noise_mm=0, orientation_noise_deg=0, occlusions_per_s=0, dropped_frames=0, outliers=0,

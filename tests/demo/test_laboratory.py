@@ -29,8 +29,8 @@ from demo.plants.bench import SAMPLE_RATE
 from demo.plants.cousin import Cousin, CousinSettings
 from demo.record import Config
 from tests.support.small_arm import small_spec
-from trunkline.arm.spiral import spiral_chain
 from trunkline.errors import InputError
+from trunkline.model.arm.spiral import spiral_chain
 from trunkline.pipeline.config import load_config
 
 DEMO = Path(__file__).parents[2] / "demo"

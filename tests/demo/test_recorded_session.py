@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tests.support.folders import demo_with
-from trunkline.filtering.filter import Filter, filter_take
-from trunkline.sessions.session import read_session
-from trunkline.takes.agreement import align_clocks
-from trunkline.takes.checks import Limits
-from trunkline.takes.intake import take_in
+from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.clock_offset import align_clocks
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.filtering.filter import Filter, filter_take
+from trunkline.recordings.session.session import read_session
 
 TRIALS = ("curl_1_040", "curl_2_3_060", "motion_15_20_m2", "motion_5_40_1")
 LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)

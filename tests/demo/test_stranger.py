@@ -25,7 +25,7 @@ from demo.plants.stranger_kernel import (
 )
 from demo.record import Config
 from tests.support.stranger_links import add_link
-from trunkline.arm.spiral import spiral_chain
+from trunkline.model.arm.spiral import spiral_chain
 from trunkline.pipeline.config import load_config
 
 DEMO = Path(__file__).parents[2] / "demo"

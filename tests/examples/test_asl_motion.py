@@ -8,8 +8,8 @@ import pytest
 from examples.asl_motion.session import COMMANDS, LOADS, OBSERVED, make_session
 from tests.support.folders import SHARED, with_recordings
 from trunkline.errors import InputError
-from trunkline.sessions.session import read_session
-from trunkline.sessions.source import open_log
+from trunkline.recordings.session.session import read_session
+from trunkline.recordings.session.source import open_log
 
 RECORDED = SHARED / "asl_trunk/actuated"
 ROWS = 15_000

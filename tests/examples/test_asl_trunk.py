@@ -7,9 +7,9 @@ import pytest
 from examples.asl_trunk.session import COLUMNS, make_loaded_session, make_session, read_releases
 from tests.support.folders import SHARED, with_recordings
 from trunkline.errors import InputError
-from trunkline.sessions.session import read_session
-from trunkline.takes.checks import Limits
-from trunkline.takes.intake import take_in
+from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.session.session import read_session
 
 LIMITS = Limits(0.5, 0.3, 0.1, 1.0)
 

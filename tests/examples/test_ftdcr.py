@@ -10,11 +10,11 @@ from examples.ftdcr.session import COLUMNS, make_session, read_csv
 from stages.build_mjcf import Config, cad_arm
 from tests.support.folders import SHARED, with_recordings
 from trunkline.errors import InputError
-from trunkline.filtering.filter import Filter, filter_take
 from trunkline.pipeline.config import load_config
-from trunkline.sessions.session import read_session
-from trunkline.takes.checks import Limits
-from trunkline.takes.intake import take_in
+from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.filtering.filter import Filter, filter_take
+from trunkline.recordings.session.session import read_session
 
 ROOT = Path(__file__).parents[2]
 LIMITS = Limits(0.5, 0.3, 0.1, 1.0)

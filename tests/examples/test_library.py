@@ -15,11 +15,11 @@ import pytest
 
 from tests.support.bent_chain import stump, stump_spec
 from trunkline.frames import STANDARD_GRAVITY, downwards
-from trunkline.ik.inputs import DIRECTION
-from trunkline.ik.network import InverseKinematics
-from trunkline.ik.onnx import to_onnx
-from trunkline.statics.chain import read_chain
-from trunkline.statics.equilibria import equilibrium
+from trunkline.kinematics.ik.inputs import DIRECTION
+from trunkline.kinematics.ik.network import InverseKinematics
+from trunkline.kinematics.ik.onnx import to_onnx
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import equilibrium
 from trunkline.unity.twin import CSHARP
 
 ROOT = Path(__file__).parents[2]

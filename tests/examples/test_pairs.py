@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from examples.pairs import session as made
-from trunkline.sessions.session import read_session
-from trunkline.takes.checks import Limits
-from trunkline.takes.intake import take_in
+from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.session.session import read_session
 
 LIMITS = Limits(0.5, 0.3, 0.1, 1.0)
 

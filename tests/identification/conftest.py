@@ -7,4 +7,4 @@ import pytest
 def few_resamplings(request, monkeypatch):
     """The bootstrap of 20,000 is half of a small fit. tests/identification/test_certainty.py tries it as it is."""
     if request.path.name != "test_certainty.py":
-        monkeypatch.setattr("trunkline.identification.certainty.RESAMPLINGS", 2000)
+        monkeypatch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", 2000)

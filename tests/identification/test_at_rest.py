@@ -7,18 +7,18 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.arm.test_sections import ACTUATION, SOLVER, arm
-from trunkline.arm.tendons import Tendon
-from trunkline.elements import PRELOAD, WINDING, numbers_place, numeric_place, segment_sites
+from tests.model.arm.test_sections import ACTUATION, SOLVER, arm
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.identification.at_rest import shapes_at_rest
-from trunkline.identification.experiment import Experiment
-from trunkline.identification.parameters import candidate_fields
-from trunkline.identification.pose_fit import PoseFit
-from trunkline.simulation.rest import settle
-from trunkline.statics.chain import read_chain
-from trunkline.statics.equilibria import actuated
-from trunkline.statics.restart import actuated_from
+from trunkline.identification.parameters.parameters import candidate_fields
+from trunkline.identification.simulate.at_rest import shapes_at_rest
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.pose_fit import PoseFit
+from trunkline.model.arm.tendons import Tendon
+from trunkline.model.elements import PRELOAD, WINDING, numbers_place, numeric_place, segment_sites
+from trunkline.model.simulation.rest import settle
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import actuated
+from trunkline.model.statics.restart import actuated_from
 
 FOUR = [Tendon(angle, 0.012, end) for angle, end in ((0.0, 2), (120.0, 0), (-120.0, 0), (60.0, 0))]
 DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import release, segments_of, small_model
-from trunkline.identification.certainty import ALONE, certainty
-from trunkline.identification.identify import BOUND_TOLERANCE, _at_bound, _factors_at_bound
-from trunkline.identification.linearisation import Linearisation
-from trunkline.identification.parameter_table import undetermined
-from trunkline.identification.parameters import PARAMETERS
-from trunkline.identification.pose_fit import PoseProblem, _descend, fit_pose
-from trunkline.identification.problem import Bounds
+from trunkline.identification.fit.certainty import ALONE, certainty
+from trunkline.identification.fit.identify import BOUND_TOLERANCE, _at_bound, _factors_at_bound
+from trunkline.identification.fit.linearisation import Linearisation
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.results.parameter_table import undetermined
+from trunkline.identification.simulate.pose_fit import PoseProblem, _descend, fit_pose
 
 LOW, HIGH = 2.0, 4.0
 MARGIN = BOUND_TOLERANCE * (HIGH - LOW)

@@ -8,16 +8,16 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from tests.support.matched_plant import curl, segments_of, small_model
-from trunkline.identification.certainty import bootstrap, certainty, weakest_in_words
-from trunkline.identification.experiment import prepare
-from trunkline.identification.fit import Fit, Method, Polish, Rough
-from trunkline.identification.identify import identify
-from trunkline.identification.linearisation import Linearisation
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.parameter_table import parameter_table, undetermined
-from trunkline.identification.parameters import PARAMETERS
-from trunkline.identification.problem import Bounds
+from trunkline.identification.fit.certainty import bootstrap, certainty, weakest_in_words
+from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.identify import identify
+from trunkline.identification.fit.linearisation import Linearisation
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.results.parameter_table import parameter_table, undetermined
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.loss import LossWeights
 from trunkline.pipeline.stage import write_json
 
 SHARED, OWN = 0.6, 0.3  # standard deviations of what a cluster's residuals have in common, and of each

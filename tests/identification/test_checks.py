@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from tests.support import matched_plant
 from tests.support.matched_plant import curl, motion, release, small_model, static_pull, tilt
 from trunkline.errors import InputError
-from trunkline.identification.checks import check_trials
+from trunkline.identification.simulate.checks import check_trials
 
 FRAMES = 60
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
-from trunkline.identification.search import AGREEING, Convergence, Found, _apart, _evolve, _several, descend, search
+from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
+from trunkline.identification.fit.search import AGREEING, Convergence, Found, _apart, _evolve, _several, descend, search
 
 LOW, HIGH = np.log(0.2), np.log(20.0)
 PATIENT, SHORT = 25, 1  # iterations: of a search that ends by itself, and of one whose time is up
@@ -156,7 +156,7 @@ def test_the_first_start_goes_to_its_own_minimum_and_the_others_leave_plateaus_a
         hasty.append(hurried)
         return [descend(problem, start, iterations, tolerance, report)]
 
-    monkeypatch.setattr("trunkline.identification.search._ends", ends)
+    monkeypatch.setattr("trunkline.identification.fit.search._ends", ends)
     search(Valleys(2.0, 2.0, 2.0), LeastSquares(12, 3, PATIENT, 1e-6), seed=3, report=quiet)
     assert hasty == [False, True, True]
 
@@ -179,7 +179,7 @@ def test_of_each_start_its_best_end_agrees_or_does_not(monkeypatch, ends, agreei
     def made(*_):
         return [Found(np.array([loss]), loss, Convergence(), True) for loss in next(left)]
 
-    monkeypatch.setattr("trunkline.identification.search._ends", made)
+    monkeypatch.setattr("trunkline.identification.fit.search._ends", made)
     starts = [np.zeros(1)] * len(ends)
     result = _several(Valleys(2.0), starts, PATIENT, 1e-6, quiet)  # type: ignore[arg-type]
     every = sorted(loss for each in ends for loss in each)

@@ -12,11 +12,11 @@ from scipy.stats import t as student
 
 from tests.support.matched_plant import FRAME, segments_of, small_model
 from tests.support.noisy_trials import STAGES, TRIALS, WEIGHTS, measured, with_values
-from trunkline.identification.certainty import bootstrap, certainty
-from trunkline.identification.experiment import prepare
-from trunkline.identification.problem import Bounds, Problem
-from trunkline.identification.search import descend
-from trunkline.identification.surrogate import surrogate
+from trunkline.identification.fit.certainty import bootstrap, certainty
+from trunkline.identification.fit.problem import Bounds, Problem
+from trunkline.identification.fit.search import descend
+from trunkline.identification.fit.surrogate import surrogate
+from trunkline.identification.simulate.experiment import prepare
 
 REPETITIONS, FRAMES = 20, 60
 STEPS = 4  # of a frame
@@ -53,7 +53,7 @@ def repetitions(request) -> Repetitions:
         errors.append(found.vector - exact)
         widths.append(certainty(found.linear, moves=moves).half_width)
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("trunkline.identification.certainty.RESAMPLINGS", RESAMPLINGS)
+            patch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", RESAMPLINGS)
             resampled.append(bootstrap(found.linear, 1, moves) - exact)
     return Repetitions(list(stage.true), np.array(errors), np.array(widths), np.array(resampled))
 

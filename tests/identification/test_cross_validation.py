@@ -5,15 +5,15 @@ import pandas as pd
 import pytest
 
 from tests.support.matched_plant import segments_of, small_model, tilt
-from trunkline.identification.cross_validation import ERRORS, cross_validate
-from trunkline.identification.evaluation import replay, scores
-from trunkline.identification.experiment import prepare
-from trunkline.identification.fit import Fit, Method, Polish, Rough
-from trunkline.identification.identify import identify
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.problem import Bounds
+from trunkline.identification.evaluation.evaluation import replay, scores
+from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.identify import identify
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.loss import LossWeights
+from trunkline.identification.uncertainty.cross_validation import ERRORS, cross_validate
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 METHOD = Method(
@@ -72,7 +72,7 @@ def test_every_trial_is_left_out_once(monkeypatch):
     model = small_model(4)
     trials = [prepare(tilt(model, angle), model, 1) for angle in (30, 60, 90)]
     seen = []
-    module = "trunkline.identification.cross_validation"
+    module = "trunkline.identification.uncertainty.cross_validation"
     monkeypatch.setattr(f"{module}.identify", lambda *args: type("Found", (), {"models": result.models})())
     monkeypatch.setattr(f"{module}.replay", lambda model, left, segments: seen.append([e.name for e in left]) or left)
     monkeypatch.setattr(f"{module}.trial_table", lambda found: error_table(found))

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from trunkline.identification.curves import shape_table
+from trunkline.identification.results.curves import shape_table
 
 
 def drawn(measured):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tests.support.swings import LIKE, STEP, STRAIGHT, experiment
-from trunkline.identification.evaluation import _mean, errors_of
-from trunkline.identification.loss import LossWeights
+from trunkline.identification.evaluation.evaluation import _mean, errors_of
+from trunkline.identification.simulate.loss import LossWeights
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 

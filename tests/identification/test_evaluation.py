@@ -6,10 +6,7 @@ import pytest
 from tests.support.matched_plant import FRAME, curl, release, segments_of, small_model, tilt
 from tests.support.small_arm import small_spec
 from tests.support.swings import FRAMES, LIKE, STEP, TIME, TIP, experiment, swing
-from trunkline.arm.holes import Holes, add_holes
-from trunkline.arm.joints import Branch, Joints, Slider, add_elements
-from trunkline.elements import arm_hinges, cables
-from trunkline.identification.evaluation import (
+from trunkline.identification.evaluation.evaluation import (
     Prediction,
     errors_of,
     halved_step,
@@ -18,9 +15,12 @@ from trunkline.identification.evaluation import (
     scores,
     segment_positions,
 )
-from trunkline.identification.experiment import own_starts, prepare
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.parameters import candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import candidate_fields, set_fields
+from trunkline.identification.simulate.experiment import own_starts, prepare
+from trunkline.identification.simulate.loss import LossWeights
+from trunkline.model.arm.guide_holes import Holes, add_holes
+from trunkline.model.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.model.elements import arm_hinges, cables
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 

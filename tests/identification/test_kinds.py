@@ -16,12 +16,12 @@ from tests.support.matched_plant import (
     with_load,
 )
 from trunkline.frames import gravity_in_base
-from trunkline.identification.evaluation import replay, scores
-from trunkline.identification.experiment import prepare
-from trunkline.identification.loss import position_error
-from trunkline.identification.parameters import candidate_fields
-from trunkline.identification.population import Population
-from trunkline.trials.experiments import EXPERIMENTS, is_static
+from trunkline.identification.evaluation.evaluation import replay, scores
+from trunkline.identification.parameters.parameters import candidate_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.loss import position_error
+from trunkline.identification.simulate.population import Population
+from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 
 PULLS = [(30, -300, -300), (25, 10, -300), (10, 8, 12)]
 

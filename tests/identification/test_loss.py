@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from trunkline.identification.loss import (
+from trunkline.identification.simulate.loss import (
     LossWeights,
     distance_residuals,
     huber,

@@ -8,9 +8,9 @@ import pytest
 from tests.identification.test_recovery import changed, identified
 from tests.support.matched_plant import curl, release, segments_of, small_model, tilt
 from tests.support.small_arm import small_spec
-from trunkline.identification.experiment import prepare
-from trunkline.identification.markers import with_measured_markers
-from trunkline.identification.parameters import candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import candidate_fields, set_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.markers import with_measured_markers
 
 
 @pytest.fixture(scope="module")

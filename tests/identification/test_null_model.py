@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import release, segments_of, small_model, tilt
-from trunkline.identification.error_tables import segment_table, trial_table
-from trunkline.identification.evaluation import Prediction, replay
-from trunkline.identification.experiment import prepare
-from trunkline.identification.null_model import hanging_still, references
+from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation.evaluation import Prediction, replay
+from trunkline.identification.evaluation.null_model import hanging_still, references
+from trunkline.identification.simulate.experiment import prepare
 
 
 @pytest.fixture(scope="module")

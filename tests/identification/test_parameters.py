@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_spec
-from trunkline.arm.holes import Holes, add_holes
-from trunkline.arm.joints import Branch, Joints, Slider, add_elements
-from trunkline.elements import BRANCH, PRELOAD, SECTIONS, WINDING, all_elements, arm_hinges
 from trunkline.errors import InputError
-from trunkline.identification.parameters import (
+from trunkline.identification.fit.setup import check_parameters
+from trunkline.identification.parameters.parameters import (
     PARAMETERS,
     Parameter,
     candidate_fields,
@@ -20,8 +18,10 @@ from trunkline.identification.parameters import (
     set_fields,
     unit_of_hinge,
 )
-from trunkline.identification.saving import save_model
-from trunkline.identification.setup import check_parameters
+from trunkline.identification.parameters.saving import save_model
+from trunkline.model.arm.guide_holes import Holes, add_holes
+from trunkline.model.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.model.elements import BRANCH, PRELOAD, SECTIONS, WINDING, all_elements, arm_hinges
 
 VALUES = {
     "joint_place": 0.3,

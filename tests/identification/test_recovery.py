@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import curl, motion, release, segments_of, small_model, tilt
-from trunkline.arm.joints import Branch, Joints, Slider
-from trunkline.identification.experiment import prepare
-from trunkline.identification.fit import Fit, Method, Polish, Rough
-from trunkline.identification.identify import identify
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.problem import DIVERGED_LOSS, Bounds, Problem
+from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.identify import identify
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.problem import DIVERGED_LOSS, Bounds, Problem
+from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.loss import LossWeights
+from trunkline.model.arm.joints import Branch, Joints, Slider
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 

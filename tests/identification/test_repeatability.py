@@ -8,9 +8,8 @@ import pytest
 
 from tests.support.folders import SHARED, with_recordings
 from tests.support.matched_plant import release, small_model, tilt
-from trunkline.filtering.filter import filter_take
 from trunkline.frames import gravity_in_base
-from trunkline.identification.repeatability import (
+from trunkline.identification.evaluation.repeatability import (
     SAME_GRAVITY,
     SAME_LOAD,
     SAME_PULL,
@@ -18,10 +17,11 @@ from trunkline.identification.repeatability import (
     end_shape,
     repeatability,
 )
-from trunkline.identification.resting import LAST
+from trunkline.identification.simulate.resting import LAST
 from trunkline.pipeline.config import settings_of
-from trunkline.sessions.session import read_session
-from trunkline.takes.intake import take_in
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.filtering.filter import filter_take
+from trunkline.recordings.session.session import read_session
 
 ROOT = Path(__file__).parents[2]
 

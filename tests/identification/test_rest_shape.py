@@ -5,13 +5,13 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import LIMIT
-from trunkline.arm.mjcf import Solver, Tendons, build_spec
-from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.frames import gravity_in_base
-from trunkline.identification.parameters import candidate_fields, set_fields
-from trunkline.identification.resting import rest_shape, spring_references
-from trunkline.identification.saving import save_model
-from trunkline.simulation.rest import longest_step
+from trunkline.identification.parameters.parameters import candidate_fields, set_fields
+from trunkline.identification.parameters.saving import save_model
+from trunkline.identification.simulate.resting import rest_shape, spring_references
+from trunkline.model.arm.mjcf import Solver, Tendons, build_spec
+from trunkline.model.arm.uniform import uniform_chain, uniform_properties
+from trunkline.model.simulation.rest import longest_step
 
 POSE = np.array([0.02, -0.05, 0.01, 0.03, -0.04, 0.06, 0.0, 0.1])
 

@@ -7,19 +7,19 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import LIMIT
-from trunkline.arm.mjcf import Marker, Solver, Tendons, build_spec
-from trunkline.arm.uniform import uniform_chain, uniform_properties
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
-from trunkline.identification.experiment import prepare
-from trunkline.identification.fit import Fit, Method, Polish, Rough
-from trunkline.identification.identify import identify
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.parameters import candidate_fields, set_fields
-from trunkline.identification.problem import Bounds
-from trunkline.identification.resting import resting_shape
-from trunkline.trials.trial import Trial
+from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.identify import identify
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.parameters.parameters import candidate_fields, set_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.loss import LossWeights
+from trunkline.identification.simulate.resting import resting_shape
+from trunkline.model.arm.mjcf import Marker, Solver, Tendons, build_spec
+from trunkline.model.arm.uniform import uniform_chain, uniform_properties
+from trunkline.recordings.trials.trial import Trial
 
 ROOT = Path(__file__).parents[2]
 FRAME, FRAMES = 1 / 120, 360

@@ -9,13 +9,13 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.matched_plant import release, segments_of, small_model, tilt
 from tests.support.noisy_trials import WEIGHTS, measured, with_values
-from trunkline.identification.experiment import prepare
-from trunkline.identification.fit import Fit, Method, Polish, Rough
-from trunkline.identification.identify import identify
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.problem import Bounds
-from trunkline.identification.robust import robust_loss, trial_weights, usual_losses
-from trunkline.identification.suspicion import suspicions
+from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.identify import identify
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.fit.robust import robust_loss, trial_weights, usual_losses
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.uncertainty.trial_diagnostics import suspicions
 
 UNITS, FRAMES, LATE = 3, 40, 10
 METHOD = Method(

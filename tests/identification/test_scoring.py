@@ -7,8 +7,8 @@ import pytest
 
 from tests.support.matched_plant import release, small_model, tilt
 from tests.support.swings import experiment, swing
-from trunkline.identification.pose_fit import PoseFit
-from trunkline.identification.scoring import Compared, evaluate, score, start_fit
+from trunkline.identification.results.scoring import Compared, evaluate, score, start_fit
+from trunkline.identification.simulate.pose_fit import PoseFit
 
 COMPARED = Compared(["static_tilt"], 30, 0.0)
 ASIDE = (0.0, 0.003, 0.006)  # m, by which the tips of tilts that should be alike end apart

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import release, segments_of, small_model
-from trunkline.identification.experiment import prepare
-from trunkline.identification.linearisation import linearise
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.problem import Bounds, Problem
-from trunkline.identification.search import descend, search
+from trunkline.identification.fit.linearisation import linearise
+from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
+from trunkline.identification.fit.problem import Bounds, Problem
+from trunkline.identification.fit.search import descend, search
+from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.loss import LossWeights
 
 TRUE = {"damping": 0.07, "tendon_friction": 0.6}
 

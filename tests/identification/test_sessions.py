@@ -12,10 +12,10 @@ from tests.identification.test_stage import metrics_of, settings
 from tests.support.matched_plant import begin_project, tilt
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.per_session import make_room, model_in, names_apart
+from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.parameters.per_session import make_room, model_in, names_apart
 from trunkline.pipeline.identify import CAD_MODEL, run
-from trunkline.trials.trial import write_trials
+from trunkline.recordings.trials.trial import write_trials
 
 NOISE = 3e-4  # m
 MOUNTS = {"monday": (0.02, -0.03), "friday": (-0.04, 0.03)}  # rad, about x and y: some 3.4 degrees apart about each
@@ -43,7 +43,7 @@ def found(tmp_path_factory):
     """By what was identified: metrics, the table of parameters, and the model. And the true stiffness."""
     results = {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("trunkline.identification.certainty.RESAMPLINGS", 2000)
+        patch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", 2000)
         patch.chdir(tmp_path_factory.mktemp("sessions"))
         model = begin_project(Path("."), 6)
         middle = model.jnt_stiffness[0]

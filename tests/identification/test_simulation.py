@@ -8,16 +8,16 @@ import pytest
 
 from tests.support.matched_plant import curl, motion, release, segments_of, small_model, tilt
 from tests.support.small_arm import small_spec
-from trunkline.arm.joints import Branch, Joints, Slider, add_elements
-from trunkline.elements import BRANCH, SLIDER, elements
 from trunkline.errors import InputError
-from trunkline.identification.evaluation import replay
-from trunkline.identification.experiment import prepare
-from trunkline.identification.in_motion import InMotion
-from trunkline.identification.loss import position_error
-from trunkline.identification.parameters import candidate_fields
-from trunkline.identification.population import Population
-from trunkline.identification.pose_fit import fit_pose
+from trunkline.identification.evaluation.evaluation import replay
+from trunkline.identification.parameters.parameters import candidate_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.in_motion import InMotion
+from trunkline.identification.simulate.loss import position_error
+from trunkline.identification.simulate.population import Population
+from trunkline.identification.simulate.pose_fit import fit_pose
+from trunkline.model.arm.joints import Branch, Joints, Slider, add_elements
+from trunkline.model.elements import BRANCH, SLIDER, elements
 
 
 def seen_at(model, qpos, segments):

@@ -9,15 +9,15 @@ import pytest
 
 from tests.support.matched_plant import begin_project, curl, release, tilt
 from trunkline.errors import InputError
-from trunkline.identification.fit import Polish, Rough
-from trunkline.identification.loss import Loss
-from trunkline.identification.optimizers import DifferentialEvolution, LeastSquares
-from trunkline.identification.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.problem import Bounds
-from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.fit.fit import Polish, Rough
+from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.simulate.loss import Loss
 from trunkline.pipeline.identify import CAD_MODEL, read_reported, run
-from trunkline.trials.splits import DECIDING
-from trunkline.trials.trial import write_trials
+from trunkline.recordings.trials.splits import DECIDING
+from trunkline.recordings.trials.trial import write_trials
 
 LOSS = Loss(
     kind="positions", delta_position=0.2, delta_velocity=2.0, epsilon=0.02, epsilon_velocity=0.002,

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from trunkline.identification.linearisation import Linearisation
-from trunkline.identification.surrogate import LONGEST, Surrogate, surrogate
+from trunkline.identification.fit.linearisation import Linearisation
+from trunkline.identification.fit.surrogate import LONGEST, Surrogate, surrogate
 
 TRIALS, ROWS = 6, 40
 CURVATURE = 0.6  # of the residuals, beside slopes of about 1 and residuals of about 0.5

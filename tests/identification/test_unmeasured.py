@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from tests.support.swings import FRAMES, LIKE, SEGMENTS, TIP, experiment, swing, trial
-from trunkline.identification.error_tables import segment_table, trial_table
-from trunkline.identification.evaluation import Prediction, errors_of, scores
-from trunkline.identification.fit import Fit
-from trunkline.identification.loss import (
+from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation.evaluation import Prediction, errors_of, scores
+from trunkline.identification.evaluation.null_model import hanging_still
+from trunkline.identification.evaluation.repeatability import end_shape
+from trunkline.identification.fit.fit import Fit
+from trunkline.identification.results.scoring import fingerprint
+from trunkline.identification.simulate.loss import (
     RESIDUALS,
     LossWeights,
     internal_error,
@@ -17,10 +20,7 @@ from trunkline.identification.loss import (
     position_error,
     velocity_error,
 )
-from trunkline.identification.null_model import hanging_still
-from trunkline.identification.repeatability import end_shape
-from trunkline.identification.scoring import fingerprint
-from trunkline.identification.suspicion import exchanged_labels, started_off
+from trunkline.identification.uncertainty.trial_diagnostics import exchanged_labels, started_off
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 FIT = Fit(SEGMENTS, {}, (), "positions", WEIGHTS, None)  # type: ignore[arg-type]

@@ -12,9 +12,9 @@ import yaml
 from omegaconf import OmegaConf
 from pydantic import Field, TypeAdapter, ValidationError
 
-from trunkline.arm import kinds
 from trunkline.errors import InputError
-from trunkline.identification.settings import IdentificationSettings
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.model.arm import kinds
 from trunkline.pipeline.config import check_settings, compose_settings, group_options, load_config, validated
 from trunkline.pipeline.settings import check_once, require_session
 from trunkline.settings import settings

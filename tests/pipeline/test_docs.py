@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from omegaconf import OmegaConf
 
-from trunkline.logs.cdr import short_name
-from trunkline.logs.messages import JOINTS, POSES
-from trunkline.sessions.session import FixedBase, MocapFrame, Session, Topics, TrialEntry
+from trunkline.recordings.logs.cdr import short_name
+from trunkline.recordings.logs.messages import JOINTS, POSES
+from trunkline.recordings.session.session import FixedBase, MocapFrame, Session, Topics, TrialEntry
 
 ROOT = Path(__file__).parents[2]
 DOCS = sorted(

@@ -2,7 +2,7 @@
 
 import pytest
 
-from trunkline.pipeline.origin import imported
+from upkeep.origin import imported
 
 
 @pytest.mark.parametrize(
@@ -10,13 +10,13 @@ from trunkline.pipeline.origin import imported
     [
         ("trunkline/frames.py", True),
         ("trunkline/errors.py", False),  # words
-        ("trunkline/figures/maps.py", False),  # pictures
-        ("trunkline/pipeline/gate.py", False),  # what is done with it afterwards
+        ("trunkline/report/figures/maps.py", False),  # pictures
+        ("upkeep/gate.py", False),  # what is done with it afterwards
         ("trunkline/pipeline/identify.py", True),  # but this is part of it
     ],
 )
 def test_of_what_is_imported_all_counts_but_what_changes_no_number(tmp_path, name, counts):
-    files = {name: "import trunkline.statics\n", "trunkline/statics.py": "LENGTH = 1\n", "studies/some.py": ""}
+    files = {name: "import trunkline.model.statics\n", "trunkline/statics.py": "LENGTH = 1\n", "studies/some.py": ""}
     files["studies/some.py"] = f"import {name.removesuffix('.py').replace('/', '.')}\n"
     for file, text in files.items():
         (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)

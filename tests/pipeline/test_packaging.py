@@ -22,9 +22,9 @@ UNSEEN = {
 }  # fmt: skip
 OF_ROS = {"builtin-interfaces", "rclpy", "sensor-msgs", "trajectory-msgs"}  # come with ROS 2, and from no package index
 NEEDS_EXTRA = (
-    "trunkline/cluster.py", "trunkline/evaluate", "trunkline/execution", "trunkline/figures", "trunkline/ik/learn.py",
-    "trunkline/ik/network.py", "trunkline/ik/onnx.py", "trunkline/ik/tip_loss.py", "trunkline/ik/training.py",
-    "trunkline/live", "trunkline/pipeline", "trunkline/teleop", "trunkline/watch", "trunkline/worker.py",
+    "trunkline/compute/cluster.py", "trunkline/tools/evaluate", "trunkline/ar/drivers", "trunkline/report/figures", "trunkline/kinematics/ik/learn.py",
+    "trunkline/kinematics/ik/network.py", "trunkline/kinematics/ik/onnx.py", "trunkline/kinematics/ik/tip_loss.py", "trunkline/kinematics/ik/training.py",
+    "trunkline/ar/session", "trunkline/pipeline", "trunkline/ar/teleop", "trunkline/tools/monitor", "trunkline/compute/worker.py",
 )  # fmt: skip
 
 

@@ -19,10 +19,10 @@ from omegaconf import OmegaConf
 from demo.plants.choice import Choice
 from tests.support.bucket import bucket
 from tests.support.stub_pipeline import StubPipeline
-from trunkline.pipeline import lock, versions
 from trunkline.pipeline.config import SHARED, check_settings, group_options
-from trunkline.pipeline.origin import imported
-from trunkline.pipeline.versions import LIBRARIES
+from upkeep import lock, versions
+from upkeep.origin import imported
+from upkeep.versions import LIBRARIES
 
 ROOT = Path(__file__).parents[2]
 OF_NO_STAGE = ["execution", "hybrid", "live", "suggest", "teleop"]  # rooms whose settings no stage reads
@@ -168,7 +168,7 @@ def test_an_example_is_the_pipeline_s_own_stages(stages, address):
         chosen |= {entry for entry in expected if entry.startswith(tuple(f"artifacts/{other}/" for other in lacking))}
         chosen |= {given.get(name, {}).get("model")}
         if name == "train_ik" and given[name]["rig"] is None:
-            chosen |= {"demo/plants", "demo/rig.py", "trunkline/arm", *_settings_of_the_rig()}
+            chosen |= {"demo/plants", "demo/rig.py", "trunkline/model/arm", *_settings_of_the_rig()}
         assert found - chosen == expected - chosen
 
 
@@ -277,17 +277,17 @@ def test_an_edit_reruns_exactly_what_depends_on_it(pipeline, stages, name):
 @pytest.mark.parametrize(
     ("file", "first"),
     [
-        ("trunkline/preparation/motive.py", []),
-        ("trunkline/figures/identification.py", []),
-        ("trunkline/pipeline/gate.py", []),
+        ("trunkline/recordings/preparation/motive.py", []),
+        ("trunkline/report/figures/identification.py", []),
+        ("upkeep/gate.py", []),
         ("docs/identification.md", []),
-        ("trunkline/takes/swaps.py", ["ingest"]),
-        ("trunkline/filtering/filter.py", ["filter"]),
-        ("trunkline/identification/search.py", ["identify_stiffness", "identify_damping", "identify_control"]),
-        ("trunkline/dataset/sampling.py", ["report", "fk_dataset", "train_ik", "reachability"]),
-        ("trunkline/ik/network.py", ["train_ik"]),
-        ("trunkline/panda/inverse.py", ["reachability"]),
-        ("trunkline/certificate/budget.py", ["report"]),
+        ("trunkline/recordings/cleaning/label_swaps.py", ["ingest"]),
+        ("trunkline/recordings/filtering/filter.py", ["filter"]),
+        ("trunkline/identification/fit/search.py", ["identify_stiffness", "identify_damping", "identify_control"]),
+        ("trunkline/kinematics/dataset/sampling.py", ["report", "fk_dataset", "train_ik", "reachability"]),
+        ("trunkline/kinematics/ik/network.py", ["train_ik"]),
+        ("trunkline/kinematics/panda/inverse.py", ["reachability"]),
+        ("trunkline/report/certificate/budget.py", ["report"]),
         ("trunkline/unity/rules.py", ["package_unity"]),
     ],
 )
@@ -475,7 +475,7 @@ def test_another_version_in_the_requirements_is_refused_until_its_stages_ran(pip
 def test_continuous_integration_fails_where_one_of_its_commands_does(clone):
     """.ci/run over the clone's own `make lock`; the other commands pass."""
     targets = {name: "true" for name in ("types", "test", "mutants_sample", "gate")}
-    targets["lock"] = f"{sys.executable} -m trunkline.pipeline.lock"
+    targets["lock"] = f"{sys.executable} -m upkeep.lock"
     (clone / "Makefile").write_text("".join(f"{name}:\n\t@{command}\n" for name, command in targets.items()))
 
     def ci():

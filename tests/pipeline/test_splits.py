@@ -15,15 +15,15 @@ from tests.identification.test_stage import settings
 from tests.support.matched_plant import begin_project, curl, release, small_model, tilt
 from tests.support.sessions import all_truths, instruments, record, static_truth
 from tests.support.small_arm import small_spec
-from trunkline.filtering.filter import Filter
-from trunkline.identification.saving import save_model
+from trunkline.identification.parameters.saving import save_model
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import run
-from trunkline.sessions.session import read_session
-from trunkline.takes.intake import take_in
-from trunkline.trials.splits import DECIDING, IDENTIFY, SPLITS, TEST, VALIDATE
-from trunkline.trials.take import write_takes
-from trunkline.trials.trial import Trial, read_trials, write_trials
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.filtering.filter import Filter
+from trunkline.recordings.session.session import read_session
+from trunkline.recordings.trials.raw_trial import write_takes
+from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, SPLITS, TEST, VALIDATE
+from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 
 ROOT = Path(__file__).parents[2]
 FOLDERS = ("trunkline", "stages", "studies", "benchmarks", "examples", "demo")
@@ -33,22 +33,27 @@ MAY_NAME = {
     "demo/laboratory.py": {"TEST"},  # records it
     "stages/filter.py": {"SPLITS"},  # filters every trial for itself
     "stages/score.py": {"TEST"},  # reads it
-    "trunkline/evaluate/session.py": {"SPLITS"},  # the whole of any session, for a user who asks for it
-    "trunkline/identification/evaluation.py": {"SPLITS"},  # sorts what it is given
-    "trunkline/takes/gathering.py": {"SPLITS", "TEST"},  # says which of them a session lacks
-    "trunkline/identification/scoring.py": {"TEST"},  # what the stage `score` calls
-    "trunkline/check/recorded.py": {"SPLITS"},  # counts its trials
+    "trunkline/tools/evaluate/session.py": {"SPLITS"},  # the whole of any session, for a user who asks for it
+    "trunkline/identification/evaluation/evaluation.py": {"SPLITS"},  # sorts what it is given
+    "trunkline/recordings/cleaning/session_checks.py": {"SPLITS", "TEST"},  # says which of them a session lacks
+    "trunkline/identification/results/scoring.py": {"TEST"},  # what the stage `score` calls
+    "trunkline/recordings/trials/inventory.py": {"SPLITS"},  # counts its trials
     "examples/asl_motion/session.py": {"TEST"},  # writes it into session.yaml
     "examples/asl_trunk/session.py": {"TEST"},  # likewise
     "examples/ftdcr/session.py": {"TEST"},  # likewise
     "examples/pairs/session.py": {"TEST"},  # likewise
-    "trunkline/fleet/results.py": {"TEST"},  # shows its errors, as `score` wrote them
-    "trunkline/pipeline/limits.py": {"TEST"},  # refuses rows of it
-    "trunkline/pipeline/readme.py": {"TEST"},  # shows it
-    "trunkline/pipeline/truth_table.py": {"TEST"},  # shows it
+    "trunkline/tools/batch/results.py": {"TEST"},  # shows its errors, as `score` wrote them
+    "upkeep/limits.py": {"TEST"},  # refuses rows of it
+    "upkeep/readme.py": {"TEST"},  # shows it
+    "upkeep/truth_table.py": {"TEST"},  # shows it
 }
 # who says the same words of something else: the network's samples are split too; `identify` is also a function
-OTHERWISE = ("trunkline/dataset/", "trunkline/ik/", "trunkline/figures/network.py", "studies/training.py")
+OTHERWISE = (
+    "trunkline/kinematics/dataset/",
+    "trunkline/kinematics/ik/",
+    "trunkline/report/figures/network.py",
+    "studies/training.py",
+)
 OTHERWISE += ("benchmarks/identification/sysid.py",)
 
 
@@ -60,12 +65,12 @@ def files() -> dict[str, ast.Module]:
 def test_the_splits_are_named_in_one_place():
     """No other module of the data's way types a split's name, and no other than these names the split test."""
     for name, tree in files().items():
-        if name == "trunkline/trials/splits.py":
+        if name == "trunkline/recordings/trials/splits.py":
             continue
         imported = {
             alias.name
             for node in ast.walk(tree)
-            if isinstance(node, ast.ImportFrom) and node.module == "trunkline.trials.splits"
+            if isinstance(node, ast.ImportFrom) and node.module == "trunkline.recordings.trials.splits"
             for alias in node.names
         }
         assert imported & {"TEST", "SPLITS"} == MAY_NAME.get(name, set()), name
@@ -84,7 +89,7 @@ def test_whoever_reads_trials_says_which_and_of_the_stages_only_score_says_test(
     assert {(name, told) for name, told in calls if told != "DECIDING"} == {
         ("stages/filter.py", "SPLITS"),
         ("stages/score.py", "(IDENTIFY, TEST)"),
-        ("trunkline/evaluate/session.py", "SPLITS"),
+        ("trunkline/tools/evaluate/session.py", "SPLITS"),
     }
     assert len(calls) >= 4
     assert TEST not in DECIDING

@@ -9,11 +9,11 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+from trunkline.compute.progress import progress
+from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError
-from trunkline.figures.style import save_figure
 from trunkline.pipeline.stage import output_folder, write_json
-from trunkline.progress import progress
-from trunkline.threads import thread_count
+from trunkline.report.figures.style import save_figure
 
 ROOT = Path(__file__).parents[2]
 
@@ -129,7 +129,7 @@ def test_a_bad_thread_count_is_refused(monkeypatch, bad):
 
 
 def test_the_first_and_the_last_line_of_progress_come_once(capsys, monkeypatch):
-    monkeypatch.setattr("trunkline.progress.PLAIN_INTERVAL", 0.0)
+    monkeypatch.setattr("trunkline.compute.progress.PLAIN_INTERVAL", 0.0)
     with progress(2, "fit", "generations") as bar:
         bar.update(1)
         bar.update(1)

@@ -12,7 +12,7 @@ import yaml
 from omegaconf import OmegaConf
 
 from trunkline.__main__ import HELP, VERBS
-from trunkline.trials.splits import DECIDING, TEST
+from trunkline.recordings.trials.splits import DECIDING, TEST
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs/tutorial.md").read_text(encoding="utf-8")

@@ -11,17 +11,17 @@ import pytest
 
 from stages import report as report_stage
 from stages import score as score_stage
-from tests.certificate.sample import ASKED, INGESTED
 from tests.identification.test_sessions import MOUNTS, mounted
 from tests.identification.test_stage import metrics_of, settings, truth_of
+from tests.report.certificate.sample import ASKED, INGESTED
 from tests.support.matched_plant import begin_project, curl, release, static_pull, tilt
 from tests.support.workbench import ROOT
-from trunkline.evaluate.__main__ import main as evaluate
-from trunkline.identification.parameters import PARAMETERS
+from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.pipeline.stage import write_json
-from trunkline.trials.splits import SPLITS
-from trunkline.trials.trial import read_trials, write_trials
+from trunkline.recordings.trials.splits import SPLITS
+from trunkline.recordings.trials.trial import read_trials, write_trials
+from trunkline.tools.evaluate.__main__ import main as evaluate
 
 SCALES = {"stiffness": 0.8, "damping": 1.4, "kp": 0.7}
 STAGES = ("identify_stiffness", "identify_damping", "identify_control")
@@ -44,7 +44,7 @@ def project(tmp_path_factory):
     """After all stages: its folder, and what the parameters truly are."""
     root = tmp_path_factory.mktemp("two")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("trunkline.identification.certainty.RESAMPLINGS", 500)
+        patch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", 500)
         patch.chdir(root)
         model = begin_project(root, 4)
         true = {name: scale * PARAMETERS[name].read(model) for name, scale in SCALES.items()}

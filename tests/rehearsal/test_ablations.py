@@ -13,18 +13,18 @@ from tests.rehearsal.arm import settings as stand_in
 from tests.rehearsal.arm import stranger
 from tests.support.bent_chain import hardening_stump, stump_spec
 from tests.support.operator import config
+from trunkline.ar.hybrid.friction import TPU_ON
+from trunkline.ar.hybrid.posterior import Contact, Doubts, draw
+from trunkline.ar.preview.package import Package
+from trunkline.ar.preview.preview_twin import Believed
+from trunkline.ar.teleop.alignment import Aligned, align, wrist_of
+from trunkline.ar.teleop.tendons import bend
+from trunkline.ar.teleop.vectors import DOWN
 from trunkline.errors import InputError
-from trunkline.foresight.package import Package
-from trunkline.foresight.twin import Believed
 from trunkline.frames import STANDARD_GRAVITY, downwards
-from trunkline.hybrid.doubts import Contact, Doubts, draw
-from trunkline.hybrid.friction import TPU_ON
-from trunkline.hybrid.robots import PandaRobot
-from trunkline.statics.chain import read_chain
-from trunkline.statics.equilibria import equilibrium
-from trunkline.teleop.alignment import Aligned, align, wrist_of
-from trunkline.teleop.tendons import bend
-from trunkline.teleop.vectors import DOWN
+from trunkline.kinematics.panda.mounts import PandaRobot
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import equilibrium
 
 FRICTION, PLACE = 0.2, (0.005, 0.005, 0.005)
 READY = (0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785)

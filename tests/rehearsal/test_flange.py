@@ -6,15 +6,15 @@ from scipy.spatial.transform import Rotation
 
 from rehearsal.robot.flange import Mount, accelerate_joints, carry, move_joints
 from rehearsal.robot.stand_in import Panda, servos_of
-from trunkline.panda.kinematics import FLANGE, Q_MAX, mount_pose
-from trunkline.panda.limits import ACCELERATION, VELOCITY
+from trunkline.kinematics.panda.kinematics import FLANGE, Q_MAX, mount_pose
+from trunkline.kinematics.panda.limits import ACCELERATION, VELOCITY
 
 READY = np.array([0.3, -0.3, 0.2, -2.2, 0.1, 1.9, 0.785])
 PANDA = Panda(mount_offset=0.05, azimuth=0.0, bandwidth=10.0, damping_ratio=1.0, dead_time=0.0)
 
 
 def test_the_base_moves_as_the_mount_s_pose_does():
-    """Velocities and accelerations against differences of the poses of `trunkline.panda`."""
+    """Velocities and accelerations against differences of the poses of `trunkline.kinematics.panda`."""
     rng = np.random.default_rng(5)
     v, a, step = rng.normal(size=7), rng.normal(size=7), 1e-4
     mount = Mount(np.eye(3), np.array([0.0, 0.0, FLANGE + 0.05]))

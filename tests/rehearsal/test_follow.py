@@ -9,7 +9,7 @@ from rehearsal.experiments.follow import Path, failure, interruption, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from tests.rehearsal.seen import frame
-from trunkline.teleop.core import STAYS
+from trunkline.ar.teleop.core import STAYS
 
 LONGEST, STEP = 1.0, 0.25  # s
 BEGUN, SECONDS = 4.0, 8.0  # s; numbers of which floats have all

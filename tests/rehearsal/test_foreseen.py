@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tests.live.test_foreseer import made, order
-from trunkline.live.foreseer import Told, told
+from tests.ar.session.test_foreseer import made, order
+from trunkline.ar.session.preview_process import Told, told
 
 
 def test_a_reach_is_foreseen_as_on_a_page():

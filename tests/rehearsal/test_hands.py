@@ -9,9 +9,9 @@ from rehearsal import settings
 from rehearsal.operator.hands import RayHand
 from rehearsal.operator.scripts import Operator
 from rehearsal.session import RATE, REFERENCE
+from trunkline.ar.teleop.tracked_controller import ray_length
+from trunkline.ar.teleop.vectors import add, rotate, scale
 from trunkline.frames import STANDARD_GRAVITY, rotation_from_wxyz
-from trunkline.teleop.hands import ray_length
-from trunkline.teleop.vectors import add, rotate, scale
 
 PLACE = np.array([0.5, 0.1, 0.2])
 ORIGIN = np.array([0.2, -0.1, -0.3])

@@ -14,8 +14,8 @@ from rehearsal.robot.kernel import set_moving
 from rehearsal.robot.stand_in import straight_state
 from tests.rehearsal.arm import stranger
 from tests.support.stranger_links import add_link
-from trunkline.arm.spiral import spiral_chain
 from trunkline.frames import wxyz_from_rotation
+from trunkline.model.arm.spiral import spiral_chain
 
 UNITS = 4
 GRAVITY = np.array([0.0, 0.0, -9.80665])

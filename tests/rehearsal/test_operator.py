@@ -11,7 +11,7 @@ from rehearsal.experiments.bench import ORIGINS
 from rehearsal.operator.hands import RayHand
 from rehearsal.operator.scripts import HAND_OVERS, LIFTED, Ending, Operator, on_object, sure_enough
 from rehearsal.session import REFERENCE, View
-from trunkline.teleop.messages import World
+from trunkline.ar.teleop.messages import World
 
 RADIUS, ACCEPT = 0.03, 0.75
 PLANS = 3  # that the operator asks for before giving up

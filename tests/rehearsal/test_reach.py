@@ -11,7 +11,7 @@ from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import Session
 from tests.rehearsal.seen import FORCE, TIP, UNITS, frame
-from trunkline.hybrid.preview import Stated
+from trunkline.ar.hybrid.preview import Stated
 
 RADIUS = 0.03
 NAN = (np.nan, 0.0, 0.0)

@@ -6,7 +6,7 @@ import pytest
 from rehearsal.experiments.follow import Path as Way
 from rehearsal.experiments.result import COLUMNS, Result, append_result, causes, rate, read_results, summary
 from trunkline.errors import InputError
-from trunkline.pipeline.rehearsal_table import rehearsal_table
+from upkeep.rehearsal_table import rehearsal_table
 
 
 def runs(successes: int, failures: int) -> list[Result]:

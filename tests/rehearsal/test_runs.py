@@ -14,10 +14,10 @@ from rehearsal import runs
 from rehearsal.experiments.result import Result, read_results, summary
 from rehearsal.report import draw
 from rehearsal.runs import Run, Source, make, make_one, source_of, wanted
+from trunkline.ar.preview.package import only_package
 from trunkline.errors import InputError
-from trunkline.foresight.package import only_package
-from trunkline.pipeline.limits import Limit
-from trunkline.pipeline.rehearsal_table import rehearsal_table
+from upkeep.limits import Limit
+from upkeep.rehearsal_table import rehearsal_table
 
 ROOT = Path(__file__).parents[2]
 SOURCE = Source("package", "code")
@@ -129,7 +129,7 @@ def test_the_code_of_runs_is_what_the_stage_depends_on(checkout, monkeypatch):
     assert after("rehearsal/report.py", "success", "successes") == before
     assert after("rehearsal/conf/rehearse/robot/stand_in.yaml", "\n", "\n# a comment\n") == before
     settings = after("rehearsal/conf/rehearse/robot/stand_in.yaml", "azimuth: 0.0", "azimuth: 0.1")
-    code = after("trunkline/teleop/core.py", "\n", "\n# edited\n")
+    code = after("trunkline/ar/teleop/core.py", "\n", "\n# edited\n")
     assert len({before.code, settings.code, code.code}) == 3
 
 

@@ -12,11 +12,11 @@ from rehearsal.experiments.bench import ORIGINS, rehearse
 from rehearsal.operator.hands import RayHand
 from rehearsal.operator.scripts import Operator
 from rehearsal.session import REFERENCE, Session
+from tests.ar.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from tests.support.operator import PACKAGE, Everywhere, config
-from tests.teleop.test_plan import BENT, LIMITS, NETWORK, OFFSET, START, STRAIGHT
-from trunkline.teleop.messages import World
-from trunkline.teleop.planner import Planner
-from trunkline.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.messages import World
+from trunkline.ar.teleop.planner import Planner
+from trunkline.ar.teleop.rigid_ik import RigidIK
 
 THING = np.array([0.6, 0.1, 0.1])
 

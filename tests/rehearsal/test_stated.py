@@ -10,7 +10,7 @@ from rehearsal.experiments.result import LATER, Result
 from rehearsal.experiments.stated import covered, probabilities, scores
 from rehearsal.rehearse import metrics_of
 from rehearsal.runs import Source
-from trunkline.hybrid.shares import wilson
+from trunkline.ar.hybrid.rates import wilson
 
 NAN = float("nan")
 

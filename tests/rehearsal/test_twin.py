@@ -8,15 +8,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
-from tests.hybrid.conftest import hybrid_settings, rubbing_arm
-from trunkline.arm.spiral import spiral_chain
-from trunkline.foresight.twin import Believed, compose_twin
-from trunkline.hybrid.doubts import Doubts, nominal_draw
-from trunkline.hybrid.futures import Way, futures
-from trunkline.hybrid.preview import joined
-from trunkline.hybrid.robots import PandaRobot
-from trunkline.panda.kinematics import mount_pose
-from trunkline.teleop.messages import Box, Thing, World
+from tests.ar.hybrid.conftest import hybrid_settings, rubbing_arm
+from trunkline.ar.hybrid.posterior import Doubts, nominal_draw
+from trunkline.ar.hybrid.preview import joined
+from trunkline.ar.hybrid.rollouts import Way, futures
+from trunkline.ar.preview.preview_twin import Believed, compose_twin
+from trunkline.ar.teleop.messages import Box, Thing, World
+from trunkline.kinematics.panda.kinematics import mount_pose
+from trunkline.kinematics.panda.mounts import PandaRobot
+from trunkline.model.arm.spiral import spiral_chain
 
 READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
 BASKET = Thing("the basket", "basket", 0.03, 0.06, 0.2, (0.5, 0.4, 0.05), support="standing")

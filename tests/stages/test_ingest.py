@@ -11,10 +11,10 @@ from mcap_ros2.writer import Writer as RosWriter
 from stages import ingest
 from tests.support.sessions import SEGMENTS
 from tests.support.workbench import workbench
-from trunkline.logs.definitions import RIGID_BODIES
 from trunkline.pipeline.stage import run_stage
-from trunkline.trials.splits import SPLITS
-from trunkline.trials.take import read_takes
+from trunkline.recordings.logs.definitions import RIGID_BODIES
+from trunkline.recordings.trials.raw_trial import read_takes
+from trunkline.recordings.trials.splits import SPLITS
 
 
 @pytest.fixture

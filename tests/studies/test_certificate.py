@@ -3,7 +3,7 @@
 import numpy as np
 
 from studies.certificate import told_lines
-from trunkline.certificate.budget import Budget
+from trunkline.report.certificate.budget import Budget
 
 
 def test_the_table_counts_the_tips_inside():

@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks.identification.case import STAGES
 from studies.choices import CHOICES, quick
-from trunkline.identification.optimizers import LeastSquares
-from trunkline.identification.setup import fit_of
+from trunkline.identification.fit.optimizers import LeastSquares
+from trunkline.identification.fit.setup import fit_of
 from trunkline.pipeline.config import load_config
 
 

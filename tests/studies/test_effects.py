@@ -10,8 +10,8 @@ from studies.choices import Chain
 from studies.effects import EFFECTS, NO_LAG, cad_model, settings_of, tried, validated
 from studies.rows import Rows
 from tests.support.matched_plant import curl, segments_of, small_model
-from trunkline.identification.experiment import prepare
-from trunkline.pipeline.origin import Origin
+from trunkline.identification.simulate.experiment import prepare
+from upkeep.origin import Origin
 
 
 def test_the_lag_of_the_motors_is_tried_after_their_dead_time():

@@ -9,10 +9,10 @@ import pytest
 
 from studies.rows import Rows, digest
 from trunkline.errors import InputError
-from trunkline.pipeline.origin import Origin
+from upkeep.origin import Origin
 
-ORIGIN = Origin("aaaaaaa", "2026-01-01", {"trunkline/arm": "0123"})
-OTHER = Origin("bbbbbbb", "2026-01-02", {"trunkline/arm": "3210"})
+ORIGIN = Origin("aaaaaaa", "2026-01-01", {"trunkline/model/arm": "0123"})
+OTHER = Origin("bbbbbbb", "2026-01-02", {"trunkline/model/arm": "3210"})
 SAME = replace(OTHER, code=ORIGIN.code)  # a later commit that changed nothing that the study goes through
 
 

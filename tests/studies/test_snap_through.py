@@ -5,7 +5,7 @@ import pytest
 
 from studies.snap_through import Branches, alike, search, ventral_pull, within_force
 from tests.support.small_arm import small_spec
-from trunkline.statics.chain import read_chain
+from trunkline.model.statics.chain import read_chain
 
 
 @pytest.fixture(params=[1.0, 0.03], ids=["stiff", "soft"])

@@ -10,11 +10,11 @@ from studies.rows import Rows
 from studies.spoilt import SPOILS, Found, PlainFit
 from tests.identification.test_robust import METHOD, PLANT, TRUE, WEIGHTS, exchanged, session
 from tests.support.matched_plant import release, segments_of, small_model, tilt
-from trunkline.identification.experiment import prepare
-from trunkline.identification.identify import identify, values_of
-from trunkline.identification.problem import Bounds
-from trunkline.identification.suspicion import moving_start
-from trunkline.pipeline.origin import Origin
+from trunkline.identification.fit.identify import identify, values_of
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.uncertainty.trial_diagnostics import moving_start
+from upkeep.origin import Origin
 
 CLEAN = Found(position=2.0, tip=5.0, plain_position=2.0, plain_tip=5.0, told={})
 

@@ -3,9 +3,9 @@
 import numpy as np
 
 from studies.watch import AFTER, LATEST, found_lines, packed, unpacked
-from tests.watch.scores import drawn
-from trunkline.watch.baseline import Baseline
-from trunkline.watch.chart import chart_of
+from tests.tools.monitor.scores import drawn
+from trunkline.tools.monitor.baseline import Baseline
+from trunkline.tools.monitor.chart import chart_of
 
 
 def test_a_kept_score_is_the_one_that_was_scored():

@@ -4,12 +4,12 @@ import mujoco
 import numpy as np
 
 from tests.support.small_arm import LIMIT
-from trunkline.arm.geometry import ChainGeometry
-from trunkline.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
-from trunkline.arm.mjcf import Solver, Tendons, build_spec
-from trunkline.arm.spiral import spiral_chain
-from trunkline.arm.tendons import even_routes
-from trunkline.elements import DIAGONAL
+from trunkline.model.arm.geometry import ChainGeometry
+from trunkline.model.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
+from trunkline.model.arm.mjcf import Solver, Tendons, build_spec
+from trunkline.model.arm.spiral import spiral_chain
+from trunkline.model.arm.tendons import even_routes
+from trunkline.model.elements import DIAGONAL
 
 
 def stump_spec(units: int = 7) -> mujoco.MjSpec:

@@ -3,8 +3,8 @@
 import json
 import subprocess
 
-from trunkline.pipeline import baseline, gate
-from trunkline.pipeline.limits import read_limits
+from upkeep import baseline, gate
+from upkeep.limits import read_limits
 
 METRICS = "artifacts/{}/metrics.json"
 LIMITS = """

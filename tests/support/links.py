@@ -1,6 +1,6 @@
 """A link between a server and a client, some of whose packets are late."""
 
-from trunkline.live.clock import PINGS, ClientClock
+from trunkline.ar.session.clock import PINGS, ClientClock
 
 
 def clock_error(rng):

@@ -13,23 +13,24 @@ import numpy as np
 from aiohttp import ClientSession, WSMsgType
 from aiohttp.test_utils import TestServer, unused_port
 
+from tests.ar.teleop.test_plan import LIMITS, NETWORK, OFFSET, START, STRAIGHT
 from tests.support.operator import PACKAGE, Everywhere, config
-from tests.teleop.test_plan import LIMITS, NETWORK, OFFSET, START, STRAIGHT
+from trunkline.ar.preview.world_model import make_world
+from trunkline.ar.session import binary as wire
+from trunkline.ar.session import messages, preview_process
+from trunkline.ar.session.auth import Origins
+from trunkline.ar.session.controller import Desk
+from trunkline.ar.session.robot import Standing
+from trunkline.ar.session.server import House, Server
+from trunkline.ar.session.settings import Config
+from trunkline.ar.teleop.core import Teleoperation
+from trunkline.ar.teleop.executor import SimulatedRobot
+from trunkline.ar.teleop.following import sought
+from trunkline.ar.teleop.messages import PlanReport
+from trunkline.ar.teleop.planner import Planner
+from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.errors import InputError
-from trunkline.foresight.believing import make_world
-from trunkline.live import foreseer, talk, wire
-from trunkline.live.access import Origins
-from trunkline.live.desk import Desk
-from trunkline.live.robot import Standing
-from trunkline.live.server import House, Server
-from trunkline.live.settings import Config
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.teleop.core import Teleoperation
-from trunkline.teleop.executor import SimulatedRobot
-from trunkline.teleop.following import sought
-from trunkline.teleop.messages import PlanReport
-from trunkline.teleop.planner import Planner
-from trunkline.teleop.rigid_ik import RigidIK
 
 TOKEN, RATE, BODIES = "t" * 22, 72.0, 3
 TICK = 0.005  # s
@@ -78,24 +79,26 @@ class PlainPlanning:
         self.heard, self.left, self.plans = None, 0, []
 
     def order(self, order):
-        if isinstance(order, foreseer.Seek):
-            self.heard(foreseer.Found(order.serial, *sought(self.planner, order.targets, order.joints, order.world)))
+        if isinstance(order, preview_process.Seek):
+            self.heard(
+                preview_process.Found(order.serial, *sought(self.planner, order.targets, order.joints, order.world))
+            )
             return
         serial = order.request.serial
         try:
             plan = self.planner.plan(order.request, order.world, order.joints, order.commands)
         except InputError as error:
-            self.heard(foreseer.Planned(PlanReport(serial, refused=str(error))))
+            self.heard(preview_process.Planned(PlanReport(serial, refused=str(error))))
             return
         digest = plan.digest()
         self.plans.append(plan)
         poses = np.zeros((15, BODIES, 7), dtype=np.float32)
-        preview = talk.Preview(digest, 0.02, PREVIEW, 0.02, (("approach", 0.0),))
-        found = talk.Foreseen(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
+        preview = messages.Preview(digest, 0.02, PREVIEW, 0.02, (("approach", 0.0),))
+        found = messages.Foreseen(digest, None, None, None, (0.0,), ((0.0, 0.0, 0.0),), (0.0,), 0.9, 12)
         for answer in (
-            foreseer.Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan),
-            foreseer.Begun(serial, preview), foreseer.Shown(serial, 0, 0.02, poses, False),
-            foreseer.Shown(serial, 15, 0.32, poses, True), foreseer.Told(serial, found),
+            preview_process.Planned(PlanReport(serial, digest, "", plan.package, plan.world), plan),
+            preview_process.Begun(serial, preview), preview_process.Shown(serial, 0, 0.02, poses, False),
+            preview_process.Shown(serial, 15, 0.32, poses, True), preview_process.Told(serial, found),
         ):  # fmt: skip
             self.heard(answer)
 

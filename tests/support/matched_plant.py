@@ -1,6 +1,6 @@
 """A plant that is the model: trials simulated to be identified again.
 
-On purpose with plain `mj_step` and not with trunkline.simulation, which these trials are to check.
+On purpose with plain `mj_step` and not with trunkline.model.simulation, which these trials are to check.
 """
 
 from pathlib import Path
@@ -10,8 +10,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.support.small_arm import small_spec
-from trunkline.arm.joints import Joints, add_elements
-from trunkline.elements import (
+from trunkline.frames import gravity_in_base, wxyz_from_rotation
+from trunkline.identification.parameters.saving import save_model
+from trunkline.identification.simulate.experiment import SLACK
+from trunkline.model.arm.joints import Joints, add_elements
+from trunkline.model.elements import (
     BACKLASH,
     BRANCH,
     RATE_LIMIT,
@@ -22,10 +25,7 @@ from trunkline.elements import (
     give_way,
     numeric,
 )
-from trunkline.frames import gravity_in_base, wxyz_from_rotation
-from trunkline.identification.experiment import SLACK
-from trunkline.identification.saving import save_model
-from trunkline.trials.trial import Trial
+from trunkline.recordings.trials.trial import Trial
 
 FRAME = 1 / 120
 

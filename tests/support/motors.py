@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 
-from trunkline.execution.bank import Bank, Plant
-from trunkline.execution.gm6020 import command_frames, feedback_of
-from trunkline.execution.motors import Motors, MotorSettings
-from trunkline.execution.settings import Config
+from trunkline.ar.drivers.gm6020 import command_frames, feedback_of
+from trunkline.ar.drivers.motors import Motors, MotorSettings
+from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.simulated_motors import Bank, Plant
 from trunkline.pipeline.config import PROJECT, load_folder
 
 TICK = 0.001  # s

@@ -15,9 +15,9 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.matched_plant import FRAME, curl, release, tilt
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.identification.loss import LossWeights
-from trunkline.identification.parameters import candidate_fields, set_fields
-from trunkline.trials.trial import Trial
+from trunkline.identification.parameters.parameters import candidate_fields, set_fields
+from trunkline.identification.simulate.loss import LossWeights
+from trunkline.recordings.trials.trial import Trial
 
 TRIALS = 6
 NOISE = 0.3e-3, np.radians(0.3)  # m and rad, per axis

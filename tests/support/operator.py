@@ -6,13 +6,13 @@ from functools import cache
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.core import Teleoperation
+from trunkline.ar.teleop.messages import Box, Controller, Input, Pose, World
+from trunkline.ar.teleop.reach import Reading
+from trunkline.ar.teleop.recorder import Recorder
 from trunkline.frames import wxyz_from_rotation
 from trunkline.pipeline.config import PROJECT, load_folder
-from trunkline.teleop.config import Config
-from trunkline.teleop.core import Teleoperation
-from trunkline.teleop.messages import Box, Controller, Input, Pose, World
-from trunkline.teleop.reach import Reading
-from trunkline.teleop.recorder import Recorder
 
 PACKAGE, DT = "a" * 64, 1 / 60
 READY_JOINTS = (0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785)  # the end effector straight down, in front of the base

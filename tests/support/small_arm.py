@@ -2,10 +2,10 @@
 
 import mujoco
 
-from trunkline.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
-from trunkline.arm.mjcf import Solver, Tendons, build_spec
-from trunkline.arm.spiral import spiral_chain
-from trunkline.arm.tendons import even_routes
+from trunkline.model.arm.material import TPU_95A_DENSITY, TPU_95A_MODULUS, unit_properties
+from trunkline.model.arm.mjcf import Solver, Tendons, build_spec
+from trunkline.model.arm.spiral import spiral_chain
+from trunkline.model.arm.tendons import even_routes
 
 LIMIT = ([0.01, 1.0], [0.9, 0.95, 0.001, 0.5, 2.0])  # solref, solimp
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from trunkline.identification.evaluation import Replay
-from trunkline.identification.experiment import Experiment
-from trunkline.identification.pose_fit import PoseFit
-from trunkline.trials.trial import Trial
+from trunkline.identification.evaluation.evaluation import Replay
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.pose_fit import PoseFit
+from trunkline.recordings.trials.trial import Trial
 
 STEP = 0.01  # s
 FRAMES = 250

@@ -2,8 +2,8 @@
 
 import time
 
-from trunkline.live.book import EVENTS
-from trunkline.logs.log import read_log
+from trunkline.ar.session.log_format import EVENTS
+from trunkline.recordings.logs.log import read_log
 
 
 def fed(journal, seconds, pace=0.01):

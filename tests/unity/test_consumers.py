@@ -17,8 +17,8 @@ from tests.support.small_arm import small_spec
 from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, sources_in
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.ik.inputs import DIRECTION
-from trunkline.simulation.rest import settle
+from trunkline.kinematics.ik.inputs import DIRECTION
+from trunkline.model.simulation.rest import settle
 from trunkline.unity.package import MANIFEST, read_tarball, write_tarball
 from trunkline.unity.twin import assemble
 

@@ -16,22 +16,22 @@ from tests.support.operator import config
 from tests.unity.mono import compiled
 from tests.unity.test_shared_vectors import CASES
 from tests.unity.test_twin import network
+from trunkline.ar.conformance.answers import TARGETS, answers_of
+from trunkline.ar.conformance.vectors import with_shared_vectors
+from trunkline.ar.hybrid.basket import Basket
+from trunkline.ar.preview.package import read_package
+from trunkline.ar.session.alignment import after, expected_error, fit, inverse, pose_of, residuals, tilt
+from trunkline.ar.teleop.alignment import Aligned, wrist_of
+from trunkline.ar.teleop.messages import Box, Thing, World
+from trunkline.ar.teleop.reach import MapReach
+from trunkline.ar.teleop.targets import bring, place
+from trunkline.ar.teleop.tendons import Network, bend
+from trunkline.ar.teleop.vectors import add
 from trunkline.errors import InputError
-from trunkline.foresight.package import read_package
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.hybrid.basket import Basket
-from trunkline.ik.inputs import DIRECTION, TILT
-from trunkline.live.aligning import after, expected_error, fit, inverse, pose_of, residuals, tilt
-from trunkline.teleop.alignment import Aligned, wrist_of
-from trunkline.teleop.messages import Box, Thing, World
-from trunkline.teleop.reach import MapReach
-from trunkline.teleop.targets import bring, place
-from trunkline.teleop.tendons import Network, bend
-from trunkline.teleop.vectors import add
-from trunkline.unity.answers import TARGETS, answers_of
+from trunkline.kinematics.ik.inputs import DIRECTION, TILT
 from trunkline.unity.frame import unity_position, unity_quaternion
 from trunkline.unity.package import MANIFEST, NETWORK, write_tarball
-from trunkline.unity.shared_vectors import with_shared_vectors
 from trunkline.unity.twin import CSHARP
 from trunkline.unity.unpacked import maps_of, network_of, package_digest, robot_of
 

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tests.support.small_arm import small_spec
-from trunkline.arm.joints import Joints, add_elements
-from trunkline.elements import diagonal_lengths
+from trunkline.model.arm.joints import Joints, add_elements
+from trunkline.model.elements import diagonal_lengths
 from trunkline.unity.linearize import Laws, compile_with, linearize
 
 

@@ -10,7 +10,8 @@ import pytest
 from tests.support.small_arm import small_spec
 from tests.unity.test_csharp import TESTS
 from trunkline.unity.manifest import StepError
-from trunkline.unity.pace import (
+from trunkline.unity.pulls import as_pulls
+from trunkline.unity.time_steps import (
     DISPLAY_RATES,
     LONGEST_STEP,
     TABLE_HERE,
@@ -20,7 +21,6 @@ from trunkline.unity.pace import (
     steps_taken,
     with_steps,
 )
-from trunkline.unity.pulls import as_pulls
 from trunkline.unity.twin import CSHARP
 
 CURL = {"duration": 0.4, "pull": 0.03, "tilts": [0.0, 1.0]}
@@ -98,12 +98,12 @@ def test_shorter_steps_err_less(models):
 
 def test_the_calibrated_step_errs_nothing_and_one_that_diverges_says_so(models, monkeypatch):
     calibrated, packed = models
-    monkeypatch.setattr("trunkline.unity.pace.DISPLAY_RATES", (1000.0,))  # the time step of the small arm
+    monkeypatch.setattr("trunkline.unity.time_steps.DISPLAY_RATES", (1000.0,))  # the time step of the small arm
     assert [one.tip_error_mm for one in step_errors(calibrated, packed, **CURL)] == [pytest.approx(0, abs=1e-3)]
     loose = small_spec(kp=2e7, kv=0.0)
     as_pulls(loose)
-    monkeypatch.setattr("trunkline.unity.pace.DISPLAY_RATES", (30.0,))
-    monkeypatch.setattr("trunkline.unity.pace.LONGEST_STEP", 1.0)
+    monkeypatch.setattr("trunkline.unity.time_steps.DISPLAY_RATES", (30.0,))
+    monkeypatch.setattr("trunkline.unity.time_steps.LONGEST_STEP", 1.0)
     (diverged, *_) = step_errors(calibrated, loose.compile(), **CURL)
     assert diverged.tip_error_mm is None
     assert "| 30 Hz | **1** | 33.3 ms | diverges |" in step_table([diverged])

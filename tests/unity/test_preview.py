@@ -8,20 +8,20 @@ import mujoco
 import numpy as np
 import pytest
 
-from tests.hybrid.conftest import rubbing_arm
+from tests.ar.hybrid.conftest import rubbing_arm
 from tests.support.folders import package
 from tests.unity.test_twin import LABEL, PARAMETERS, ROBOT, sources  # noqa: F401
-from trunkline.arm.spiral import spiral_chain
-from trunkline.elements import capstan_friction
+from trunkline.ar.hybrid.compose import Placed, compose
+from trunkline.ar.hybrid.objects import Thing
+from trunkline.ar.hybrid.posterior import Contact, nominal_draw, read_doubts
+from trunkline.ar.hybrid.preview import Holding, joined, preview
+from trunkline.ar.hybrid.rollouts import Twin, Way, futures
+from trunkline.ar.hybrid.worlds import World
 from trunkline.errors import InputError
-from trunkline.hybrid.compose import Placed, compose
-from trunkline.hybrid.doubts import Contact, nominal_draw, read_doubts
-from trunkline.hybrid.futures import Twin, Way, futures
-from trunkline.hybrid.objects import Thing
-from trunkline.hybrid.preview import Holding, joined, preview
-from trunkline.hybrid.robots import FixedMount
-from trunkline.hybrid.touch import read_geometry
-from trunkline.hybrid.worlds import World
+from trunkline.kinematics.panda.mounts import FixedMount
+from trunkline.model.arm.contact_geometry import read_geometry
+from trunkline.model.arm.spiral import spiral_chain
+from trunkline.model.elements import capstan_friction
 from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, write_tarball
 from trunkline.unity.sources import IDENTIFIED
 from trunkline.unity.twin import Trajectory, assemble

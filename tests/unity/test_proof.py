@@ -8,8 +8,8 @@ import pytest
 
 from trunkline.errors import InputError
 from trunkline.unity import proof
-from trunkline.unity.pace import steps_taken
 from trunkline.unity.proof import WATCHED, recreated_error, start_error, started
+from trunkline.unity.time_steps import steps_taken
 
 REST = np.array([0.0, 0.1, -0.4])
 

@@ -11,8 +11,8 @@ import torch
 from tests.support.folders import package
 from tests.unity.mono import compiled
 from tests.unity.test_twin import files, sources  # noqa: F401
-from trunkline.ik.network import InverseKinematics
-from trunkline.ik.onnx import to_onnx
+from trunkline.kinematics.ik.network import InverseKinematics
+from trunkline.kinematics.ik.onnx import to_onnx
 from trunkline.unity import readers
 from trunkline.unity.package import MANIFEST, MODEL, NETWORK, read_tarball, write_tarball
 from trunkline.unity.readers import ENGINES, refusals

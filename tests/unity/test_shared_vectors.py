@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
+from tests.ar.teleop.test_bad_input import LINES
 from tests.support.operator import config
-from tests.teleop.test_bad_input import LINES
 from tests.unity.test_twin import LABEL, TRAJECTORY, sources_in
+from trunkline.ar.conformance.answers import answers_of
+from trunkline.ar.conformance.vectors import FOLDER, STEPS, cases_file, steps_file, with_shared_vectors
+from trunkline.ar.teleop.messages import Input, from_json
+from trunkline.ar.teleop.settings import Teleop
+from trunkline.ar.teleop.transitions import MODES, TRANSITIONS
 from trunkline.errors import InputError
-from trunkline.hybrid.robots import FixedMount
-from trunkline.teleop.messages import Input, from_json
-from trunkline.teleop.settings import Teleop
-from trunkline.teleop.transitions import MODES, TRANSITIONS
-from trunkline.unity.answers import answers_of
+from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.unity.package import NETWORK
 from trunkline.unity.readers import ENGINES, ENGINES_APART, refusals
-from trunkline.unity.shared_vectors import FOLDER, STEPS, cases_file, steps_file, with_shared_vectors
 from trunkline.unity.twin import assemble
 from trunkline.unity.unpacked import package_digest, robot_of
 
@@ -153,6 +153,6 @@ def test_an_arm_on_a_mount_that_stands_still_has_none(tmp_path):
 
 
 def test_maps_that_leave_nothing_within_reach_are_one_line(plain, monkeypatch):
-    monkeypatch.setattr("trunkline.unity.questions.TRIES", 1)
+    monkeypatch.setattr("trunkline.ar.conformance.questions.TRIES", 1)
     with pytest.raises(InputError, match="maps: found no mount and tip within reach in 1 tries, expected"):
         with_shared_vectors(plain, config().core)

@@ -10,17 +10,17 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.small_arm import small_spec
 from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, sources_in
-from trunkline.arm.joints import Branch, Joints, add_elements
 from trunkline.frames import gravity_in_base
-from trunkline.simulation.rest import settle
+from trunkline.model.arm.joints import Branch, Joints, add_elements
+from trunkline.model.simulation.rest import settle
 from trunkline.unity import start
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import Laws, write_laws
-from trunkline.unity.pace import steps_taken
 from trunkline.unity.package import MODEL
 from trunkline.unity.plugin import Imported, Scene
 from trunkline.unity.proof import DOWN, PREFIX, TIP, at_rest, manifest_of, pull, scene_of, turns
 from trunkline.unity.start import Twin
+from trunkline.unity.time_steps import steps_taken
 from trunkline.unity.twin import CSHARP, assemble
 from trunkline.unity.unpacked import model_of
 

@@ -19,13 +19,13 @@ import yaml
 from onnx import TensorProto, helper
 
 from tests.support.small_arm import small_mjcf
-from trunkline.arm.joints import Branch, Joints, add_elements
-from trunkline.dataset.gravities import spread
 from trunkline.errors import InputError
 from trunkline.frames import downwards
-from trunkline.hybrid.robots import PandaRobot
-from trunkline.ik.inputs import TILT
-from trunkline.reachability.sheets import Sheets
+from trunkline.kinematics.dataset.gravities import spread
+from trunkline.kinematics.ik.inputs import TILT
+from trunkline.kinematics.panda.mounts import PandaRobot
+from trunkline.kinematics.reachability.workspace_surface import Sheets
+from trunkline.model.arm.joints import Branch, Joints, add_elements
 from trunkline.unity import manifest as schema
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import JointLaw, Laws, TendonLaw, compile_with

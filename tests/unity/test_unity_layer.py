@@ -21,18 +21,18 @@ from scipy.spatial.transform import Rotation
 from tests.support.operator import config
 from tests.unity.mono import compiled
 from tests.unity.test_csharp import SHARED, bends, case, moved_a_little, said_by
+from trunkline.ar.conformance.answers import PACKAGE
+from trunkline.ar.conformance.vectors import with_shared_vectors
+from trunkline.ar.session.alignment import inverse
+from trunkline.ar.teleop.core import Teleoperation
+from trunkline.ar.teleop.messages import Controller, Input, Pose, to_json
+from trunkline.ar.teleop.reach import MapReach
+from trunkline.ar.teleop.vectors import about, conjugate, multiply
 from trunkline.frames import wxyz_from_rotation
-from trunkline.live.aligning import inverse
-from trunkline.reachability.sheets import sheet_triangles
-from trunkline.reachability.triangles import nearest_on_triangles
-from trunkline.reachability.weights import spline_weights
-from trunkline.teleop.core import Teleoperation
-from trunkline.teleop.messages import Controller, Input, Pose, to_json
-from trunkline.teleop.reach import MapReach
-from trunkline.teleop.vectors import about, conjugate, multiply
-from trunkline.unity.answers import PACKAGE
+from trunkline.kinematics.reachability.triangles import nearest_on_triangles
+from trunkline.kinematics.reachability.weights import spline_weights
+from trunkline.kinematics.reachability.workspace_surface import sheet_triangles
 from trunkline.unity.package import MANIFEST, SAMPLES, package_json
-from trunkline.unity.shared_vectors import with_shared_vectors
 from trunkline.unity.twin import CSHARP
 from trunkline.unity.unpacked import maps_of, package_digest
 

@@ -6,10 +6,10 @@ import json
 import numpy as np
 import pytest
 
-from trunkline.dataset.gravities import spread
+from trunkline.ar.teleop.reach import MapReach
 from trunkline.errors import InputError
-from trunkline.reachability.sheets import Sheets
-from trunkline.teleop.reach import MapReach
+from trunkline.kinematics.dataset.gravities import spread
+from trunkline.kinematics.reachability.workspace_surface import Sheets
 from trunkline.unity.package import MANIFEST, write_tarball
 from trunkline.unity.reach_maps import convert_grids, convert_sheets, describe_reach
 from trunkline.unity.rounding import rounded

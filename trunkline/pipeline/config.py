@@ -19,7 +19,7 @@ from pydantic import TypeAdapter, ValidationError
 from yaml import YAMLError
 
 from trunkline.errors import InputError, nearest
-from trunkline.pipeline.mistakes import describe, in_order, others_missing, path_of
+from trunkline.pipeline.validation_errors import describe, in_order, others_missing, path_of
 from trunkline.settings import read_yaml
 
 Schema = TypeVar("Schema")

@@ -6,29 +6,35 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, numeric, switch_off
 from trunkline.errors import InputError, existing
-from trunkline.identification.checks import check_trials
-from trunkline.identification.cross_validation import cross_validate
-from trunkline.identification.error_tables import segment_table, trial_table
-from trunkline.identification.evaluation import Prediction, halved_step, replay
-from trunkline.identification.identify import Identification, identify, with_parameters
-from trunkline.identification.null_model import references
-from trunkline.identification.parameter_table import parameter_table, undetermined
-from trunkline.identification.parameters import PARAMETERS, parameter_named
-from trunkline.identification.per_session import make_room, names_apart, names_in, other_sessions, untold_apart
-from trunkline.identification.problem import Bounds
-from trunkline.identification.repeatability import repeatability
-from trunkline.identification.saving import save_model
-from trunkline.identification.scoring import Compared, fingerprints, predict, start_fit
-from trunkline.identification.settings import IdentificationSettings
-from trunkline.identification.setup import check_folds, check_parameters, set_up, with_every
-from trunkline.identification.suspicion import suspicions
+from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation.evaluation import Prediction, halved_step, replay
+from trunkline.identification.evaluation.null_model import references
+from trunkline.identification.evaluation.repeatability import repeatability
+from trunkline.identification.fit.identify import Identification, identify, with_parameters
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.fit.setup import check_folds, check_parameters, set_up, with_every
+from trunkline.identification.parameters.parameters import PARAMETERS, parameter_named
+from trunkline.identification.parameters.per_session import (
+    make_room,
+    names_apart,
+    names_in,
+    other_sessions,
+    untold_apart,
+)
+from trunkline.identification.parameters.saving import save_model
+from trunkline.identification.results.parameter_table import parameter_table, undetermined
+from trunkline.identification.results.scoring import Compared, fingerprints, predict, start_fit
+from trunkline.identification.simulate.checks import check_trials
+from trunkline.identification.uncertainty.cross_validation import cross_validate
+from trunkline.identification.uncertainty.trial_diagnostics import suspicions
+from trunkline.model.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, numeric, switch_off
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json
-from trunkline.trials.experiments import EXPERIMENTS, is_static
-from trunkline.trials.splits import DECIDING, VALIDATE
-from trunkline.trials.trial import Trial, read_trials
+from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
+from trunkline.recordings.trials.splits import DECIDING, VALIDATE
+from trunkline.recordings.trials.trial import Trial, read_trials
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 TRIALS = Path("data/processed/filter")
@@ -185,10 +191,10 @@ def write_plots(
 ) -> None:
     """PNGs for people and CSV for `dvc plots`: of one shape a trial (`shapes`), or of motions."""
     # pyplot and scipy.signal take long to import, so not before the first line
-    from trunkline.figures import identification as plots
-    from trunkline.figures.scoring import segment_figure
-    from trunkline.figures.style import save_figure
-    from trunkline.identification import curves
+    from trunkline.identification.results import curves
+    from trunkline.report.figures import identification as plots
+    from trunkline.report.figures.scoring import segment_figure
+    from trunkline.report.figures.style import save_figure
 
     curves.convergence_table(result).to_csv(folder / "convergence.csv", **CSV)
     save_figure(plots.convergence_figure(result), folder / "convergence.png")

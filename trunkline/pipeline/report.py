@@ -10,9 +10,9 @@ import subprocess
 import sys
 from pathlib import Path
 
-from trunkline.called import called
 from trunkline.errors import in_one_line
 from trunkline.pipeline.checkout import require_checkout
+from trunkline.program import called
 
 PAGE = Path("artifacts/report/certificate.html")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from trunkline.errors import InputError, in_one_line, nearest
 from trunkline.pipeline.checkout import require_checkout
 from trunkline.pipeline.config import PROJECT, check_settings, own_or_project
-from trunkline.sessions.session import sessions_in
+from trunkline.recordings.session.session import sessions_in
 from trunkline.settings import read_yaml
 
 LAB = "demo"  # the session that the stand-in lab records, see demo/dvc.yaml

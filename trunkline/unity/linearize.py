@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from trunkline.elements import diagonal_lengths
+from trunkline.model.elements import diagonal_lengths
 
 
 @dataclass(frozen=True)

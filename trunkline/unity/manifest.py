@@ -6,9 +6,9 @@ from typing import Literal
 import mujoco
 from pydantic import BaseModel, ConfigDict, Field
 
-from trunkline.elements import BRANCH, all_elements, cables
 from trunkline.errors import InputError
-from trunkline.hybrid.robots import Robot
+from trunkline.kinematics.panda.mounts import Robot
+from trunkline.model.elements import BRANCH, all_elements, cables
 from trunkline.unity.frame import unity_position
 from trunkline.unity.linearize import JointLaw, TendonLaw
 from trunkline.unity.plugin import VERSION
@@ -132,7 +132,7 @@ class Hybrid(_Block):
         description="what was identified, a stage after the other: of each parameter `value`, `unit` and"
         " `interval_95_given_model`, and how those of a stage correlate; the latest stage counts"
     )
-    robot: Robot = Field(description="what holds the arm, as `trunkline/hybrid/robots.py` says")
+    robot: Robot = Field(description="what holds the arm, as `trunkline/kinematics/panda/mounts.py` says")
 
 
 class Network(_Block):

@@ -9,14 +9,14 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, gravity_in_base
-from trunkline.statics.chain import read_chain
-from trunkline.statics.equilibria import actuated
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import actuated
 from trunkline.unity.importer import as_imported
 from trunkline.unity.manifest import Manifest, Model
-from trunkline.unity.pace import steps_taken
 from trunkline.unity.package import MANIFEST, MODEL
 from trunkline.unity.plugin import Imported, Scene
 from trunkline.unity.start import Twin
+from trunkline.unity.time_steps import steps_taken
 
 DOWN = np.array([0.0, 0.0, -STANDARD_GRAVITY])
 PREFIX = "arm_"  # before an arm's names in the scene

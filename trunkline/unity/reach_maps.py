@@ -7,9 +7,9 @@ import trimesh
 from scipy.ndimage import map_coordinates
 
 from trunkline.errors import InputError
-from trunkline.fields.grid import Lattice
-from trunkline.fields.mesh import unsimplified
-from trunkline.fields.mesh_distance import mesh_distance
+from trunkline.kinematics.sdf.grid import Lattice
+from trunkline.kinematics.sdf.mesh import unsimplified
+from trunkline.kinematics.sdf.mesh_distance import mesh_distance
 from trunkline.unity.frame import unity_obj, unity_position, unity_volume
 from trunkline.unity.manifest import Grid, Mesh, Reach, Sheets
 from trunkline.unity.rounding import rounded

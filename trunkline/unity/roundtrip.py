@@ -7,7 +7,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
-from trunkline.simulation.motion import batch_of, hold, move
+from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.unity.pulls import controls
 
 SLACK = 1e-4  # m, of every tendon at first: at none, the last digit decides whether it damps the arm

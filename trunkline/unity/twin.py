@@ -10,12 +10,11 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.errors import InputError
-from trunkline.hybrid.robots import Robot
+from trunkline.kinematics.panda.mounts import Robot
 from trunkline.unity.importer import as_imported
 from trunkline.unity.linearize import compile_with, linearize
 from trunkline.unity.manifest import Hybrid, Manifest, Versions, describe_model, hashes
 from trunkline.unity.network import describe_network
-from trunkline.unity.pace import LONGEST_STEP, step_errors, with_steps
 from trunkline.unity.package import (
     CALIBRATED,
     MANIFEST,
@@ -30,6 +29,7 @@ from trunkline.unity.pulls import as_pulls
 from trunkline.unity.reach_maps import convert_grids, convert_meshes, convert_sheets, describe_reach
 from trunkline.unity.roundtrip import curl, deviation, simulate
 from trunkline.unity.rules import Violation, lint_mjcf
+from trunkline.unity.time_steps import LONGEST_STEP, step_errors, with_steps
 from trunkline.unity.unsupported import without_unsupported
 
 CSHARP = Path(__file__).parent / "csharp"

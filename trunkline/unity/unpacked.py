@@ -11,10 +11,10 @@ import mujoco
 import numpy as np
 from pydantic import TypeAdapter
 
+from trunkline.ar.hybrid import posterior
+from trunkline.ar.teleop import tendons
 from trunkline.errors import InputError
-from trunkline.hybrid import doubts
-from trunkline.hybrid.robots import Robot
-from trunkline.teleop import tendons
+from trunkline.kinematics.panda.mounts import Robot
 from trunkline.unity.frame import unity_position
 from trunkline.unity.manifest import require_widths
 from trunkline.unity.package import MANIFEST, read_tarball
@@ -114,13 +114,13 @@ def arm_of(files: dict[str, bytes]) -> mujoco.MjSpec:
     return mujoco.MjSpec.from_string(_file(files, "arm").decode())
 
 
-def doubts_of(files: dict[str, bytes], contact: doubts.Contact | None = None) -> doubts.Doubts:
+def doubts_of(files: dict[str, bytes], contact: posterior.Contact | None = None) -> posterior.Doubts:
     """What is not known of the arm, and of what it touches.
 
     Raises:
         InputError: naming a parameter that is unknown or whose interval is none.
     """
-    return doubts.doubts_of(json.loads(_file(files, "parameters"))["stages"], contact)
+    return posterior.doubts_of(json.loads(_file(files, "parameters"))["stages"], contact)
 
 
 def robot_of(files: dict[str, bytes]) -> Robot:

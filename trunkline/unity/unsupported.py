@@ -3,7 +3,15 @@ manifest. `calibrated.xml` of the package keeps it all."""
 
 import mujoco
 
-from trunkline.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, SLIP_LENGTH, capstan_friction, is_hole, numeric
+from trunkline.model.elements import (
+    BACKLASH,
+    CAPSTAN_FRICTION,
+    RATE_LIMIT,
+    SLIP_LENGTH,
+    capstan_friction,
+    is_hole,
+    numeric,
+)
 
 
 def without_unsupported(spec: mujoco.MjSpec) -> dict[str, float]:

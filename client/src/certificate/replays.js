@@ -3,7 +3,7 @@
 const LOST = -32768; // of a point that the cameras did not see
 const USUAL = 0.95; // share of a trial's errors that the colours tell apart
 
-/** What Python packed (trunkline/certificate/replays.py): trials by number, and each frame's points. */
+/** What Python packed (trunkline/report/certificate/replays.py): trials by number, and each frame's points. */
 export class Replays {
   constructor(told) {
     const bytes = Uint8Array.from(atob(told.data), (letter) => letter.charCodeAt(0));

@@ -5,7 +5,7 @@ namespace Trunkline {
 
 /// <summary>The time step: whole steps a frame of the display, as few as keep each short enough, so that every frame
 /// shows the arm after as many steps as the last, and nothing judders. Nothing of Unity's is used here. Python:
-/// trunkline/unity/pace.py.</summary>
+/// trunkline/unity/time_steps.py.</summary>
 public static class Pace {
 
   private const double _exact = 1e-9;  // share by which a step may be longer: of rounding

@@ -44,7 +44,7 @@ public readonly struct Aligned {
 }
 
 /// <summary>Bending-plane alignment: the wrist turns so that the tip target lies in a plane in which the arm bends.
-/// Port of trunkline/teleop/alignment.py, which has the equations.</summary>
+/// Port of trunkline/ar/teleop/alignment.py, which has the equations.</summary>
 public static class Alignment {
   private static readonly Vector _x = new Vector(1, 0, 0), _z = new Vector(0, 0, 1);
 

@@ -39,8 +39,8 @@ public sealed class Answer {
   }
 }
 
-/// <summary>Gravity and tip to the motors' commands, by the package's network. Port of trunkline/ik/ask.py and of
-/// trunkline/teleop/tendons.py but for its correction by the arm's statics.</summary>
+/// <summary>Gravity and tip to the motors' commands, by the package's network. Port of trunkline/kinematics/ik/inference.py and of
+/// trunkline/ar/teleop/tendons.py but for its correction by the arm's statics.</summary>
 public sealed class ArmKinematics {
   private const double _unit = 1e-3;  // by which the length of a quaternion or direction may differ from 1
   private const int _tilt = 8;  // inputs of a network that is told an angle of gravity, not its direction

@@ -3,7 +3,7 @@ using static Trunkline.Vectors;
 namespace Trunkline {
 
 /// <summary>What happened at a step, of all that the state machine answers to, and a line about what was asked for in
-/// vain. Port of trunkline/teleop/events.py.</summary>
+/// vain. Port of trunkline/ar/teleop/events.py.</summary>
 public static class Events {
   /// <summary>Whether either secondary button is held; it counts even where nothing else of an input does.</summary>
   public static bool StoppedBy(Input given) => given.Left.Secondary || given.Right.Secondary;

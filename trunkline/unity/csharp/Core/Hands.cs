@@ -55,7 +55,7 @@ public sealed class Hand {
 }
 
 /// <summary>One hand: its controller's pose as filtered, its ray, and which buttons it has pressed since the step
-/// before. Port of trunkline/teleop/hands.py.</summary>
+/// before. Port of trunkline/ar/teleop/tracked_controller.py.</summary>
 public static class Hands {
   private static readonly Vector _ahead = new Vector(0, 0, -1);  // of a controller's pose: along its ray
   private static readonly Vector _below = new Vector(0, -1, 0);  // down, where it is held level

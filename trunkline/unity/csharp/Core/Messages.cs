@@ -2,7 +2,7 @@ using System.Collections.Generic;
 
 namespace Trunkline {
 
-// What goes into the core and what comes out: trunkline/teleop/messages.py.
+// What goes into the core and what comes out: trunkline/ar/teleop/messages.py.
 //
 // Frames: `reference` is the headset's, right-handed, any that stands still; `base` is the rigid robot's, z up. A
 // controller's pose is that of its ray: origin at the device, the ray along -z, y up from the back of the hand.

@@ -3,7 +3,7 @@ using static Trunkline.Vectors;
 
 namespace Trunkline {
 
-/// <summary>The One-Euro filter, a low-pass whose cutoff grows with speed: trunkline/teleop/one_euro.py, which has the
+/// <summary>The One-Euro filter, a low-pass whose cutoff grows with speed: trunkline/ar/teleop/one_euro.py, which has the
 /// equations and their source.</summary>
 public sealed class OneEuro {
   /// <summary>Hz: the paper's f_min.</summary>

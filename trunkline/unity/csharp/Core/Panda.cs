@@ -2,7 +2,7 @@ using System;
 
 namespace Trunkline {
 
-/// <summary>The Franka Emika Panda's published geometry: trunkline/panda/kinematics.py.</summary>
+/// <summary>The Franka Emika Panda's published geometry: trunkline/kinematics/panda/kinematics.py.</summary>
 public static class Panda {
   /// <summary>Modified Denavit-Hartenberg parameters: m, m, rad.</summary>
   internal static readonly double[] A = { 0, 0, 0, 0.0825, -0.0825, 0, 0.088 };

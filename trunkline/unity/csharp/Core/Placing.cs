@@ -4,7 +4,7 @@ using static Trunkline.Vectors;
 namespace Trunkline {
 
 /// <summary>Targets: where both rays want the robot, tested against what it can reach and what stands in the way. Port
-/// of trunkline/teleop/targets.py.</summary>
+/// of trunkline/ar/teleop/targets.py.</summary>
 public static class Placing {
   /// <summary>Both targets (base frame, m) with their reach under the gravity that the arm will have there. A tip
   /// target that marks a thing is where the arm grips it.</summary>

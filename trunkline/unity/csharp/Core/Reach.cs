@@ -3,7 +3,7 @@ using static Trunkline.Vectors;
 
 namespace Trunkline {
 
-/// <summary>What tells whether targets can be reached: trunkline/teleop/reach.py.</summary>
+/// <summary>What tells whether targets can be reached: trunkline/ar/teleop/reach.py.</summary>
 public interface IReach {
   /// <summary>Of the mount at <paramref name="mount"/>, m, the end effector pointing along a unit vector, both in the
   /// rigid base frame.</summary>

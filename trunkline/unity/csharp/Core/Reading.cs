@@ -1,7 +1,7 @@
 namespace Trunkline {
 
 /// <summary>What is told of a target's reach: where a point is, how far outside, m, and the nearest reachable point, m,
-/// where it is outside. Port of trunkline/teleop/reading.py.</summary>
+/// where it is outside. Port of trunkline/ar/teleop/reach_message.py.</summary>
 public readonly struct Reading {
   /// <summary>Inside or outside, or unknown.</summary>
   public readonly Where Where;

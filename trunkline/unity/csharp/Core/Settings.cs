@@ -2,7 +2,7 @@ using System.Collections.Generic;
 
 namespace Trunkline {
 
-// What the core is set by: trunkline/teleop/settings.py, and conf/shared/core/two_rays.yaml in the repository for what
+// What the core is set by: trunkline/ar/teleop/settings.py, and conf/shared/core/two_rays.yaml in the repository for what
 // each number means to a user. A package's Tests/Vectors/steps.json has those that its vectors were made with.
 
 /// <summary>Length of the rays, m, and its rate at full deflection, m/s; dead zone of the stick, share of its

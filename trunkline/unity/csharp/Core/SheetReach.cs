@@ -3,7 +3,7 @@ using static Trunkline.Vectors;
 
 namespace Trunkline {
 
-/// <summary>Reach of the tip by sheets, under gravity from any side: trunkline/teleop/sheet_reach.py.
+/// <summary>Reach of the tip by sheets, under gravity from any side: trunkline/ar/teleop/surface_reach.py.
 ///
 /// With points p_j of the surface of tips under gravity g_j, under gravity g they are Σ w_j p_j. The nearest point of
 /// all triangles between them is the nearest that the tip reaches. Gravity further from straight down than any of the

@@ -7,7 +7,7 @@ namespace Trunkline {
 /// <summary>Signed distance s at a point, m, negative within reach, and its gradient there, without a unit.</summary>
 public delegate double Signal(Vector point, out Vector slope);
 
-/// <summary>A map as a signed distance on a lattice, and the nearest point within it: trunkline/teleop/signed_map.py.
+/// <summary>A map as a signed distance on a lattice, and the nearest point within it: trunkline/ar/teleop/signed_map.py.
 ///
 /// The signal s at a point is trilinear between lattice points, negative inside. Outside, the nearest point is looked
 /// for down the signal's gradient. Where that leads further away than the nearest lattice point that is inside, that

@@ -4,7 +4,7 @@ using static Trunkline.Vectors;
 namespace Trunkline {
 
 /// <summary>Whether an input can be trusted. What cannot has a one-line answer, and the robot holds. Port of
-/// trunkline/teleop/soundness.py.</summary>
+/// trunkline/ar/teleop/input_validation.py.</summary>
 public static class Soundness {
   private const double _unit = 1e-2;  // by which the length of a quaternion may differ from 1
 

@@ -34,7 +34,7 @@ public readonly struct Remembered {
   }
 }
 
-/// <summary>All that the core remembers from step to step: trunkline/teleop/state.py. It never changes; a step makes
+/// <summary>All that the core remembers from step to step: trunkline/ar/teleop/state.py. It never changes; a step makes
 /// another.</summary>
 public sealed class State {
   internal static readonly IReadOnlyList<Remembered> Nothing = new Remembered[0];

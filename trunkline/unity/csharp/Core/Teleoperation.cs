@@ -4,7 +4,7 @@ using static Trunkline.Vectors;
 namespace Trunkline {
 
 /// <summary>The core of teleoperation: one pure function from what is heard to what is wanted. Port of
-/// trunkline/teleop/core.py.
+/// trunkline/ar/teleop/core.py.
 ///
 /// <see cref="Step"/> has no clock, threads or sockets; the same inputs give the same intents. It decides; it does not
 /// move anything: planning, preview and motion are done outside and reported in the next input.</summary>

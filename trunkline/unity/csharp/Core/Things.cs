@@ -2,7 +2,7 @@ using static Trunkline.Vectors;
 
 namespace Trunkline {
 
-/// <summary>Things as a grasp sees them: trunkline/teleop/things.py, trunkline/hybrid/basket.py.</summary>
+/// <summary>Things as a grasp sees them: trunkline/ar/teleop/object_shapes.py, trunkline/ar/hybrid/basket.py.</summary>
 public static class Things {
   private const double _handle = 0.1;  // of a basket's mass, in bar and posts
 

@@ -5,7 +5,7 @@ using static Trunkline.Vectors;
 namespace Trunkline {
 
 /// <summary>Reach of the tip by the maps of one tilt: grids of signed distances, linear between the gravity angles
-/// beside the present one. Port of trunkline/teleop/tilt_reach.py.
+/// beside the present one. Port of trunkline/ar/teleop/tilt_reach.py.
 ///
 /// What no map tells is unknown: gravity that is not in the plane of a tendon, or beyond the last angle.</summary>
 public sealed class TiltReach : ISoftReach {

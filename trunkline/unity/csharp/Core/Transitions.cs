@@ -41,7 +41,7 @@ public enum Event {
 }
 
 /// <summary>The state machine as a table: which event leads from which mode to which. What is not in it is forbidden.
-/// Port of trunkline/teleop/transitions.py, which says what each event means.</summary>
+/// Port of trunkline/ar/teleop/transitions.py, which says what each event means.</summary>
 public static class Transitions {
   private const int _modes = (int)Mode.Stopped + 1;
 

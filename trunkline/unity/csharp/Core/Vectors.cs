@@ -71,7 +71,7 @@ public readonly struct Quaternion : IEquatable<Quaternion> {
       W.GetHashCode() ^ (31 * X.GetHashCode()) ^ (397 * Y.GetHashCode()) ^ (7919 * Z.GetHashCode());
 }
 
-/// <summary>Arithmetic of both: trunkline/teleop/vectors.py.</summary>
+/// <summary>Arithmetic of both: trunkline/ar/teleop/vectors.py.</summary>
 public static class Vectors {
   /// <summary>No rotation.</summary>
   public static readonly Quaternion Identity = new Quaternion(1, 0, 0, 0);

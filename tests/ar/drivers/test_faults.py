@@ -1,0 +1,324 @@
+"""What is a fault of each limb and of the machine, from both sides of each border, each by itself: motors, reels, a
+controller of ROS 2, and both limbs on one clock."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.support.motors import TICK, homed, motor_settings
+from trunkline.ar.drivers import robot as machines
+from trunkline.ar.drivers import ros_arm
+from trunkline.ar.drivers.driver import CONNECTING, SILENT, Watchdog
+from trunkline.ar.drivers.gm6020 import MOST_AMPERES, Feedback, command_frames, commanded
+from trunkline.ar.drivers.motors import PRESENT, Motors
+from trunkline.ar.drivers.motors import SILENT as UNHEARD
+from trunkline.ar.drivers.robot import LEAD, Machine
+from trunkline.ar.drivers.ros_arm import RosArm
+from trunkline.ar.drivers.setpoint_filter import ROUNDING
+from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.winch import Reel
+from trunkline.errors import InputError
+from trunkline.kinematics.panda.limits import VELOCITY
+from trunkline.pipeline.config import PROJECT, load_folder
+
+NEAR = 1e-6
+ROS = load_folder(Config, PROJECT / "conf/execution").ros
+READY = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])
+JOINTS = range(7)
+
+
+# --- motors
+
+
+def heard_at(now, motors, numbers=(1, 2, 3), celsius=30):
+    for number in numbers:
+        motors.hear(Feedback(number, 0, 0, 0.0, celsius), now)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+@pytest.mark.parametrize(("silent", "faulty"), [(UNHEARD - NEAR, False), (UNHEARD + NEAR, True)])
+def test_a_motor_may_be_silent_for_so_long(number, silent, faulty):
+    motors = Motors(motor_settings(), 100.0)
+    heard_at(100.0, motors)
+    heard_at(100.0 + silent, motors, {1, 2, 3} - {number})
+    currents = motors.currents([0.0] * 3, [0.0] * 3, 100.0 + silent)
+    assert motors.fault == (f"motor {number}: silent for 20 ms, expected feedback every 1 ms" if faulty else "")
+    assert not (faulty and any(currents.values()))
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+@pytest.mark.parametrize(("late", "faulty"), [(PRESENT - NEAR, False), (PRESENT + NEAR, True)])
+def test_each_motor_has_to_be_heard_at_first_and_none_is_driven_before(number, late, faulty):
+    motors = Motors(motor_settings(), 100.0)
+    heard_at(100.0 + late, motors, {1, 2, 3} - {number})
+    assert set(motors.currents([0.01] * 3, [0.0] * 3, 100.0 + late).values()) == {0.0}
+    assert motors.fault.startswith(f"motor {number}: found no feedback") == faulty
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+@pytest.mark.parametrize("beyond", [0, 1])
+def test_a_motor_may_be_so_hot(number, beyond):
+    bench = homed()
+    hot = int(motor_settings().hot) + beyond
+    bench.motors.hear(Feedback(number, bench.motors.reels[number - 1]._angle, 0, 0.0, hot), bench.now)
+    assert bench.motors.fault == (f"motor {number}: found {hot} °C, expected at most 80" if beyond else "")
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("cable", range(3))
+def test_a_cable_may_be_so_far_from_where_it_shall_be(cable, sign):
+    """Reeled in too far, or not far enough."""
+    astray = motor_settings().astray
+    for off, faulty in ((astray - NEAR, False), (astray + NEAR, True)):
+        bench = homed()
+        pulls = np.array(bench.motors.pulls)
+        currents = bench.motors.currents(pulls + sign * off * np.eye(3)[cable], np.zeros(3), bench.now)
+        said = f"motor {cable + 1}: found 20 mm from where its cable shall be, expected at most 20"
+        assert bench.motors.fault == (said if faulty else "")
+        assert faulty == (not any(currents.values()))
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_a_fault_of_any_motor_ends_the_current_of_all(number):
+    bench = homed()
+    bench.rest(0.3, pull=0.01)
+    assert min(np.abs(bench.currents)) > 0.05
+    bench.motors.hear(Feedback(number, 0, 0, 0.0, 120), bench.now)
+    bench.tick(pull=0.01)
+    assert bench.currents == [0.0, 0.0, 0.0]
+
+
+@pytest.mark.parametrize("beyond", [-NEAR, NEAR])
+def test_a_cable_may_be_so_loose_as_homing_begins(beyond):
+    settings = motor_settings().reel
+    reel = Reel(settings, 1)
+    reel.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
+    reel.pull = settings.slack + beyond
+    current = reel.home(0.001)
+    assert reel.fault == ("found no tension within 100 mm, expected 6 N" if beyond > 0 else "")
+    assert not (reel.fault and current)
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize(("asked", "sent"), [(0.5, 0.5), (MOST_AMPERES, MOST_AMPERES), (9.0, MOST_AMPERES)])
+def test_no_command_asks_a_motor_for_more_than_it_may_have(asked, sent, sign):
+    ((identifier, data),) = command_frames({2: sign * asked})
+    assert commanded(identifier, data)[2] == pytest.approx(sign * sent, abs=1e-3)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize("wanted", [-1.0, 1.0])
+def test_the_current_of_a_loop_ends_at_what_the_settings_allow_either_way(side, wanted):
+    reel = Reel(motor_settings().reel, side)
+    reel.read(Feedback(1, 0, 0, 0.0, 30), 0.0)
+    assert reel.current(wanted, 0.0, 0.001) == pytest.approx(side * wanted * motor_settings().reel.most)
+
+
+# --- setpoints
+
+
+@pytest.mark.parametrize(("silent", "late"), [(SILENT - NEAR, False), (SILENT + NEAR, True)])
+def test_a_watchdog_barks_after_so_long_and_not_before_the_first_setpoint(silent, late):
+    dog = Watchdog()
+    assert dog.late(1e9) == ""
+    dog.feed(100.0)
+    assert dog.late(100.0 + silent) == ("heard no setpoint for 50 ms, expected one every 1 ms" if late else "")
+
+
+# --- a controller of ROS 2
+
+
+class Link:
+    """A link that a test has in its hands. `sent`: (s, joints) of each point."""
+
+    def __init__(self):
+        self.listeners, self.joints, self.sent, self.error = 1, READY, [], None
+
+    def send(self, seconds, joints):
+        if self.error is not None:
+            raise self.error
+        self.sent.append((seconds, np.array(joints)))
+
+    def states(self):
+        return [] if self.joints is None else [(list(ROS.names), self.joints.tolist())]
+
+    def close(self):
+        pass
+
+
+@pytest.fixture
+def link(monkeypatch):
+    made = Link()
+    monkeypatch.setattr(ros_arm, "link_of", lambda settings: made)
+    monkeypatch.setattr(ros_arm.time, "monotonic", lambda: 100.0)
+    return made
+
+
+@pytest.fixture
+def arm(link):
+    found = RosArm(ROS)
+    found.turn(100.0)
+    assert found.ready
+    return found
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_joint_may_be_so_far_from_where_its_controller_is_sent(arm, link, joint, sign):
+    arm.send(100.0 + LEAD, READY)
+    arm.turn(100.0)
+    off = sign * np.eye(7)[joint]
+    for beyond, faulty in ((-NEAR, False), (NEAR, True)):
+        link.joints = READY + (ROS.astray + beyond) * off
+        arm.turn(100.01)
+        said = f"{ROS.names[joint]}: found 0.1 rad from where it is sent, expected at most 0.1"
+        assert arm.fault == (said if faulty else "")
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_joint_whose_place_is_no_number_is_a_fault(arm, link, joint):
+    link.joints = np.where(np.arange(7) == joint, np.nan, READY)
+    arm._sent = READY
+    arm.turn(100.01)
+    assert arm.fault.startswith(f"{ROS.names[joint]}: found nan rad")
+
+
+@pytest.mark.parametrize(("silent", "faulty"), [(ros_arm.SILENT - NEAR, False), (ros_arm.SILENT + NEAR, True)])
+def test_joints_have_to_be_told_of_so_often(arm, link, silent, faulty):
+    link.joints = None
+    arm.turn(100.0 + silent)
+    assert arm.fault == (f"{ROS.states}: silent for 200 ms" if faulty else "")
+
+
+@pytest.mark.parametrize(("late", "faulty"), [(CONNECTING - NEAR, False), (CONNECTING + NEAR, True)])
+@pytest.mark.parametrize("missing", ["listeners", "states"])
+def test_a_controller_has_to_be_there_within_its_time(link, missing, late, faulty):
+    if missing == "listeners":
+        link.listeners = 0
+    else:
+        link.joints = None
+    found = RosArm(ROS)
+    found.turn(100.0 + late)
+    assert not found.ready
+    side = "found nobody who listens" if missing == "listeners" else "found no state of panda_joint1 and others"
+    topic = ROS.trajectory if missing == "listeners" else ROS.states
+    assert found.fault == (f"{topic}: {side} within 20 s" if faulty else "")
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("joint", JOINTS)
+def test_no_joint_is_sent_faster_than_it_may_go(link, joint, sign):
+    for share, faulty in ((1 - 1e-4, False), (1 + 1e-4, True)):
+        link.joints, link.sent = READY, []
+        found = RosArm(ROS)
+        found.turn(100.0)
+        there = READY + sign * share * ROUNDING * VELOCITY[joint] * LEAD * np.eye(7)[joint]
+        found.send(100.02 + LEAD, there)
+        found.turn(100.02)
+        assert found.fault.startswith(f"setpoint: {ROS.names[joint]} asks for ") == faulty
+        assert len(link.sent) == (0 if faulty else 1)
+
+
+@pytest.mark.parametrize("place", range(8))
+def test_a_point_that_is_no_number_is_not_sent(arm, link, place):
+    numbers = [100.0 + LEAD, *READY]
+    numbers[place] = np.nan
+    arm.send(numbers[0], np.array(numbers[1:]))
+    arm.turn(100.02)
+    assert arm.fault == "setpoint: found values that are not finite"
+    assert link.sent == []
+
+
+def test_a_point_that_cannot_be_sent_is_a_fault(arm, link):
+    link.error = InputError("dds: closed")
+    arm.send(100.02 + LEAD, READY)
+    arm.turn(100.02)
+    assert arm.fault == "dds: closed"
+
+
+# --- both limbs
+
+
+class Told:
+    """A limb that is told what to be. `ahead`: s from its clock to when each setpoint is due."""
+
+    def __init__(self, ready=True, fault="", at=READY):
+        self.ready, self.fault, self.sent, self.measured = ready, fault, at, at
+        self.turns, self.closed = 0, False
+
+    def send(self, due, axes):
+        self.sent = axes
+
+    def turn(self, now):
+        self.turns += 1
+
+    def close(self):
+        self.closed = True
+
+
+@pytest.mark.parametrize(
+    ("arm", "motors", "fault"),
+    [("", "", ""), ("reflex", "", "robot: reflex"), ("", "hot", "motors: hot"), ("reflex", "hot", "robot: reflex"),
+     (None, "hot", "motors: hot"), ("reflex", None, "robot: reflex"), (None, None, "")],
+)  # fmt: skip
+def test_a_fault_of_either_limb_is_the_machines_and_has_its_name(arm, motors, fault):
+    limbs = [None if said is None else Told(fault=said) for said in (arm, motors)]
+    assert Machine(*limbs, np.full(3, 0.5), lambda: 100.0).fault == fault
+
+
+@pytest.fixture
+def waits(monkeypatch):
+    """What is done while a machine waits for its limbs, one after the other."""
+    done = []
+    monkeypatch.setattr(machines, "time", SimpleNamespace(sleep=lambda seconds: done.pop(0)(), monotonic=lambda: 100.0))
+    return done
+
+
+def test_a_machine_begins_once_both_limbs_are_ready(waits):
+    arm, motors = Told(ready=False), Told(ready=False, at=np.zeros(3))
+    waits += [lambda: setattr(arm, "ready", True), lambda: None, lambda: setattr(motors, "ready", True)]
+    made = Machine(arm, motors, np.full(3, 0.5), lambda: 100.0)
+    np.testing.assert_array_equal(made.begin(np.ones(7)), READY)
+    assert waits == []
+    assert (arm.turns, motors.turns) == (3, 3)
+
+
+@pytest.mark.parametrize(("limb", "said"), [("arm", "robot: no robot"), ("motors", "motors: no robot")])
+def test_a_machine_whose_limb_fails_does_not_begin(waits, limb, said):
+    limbs = {"arm": Told(ready=False), "motors": Told(ready=False)}
+    waits += [lambda: setattr(limbs[limb], "fault", "no robot")]
+    with pytest.raises(InputError, match=f"^{said}$"):
+        Machine(**limbs, straight=np.full(3, 0.5), clock=lambda: 100.0).begin(np.ones(7))
+
+
+def test_a_machine_that_is_ready_and_has_failed_does_not_begin():
+    with pytest.raises(InputError, match="^robot: reflex$"):
+        Machine(Told(fault="reflex"), Told(), np.full(3, 0.5), lambda: 100.0).begin(np.ones(7))
+
+
+@pytest.mark.parametrize("ready", [True, False])
+def test_a_machine_that_nobody_wants_any_more_does_not_begin(ready):
+    with pytest.raises(InputError, match="^the session is gone$"):
+        Machine(Told(ready=ready), None, np.full(3, 0.5), lambda: 100.0).begin(np.ones(7), lambda: True)
+
+
+@pytest.mark.parametrize("limbs", [(True, True), (True, False), (False, True)])
+def test_each_limb_that_is_there_is_given_back(limbs):
+    made = [Told() if there else None for there in limbs]
+    Machine(*made, np.full(3, 0.5), lambda: 100.0).close()
+    assert [limb.closed for limb in made if limb is not None] == [True] * sum(limbs)
+
+
+def test_moves_that_are_due_anew_are_not_made_up_for():
+    now = [100.0]
+    made = Machine(Told(), None, np.full(3, 0.5), lambda: now[0])
+    made.begin(READY)
+    made.move(READY, np.full(3, 0.5))
+    assert made.behind == 0.0  # the first
+    now[0] += TICK
+    made.move(READY, np.full(3, 0.5))
+    assert made.behind == np.inf
+    now[0] += LEAD + 2 * TICK
+    made.move(READY, np.full(3, 0.5))
+    assert made.behind == 0.0

@@ -1,0 +1,146 @@
+"""The figures of docs/execution.md and docs/safety.md are those of the code: each is read from its sentence and
+compared with what the code has, and none is left out."""
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from trunkline.ar.drivers import (
+    driver,
+    driver_client,
+    driver_host,
+    gm6020,
+    motors,
+    ros_arm,
+    setpoint_filter,
+    simulated_motors,
+    time_scaling,
+    winch,
+)
+from trunkline.ar.drivers import robot as machine
+from trunkline.ar.drivers.settings import Config
+from trunkline.ar.drivers.winch import ReelSettings
+from trunkline.ar.session import auth, client, clock, follow, lease, log_writer, real, robot, server
+from trunkline.ar.session.settings import Config as Live
+from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.executor import BRAKE
+from trunkline.kinematics.panda.limits import ACCELERATION, VELOCITY
+from trunkline.pipeline.config import PROJECT, load_folder
+
+ROOT = Path(__file__).parents[3]
+EXECUTION, SAFETY = "docs/execution.md", "docs/safety.md"
+SET, TELEOP = load_folder(Config, PROJECT / "conf/execution"), load_folder(Teleop, PROJECT / "conf/teleop")
+LIVE, CORE = load_folder(Live, PROJECT / "conf/live"), TELEOP.core
+ms, mm, Hz = 1e-3, 1e-3, 1.0
+FASTEST_CROSSOVER = next(part.le for part in ReelSettings.__annotations__["crossover"].__metadata__[0].metadata
+                         if hasattr(part, "le"))  # fmt: skip
+PLANNED = TELEOP.motors.share * VELOCITY[1]  # rad/s
+DELAYED = machine.LEAD + (machine.SMOOTH - 1) * driver.TICK  # s that limbs are behind a plan
+
+# In the order of the page: a sentence with each figure in brackets, and what the code has, in the sentence's own units.
+# A row of a sentence that stands there twice holds both.
+FIGURES = {
+    EXECUTION: [
+        (r"every ms it sends both limbs where they shall be (30) ms later", [machine.LEAD / ms]),
+        (r"without a permit for (80) ms it slows", [robot.DEAD_MAN / ms]),
+        (r"run out \((30) ms\), do not come \((50) ms\) or are played late \((0\.3) s\)",
+         [machine.LEAD / ms, driver.SILENT / ms, setpoint_filter.BEHIND]),
+        (r"plays their setpoints, (1000) times a second", [1 / driver.TICK]),
+        (r"or it is late itself \((50) ms\): the cables", [driver.SILENT / ms]),
+        (r"A motor silent for (20) ms: no current", [motors.SILENT / ms]),
+        (r"or it is late itself \((50) ms\), a point", [driver.SILENT / ms]),
+        (r"late by less than the (30) ms moves nothing", [machine.LEAD / ms]),
+        (r"again (30) ms ahead", [machine.LEAD / ms]),
+        (r"silent for (0\.1) s, or ends, is a fault of the machine", [driver_client.SILENT]),
+        (r"no permit for (80) ms", [robot.DEAD_MAN / ms]),
+        (r"where the process is gone, for (0\.2) s, then no current", [driver_host.SETTLES]),
+        (r"a joint (0\.05) rad off", [SET.arm.astray]),
+        (r"a motor silent for (20) ms, too hot, or a cable (20) mm off", [motors.SILENT / ms, SET.motors.astray / mm]),
+        (r"It takes (0\.1) s where the Panda's", [BRAKE]),
+        (r"joint 2 at its planned speed of (1\.09) rad/s needs (0\.15) s",
+         [round(PLANNED, 2), round(PLANNED / (time_scaling.SHARE * ACCELERATION[1]), 2)]),
+        (r"min\(1 / (0\.1) s, \((0\.95) a", [BRAKE, time_scaling.SHARE]),
+        (r"is (39) ms behind that: (30) ms ahead of time, and two means over (10) ms",
+         [DELAYED / ms, machine.LEAD / ms, machine.SMOOTH * driver.TICK / ms]),
+        (r"Every (5) ms the machine's process seeks its way", [time_scaling.STRIDE / ms]),
+        (r"±(16384) = ±(3) A; feedback 0x204", [gm6020.FULL, gm6020.MOST_AMPERES]),
+        (r"falls to 1 at\s+(8) Hz: below", [SET.motors.reel.crossover / Hz]),
+        (r"up to\s+(6\.4) mrad/A, nine times a turn", [simulated_motors.RIPPLE / 1e-3]),
+        (r"(10) Hz is the most that settings may ask for", [FASTEST_CROSSOVER]),
+        (r"from feedback at (1) kHz", [gm6020.RATE / 1e3]),
+        (r"commands joint positions (1000) times", [1 / setpoint_filter.CYCLE]),
+        (r"comes back to the plan within (0\.1) s with the least", [setpoint_filter.BRIDGED]),
+        (r"one point every (10) ms", [ros_arm.PERIOD / ms]),
+        (r"(0\.2) s of silence, or\s+a joint (0\.1) rad off", [ros_arm.SILENT, SET.ros.astray]),
+        (r"at most (30) ms of the way ahead", [machine.LEAD / ms]),
+        (r"to within the (0\.1) rad", [SET.ros.astray]),
+        (r"is sent (0\.15) s behind", [real.DELAY]),
+    ],
+    SAFETY: [
+        (r"the motion begins (0\.5) s later", [CORE.delay]),
+        (r"the next input, then (0\.1) s of braking", [BRAKE]),
+        (r"(0\.12) s of silence \(`silence`\), (0\.1) s of a lost controller",
+         [CORE.safety.silence, CORE.safety.grace]),
+        (r"(0\.25) s, by its stamp or there and back", [clock.LATEST]),
+        (r"sends nothing for (1) s", [lease.SILENCE]),
+        (r"at once, or (1) s", [lease.SILENCE]),
+        (r"along the plan \| (0\.08) s \|", [robot.DEAD_MAN]),
+        (r"its process ends \| (0\.08) s \|", [robot.DEAD_MAN]),
+        (r"the same as a stop \| (1) s \|", [follow.SILENT]),
+        (r"permits nothing \| (0\.15) s \|", [robot.STALE]),
+        (r"as soon as a write fails; (1) s in which nothing", [LIVE.journal.period + log_writer.LATE]),
+        (r"A token of (128) bits", [8 * auth.TOKEN_BYTES]),
+        (r"for (2) minutes and (5) tries", [auth.CODE_SECONDS / 60, auth.CODE_TRIES]),
+        (r"longer than (64) KiB, more than (400) a second", [server.LARGEST / 1024, client.PER_SECOND]),
+    ],
+}  # fmt: skip
+# Not of the code: what others measured or published, and what was done to a session as it was timed.
+OTHERS = {
+    EXECUTION: ["14 to 17 Hz"],
+    SAFETY: ["holds the grips for 1 s"],
+}
+UNITS = r"(?:ms|s|rad|N|mm|Hz|kHz|A|°C|m/s|KiB|bits|rad/s|mrad/A|times|minutes|tries)\b"
+
+
+@cache
+def written(page: str) -> str:
+    """What people wrote: without generated blocks and code."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    text = re.sub(r"<!-- results/(\w+) -->.*?<!-- /results/\1 -->", "", text, flags=re.DOTALL)
+    return re.sub(r"```.*?```", "", text, flags=re.DOTALL)
+
+
+ROWS = [(page, sentence, figures) for page, rows in FIGURES.items() for sentence, figures in rows]
+
+
+@pytest.mark.parametrize(("page", "sentence", "figures"), ROWS, ids=[row[1][:40] for row in ROWS])
+def test_a_figure_is_that_of_the_code(page, sentence, figures):
+    matches = list(re.finditer(sentence, written(page)))
+    assert matches, "the sentence is not there"
+    for match in matches:
+        assert [float(figure) for figure in match.groups()] == pytest.approx(figures, rel=1e-9)
+
+
+@pytest.mark.parametrize("page", FIGURES)
+def test_no_figure_with_a_unit_is_left_out(page):
+    text = written(page)
+    spans = [match.span() for sentence, _ in FIGURES[page] for match in re.finditer(sentence, text)]
+    spans += [(at, at + len(words)) for words in OTHERS[page] for at in (text.find(words),) if at >= 0]
+    left = [
+        text[max(found.start() - 40, 0) : found.end() + 10]
+        for found in re.finditer(rf"\d[\d.]*\s{UNITS}", text)
+        if not any(low <= found.start() < high for low, high in spans)
+    ]
+    assert left == []
+
+
+def test_words_for_figures_are_true_too():
+    assert motors.HOMING == 60.0  # "for a minute at most"
+    assert simulated_motors.PER_TURN == 9  # "nine times a turn"
+    assert winch.MOST_AMPERES == gm6020.MOST_AMPERES
+    assert auth.CODE_DIGITS == 6  # "six digits"
+    assert gm6020.FEEDBACK == 0x204
+    assert set(gm6020.GROUPS) == {0x1FE, 0x2FE}
+    assert client.BURST == client.PER_SECOND

@@ -1,0 +1,228 @@
+"""Motors on a bus: on a clock that a test turns, and on python-can's virtual bus, alone."""
+
+from dataclasses import replace
+from functools import partial
+from types import SimpleNamespace
+
+import can
+import numpy as np
+import pytest
+
+from tests.support import waiting
+from tests.support.motors import PLANTS, TICK, Workbench, homed, motor_settings
+from trunkline.ar.drivers import on_bus
+from trunkline.ar.drivers.gm6020 import Feedback
+from trunkline.ar.drivers.motors import SILENT
+from trunkline.ar.drivers.on_bus import FILTERS, BankInThread, BankOnBus, BusMotors, SimulatedMotors, open_bus
+from trunkline.ar.drivers.simulated_motors import WATCHDOG
+from trunkline.errors import InputError
+
+until = partial(waiting.until, seconds=5.0)
+GONE = can.CanOperationError("gone")
+
+
+class BenchBus:
+    """A bus with a bench's bank on its other end, on the bench's clock. `hears`, `takes`: whether it does; `deaf`: the
+    id of a frame that it does not take. `sent`: (id, data) of what it took."""
+
+    def __init__(self, bench):
+        self.bench, self.waiting, self.sent = bench, [], []
+        self.hears = self.takes = True
+        self.deaf, self.filters, self.closed = None, None, False
+
+    def set_filters(self, filters):
+        self.filters = filters
+
+    def tick(self):
+        self.bench.now += TICK
+        self.waiting += self.bench.bank.advance(self.bench.now)
+
+    def recv(self, timeout):
+        assert timeout == 0
+        if not self.hears:
+            raise GONE
+        if not self.waiting:
+            return None
+        identifier, data = self.waiting.pop(0)
+        return can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+
+    def send(self, message):
+        if not self.takes or message.arbitration_id == self.deaf:
+            raise can.CanOperationError("full")
+        self.sent.append((message.arbitration_id, bytes(message.data)))
+        self.bench.bank.hear(message.arbitration_id, bytes(message.data), self.bench.now)
+
+    def shutdown(self):
+        self.closed = True
+
+
+class Played:
+    """Motors on a bench's bus. They are homed, and pull, so that all of them carry current."""
+
+    def __init__(self, monkeypatch, bench):
+        self.bench, self.bus = bench, BenchBus(bench)
+        monkeypatch.setattr(on_bus, "time", SimpleNamespace(monotonic=lambda: bench.now))
+        self.driver = BusMotors(motor_settings(), self.bus)
+        self.driver.motors = bench.motors
+
+    def turn(self, seconds=TICK, pull=0.01):
+        for _ in range(max(round(seconds / TICK), 1)):
+            self.bus.tick()
+            self.driver.turn([pull] * 3, [0.0] * 3)
+        return self
+
+    @property
+    def currents(self):
+        return np.abs(self.bench.currents)
+
+
+@pytest.fixture
+def driven(monkeypatch):
+    found = Played(monkeypatch, homed()).turn(0.3)
+    assert found.currents.min() > 0.05
+    assert found.driver.fault == ""
+    return found
+
+
+def test_motors_that_are_heard_are_homed_and_driven(monkeypatch):
+    found = Played(monkeypatch, Workbench())
+    for _ in range(10_000):
+        found.turn()
+        if found.driver.motors.homed:
+            break
+    assert found.driver.motors.homed
+    assert found.driver.fault == ""
+    assert found.bus.filters == FILTERS
+
+
+def test_a_bus_that_gives_nothing_but_errors_ends_all_current_at_once(driven):
+    """At that very turn, long before anybody finds a motor silent; and for good."""
+    driven.bus.hears = False
+    driven.turn()
+    assert driven.currents.max() == 0.0
+    assert driven.driver.fault == "bus: gone"
+    assert driven.bus.sent[-1] == (0x1FE, bytes(8))
+    driven.turn(SILENT / 2)
+    assert driven.driver.motors.fault == ""
+    assert driven.currents.max() == 0.0
+    driven.bus.hears = True
+    driven.turn(0.1)
+    assert driven.currents.max() == 0.0
+    assert driven.driver.fault == "bus: gone"
+
+
+def test_a_bus_that_takes_nothing_is_a_fault_and_no_current_is_sent_once_it_does(driven):
+    before = len(driven.bus.sent)
+    driven.bus.takes = False
+    driven.turn()
+    assert driven.driver.fault == "bus: full"
+    assert len(driven.bus.sent) == before
+    driven.bus.takes = True
+    driven.turn(0.05)
+    assert set(driven.bus.sent[before:]) == {(0x1FE, bytes(8))}
+    assert driven.currents.max() == 0.0
+
+
+def test_a_motor_that_is_silent_ends_all_current(driven):
+    driven.bench.bank.motors[0].silent = True
+    driven.turn(SILENT - TICK)
+    assert driven.driver.fault == ""
+    assert driven.currents.min() > 0.0
+    driven.turn(3 * TICK)
+    assert driven.driver.fault.startswith("motor 1: silent for 2")
+    assert driven.currents.max() == 0.0
+    driven.bench.bank.motors[0].silent = False
+    driven.turn(0.1)
+    assert driven.currents.max() == 0.0
+
+
+def test_a_fault_of_the_motors_ends_all_current_though_the_bus_is_well(driven):
+    driven.bench.motors.hear(Feedback(2, 0, 0, 0.0, 119), driven.bench.now)
+    driven.turn()
+    assert driven.driver.fault.startswith("motor 2: found 119 °C")
+    assert driven.currents.max() == 0.0
+
+
+def test_of_the_frames_of_a_motor_that_wait_the_newest_counts(driven):
+    for _ in range(5):
+        driven.bus.tick()
+    assert len(driven.bus.waiting) == 15
+    driven.driver.turn([0.01] * 3, [0.0] * 3)
+    np.testing.assert_allclose(driven.bench.motors.pulls, driven.bench.pulls, atol=3e-4)
+    assert {reel.heard for reel in driven.bench.motors.reels} == {driven.bench.now}
+
+
+def test_an_error_frame_is_no_feedback(monkeypatch):
+    found = Played(monkeypatch, Workbench())
+    frame = can.Message(arbitration_id=0x205, data=bytes(8), is_extended_id=False, is_error_frame=True)
+    waits = [frame, None]
+    found.bus.recv = lambda timeout: waits.pop(0)
+    found.driver.turn([0.0] * 3, [0.0] * 3)
+    assert found.bench.motors.reels[0].heard is None
+
+
+def test_a_closed_driver_leaves_no_current_and_no_bus(driven):
+    driven.driver.close()
+    assert driven.currents.max() == 0.0
+    assert driven.bus.closed
+
+
+def test_a_driver_that_stops_sending_leaves_no_current(driven):
+    for _ in range(round(WATCHDOG / TICK) - 1):
+        driven.bus.tick()
+    assert driven.currents.min() > 0.0
+    for _ in range(3):
+        driven.bus.tick()
+    assert driven.currents.max() == 0.0
+
+
+def test_where_one_frame_is_not_taken_the_other_still_is(monkeypatch):
+    found = Played(monkeypatch, Workbench())
+    driver = BusMotors(replace(motor_settings(), numbers=(1, 5, 6)), found.bus)
+    found.bus.deaf = 0x1FE
+    driver.turn([0.01] * 3, [0.0] * 3)
+    assert driver.fault == "bus: full"
+    assert found.bus.sent == [(0x2FE, bytes(8))]
+
+
+# --- on a bus of python-can
+
+
+@pytest.mark.realtime
+def test_motors_in_real_time_are_driven_until_one_is_silent(request):
+    bank = BankInThread(PLANTS, can.Bus(interface="virtual", channel=request.node.name))
+    driver = BusMotors(motor_settings(), can.Bus(interface="virtual", channel=request.node.name))
+    begun = len(bank.reeled)
+
+    def turn():
+        driver.turn([0.0] * 3, [0.0] * 3)
+
+    try:
+        until(lambda: all(motor.current for motor in bank.bank.motors), turn)  # homing has begun
+        until(lambda: len(bank.reeled) > begun + 200, turn)
+        assert driver.fault == ""
+        bank.bank.motors[0].silent = True
+        until(lambda: driver.fault, turn)
+        assert driver.fault.startswith("motor 1: silent for 2")
+        until(lambda: not any(motor.current for motor in bank.bank.motors), turn)
+    finally:
+        driver.close()
+        bank.close()
+
+
+@pytest.mark.realtime
+def test_simulated_motors_turn_when_their_driver_does(request):
+    name = request.node.name
+    bank = BankOnBus(PLANTS, can.Bus(interface="virtual", channel=name))
+    driver = SimulatedMotors(motor_settings(), can.Bus(interface="virtual", channel=name), bank)
+    until(lambda: all(motor.current for motor in bank.bank.motors), lambda: driver.turn([0.0] * 3, [0.0] * 3))
+    before = [motor.reeled for motor in bank.bank.motors]
+    until(lambda: all(m.reeled > b for m, b in zip(bank.bank.motors, before, strict=True)),
+          lambda: driver.turn([0.0] * 3, [0.0] * 3))  # fmt: skip
+    assert driver.fault == ""
+    driver.close()
+
+
+def test_a_bus_that_is_not_there_is_one_line():
+    with pytest.raises(InputError, match=r"^bus nowhere0: found no socketcan bus that opens"):
+        open_bus("socketcan", "nowhere0")

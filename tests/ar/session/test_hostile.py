@@ -1,0 +1,317 @@
+"""Who should not come in does not, what should not move the robot does not, and each is refused by name."""
+
+import asyncio
+import math
+import struct
+from contextlib import suppress
+
+import pytest
+from aiohttp import WSServerHandshakeError
+
+from tests.ar.session.test_session import asked, executing, grips
+from tests.ar.teleop.test_plan import MOUNT, TIP
+from tests.support.live import TOKEN, Hands, controlling, hand, laid
+from trunkline.ar.session.auth import CODE_SECONDS, HEADERS, Origins, PairingCode
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "", "http://127.0.0.1:1", "https://127.0.0.1"])
+def test_another_origin_does_not_come_in(origin):
+    async def session():
+        async with laid() as here:
+            with pytest.raises(WSServerHandshakeError) as found:
+                await here.come(origin=origin)
+            assert found.value.status == 403
+            assert "origin" in here.log[-1]
+            assert here.server.clients == {}
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_no_origin_and_another_host_do_not_come_in():
+    async def session():
+        async with laid() as here:
+            with pytest.raises(WSServerHandshakeError) as found:
+                await here.session.ws_connect(f"{here.url}/ws")
+            assert found.value.status == 403
+            for path in ("/", "/scene.json", "/ws"):
+                answer = await here.session.get(f"{here.url}{path}", headers={"Host": "rebound.example:80"})
+                assert (answer.status, await answer.text()) == (403, "error: host: not a name of this server\n")
+            answer = await here.session.get(here.url, headers={"Origin": "http://evil.example"})
+            assert answer.status == 403
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize(
+    ("hello", "word"),
+    [
+        ({"token": ""}, "token"), ({"token": TOKEN[:-1]}, "token"), ({"token": "", "code": "123456"}, "code"),
+        ({"version": 2}, "version"), ({"type": "lease", "action": "ask"}, "message"),
+    ],
+)  # fmt: skip
+def test_a_wrong_hello_ends_the_connection_and_says_why(hello, word):
+    async def session():
+        async with laid() as here:
+            guest = await here.come(hello=False)
+            await guest.say(**{"type": "hello", "version": 1, "token": TOKEN} | hello)
+            assert word in await guest.refused(word)
+            await asyncio.wait_for(guest.closed.wait(), 2.0)
+            assert guest.socket.close_code == 1008
+            assert here.server.clients == {}
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_who_says_nothing_is_shown_out():
+    async def session():
+        async with laid() as here:
+            guest = await here.come(hello=False)
+            assert "within 3 s" in await guest.refused("hello", 5.0)
+
+    asyncio.run(session())
+
+
+def test_a_pairing_code_opens_once_and_ends_by_tries_and_time():
+    code = PairingCode()
+    assert code.fault("000000", 0.0)
+    digits = code.renew(0.0)
+    assert len(digits) == 6
+    wrong = f"{(int(digits) + 1) % 10**6:06d}"
+    assert [bool(code.fault(wrong, 1.0)) for _ in range(4)] == [True] * 4
+    assert code.fault(digits, 1.0) == ""
+    assert code.fault(digits, 1.0)
+    digits = code.renew(0.0)
+    for _ in range(5):
+        code.fault("x", 1.0)
+    assert code.fault(digits, 1.0)
+    assert code.fault(code.renew(0.0), CODE_SECONDS + 1.0)
+
+
+@pytest.mark.realtime
+def test_a_pairing_code_lets_in_and_gives_the_token():
+    async def session():
+        async with laid() as here:
+            digits = here.server.code.renew(here.server.now())
+            guest = await here.come(token="", code=digits)
+            assert (await guest.hears("welcome"))["token"] == TOKEN
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("message", [
+    bytes(10_000_000), b"\x10", b"", struct.pack("<BBHId", 99, 0, 0, 0, 0.0), "x" * 10_000_000, "{", '{"type": "go"}',
+    '{"type": "execute", "digest": "' + "a" * 64 + '"}',
+])  # fmt: skip
+def test_what_is_no_message_ends_the_connection_and_nothing_else(message):
+    async def session():
+        async with laid() as here:
+            guest, other = await here.come(), await here.come()
+            send = guest.socket.send_str if isinstance(message, str) else guest.socket.send_bytes
+            with suppress(ConnectionError):  # it is cut off within the large ones
+                await send(message)
+            await asyncio.wait_for(guest.closed.wait(), 3.0)
+            assert guest.socket.close_code in (1006, 1008, 1009)
+            assert any(line.startswith(f"refused {guest.id}: ") for line in here.log)
+            seen = len(other.frames)
+            await asyncio.sleep(0.3)
+            assert len(other.frames) > seen
+            assert here.robot.permits == 0
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("number", [math.nan, math.inf, 3e38])
+def test_poses_that_are_no_numbers_hold_the_robot(number):
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            await executing(here, guest)
+            guest.left = grips((number, 0.0, 0.0))
+            await asyncio.sleep(0.5)
+            state = await guest.hears("state", motion="hold")
+            if not math.isfinite(number):
+                assert "not a number" in state["notice"]
+            assert here.robot.state().mode != "running"
+            seen = len(guest.frames)
+            await asyncio.sleep(0.3)
+            assert len(guest.frames) > seen
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_a_confirmation_that_is_sent_again_is_refused_and_moves_nothing():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            state = await asked(here, guest)
+            await asyncio.sleep(0.4)
+            await guest.say(type="shown", digest=state["preview"])
+            await guest.hears("state", mode="ready")
+            guest.sending.cancel()
+            began = guest.now()
+            for n in range(40):
+                await guest.input(grips(MOUNT), grips(TIP, trigger=float(n > 20)), began + n / 200)
+                await asyncio.sleep(1 / 200)
+            guest.begin()
+            guest.left, guest.right = hand(MOUNT), hand(TIP)  # taken back within the delay
+            await guest.hears("state", mode="ready")
+            await asyncio.sleep(0.2)
+            for n in range(40):
+                await guest.input(grips(MOUNT), grips(TIP, trigger=float(n > 20)), began + n / 200)
+            await guest.refused("s late, expected at most")
+            await asyncio.sleep(1.0)
+            assert here.robot.permits == 0
+            assert here.robot.state().mode == "idle"
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_an_input_that_is_sent_again_at_once_counts_once():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            guest.sending.cancel()
+            stamp = guest.now()
+            for _ in range(2):
+                await guest.input(hand(MOUNT), hand(TIP), stamp)
+            await guest.refused("heard before")
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_a_preview_that_was_not_shown_is_not_taken_for_shown():
+    async def session():
+        async with laid() as here:
+            guest, watcher = await controlling(here), await here.come()
+            await guest.say(type="shown", digest="a" * 64)
+            await guest.refused("no plan is previewed")
+            state = await asked(here, guest)
+            await watcher.say(type="shown", digest=state["preview"])
+            await watcher.refused("shown: you do not control")
+            await asyncio.sleep(0.6)
+            await guest.say(type="shown", digest="b" * 64)
+            await guest.refused("shown: found digest 'bbbbbbbbbbbb'")
+            assert here.desk.intent.mode == "preview"
+            guest.right = grips(TIP, trigger=1.0)
+            await asyncio.sleep(0.3)
+            assert here.desk.intent.mode == "preview"
+            assert here.robot.permits == 0
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_a_preview_lasts_as_long_as_it_lasts():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            state = await asked(here, guest)
+            here.desk._since = here.server.now()
+            await guest.say(type="shown", digest=state["preview"])
+            await guest.refused("shown: its preview lasts")
+            assert here.desk.intent.mode == "preview"
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_a_second_client_moves_nothing():
+    async def session():
+        async with laid() as here:
+            guest, second = await controlling(here), await here.come(Hands)
+            await guest.hears("state", mode="aim")
+            await second.hears("clock")
+            second.begin()
+            second.left, second.right = grips(MOUNT), grips(TIP, trigger=1.0)
+            await second.say(type="alignment", pose={"position": [0, 0, 0], "quaternion": [1, 0, 0, 0]})
+            await second.refused("input: you do not control")
+            await second.refused("alignment")
+            await asyncio.sleep(0.5)
+            assert here.desk.state.left.target is None
+            assert here.desk.intent.mode == "aim"
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_a_clock_that_jumps_holds_the_robot():
+    async def session():
+        async with laid() as here:
+            guest = await controlling(here)
+            await executing(here, guest)
+            guest.now = lambda now=guest.now: now() + 5.0
+            await guest.refused("the clock has jumped")
+            await guest.hears("state", motion="hold")
+            assert here.robot.stops
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_input_does_not_count_before_the_clock_is_known():
+    async def session():
+        async with laid() as here:
+            guest = await here.come(Hands)
+            await guest.say(type="lease", action="ask")
+            await guest.input(hand(MOUNT), hand(TIP))
+            await guest.refused("offset is not known")
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_only_the_page_s_own_files_are_served_with_every_header(tmp_path):
+    page = tmp_path / "page"
+    page.mkdir()
+    (page / "index.html").write_text("<p>page</p>")
+    (page / "app.js").write_text("1")
+    (page / "notes.txt").write_text("secret")
+    (page / "link.js").symlink_to(tmp_path / "secret.js")
+    (tmp_path / "secret.js").write_text("secret")
+
+    async def session():
+        async with laid(page) as here:
+            found = {}
+            for path in ("/", "/app.js", "/index.html", "/notes.txt", "/link.js", "/../secret.js", "/%2e%2e/secret.js",
+                         "/pyproject.toml", "/scene.json"):  # fmt: skip
+                answer = await here.session.get(here.url + path)
+                found[path] = answer.status
+                assert "secret" not in await answer.text()
+                assert {name: answer.headers[name] for name in HEADERS} == HEADERS
+            assert [path for path, status in found.items() if status == 200] == ["/", "/app.js", "/index.html"]
+            assert found["/scene.json"] == 401
+            answer = await here.session.get(f"{here.url}/scene.json", headers={"Authorization": f"Bearer {TOKEN}"})
+            assert (await answer.json())["bodies"] == ["a", "b", "c"]
+            assert (await here.session.post(here.url, data=b"x")).status in (404, 405)
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_without_a_page_there_is_one_line():
+    async def session():
+        async with laid() as here:
+            answer = await here.session.get(here.url)
+            assert answer.status == 503
+            assert "error: the page is not built" in await answer.text()
+
+    asyncio.run(session())
+
+
+def test_names_of_a_server_are_exact():
+    origins = Origins.of(["127.0.0.1", "localhost"], 8443, tls=True)
+    assert origins.fault("localhost:8443", "https://localhost:8443", True) == ""
+    for host, origin in [
+        ("localhost", "https://localhost:8443"), ("LOCALHOST:8443.evil.example", None), (None, None),
+        ("localhost:8443", "http://localhost:8443"), ("localhost:8443", "https://localhost:8443.evil.example"),
+    ]:  # fmt: skip
+        assert origins.fault(host, origin, True)

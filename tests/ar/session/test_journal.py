@@ -1,0 +1,593 @@
+"""The log of a live session: the core goes through it again to the same bytes, `ingest` sees the arm in it, and neither
+a killed process nor a full disk moves a robot or loses more than a second."""
+
+import asyncio
+import gc
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from itertools import count, groupby
+
+import numpy as np
+import pytest
+from mcap.reader import make_reader
+from mcap.writer import Writer
+from mcap_ros2.decoder import DecoderFactory
+
+from tests.ar.session.test_robot import simulation
+from tests.ar.session.test_session import asked, executing, grips
+from tests.ar.teleop.test_plan import MOUNT, OFFSET, START, STRAIGHT, TIP
+from tests.support.disks import filling, full, stuck
+from tests.support.live import BODIES, RATE, controlling, hand, laid, patient
+from tests.support.operator import PACKAGE, Everywhere, Operator
+from tests.support.sessions import instruments, motion_truth, record
+from tests.support.ticking import fed, ticks
+from tests.support.workbench import ROOT
+from trunkline.ar.dataset.recording import read_recording
+from trunkline.ar.drivers.settings import Config as Execution
+from trunkline.ar.session import replay
+from trunkline.ar.session.binary import HANDS
+from trunkline.ar.session.composition import subject_of
+from trunkline.ar.session.hardware import hardware_of
+from trunkline.ar.session.log_format import EVENTS, POSES, TWIN, Book, Subject
+from trunkline.ar.session.log_reader import read_logbook
+from trunkline.ar.session.log_writer import Journal, JournalProcess, new_path
+from trunkline.ar.session.robot import Standing
+from trunkline.ar.teleop.core import Teleoperation
+from trunkline.ar.teleop.messages import Input, Pose, from_json, to_json
+from trunkline.errors import InputError
+from trunkline.pipeline.config import PROJECT, load_folder
+from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.preparation.inspect import main as inspect
+from trunkline.recordings.session.session import read_session
+from trunkline.recordings.session.source import open_log
+
+NAMES = ("link_7", "base", "unit_01")
+JOINTS = tuple(f"joint_{n}" for n in range(1, 8))
+SUBJECT = Subject(NAMES, JOINTS, ("tendon_1", "tendon_2", "tendon_3"), STRAIGHT, ("unit_01", (0.0, 0.0, -0.1)))
+ZERO = 1_700_000_000 * 10**9
+PERIOD = 0.2
+REAL = "the robot fr3 at 192.168.1.11, no real motors"
+
+
+class Written(Journal):
+    """One that writes here and now; `time` is its clock where it is set."""
+
+    def __init__(self, path, subject=SUBJECT):
+        super().__init__(subject, lambda: time.monotonic() if self.time is None else self.time)
+        self.time = None
+        self.file = open(path, "wb")  # noqa: SIM115
+        self.book = Book(self.file, subject, ZERO)
+
+    def keep(self, record):
+        self.book.write(record)
+
+    def close(self):
+        self.settle()
+        self.book.finish()
+        self.file.close()
+
+
+UNHURRIED = patient(silence=5.0, plan_wait=30.0, start_wait=30.0)
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """Of a session in which a plan was executed to its end, another stopped, and its client went."""
+    path = tmp_path_factory.mktemp("logs") / "run.mcap"
+    journal = Written(path)
+
+    async def session():
+        async with laid(journal=journal, settings=UNHURRIED) as here:
+            guest = await controlling(here)
+            await executing(here, guest)
+            await guest.hears("state", 60.0, mode="aim", robot="done")
+            guest.left, guest.right = grips(MOUNT, stick_y=float("nan")), hand(MOUNT)
+            await guest.hears("state", mode="hold")
+            guest.left, guest.right = hand(MOUNT), hand(TIP)
+            await guest.say(type="shown", digest="x")
+            await guest.stop()
+            await guest.hears("state", mode="stopped")
+            guest.sending.cancel()
+            await guest.socket.close()
+            await asyncio.sleep(0.1)
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("trunkline.ar.session.lease.SILENCE", 60.0)
+        asyncio.run(session())
+    journal.close()
+    return path
+
+
+def core(**changes):
+    return Teleoperation(replace(UNHURRIED, **changes), Everywhere(), PACKAGE, OFFSET)
+
+
+@pytest.mark.realtime
+def test_the_core_goes_through_a_log_again_to_the_same_bytes(log):
+    logbook = read_logbook(log)
+    assert logbook.damage == []
+    assert len(logbook.steps) > RATE
+    found = replay.core_of(logbook, PACKAGE, Everywhere())
+    assert found.settings == UNHURRIED
+    assert replay.replay(logbook.steps, found) is None
+
+
+@pytest.mark.realtime
+def test_the_first_difference_is_named_by_time_and_field(log):
+    steps = read_logbook(log).steps
+    aiming = next(n for n, step in enumerate(steps) if b'"mode":"aim"' in step.intent and b'"targets":{' in step.intent)
+    given = from_json(Input, steps[aiming].given)
+    (x, y, z), turn = given.left.position, given.left
+    moved = replace(given, left=replace(turn, position=(x + 1e-9, y, z)))
+    other = [*steps[:aiming], steps[aiming]._replace(given=to_json(moved)), *steps[aiming + 1 :]]
+    found = replay.replay(other, core())
+    assert (found.number, found.time) == (aiming + 1, steps[aiming].time)
+    assert found.field.startswith("targets.rigid.position")
+    assert f"step {aiming + 1} at {found.time:.3f} s" in str(found)
+    found = replay.replay(steps, core(delay=0.25))
+    assert (found.field, found.found, found.expected) == ("countdown", 0.25, 0.5)
+
+
+@pytest.mark.realtime
+def test_a_log_of_another_package_or_of_no_session_is_refused_by_name(log, tmp_path):
+    with pytest.raises(InputError, match="package: found digest bbbbbbbbbbbb, expected aaaaaaaaaaaa"):
+        replay.core_of(read_logbook(log), "b" * 64, Everywhere())
+    path = tmp_path / "empty.mcap"
+    Written(path).close()
+    with pytest.raises(InputError, match="found no step of the core"):
+        read_logbook(path)
+
+
+@pytest.mark.realtime
+def test_ingest_sees_the_arm_whole_and_takes_no_hand_for_it(log, capsys):
+    assert inspect([str(log)]) == 0
+    said, proposed = capsys.readouterr().out.split("Proposed session.yaml:\n")
+    for name in NAMES:
+        assert f"    {name:7}  seen in 100.0 %" in said
+    assert f"frames of {BODIES} bodies, with orientations; " in said
+    assert " 0 messages unreadable" in said
+    assert f"/headset/{HANDS[0]}" in said
+    assert "topics: {poses: /tf, commands: /tendons/command}" in proposed  # this robot measures no lengths
+    assert "base: base" in proposed
+
+
+def told_of(path, truth, **hardware):
+    """A log of a session in which a robot did what `truth` says, and a twin, where it is one of hardware, as well."""
+    bodies, tip = ("link_7", "base", *truth.segments), ("unit_08", (0.0, 0.0, 0.0))
+    journal = Written(path, Subject(bodies, JOINTS, truth.tendons, STRAIGHT, tip, **hardware))
+    base = np.append(truth.base_position, truth.base_quaternion)
+    intent = (operator := Operator()).step()
+    for row in range(0, len(truth.time), 4):
+        at = journal.time = float(truth.time[row])
+        if not row:
+            journal.event("begin", tip={"body": tip[0], "place": tip[1]})
+        arm = np.concatenate([truth.positions[row], truth.quaternions[row]], axis=1)
+        pull, wound = truth.commands[row // 5], truth.tendon_positions[row]
+        joints, nothing = START + 0.1 * np.sin(at), np.full(7, np.nan)
+        poses = np.stack([base, base, *arm])
+        journal.standing(Standing(at, 0.0, joints, STRAIGHT - pull, nothing, poses, joints + 1e-4, STRAIGHT - wound))
+        for part in ("left", "right", "view"):
+            journal.headset(part, at, base, False)
+        journal.step(1 / 120, operator.given, intent)
+    journal.close()
+
+
+def test_a_session_in_which_the_arm_was_seen_is_one_to_identify_from(tmp_path, capsys):
+    truth = motion_truth()
+    told_of(tmp_path / "run.mcap", truth)
+    assert inspect([str(tmp_path)]) == 0
+    (tmp_path / "session.yaml").write_text(capsys.readouterr().out.split("Proposed session.yaml:\n")[1])
+    session = read_session(tmp_path)
+    session.segments = {name: name for name in truth.segments}  # the Panda's links are left out
+    ((_, take, _),) = take_in(tmp_path, session, Limits(0.2, 0.3, 0.1, 1.0))
+    assert (take.segments, take.tendons) == (truth.segments, truth.tendons), take
+    moves = take.time > 0.5  # poses that repeat themselves to the last bit are taken for frozen ones
+    np.testing.assert_allclose(take.positions[moves], truth.positions[::4][moves], atol=1e-9)
+    there = np.isfinite(take.base_positions).all(axis=1)
+    np.testing.assert_allclose(take.base_positions[there], [truth.base_position] * there.sum(), atol=1e-9)
+    np.testing.assert_allclose(take.tendon_positions, truth.tendon_positions[::4], atol=1e-12)
+    assert take.commands.max() == pytest.approx(truth.commands.max(), rel=1e-3)
+
+
+def test_what_a_twin_drew_of_a_real_machine_is_not_taken_for_the_arm(tmp_path, capsys):
+    truth, path = motion_truth(), tmp_path / "run.mcap"
+    told_of(path, truth, hardware=REAL)
+    assert inspect([str(path)]) == 0
+    said = capsys.readouterr().out
+    assert re.search(rf"{TWIN} +tf2_msgs/msg/TFMessage \(cdr\), drawn by a twin, not read", said)
+    assert f"  {POSES} " not in said
+    assert "no session.yaml to propose" in said
+    (tmp_path / "session.yaml").write_text(
+        "frame: {up: [0, 0, 1], unit: m}\nbase: base\ntopics: {commands: /tendons/command}\n"
+        "trials: [{file: run.mcap, experiment: motion, split: identify}]\n"
+    )
+    with open(path, "rb") as file:
+        kept = [one for one in make_reader(file).iter_messages() if not one[1].topic.startswith("/headset/")]
+    merged(path, kept)
+    with pytest.raises(InputError, match=f"no pose topic, found .*{TWIN}"):
+        open_log(path, read_session(tmp_path))
+    logbook = read_logbook(path)
+    assert logbook.poses is None
+    assert logbook.twin.names[-1] == "unit_08"
+    assert read_recording(path).tip.names == ("tip.x.twin", "tip.y.twin", "tip.z.twin")
+
+
+def merged(path, messages):
+    """A log of all of them, (schema, channel, message), in the order of their log times."""
+    with open(path, "wb") as file:
+        writer, channels = Writer(file), {}
+        writer.start(profile="ros2")
+        for schema, channel, message in sorted(messages, key=lambda one: one[2].log_time):
+            if channel.topic not in channels:
+                known = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, known)
+            writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
+        writer.finish()
+
+
+def test_with_motion_capture_merged_into_it_a_real_session_is_one_to_identify_from(tmp_path, capsys):
+    """Its twin did something else: no part of that is taken."""
+    truth = motion_truth()
+    twin = replace(truth, positions=truth.positions[::-1] + 1.0)
+    told_of(tmp_path / "run.mcap", twin, hardware=REAL)
+    plain = instruments(
+        position_noise_mm=0.0, orientation_noise_deg=0.0, occlusions_per_s=0.0, dropped_frames=0.0, outliers=0.0,
+        stamp_jitter_ms=0.0, epoch_s=ZERO // 10**9,
+    )  # fmt: skip
+    record(tmp_path / "seen", [truth], plain)
+    messages = []
+    for path in (tmp_path / "run.mcap", tmp_path / "seen/motion_identify.mcap"):
+        with open(path, "rb") as file:
+            found = list(make_reader(file).iter_messages())
+        messages += [one for one in found if path.name == "run.mcap" or one[1].topic == "/rigid_bodies"]
+    (tmp_path / "merged").mkdir()
+    merged(tmp_path / "merged/run.mcap", messages)
+    assert inspect([str(tmp_path / "merged")]) == 0
+    proposed = capsys.readouterr().out.split("Proposed session.yaml:\n")[1]
+    topics = "{poses: /rigid_bodies, commands: /tendons/command, tendon_positions: /tendons/state}"
+    assert f"topics: {topics}" in proposed
+    (tmp_path / "merged/session.yaml").write_text(proposed)
+    session = read_session(tmp_path / "merged")
+    ((_, take, _),) = take_in(tmp_path / "merged", session, Limits(0.2, 0.3, 0.1, 1.0))
+    assert (take.segments, take.tendons) == (truth.segments, truth.tendons), take
+    far = np.linalg.norm(take.positions[:, -1] - take.base_positions, axis=1)
+    true = np.linalg.norm(truth.positions[::4, -1] - truth.base_position, axis=1)
+    there = np.isfinite(far)
+    assert there.sum() > 100
+    np.testing.assert_allclose(far[there], true[: len(far)][there], atol=1e-3)
+
+
+@pytest.mark.realtime
+def test_a_log_says_what_of_its_robot_is_real(log):
+    assert read_logbook(log).begin["hardware"] == "simulated"
+    found = hardware_of("fr3", "simulated", "", "", load_folder(Execution, PROJECT / "conf/execution"))
+    subject = subject_of(simulation(), found)
+    assert (subject.hardware, subject.poses) == (found.words(), TWIN)
+    assert subject_of(simulation()).poses == POSES
+
+
+@pytest.mark.realtime
+def test_events_tell_who_controlled_what_was_planned_and_how_it_ended(log):
+    events = read_logbook(log).events
+    kinds = [event["event"] for event in events]
+    for kind in ("begin", "came", "clock", "control", "request", "planned", "preview", "piece", "foreseen", "shown",
+                 "execute", "refused", "stop", "stopped", "left", "alignment", "world"):  # fmt: skip
+        assert kind in kinds, kind
+    modes = [mode for mode, _ in groupby(event["mode"] for event in events if event["event"] == "mode")]
+    assert modes[:8] == ["hold", "aim", "plan", "preview", "ready", "delay", "execute", "aim"]
+    assert modes[-1] == "stopped"
+    digests = {e["digest"] for e in events if e["event"] in ("shown", "execute")}
+    assert digests == {e["preview"]["digest"] for e in events if e["event"] == "preview"}
+    assert [e["robot"]["mode"] for e in events if e["event"] == "robot"] == ["idle", "running", "done"]
+
+
+@pytest.mark.realtime
+def test_others_read_it_as_ros_2(log):
+    with open(log, "rb") as file:
+        found = {}
+        for _, channel, message, ros in make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages():
+            found.setdefault(channel.topic, []).append((message, ros))
+    _, first = found[POSES][0]
+    assert [one.child_frame_id for one in first.transforms] == list(NAMES)
+    assert first.transforms[0].header.frame_id == "rigid_base"
+    assert first.transforms[0].transform.translation.z == 3.0
+    _, fixed = found["/tf_static"][0]
+    assert (fixed.transforms[0].header.frame_id, fixed.transforms[0].child_frame_id) == ("rigid_base", "reference")
+    message, joints = found["/joints/command"][0]
+    np.testing.assert_allclose(joints.position, START)
+    assert message.log_time // 10**9 >= ZERO // 10**9
+    pulls = np.array([ros.position for _, ros in found["/tendons/command"]])
+    np.testing.assert_allclose(pulls[0], 0.0, atol=1e-12)
+    assert pulls.max() > 0.01  # a cable that is wound in is a pull of more than 0
+    _, held = found["/headset/left"][0]
+    assert held.header.frame_id == "rigid_base"  # hands of a browser
+    assert found[EVENTS][0][1].data.startswith('{"event":"begin"')
+
+
+def test_poses_that_are_no_newer_are_not_told_twice_and_what_is_not_there_is_left_out(tmp_path):
+    journal = Written(tmp_path / "run.mcap")
+    poses = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1))
+    poses[0] = np.nan
+    for at in (1.0, 1.0, 0.9, 1.1):
+        journal.standing(Standing(at, 0.0, START, STRAIGHT, poses[0], poses))
+    operator = Operator()
+    journal.step(0.1, operator.given, operator.step())
+    journal.close()
+    found = read_logbook(tmp_path / "run.mcap").poses
+    assert found.names == NAMES[1:]
+    np.testing.assert_allclose(1e-9 * (found.stamps - ZERO), [1.0, 1.1], atol=1e-6)
+
+
+def test_what_is_sent_and_what_is_measured_are_told_apart_and_what_is_not_measured_is_left_out(tmp_path):
+    journal = Written(tmp_path / "run.mcap")
+    poses, unknown = np.tile([1.0, 2.0, 3.0, 1.0, 0.0, 0.0, 0.0], (3, 1)), np.full(3, np.nan)
+    journal.standing(Standing(1.0, 0.0, START, STRAIGHT, poses[0], poses, START + 0.01, unknown))
+    journal.close()
+    with open(tmp_path / "run.mcap", "rb") as file:
+        found = make_reader(file, decoder_factories=[DecoderFactory()]).iter_decoded_messages()
+        told = {channel.topic: ros for _, channel, _, ros in found}
+    np.testing.assert_allclose(told["/joints/command"].position, START)
+    np.testing.assert_allclose(told["/joint_states"].position, START + 0.01)
+    assert "/tendons/command" in told
+    assert "/tendons/state" not in told
+
+
+# --- the process
+
+
+def until(happens, seconds=20.0):
+    end = time.monotonic() + seconds
+    while not happens():
+        assert time.monotonic() < end, "it did not happen"
+        time.sleep(0.01)
+
+
+@pytest.mark.realtime
+def test_a_process_that_is_killed_loses_less_than_a_second_and_says_so(tmp_path):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, PERIOD)
+    journal.event("tick", number=0)
+    until(lambda: path.exists() and path.stat().st_size > 500)
+    told = fed(journal, 1.5)
+    killed = time.monotonic()
+    os.kill(journal.pid, signal.SIGKILL)
+    journal.event("tick", number=-1)
+    until(lambda: (journal.event("tick", number=-1), journal.fault)[1])
+    assert journal.fault == "log: run.mcap: its process has ended; nothing is executed"
+    numbers, damage = ticks(path)
+    assert numbers == list(range(len(numbers)))  # none is missing in between
+    assert damage != []
+    assert killed - told[numbers[-1]] < 1.0
+    journal.close()
+
+
+SESSION = """
+import sys, time
+from pathlib import Path
+if __name__ == "__main__":
+    from trunkline.ar.session.log_writer import NOTHING, JournalProcess
+    journal = JournalProcess(Path(sys.argv[1]), NOTHING, 60.0)
+    for number in range(1, 301):
+        journal.event("tick", number=number)
+    while journal._waiting:
+        time.sleep(0.01)
+    time.sleep(0.1)
+    print("told", flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.realtime
+def test_a_process_that_hangs_is_a_fault_before_more_than_a_second_is_lost(tmp_path):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, 0.5)
+    journal.event("tick", number=0)
+    until(lambda: path.exists() and path.stat().st_size > 500)
+    told = fed(journal, 1.2)
+    os.kill(journal.pid, signal.SIGSTOP)
+    stopped, number, longest = time.monotonic(), len(told), 0.0
+    while not journal.fault:
+        assert time.monotonic() - stopped < 10.0
+        told.append(time.monotonic())
+        number += 1
+        before = time.thread_time()
+        journal.event("tick", number=number)
+        longest = max(longest, time.thread_time() - before)
+        time.sleep(0.01)
+    seen = time.monotonic()
+    assert journal.fault == "log: run.mcap: its process does not answer for 1 s; nothing is executed"
+    os.kill(journal.pid, signal.SIGKILL)
+    journal.close()
+    assert journal.fault == "log: run.mcap: its process does not answer for 1 s; nothing is executed"
+    numbers, damage = ticks(path)
+    assert numbers == list(range(len(numbers)))
+    assert seen - told[numbers[-1]] < 1.5  # 1.05, but for a busy machine
+    assert longest < 0.05
+
+
+@pytest.mark.realtime
+def test_a_process_that_stalls_for_a_moment_is_no_fault(tmp_path):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, 0.5)
+    journal.await_begun()
+    told = len(fed(journal, 0.7))
+    os.kill(journal.pid, signal.SIGSTOP)
+    time.sleep(0.3)
+    journal.event("tick", number=told + 1)
+    os.kill(journal.pid, signal.SIGCONT)
+    time.sleep(2.0)  # nothing waits, so nothing need be written
+    assert not journal.fault
+    journal.event("tick", number=told + 2)
+    journal.close()
+    assert ticks(path) == (list(range(1, told + 3)), [])
+
+
+STILL = """
+import sys, time
+from pathlib import Path
+from tests.support.ticking import fed
+if __name__ == "__main__":
+    from trunkline.ar.session.log_writer import NOTHING, JournalProcess
+    journal = JournalProcess(Path(sys.argv[1]), NOTHING, 0.5)
+    journal.await_begun()
+    print(journal.pid, flush=True)
+    fed(journal, 4.0)
+    print(repr(journal.fault), flush=True)
+    journal.close()
+"""
+
+
+@pytest.mark.realtime
+def test_a_machine_that_stands_still_as_a_whole_is_no_fault(tmp_path):
+    script = tmp_path / "session.py"
+    script.write_text(STILL)
+    session = subprocess.Popen([sys.executable, str(script), str(tmp_path / "run.mcap")], cwd=ROOT, text=True,
+                               stdout=subprocess.PIPE, env=os.environ | {"PYTHONPATH": str(ROOT)})  # fmt: skip
+    both = [int(session.stdout.readline()), session.pid]
+    time.sleep(0.5)
+    for pid in both:
+        os.kill(pid, signal.SIGSTOP)
+    time.sleep(2.0)
+    for pid in reversed(both):
+        os.kill(pid, signal.SIGCONT)
+    assert session.stdout.readline() == "''\n"
+    assert session.wait(20.0) == 0
+
+
+def test_a_session_waits_until_its_log_has_begun(tmp_path, monkeypatch):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, PERIOD)
+    journal.await_begun()
+    assert path.exists()
+    journal.close()
+    monkeypatch.setattr("trunkline.ar.session.log_writer.BEGINS", 0.3)
+    monkeypatch.setattr("trunkline.ar.session.log_writer.PATIENCE", 0.1)
+    hangs = JournalProcess(tmp_path / "other.mcap", SUBJECT, PERIOD, stuck)
+    hangs.await_begun()
+    assert hangs.fault == "log: other.mcap: its process has not begun for 0.3 s; nothing is executed"
+    hangs.close()
+
+
+@pytest.mark.realtime
+def test_where_the_session_itself_is_killed_its_log_is_ended_as_it_should(tmp_path):
+    path, script = tmp_path / "run.mcap", tmp_path / "session.py"
+    script.write_text(SESSION)
+    session = subprocess.Popen([sys.executable, str(script), str(path)], cwd=ROOT, stdout=subprocess.PIPE,
+                               env=os.environ | {"PYTHONPATH": str(ROOT)})  # fmt: skip
+    assert session.stdout.readline() == b"told\n"
+    session.kill()
+    session.wait()
+    until(lambda: path.is_file() and path.stat().st_size > 0 and ticks(path) == (list(range(1, 301)), []))
+
+
+def test_a_session_that_ends_leaves_a_whole_file(tmp_path):
+    journal = JournalProcess(tmp_path / "ended.mcap", SUBJECT, PERIOD)
+    told = len(fed(journal, 0.2))
+    journal.close()
+    numbers, damage = ticks(tmp_path / "ended.mcap")
+    assert (numbers, damage) == (list(range(1, told + 1)), [])
+    assert not journal.fault
+
+
+@pytest.mark.realtime
+@pytest.mark.parametrize("opened", [full, filling])
+def test_a_full_disk_is_said_in_one_line_and_what_was_written_stays(tmp_path, opened):
+    path = tmp_path / "run.mcap"
+    journal = JournalProcess(path, SUBJECT, PERIOD, opened)
+    numbers = count(1)
+
+    def fails():
+        journal.event("tick", number=next(numbers))
+        return journal.fault
+
+    until(fails)
+    assert journal.fault == "log: run.mcap: no space left on device; nothing is executed"
+    journal.close()
+    if opened is filling:
+        found, damage = ticks(path)
+        assert found == list(range(1, len(found) + 1))
+        assert len(found) > 10
+        assert damage != []
+
+
+@pytest.mark.realtime
+def test_a_disk_that_does_not_answer_delays_nobody(tmp_path, monkeypatch):
+    monkeypatch.setattr("trunkline.ar.session.log_writer.MOST", 200)
+    monkeypatch.setattr("trunkline.ar.session.log_writer.PATIENCE", 0.1)
+    journal = JournalProcess(tmp_path / "run.mcap", SUBJECT, PERIOD, stuck)
+    longest = 0.0
+    gc.disable()  # a collection of all that the tests have loaded is not the journal's
+    for number in range(20_000):
+        before = time.thread_time()
+        journal.event("tick", number=number, filler="x" * 1000)
+        longest = max(longest, time.thread_time() - before)
+        if journal.fault:
+            break
+    gc.enable()
+    assert journal.fault == "log: run.mcap: the disk does not keep up; nothing is executed"
+    assert longest < 0.1
+    journal.close()
+
+
+class Failing(Journal):
+    fault = ""
+
+
+@pytest.mark.realtime
+def test_where_the_log_ends_nothing_new_is_executed_and_all_are_told():
+    async def session():
+        journal = Failing()
+        async with laid(journal=journal) as here:
+            guest, watcher = await controlling(here), await here.come()
+            state = await asked(here, guest)
+            journal.fault = "log: run.mcap: no space left on device; nothing is executed"
+            await asyncio.sleep(0.4)
+            await guest.say(type="shown", digest=state["preview"])
+            await guest.hears("state", mode="ready")
+            assert (await watcher.hears("state", mode="ready"))["notice"].endswith(journal.fault)
+            kept = here.robot.robot.joints.copy()
+            guest.right = grips(TIP, trigger=1.0)
+            await guest.hears("state", mode="stopped")
+            assert journal.fault in (await watcher.hears("state", mode="stopped"))["notice"]
+            assert here.log.count(journal.fault) == 1
+            np.testing.assert_array_equal(here.robot.robot.joints, kept)
+
+    asyncio.run(session())
+
+
+@pytest.mark.realtime
+def test_where_the_log_ends_a_robot_under_way_holds():
+    async def session():
+        journal = Failing()
+        async with laid(journal=journal) as here:
+            guest = await controlling(here)
+            await executing(here, guest)
+            await asyncio.sleep(0.2)
+            journal.fault = "log: run.mcap: no space left on device; nothing is executed"
+            await guest.hears("state", mode="stopped", robot="idle")
+            assert here.robot.stops
+
+    asyncio.run(session())
+
+
+def test_a_folder_that_cannot_be_is_one_line(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="journal.folder: .*file/logs: not a directory"):
+        new_path(tmp_path / "file/logs")
+    assert new_path(tmp_path / "logs").parent.is_dir()
+
+
+def test_a_lost_alignment_is_told_and_none_is_written_for_it(tmp_path):
+    journal = Written(tmp_path / "run.mcap")
+    journal.alignment(Pose((1.0, 2.0, 3.0), (1.0, 0.0, 0.0, 0.0)))
+    journal.event("alignment", pose=None)
+    journal.close()
+    with open(tmp_path / "run.mcap", "rb") as file:
+        topics = [c.topic for _, c, _ in make_reader(file).iter_messages()]
+    assert sorted(topics) == [EVENTS, "/tf_static"]

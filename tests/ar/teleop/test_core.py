@@ -1,0 +1,192 @@
+"""The core: the same inputs give the same intents, rays and presses do what they say, and nothing is clamped
+silently."""
+
+import math
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tests.support.operator import DT, FORWARD, Everywhere, Operator, config
+from trunkline.ar.teleop.messages import Input, Intent, from_json, to_json
+from trunkline.ar.teleop.one_euro import OneEuro
+from trunkline.ar.teleop.targets import tilted
+from trunkline.ar.teleop.tracked_controller import ray_length
+from trunkline.ar.teleop.vectors import DOWN
+from trunkline.errors import InputError
+from trunkline.frames import wxyz_from_rotation
+
+REPLAY = """
+import sys
+from tests.support.operator import Operator, DT
+from trunkline.ar.teleop.messages import Input, from_json, to_json
+operator = Operator()
+state = operator.core.start()
+for line in sys.stdin.buffer:
+    state, intent = operator.core.step(state, from_json(Input, line), DT)
+    sys.stdout.buffer.write(to_json(intent) + b"\\n")
+"""
+
+
+def trembling() -> Operator:
+    """All modes once, by a hand that trembles, with faults among it."""
+    operator, rng = Operator(), np.random.default_rng(0)
+    operator.to("execute")
+    for i in range(200):
+        noise = lambda: tuple(map(float, rng.normal(scale=0.01, size=3)))  # noqa: E731
+        stick = (0.0, float(rng.uniform(-1, 1)))
+        operator.step(
+            left={"position": noise() if i % 50 else (float("nan"), 0.0, 0.0), "stick": stick, "grip": i % 70 > 30},
+            right={"position": noise(), "grip": i % 70 > 30, "trigger": i % 20 == 0},
+        )
+    return operator
+
+
+def test_the_same_inputs_give_the_same_intents_byte_for_byte_also_elsewhere():
+    operator = trembling()
+    recorded = b"".join(to_json(given) + b"\n" for given in operator.inputs)
+    told = subprocess.run([sys.executable, "-c", REPLAY], input=recorded, capture_output=True, check=True).stdout
+    assert told == b"".join(to_json(intent) + b"\n" for intent in operator.intents)
+    assert len({intent.mode for intent in operator.intents}) >= 6
+
+
+def test_step_changes_neither_its_state_nor_anything_else():
+    operator = Operator()
+    operator.to("aim")
+    state, given = operator.state, operator.given
+    given = replace(given, stamp=given.stamp + DT)
+    first, again = operator.core.step(state, given, DT), operator.core.step(state, given, DT)
+    assert first == again
+    assert state is operator.state
+
+
+def test_messages_come_back_from_json_exactly():
+    operator = trembling()
+    for given, intent in zip(operator.inputs, operator.intents, strict=True):
+        assert to_json(from_json(Input, to_json(given))) == to_json(given)
+        assert from_json(Intent, to_json(intent)) == intent
+    missing = next(given for given in operator.inputs if math.isnan(given.left.position[0]))
+    assert math.isnan(from_json(Input, to_json(missing)).left.position[0])
+
+
+@pytest.mark.parametrize(("text", "line"), [("{}", "Input: stamp: Field required"), ("[", "Input: the whole: Invalid")])
+def test_what_is_no_message_is_one_line(text, line):
+    with pytest.raises(InputError, match=line):
+        from_json(Input, text)
+
+
+def test_targets_are_at_the_ends_of_the_rays_in_the_base_frame():
+    operator = Operator()
+    operator.wait(0.5)
+    turn = Rotation.from_euler("y", 30, degrees=True)
+    pose = {"quaternion": tuple(map(float, wxyz_from_rotation(turn)))}
+    intent = operator.wait(3.0, left={"grip": True, **pose}, right={"grip": True})
+    alignment = operator.given.alignment
+    end = np.array(operator.given.left.position) + turn.apply([0, 0, -0.6])
+    expected = alignment.position + Rotation.from_quat(alignment.quaternion, scalar_first=True).apply(end)
+    np.testing.assert_allclose(intent.targets.rigid.position, expected, atol=1e-6)
+    np.testing.assert_allclose(intent.rays[0], expected, atol=1e-6)
+
+
+def test_stick_makes_the_ray_longer_at_its_rate_and_to_its_limits():
+    rays = config().core.rays
+    assert ray_length(1.0, 1.0, 0.5, rays) == pytest.approx(1.0 + 0.5 * rays.rate)
+    assert ray_length(1.0, -1.0, 0.5, rays) == pytest.approx(1.0 - 0.5 * rays.rate)
+    assert ray_length(1.0, rays.dead_zone, 0.5, rays) == 1.0
+    half = (1 + rays.dead_zone) / 2
+    assert ray_length(1.0, half, 0.5, rays) == pytest.approx(1.0 + 0.25 * rays.rate)
+    assert ray_length(1.0, 1.0, 100.0, rays) == rays.longest
+    assert ray_length(1.0, -1.0, 100.0, rays) == rays.shortest
+
+
+def test_clutch_a_target_stays_while_its_grip_is_let_go():
+    operator = Operator()
+    operator.wait(0.5)
+    kept = operator.wait(0.3, left={"grip": True}, right={"grip": True}).targets
+    operator.wait(0.1, left={"grip": False})
+    intent = operator.wait(0.5, left={"position": (0.5, 0.5, 0.5)})
+    assert intent.targets.rigid.position == kept.rigid.position
+    assert intent.rays[0] != intent.targets.rigid.position
+    intent = operator.wait(0.5, left={"grip": True})
+    np.testing.assert_allclose(intent.rays[0], intent.targets.rigid.position)
+
+
+def kick(seconds):
+    """How far the trigger has turned the ray, rad, so long before it is pressed: 0.6° over the last 80 ms."""
+    return np.radians(0.6) * min(max(1 - seconds / 0.08, 0.0), 1.0)
+
+
+def test_a_press_takes_the_pose_from_before_the_triggers_jerk():
+    still = OneEuro(1.0, 20.0, 1.0)
+    errors = {}
+    for look_back in (0.0, 0.1):
+        operator = Operator(look_back=look_back, position_filter=still, orientation_filter=still)
+        operator.wait(0.5)
+        wanted = operator.wait(0.5, left={"grip": True}, right={"grip": True}).targets.rigid.position
+        for i in range(12, -1, -1):
+            turn = Rotation.from_rotvec([kick(i * DT), 0, 0])
+            pose = {"quaternion": tuple(map(float, wxyz_from_rotation(turn)))}
+            intent = operator.step(left={**pose, "trigger": i == 0})
+        assert intent.mode == "plan"
+        errors[look_back] = np.linalg.norm(np.array(intent.request.targets.rigid.position) - wanted)
+    assert errors[0.1] < 1e-4
+    assert errors[0.0] > 5 * errors[0.1]
+    assert errors[0.0] > 1e-3
+
+
+def test_tilting_the_controller_aligns_the_end_effector_with_it():
+    operator = Operator()
+    operator.wait(0.5)
+    operator.wait(0.3, left={"grip": True}, right={"grip": True})
+    kept = operator.intents[-1].targets
+    tilt = Rotation.from_euler("z", 30, degrees=True)  # about the ray: its end stays where it is
+    pose = {"quaternion": tuple(map(float, wxyz_from_rotation(tilt)))}
+    operator.step(left={"primary": True})
+    intent = operator.wait(3.0, left=pose)
+    turn = Rotation.from_quat(operator.given.alignment.quaternion, scalar_first=True) * tilt
+    np.testing.assert_allclose(intent.targets.pointing, turn.apply([0, -1, 0]), atol=1e-6)
+    np.testing.assert_allclose(intent.targets.rigid.position, kept.rigid.position, atol=1e-6)
+    assert not intent.targets.tilt_limited
+    assert np.arccos(-intent.targets.pointing[2]) == pytest.approx(np.radians(30), abs=1e-6)
+
+
+def test_tilt_ends_at_its_limit_and_is_marked_there():
+    orientation = config().core.orientation
+    toward = (math.sin(2.0), 0.0, -math.cos(2.0))
+    pointing, limited = tilted(DOWN, toward, 100.0, orientation)
+    assert limited
+    expected = (math.sin(orientation.most_tilt), 0.0, -math.cos(orientation.most_tilt))
+    np.testing.assert_allclose(pointing, expected, atol=1e-12)
+    slow, _ = tilted(DOWN, toward, 0.1, orientation)
+    assert math.acos(-slow[2]) == pytest.approx(0.1 * orientation.rate)
+
+
+def test_outside_the_nearest_point_is_offered_and_taken_only_when_asked():
+    operator = Operator(reach=Everywhere(1.0))
+    operator.wait(0.5)
+    intent = operator.wait(0.3, left={"grip": True}, right={"grip": True})
+    target = intent.targets.rigid
+    assert target.reach == "outside"
+    assert target.outside_by == pytest.approx(np.linalg.norm(target.position) - 1.0)
+    np.testing.assert_allclose(target.position, intent.rays[0])  # where the user put it
+    intent = operator.step(left={"trigger": True})
+    assert intent.mode == "aim"
+    assert intent.notice == "rigid target is 281 mm out of reach; primary button takes the nearest point that is within"
+    offer = intent.targets.rigid.offer
+    operator.step(left={"trigger": False, "grip": False})
+    operator.step(left={"primary": True})
+    intent = operator.wait(0.2, left={"primary": False})
+    assert intent.targets.rigid.position == offer
+    assert operator.step(right={"trigger": True}).mode == "plan"
+
+
+def test_hands_are_chosen_by_the_settings():
+    one, other = Operator(), Operator(rigid_hand="right")
+    for operator in (one, other):
+        operator.wait(0.5)
+        operator.wait(0.3, left={"grip": True}, right={"grip": True})
+    assert one.intents[-1].targets.rigid.position == other.intents[-1].targets.tip.position
+    assert one.given.left.quaternion == FORWARD

@@ -1,0 +1,67 @@
+"""Commands for a tip target: the network asked in its own form, and its answer corrected by the arm's statics."""
+
+import numpy as np
+import pytest
+
+from tests.support.bent_chain import hardening_stump
+from trunkline.ar.teleop.tendons import Network, bend
+from trunkline.errors import InputError
+from trunkline.frames import STANDARD_GRAVITY, downwards
+from trunkline.kinematics.ik.inputs import DIRECTION
+from trunkline.model.simulation.rest import settle
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import equilibrium
+
+
+@pytest.fixture(scope="module")
+def chain():
+    return read_chain(hardening_stump())
+
+
+def poor(chain, gravity, asked=None):
+    """A network of directions that answers half of the pull that it takes, and foresees what was asked for."""
+    tensions = np.zeros((1, chain.tendons))
+    tensions[0, 0] = 0.5 * chain.max_tension[0]
+    held = equilibrium(chain, 0.5 * tensions, STANDARD_GRAVITY * gravity)
+
+    def ask(poses):
+        if asked is not None:
+            asked.append(poses)
+        rows = len(poses)
+        return {
+            "commands": np.tile(held.commands, (rows, 1)),
+            "lengths": np.tile(held.lengths, (rows, 1)),
+            "tip": poses[:, -7:-4],
+        }
+
+    target = equilibrium(chain, tensions, STANDARD_GRAVITY * gravity).position[0]
+    return Network(ask, len(DIRECTION)), tuple(map(float, target)), held.position[0]
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 1.0, 4.0])
+def test_statics_bring_the_tip_where_a_poor_network_leaves_it_short(chain, azimuth):
+    down = downwards(0.6, azimuth)
+    network, target, short = poor(chain, down)
+    assert np.linalg.norm(short - target) > 0.02 * chain.length
+    found = bend(network, target, tuple(map(float, down)), 0.02, chain)
+    np.testing.assert_allclose(found.tip, target, atol=1e-4)
+    rest = settle(hardening_stump(), found.commands[None], STANDARD_GRAVITY * down)
+    np.testing.assert_allclose(rest.position[0], found.tip, atol=5e-4)
+
+
+def test_a_network_of_directions_is_told_gravity_as_it_is(chain):
+    asked = []
+    down = downwards(0.6, 1.0)
+    network, target, _ = poor(chain, down, asked)
+    bend(network, target, tuple(map(float, down)), 0.02)
+    (poses,) = asked
+    assert poses.shape[1] == len(DIRECTION)
+    np.testing.assert_allclose(poses[:, :3], np.tile(down, (len(poses), 1)))
+    np.testing.assert_allclose(np.linalg.norm(poses[:, 6:], axis=1), 1)
+
+
+def test_what_the_statics_cannot_reach_is_refused_though_the_network_foresees_it(chain):
+    down = downwards(0.3, 1.0)
+    network, _, _ = poor(chain, down)
+    with pytest.raises(InputError, match="out of reach: the soft arm's tip comes no nearer to its target than"):
+        bend(network, (2 * chain.length, 0.0, 0.0), tuple(map(float, down)), 0.02, chain)

@@ -1,0 +1,311 @@
+"""Work spread over a real cluster of two processes: the same bits, whoever dies on the way; mistakes are one line."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from distributed import LocalCluster
+
+from rehearsal import runs
+from rehearsal.experiments.result import Result
+from tests.identification.test_stage import settings, truth_of
+from tests.support.bent_chain import hardening_stump
+from tests.support.matched_plant import FRAME, begin_project, curl, release, segments_of, small_model, tilt
+from tests.support.small_arm import small_spec
+from trunkline.compute import cluster as workers
+from trunkline.compute import scheduler
+from trunkline.compute.cluster import VARIABLE
+from trunkline.compute.environment import likeness_for
+from trunkline.compute.scheduler import arriving, pieces, spread
+from trunkline.errors import InputError
+from trunkline.identification.fit.problem import Bounds, Problem
+from trunkline.identification.parameters.parameters import candidate_fields
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.identification.simulate.loss import LossWeights
+from trunkline.identification.simulate.population import Population
+from trunkline.kinematics.dataset import sampling
+from trunkline.kinematics.dataset.deviation import mujoco_deviation
+from trunkline.kinematics.dataset.table import sample_table
+from trunkline.kinematics.panda import labels
+from trunkline.model.arm.guide_holes import Holes, add_holes
+from trunkline.model.statics.chain import read_chain
+from trunkline.pipeline.identify import CAD_MODEL, run
+from trunkline.pipeline.stage import output_folder
+from trunkline.recordings.trials.trial import write_trials
+
+WEIGHTS = LossWeights(
+    delta_position=0.2, delta_velocity=2.0, epsilon=0.02, epsilon_velocity=0.002, weight_position=1.0,
+    weight_velocity=0.03,
+)  # fmt: skip
+DOWN = np.array([0.5, 0.0, -np.sqrt(0.75)])
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs="CRITICAL"
+    ) as cluster:
+        yield cluster
+        scheduler._connected.cache_clear()
+
+
+@pytest.fixture
+def spreading(cluster, monkeypatch):
+    """Call it, and from then on work goes to the cluster."""
+    return lambda: monkeypatch.setenv(VARIABLE, cluster.scheduler_address)
+
+
+def same(one, other) -> bool:
+    return len(one) == len(other) and all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, other, strict=True))
+
+
+def rubbing_model():
+    """Cables rub, winches wind at a limited rate and with backlash: all that goes on between two steps."""
+    spec = small_spec(4, rate_limit=0.3, backlash=1e-3)
+    spec.option.timestep = FRAME / 8
+    add_holes(spec, Holes(0.1, 2))
+    return spec.compile()
+
+
+@pytest.fixture(scope="module")
+def trials():
+    """Experiments of one model: at rest, let go, drawn in, of several lengths; a load hangs from one."""
+    model, at_rest = rubbing_model(), small_model(4)
+    recorded = [
+        tilt(at_rest, 60), tilt(at_rest, 30), release(model, 0.25, frames=30), release(model, -0.2, frames=20),
+        curl(model, 40, frames=30), curl(model, 25, tendon=1, frames=16), curl(model, 30, tendon=2, frames=20),
+    ]  # fmt: skip
+    experiments = [prepare(trial, model, 437) for trial in recorded]
+    experiments[4] = replace(experiments[4], load=0.02, lead=0.6 / 120)
+    return model, experiments
+
+
+def as_problem(model, experiments) -> Problem:
+    bounds = {"damping": Bounds(1e-3, 1.0), "stiffness": Bounds(0.1, 1e3), "rate_limit": Bounds(0.02, 2.0)}
+    return Problem(model, experiments, segments_of(model), bounds, "positions", WEIGHTS)
+
+
+@pytest.mark.parametrize("count", [1, 3, 11])
+def test_candidates_times_trials_are_the_same_bits(trials, spreading, count):
+    """Cut into trials, into both, into candidates."""
+    here, there = as_problem(*trials), as_problem(*trials)
+    vectors = here.start() + np.linspace(-0.2, 0.2, count)[:, None]
+    near = vectors[0] + 0.01
+    alone, beside = here.residuals(vectors), here.residuals(vectors, near)
+    spreading()
+    assert same(there.residuals(vectors), alone)
+    assert same(there.residuals(vectors, near), beside)
+    assert (there.steps, there.evaluations, there.diverged) == (here.steps, here.evaluations, here.diverged)
+    assert same(there._last[1], here._last[1])
+
+
+def test_pieces_are_really_cut_and_done_elsewhere(trials, spreading):
+    model, experiments = trials
+    population = Population(model, experiments, segments_of(model))
+
+    def cut(count):
+        return population._cut({"dof_damping": np.arange(count)}, None)
+
+    (whole,) = cut(5)
+    assert whole.fields["dof_damping"].tolist() == [0, 1, 2, 3, 4]
+    assert sorted(whole.trials) == list(range(7)), "here, one piece"
+    spreading()
+    assert [pieces(most) for most in (0, 1, 3, 99)] == [1, 1, 3, 8]
+    assert sorted(piece.trials for piece in cut(1)) == [[0, 1], [2], [3], [4], [5], [6]], "each by itself, but at rest"
+    assert [len(piece.fields["dof_damping"]) for piece in cut(11)] == [1, 1, 2, 1, 1, 2, 1, 2]
+    pids = spread(_pid, list(range(8)))
+    assert os.getpid() not in pids
+    assert len(set(pids)) == 2
+
+
+def _pid(_, piece):
+    time.sleep(0.05)
+    return os.getpid()
+
+
+def test_a_candidate_that_diverges_does_so_there_too(spreading):
+    model = small_model()
+    experiments = [prepare(release(model, 0.25, frames=30), model, 30)]
+    fields = candidate_fields(model, {"stiffness": model.jnt_stiffness[:1] * [1.0, 1e5, 1.1]})
+    here = Population(model, experiments, segments_of(model)).simulate(fields)
+    spreading()
+    there = Population(model, experiments, segments_of(model)).simulate(fields)
+    assert there.diverged.tolist() == here.diverged.tolist() == [False, True, False]
+    assert same(there.positions, here.positions)
+
+
+def _run_or_die(given, piece):
+    population, flag = given
+    try:
+        flag.touch(exist_ok=False)
+    except FileExistsError:
+        return Population.run(population, piece)
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_worker_killed_on_the_way_changes_no_bit(trials, spreading, tmp_path, monkeypatch):
+    model, experiments = trials
+    fields = candidate_fields(model, {"damping": np.linspace(0.01, 0.05, 5)})
+    here = Population(model, experiments, segments_of(model)).simulate(fields)
+    spreading()
+    flag = tmp_path / "killed"
+    population = Population(model, experiments, segments_of(model))
+    monkeypatch.setattr(
+        "trunkline.identification.simulate.population.spread",
+        lambda work, pieces, given: spread(_run_or_die, pieces, (given, flag)),
+    )
+    there = population.simulate(fields)
+    assert flag.exists(), "one was killed"
+    assert same(there.positions, here.positions)
+
+
+def test_samples_of_forward_kinematics_are_the_same_bits(spreading, monkeypatch):
+    model = hardening_stump()
+    chain = read_chain(model)
+
+    def made():
+        rng = np.random.default_rng(3)
+        table, _ = sample_table(chain, DOWN, 60, 12, 10, rng)
+        return table, mujoco_deviation(model, chain, table, 9, rng)
+
+    here = made()
+    spreading()
+    monkeypatch.setattr(sampling, "LEAST", 20)
+    for one, other in zip(made(), here, strict=True):
+        assert one.equals(other)
+
+
+def test_labels_of_the_rigid_map_are_the_same(spreading, monkeypatch):
+    points = labels.draw_points(np.array([-0.9, -0.9, -0.3]), np.array([0.9, 0.9, 0.9]), 120, 5)
+    how = {"seed": 2, "starts": 6, "starts_in_doubt": 6, "mount_offset": 0.1, "avoid_collisions": True}
+    here = labels.label(points, **how)
+    assert 0.1 < here.mean() < 0.9
+    spreading()
+    monkeypatch.setattr(labels, "LEAST", 10)
+    assert np.array_equal(labels.label(points, **how), here)
+
+
+def test_rehearsals_arrive_from_workers_too(monkeypatch, tmp_path):
+    """In this process, so that the bench can be another one."""
+    monkeypatch.setenv("TRUNKLINE_THREADS", "1")
+    source, package = runs.Source("package", "code"), tmp_path / "package.tgz"
+    package.write_bytes(b"a package")
+    monkeypatch.setattr(runs, "bench_of", lambda file: file.read_bytes().decode())
+    monkeypatch.setattr(runs, "source_of", lambda file: source)
+    touched = lambda bench, run: (Result(run.experiment, run.seed, True, bench), 1.0)  # noqa: E731
+    monkeypatch.setattr(runs, "make_one", touched)
+    wanted = runs.wanted({"touch": 5}, 0)
+    with LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None) as cluster:
+        monkeypatch.setenv(VARIABLE, cluster.scheduler_address)
+        made = runs.make(wanted, package, source, tmp_path / "runs.csv", workers=1)
+        assert sorted(one.seed for one in made) == [0, 1, 2, 3, 4]
+        assert {one.cause for one in made} == {"a package"}
+        other = replace(source, code="other")
+        answers = iter([source, *[other] * 9])
+        monkeypatch.setattr(runs, "source_of", lambda file: next(answers))
+        with pytest.raises(InputError, match="found code and settings other, expected code as here"):
+            runs.make([runs.Run("touch", 9)], package, source, tmp_path / "runs.csv", workers=1)
+        assert len(runs.read_results(tmp_path / "runs.csv")) == 5
+        scheduler._connected(cluster.scheduler_address)._client.close()
+        scheduler._connected.cache_clear()
+
+
+def test_a_mistake_in_the_work_comes_back_as_it_is(spreading):
+    spreading()
+    with pytest.raises(InputError, match="trial 3: found nothing"):
+        spread(_mistaken, [1, 3])
+    assert spread(_mistaken, [1, 2]) == [1, 2], "and the workers go on"
+
+
+def _mistaken(_, piece):
+    if piece == 3:
+        raise InputError("trial 3: found nothing, expected something")
+    return piece
+
+
+@pytest.mark.parametrize("joined_late", [False, True])
+def test_a_worker_with_another_library_is_refused_in_one_line(spreading, monkeypatch, joined_late):
+    spreading()
+    real = likeness_for(_mistaken)
+    wanted = replace(real, parts=real.parts | {"mujoco": "9.9.9"})
+    monkeypatch.setattr(workers, "likeness_for", lambda _: wanted)
+    own = scheduler._cluster()
+    monkeypatch.setattr(own, "_alike", set())
+    if joined_late:
+        monkeypatch.setattr(own, "_check", lambda expected: None)
+    else:
+        monkeypatch.setattr(workers, "_do", None)  # no work is sent
+    told = rf"^{VARIABLE}: worker tcp://\S+: found mujoco {real.parts['mujoco']}, expected 9\.9\.9 as here$"
+    with pytest.raises(InputError, match=told):
+        spread(_mistaken, [1, 2])
+
+
+@pytest.mark.parametrize(
+    ("address", "told"),
+    [
+        ("tcp://127.0.0.1:9", "found no scheduler at tcp://127.0.0.1:9, expected one that answers"),
+        ("nonsense", "found 'nonsense', expected an address such as tcp://host:8786"),
+    ],
+)
+def test_a_stage_without_its_scheduler_ends_in_one_line_and_writes_nothing(monkeypatch, tmp_path, address, told):
+    monkeypatch.chdir(tmp_path)
+    model = begin_project(tmp_path, 4)
+    truth = truth_of(model, stiffness=0.7)
+    write_trials(tmp_path / "data/processed/filter", [tilt(truth, 60), tilt(truth, 75, "validate")])
+    monkeypatch.setenv(VARIABLE, address)
+    monkeypatch.setattr(workers, "CONNECTING", 1.0)
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(InputError, match=f"^{VARIABLE}: {told}$"):
+        run("identify_stiffness", settings(["static_tilt"], ["static_tilt"], {"stiffness": (1, 9)}), CAD_MODEL)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def _slowly(_, piece):
+    time.sleep(0.2)
+    return piece
+
+
+def _started(file: Path, *command: str) -> subprocess.Popen:
+    output = file.with_suffix(".log").open("w")
+    return subprocess.Popen([sys.executable, "-m", *command], stdout=output, stderr=output, start_new_session=True)
+
+
+def test_a_scheduler_that_goes_away_is_told_in_one_line(monkeypatch, tmp_path):
+    """A real one, with a worker as docs/cluster.md starts it; before the worker is there, that is told."""
+    file = tmp_path / "scheduler.json"
+    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file)]
+    processes = [_started(file, "distributed.cli.dask_scheduler", *options)]
+    try:
+        while not file.exists():
+            assert processes[0].poll() is None, file.with_suffix(".log").read_text()
+            time.sleep(0.1)
+        monkeypatch.setattr(workers, "CONNECTING", 5.0)
+        address = scheduler_address(file)
+        monkeypatch.setenv(VARIABLE, address)
+        with pytest.raises(InputError, match=f"^{VARIABLE}: found no workers at {address}, expected at least one$"):
+            spread(_slowly, [1])
+        monkeypatch.setattr(workers, "CONNECTING", 60.0)
+        worker = ["trunkline.compute.worker", address, "--nworkers", "1", "--no-nanny", "--no-dashboard"]
+        processes.append(_started(tmp_path / "worker", *worker, "--local-directory", str(tmp_path)))
+        rows = arriving(_slowly, list(range(100)))
+        kept = [next(rows)]
+        processes[0].kill()
+        with pytest.raises(InputError, match=f"the scheduler at {address} went away"), output_folder(tmp_path / "out"):
+            kept += rows
+        assert not (tmp_path / "out").exists()
+        assert kept
+    finally:
+        for process in processes:
+            process.kill()
+            process.wait()
+
+
+def scheduler_address(file: Path) -> str:
+    return json.loads(file.read_text())["address"]

@@ -1,0 +1,140 @@
+"""Commands as a user sends them: exact ones bring MuJoCo's tip home, lengths sent in their place do not."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from trunkline.frames import gravity_in_base
+from trunkline.kinematics.ik import as_controls
+from trunkline.kinematics.ik.as_controls import AsControls, draw_targets, driven, score, settled
+from trunkline.kinematics.ik.refine import polish
+from trunkline.model.simulation.drive import drive
+
+ANGLES = np.radians([[0.0], [60.0]])
+
+
+@pytest.fixture(scope="module")
+def targets(model, chain):
+    found = draw_targets(model, chain, ANGLES, np.full(3, 0.01), 12, np.random.default_rng(0)).targets
+    assert len(found) >= 6
+    return found
+
+
+def test_targets_that_are_left_out_are_counted(model, chain, targets, monkeypatch):
+    def drawn():
+        return draw_targets(model, chain, ANGLES, np.full(3, 0.01), 12, np.random.default_rng(0))
+
+    assert drawn().counts()["targets"] == len(targets)
+    assert sum(drawn().counts()["left_out"].values()) == 12 - len(targets)
+    rest_as_it_is = as_controls.settle
+
+    def settled_but_three(*arguments):
+        found = rest_as_it_is(*arguments)
+        found.rested[:] = np.arange(12) >= 3
+        found.tensions[2:7] = chain.max_tension
+        found.tensions[7:] = 0.0
+        return found
+
+    monkeypatch.setattr(as_controls, "settle", settled_but_three)
+    assert drawn().counts() == {"targets": 5, "left_out": {"near_limit": 4, "unrested": 3}}
+
+
+def exact(chain, wrong: str | None = None):
+    """What a perfect network would answer, of the statics; with `wrong`, lengths for commands."""
+
+    def ask(poses):
+        first = np.tile(chain.straight_lengths, (len(poses), 1))
+        found = polish(chain, poses, first, steps=30)
+        commands = found.lengths if wrong else found.commands
+        return {"commands": commands, "lengths": found.lengths, "tip": poses[:, 1:4], "doubtful": found.steps < 0}
+
+    return ask
+
+
+def test_exact_commands_settle_on_their_targets_and_lengths_do_not(model, chain, targets):
+    home = settled(model, exact(chain), targets)
+    assert home.rested.all()
+    assert home.position.max() < 2e-5
+    short = settled(model, exact(chain, "lengths"), targets)
+    assert np.median(short.position) > 10 * home.position.max()
+
+
+def test_a_drive_without_friction_ends_where_settling_does_and_says_when(model, chain, targets):
+    found = driven(model, exact(chain), targets, 20.0, friction=False)
+    assert found.rested.all()
+    assert found.position.max() < 3e-4
+    assert ((found.seconds > 0) & (found.seconds < 20)).all()
+
+
+def test_what_did_not_rest_is_counted_and_its_time_is_none(model, chain, targets):
+    found = driven(model, exact(chain), targets, 0.5)
+    metrics = found.metrics(chain.length)
+    assert metrics["rested"] == 0
+    assert found.time_to_rest() == {"median": None, "p95": None}
+
+
+def test_errors_beyond_one_percent_are_counted_with_what_was_said(model, chain, targets):
+    def careless(poses):
+        answer = exact(chain)(poses)
+        answer["commands"] = answer["commands"] + [0.0, 0.0, -0.01]
+        answer["doubtful"] = np.arange(len(poses)) == 0
+        return answer
+
+    found = settled(model, careless, targets)
+    metrics = found.metrics(chain.length)
+    far = found.position > 0.01 * chain.length
+    assert metrics["beyond_1pct"] == far.sum() > 1
+    assert metrics["beyond_1pct_unsaid"] == far[1:].sum()
+
+
+def test_the_score_has_the_rig_beside_the_model(model, chain):
+    asked = []
+
+    def rig(pulls, gravity):
+        asked.append(len(pulls))
+        return drive(model, chain.straight_lengths - pulls, gravity, 10.0).end + [1e-3, 0, 0]
+
+    settings = AsControls(targets=12, timed=8, sent=4, seconds=10.0)
+    rng = np.random.default_rng(0)
+    on_model, on_plant = score(model, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, rng, rig)
+    assert asked == [4]
+    assert on_model["targets"] + sum(on_model["left_out"].values()) == 12
+    taut = on_model["all_taut"]
+    assert taut["targets"] + sum(taut["left_out"].values()) == 12 // 8
+    assert on_plant["targets"] == 4
+    assert "rested" not in on_plant, "nobody looked whether the rig's arm was at rest"
+    assert set(on_plant["position_error_mm"]) == {"median", "p95", "max"}
+    assert {"beyond_1pct", "beyond_1pct_unsaid"} <= set(on_plant)
+    assert "rested" in on_model["friction"], "of the model it is known"
+    assert 0.5 < on_plant["position_error_mm"]["median"] < 1.5
+    assert on_model["frictionless"]["position_error_mm"]["max"] < 0.02
+    assert on_model["friction"]["dry_friction"]["tendons_n"] == model.tendon_frictionloss.max() > 0
+    assert score(model, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, rng)[1] is None
+
+
+def test_a_model_without_friction_is_driven_once_and_damped_at_last(model, chain, monkeypatch):
+    smooth, driven_arms = copy.copy(model), []
+    smooth.tendon_frictionloss[:] = 0
+
+    def counted(model, commands, *rest, **more):
+        driven_arms.append(len(commands))
+        return drive(model, commands, *rest, **more)
+
+    monkeypatch.setattr(as_controls, "drive", counted)
+    settings = AsControls(targets=12, timed=2, sent=4, seconds=10.0)
+    found, _ = score(smooth, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, np.random.default_rng(0))
+    assert driven_arms == [2, found["targets"] - 2]
+    friction = found["friction"]
+    assert friction["rested"] == 1.0
+    assert friction["position_error_mm"]["max"] < 0.02
+    assert friction["seconds_to_rest"] == found["frictionless"]["seconds_to_rest"]
+    assert friction["dry_friction"] == {
+        "tendons_n": 0.0, "joints_nm": 0.0, "sliders": 0, "capstan": 0.0, "backlash_m": 0.0,
+    }  # fmt: skip
+
+
+def test_tips_of_a_drive_are_in_the_base_frame(model, chain, targets):
+    answer = exact(chain)(targets)
+    found = drive(model, answer["commands"], gravity_in_base(targets[:, 0]), 20.0, friction=False)
+    np.testing.assert_allclose(found.end, targets[:, 1:4], atol=3e-4)

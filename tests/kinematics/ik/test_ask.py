@@ -1,0 +1,91 @@
+"""The network's file is asked for poses alone: whatever else is an error of one line."""
+
+import numpy as np
+import onnx
+import onnxruntime
+import pytest
+
+from trunkline.errors import InputError
+from trunkline.kinematics.ik.inference import ask
+from trunkline.kinematics.ik.network import InverseKinematics
+from trunkline.kinematics.ik.onnx import to_onnx
+
+POSE = np.array([[0.3, 0.1, 0.0, -0.4, 1.0, 0.0, 0.0, 0.0], [0.2, 0.1, 0.1, -0.3, 0.6, 0.0, -0.8, 0.0]])
+QUATERNION = slice(4, 8)
+
+
+def session(model) -> onnxruntime.InferenceSession:
+    return onnxruntime.InferenceSession(model.SerializeToString(), providers=["CPUExecutionProvider"])
+
+
+@pytest.fixture(scope="module")
+def model():
+    commands = np.array([[0.4, 0.5, 0.6], [0.5, 0.6, 0.7]])
+    return to_onnx(InverseKinematics(8, POSE, commands, commands + 0.01), ["a", "b", "c"], 0.05)
+
+
+@pytest.fixture(scope="module")
+def network(model):
+    return session(model)
+
+
+def changed(row, columns, value):
+    pose = POSE.copy()
+    pose[row, columns] = value
+    return pose
+
+
+def test_it_answers_as_the_file_does_for_either_sign_and_rounded_quaternions(network):
+    expected = network.run(None, {"pose": POSE.astype(np.float32)})[0]
+    np.testing.assert_array_equal(ask(network, POSE)["commands"], expected)
+    np.testing.assert_array_equal(ask(network, POSE * np.repeat([1, -1], 4))["commands"], expected)
+    assert ask(network, POSE.astype(np.float32).round(3).tolist())["commands"].shape == (2, 3)
+    assert ask(network, POSE[:0])["commands"].shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("poses", "problem"),
+    [
+        (changed(1, 2, np.nan), r"pose 1: y: found nan, expected a finite number"),
+        (changed(0, 0, np.inf), r"pose 0: theta_g: found inf, expected a finite number"),
+        (changed(0, 3, -1e300), r"pose 0: z: found -1e\+300, expected a finite number"),
+        (changed(0, 4, np.nan), r"pose 0: qw: found nan"),
+        (changed(1, QUATERNION, 0.0), r"pose 1: found a quaternion of length 0, expected unit length"),
+        (changed(0, QUATERNION, [2.0, 0, 0, 0]), r"pose 0: found a quaternion of length 2, expected unit length"),
+        (changed(0, QUATERNION, [0.99, 0, 0, 0]), r"pose 0: found a quaternion of length 0.99, expected unit length"),
+        (POSE[0], r"poses: found shape \(8,\), expected \(N, 8\): theta_g, x, y, z, qw, qx, qy, qz"),
+        (POSE[:, :7], r"poses: found shape \(2, 7\), expected \(N, 8\)"),
+        (POSE[None], r"poses: found shape \(1, 2, 8\)"),
+        ([["a"] * 8], r"poses: could not convert string to float.* expected numbers of shape \(N, 8\)"),
+        ([[1.0], [1.0, 2.0]], r"poses: .*expected numbers of shape \(N, 8\)"),
+    ],
+)
+def test_what_is_no_pose_is_an_error(network, poses, problem):
+    with pytest.raises(InputError, match=problem) as caught:
+        ask(network, poses)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_answer_that_is_not_finite_is_an_error(model):
+    broken = onnx.ModelProto.FromString(model.SerializeToString())
+    (middle,) = (tensor for tensor in broken.graph.initializer if tensor.name == "middle")
+    middle.CopyFrom(onnx.numpy_helper.from_array(np.array([np.nan, 0, 0], np.float32), "middle"))
+    with pytest.raises(InputError, match="pose 0: found commands .*nan"):
+        ask(session(broken), POSE)
+
+
+def test_a_network_of_somebody_else_is_an_error(model):
+    other = onnx.ModelProto.FromString(model.SerializeToString())
+    del other.metadata_props[:]
+    with pytest.raises(InputError, match="found no 'inputs' in the file's metadata"):
+        ask(session(other), POSE)
+
+
+def test_a_tip_foreseen_far_from_its_target_is_doubted(network):
+    tip = ask(network, POSE)["tip"].astype(float)
+    for distance, doubtful in ((0.01, False), (0.06, True)):
+        near = POSE.copy()
+        for _ in range(200):  # where the network foresees the tip that it is asked for, but for `distance`
+            near[:, 1:4] = ask(network, near)["tip"] + [0, 0, distance]
+        np.testing.assert_array_equal(ask(network, near)["doubtful"], doubtful)
+    assert np.isfinite(tip).all()

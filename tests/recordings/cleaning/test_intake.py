@@ -1,0 +1,259 @@
+"""What a session's logs become: good takes, repairs that are said, refusals that name the culprit."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from demo.instruments import measure
+from demo.recorder import write_log, write_session
+from tests.support.folders import SHARED, with_recordings
+from tests.support.sessions import SEGMENTS, curl_truth, instruments, record, release_truth, static_truth
+from trunkline.errors import InputError
+from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.clock_offset import align_clocks
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.filtering.filter import Filter, filter_take
+from trunkline.recordings.session.session import read_session
+
+LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+FILTER = Filter(120.0, 20.0, 4, 0.06, 8.0, "onset")
+REAL = SHARED / "asl_trunk"
+
+
+def taken(folder):
+    """[(take or error, findings)] of the session in `folder`."""
+    return [(take, findings) for _, take, findings in take_in(folder, read_session(folder), LIMITS)]
+
+
+def one_trial(folder, change, truth=None):
+    """The take, or error, of a session of one trial whose measurement went through `change`."""
+    m = measure(
+        truth or release_truth(),
+        instruments(occlusions_per_s=0, outliers=0),
+        np.random.default_rng(0),
+    )
+    m = change(m) or m
+    write_log(folder / f"{m.name}.mcap", m)
+    write_session(folder, [m], instruments())
+    ((take, findings),) = taken(folder)
+    return take, findings
+
+
+def edit_session(folder, old, new):
+    path = folder / "session.yaml"
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+
+
+def refused(result, message):
+    error, _ = result
+    assert isinstance(error, InputError), f"expected a refusal, found {error}"
+    assert "release_a.mcap" in str(error)
+    assert "\n" not in str(error)
+    assert re.search(message, str(error)), str(error)
+
+
+def test_takes_carry_what_was_measured(tmp_path):
+    (m,) = record(tmp_path, [curl_truth()], instruments())
+    ((take, findings),) = taken(tmp_path)
+    assert take.segments == SEGMENTS
+    assert findings.repairs == []
+    np.testing.assert_array_equal(take.positions, m.positions[:, 1:])
+    np.testing.assert_array_equal(take.base_positions, m.positions[:, 0])
+    np.testing.assert_allclose(
+        np.abs(np.nansum(take.quaternions * m.quaternions[:, 1:], axis=-1)).max(), 1
+    )
+    np.testing.assert_allclose(take.time, (m.frames - m.frames[0]) / 120, atol=2e-3)
+    assert np.abs(np.diff(take.time) * 120 - np.diff(m.frames)).max() < 1e-2, (
+        "the frame clock has no jitter"
+    )
+    np.testing.assert_array_equal(take.commands, m.commands[: len(take.commands)])
+    assert align_clocks([take], [findings], 0.1).by == "log times"
+    assert take.clock_offset == pytest.approx(-0.137, abs=0.5e-3)
+
+
+def test_stamp_and_log_clocks(tmp_path):
+    (m,) = record(tmp_path, [release_truth()], instruments())
+    edit_session(tmp_path, "clock: frame", "clock: stamp")
+    ((take, _),) = taken(tmp_path)
+    np.testing.assert_allclose(take.time, np.sort(m.stamps - m.stamps.min()) * 1e-9, atol=1e-9)
+    edit_session(tmp_path, "clock: stamp", "clock: log")
+    ((take, _),) = taken(tmp_path)
+    np.testing.assert_allclose(take.time[[0, -1]], (m.logged[[0, -1]] - m.logged[0]) * 1e-9, atol=1e-9)
+
+
+def test_window_and_names_from_the_session(tmp_path):
+    record(tmp_path, [release_truth()], instruments())
+    edit_session(tmp_path, "split: identify", "split: identify, window: [0.5, 1.5]")
+    edit_session(tmp_path, "base: base", "base: base\nsegments: {unit_08: tip, unit_02: root}")
+    ((take, _),) = taken(tmp_path)
+    assert take.segments == ("tip", "root")
+    assert take.time[0] == 0
+    assert take.time[-1] == pytest.approx(1.0, abs=0.02)
+    edit_session(tmp_path, "[0.5, 1.5]", "[50, 60]")
+    refused(taken(tmp_path)[0], r"window \[50.0, 60.0\] s holds no pose, the log has 2.\d+ s")
+
+
+def test_bad_quaternions_and_positions_are_dropped_and_counted(tmp_path):
+    def spoil(m):
+        m.quaternions[10:15, 2] = np.nan
+        m.quaternions[20:30, 3] = 0.0
+        m.quaternions[40, 1] *= 1.5
+        m.positions[50:52, 4, 1] = np.inf
+
+    take, findings = one_trial(tmp_path, spoil)
+    assert findings.repairs == [
+        "16 samples with a NaN, zero or unnormalised quaternion dropped (unit_02, unit_04, unit_06)",
+        "2 samples with a position that is not finite dropped (unit_08)",
+    ]
+    assert np.isnan(take.positions[10:15, 1]).all()
+    assert np.isfinite(take.positions).all(axis=-1).sum() == take.positions[..., 0].size - 18
+
+
+def test_nothing_but_bad_quaternions_is_refused(tmp_path):
+    def spoil(m):
+        m.quaternions[:, 2] = 0.0
+
+    refused(one_trial(tmp_path, spoil), "trial release_a: 'unit_04' is seen in 0.0 % of 2.. frames")
+
+
+def test_segment_that_never_appears_is_refused_by_name(tmp_path):
+    def hide(m):
+        m.positions[:, 3] = m.quaternions[:, 3] = np.nan
+
+    one_trial(tmp_path, hide)
+    edit_session(tmp_path, "base: base", "base: base\nsegments: {unit_02: unit_02, unit_06: unit_06}")
+    message = (
+        "trial release_a: 'unit_06' never appears in /rigid_bodies, found base, unit_02, unit_04, unit_08"
+    )
+    refused(taken(tmp_path)[0], message)
+
+
+def test_segment_that_only_other_trials_have_is_refused_by_name(tmp_path):
+    record(tmp_path, [static_truth(0.0), release_truth()], instruments())
+    m = measure(release_truth(), instruments(), np.random.default_rng(0))
+    m.positions[:, 3] = m.quaternions[:, 3] = np.nan
+    write_log(tmp_path / "release_a.mcap", m)
+    good, bad = taken(tmp_path)
+    assert good[0].segments == SEGMENTS
+    refused(bad, "'unit_06' never appears")
+
+
+def test_base_that_never_appears_is_refused(tmp_path):
+    def hide(m):
+        m.positions[:, 0] = m.quaternions[:, 0] = np.nan
+
+    refused(one_trial(tmp_path, hide), "'base' never appears")
+
+
+def test_no_pose_topic_is_refused(tmp_path):
+    (m,) = record(tmp_path, [curl_truth()], instruments())
+    nothing = {
+        key: getattr(m, key)[:0] for key in ("frames", "stamps", "logged", "positions", "quaternions")
+    }
+    write_log(tmp_path / "curl_40.mcap", replace(m, **nothing))
+    ((error, _),) = taken(tmp_path)
+    assert "curl_40.mcap: no pose topic, found /tendon_" in str(error)
+    assert "(sensor_msgs/msg/JointState)" in str(error)
+
+
+def test_named_topic_of_the_wrong_kind_is_refused(tmp_path):
+    record(tmp_path, [curl_truth()], instruments())
+    edit_session(tmp_path, "poses: /rigid_bodies", "poses: /tendon_states")
+    ((error, _),) = taken(tmp_path)
+    assert "/tendon_states: found sensor_msgs/msg/JointState, expected a pose schema: mocap4r2" in str(
+        error
+    )
+
+
+def test_topics_are_found_by_schema_and_name(tmp_path):
+    record(tmp_path, [curl_truth()], instruments())
+    text = (tmp_path / "session.yaml").read_text().splitlines(keepends=True)
+    (tmp_path / "session.yaml").write_text(
+        "".join(line for line in text if not line.startswith("topics"))
+    )
+    ((take, _),) = taken(tmp_path)
+    assert len(take.command_time) > 100
+    assert len(take.tendon_time) > 400
+
+
+@pytest.mark.parametrize("clock", ["stamp", "frame"])
+def test_time_running_backwards_is_refused(tmp_path, clock):
+    def reset(m):
+        m.stamps[150:] -= 2_000_000_000
+        m.frames[:150] += 240
+
+    result = one_trial(tmp_path, reset)
+    if clock == "stamp":
+        edit_session(tmp_path, "clock: frame", "clock: stamp")
+        result = taken(tmp_path)[0]
+        refused(
+            result,
+            r"/rigid_bodies: time runs backwards by 1\.99\d s at message 150, expected no step back",
+        )
+    else:
+        refused(result, "frame numbers do not increase, expected `clock: stamp` or `log`")
+
+
+def test_frames_slightly_out_of_order_are_sorted_and_said(tmp_path):
+    def swap(m):
+        m.stamps[:] = m.stamps[0] + np.round(m.frames * 1e9 / 120).astype(np.int64)
+        for values in (m.stamps, m.positions, m.quaternions, m.frames):
+            values[[100, 101]] = values[[101, 100]]
+        m.stamps[200] = m.stamps[199]
+
+    one_trial(tmp_path, swap)
+    edit_session(tmp_path, "clock: frame", "clock: stamp")
+    take, findings = taken(tmp_path)[0]
+    assert findings.repairs == [
+        "1 frames out of order sorted by their stamps",
+        "1 frames with a stamp that was there already dropped",
+    ]
+    assert np.all(np.diff(take.time) > 0)
+
+
+def test_truncated_log_is_salvaged_with_the_loss_stated(tmp_path):
+    record(tmp_path, [release_truth()], instruments())
+    log = tmp_path / "release_a.mcap"
+    data = log.read_bytes()
+    ((whole, _),) = taken(tmp_path)
+    log.write_bytes(data[: len(data) * 3 // 4])
+    take, findings = taken(tmp_path)[0]
+    assert 60 < len(take.time) < len(whole.time)
+    np.testing.assert_array_equal(take.positions, whole.positions[: len(take.time)])
+    assert findings.repairs[0].startswith(f"log: cut off at byte {len(data) * 3 // 4}")
+    log.write_bytes(data[: len(data) // 20])
+    refused(taken(tmp_path)[0], r"(damaged: cut off at byte|no pose topic.*damaged: cut off)")
+
+
+def test_zero_stamps_need_another_clock(tmp_path):
+    def zero(m):
+        m.stamps[:] = 0
+
+    refused(one_trial(tmp_path, zero), "/rigid_bodies: all stamps are zero, expected `clock: log`")
+    edit_session(tmp_path, "clock: frame", "clock: log")
+    assert len(taken(tmp_path)[0][0].time) > 250
+
+
+@with_recordings
+def test_real_recordings_without_orientations_or_base_body(tmp_path):
+    """Thirteen releases of a hose with three discs; y is up, and the mount is known to a few millimetres."""
+    names = sorted(path.name for path in REAL.glob("*.mcap"))
+    for name in names:
+        (tmp_path / name).symlink_to(REAL / name)
+    lines = "".join(f"  - {{file: {name}, experiment: release, split: identify}}\n" for name in names)
+    head = "frame: {up: [0, 1, 0]}\nbase: {position: [0.1015, 0.0, 0.105]}\n"
+    (tmp_path / "session.yaml").write_text(head + "trials:\n" + lines)
+    takes = [take for take, _ in taken(tmp_path)]
+    assert len(takes) == 13
+    for take in takes:
+        assert take.segments == ("1", "2", "3")
+        trial, _ = filter_take(take, FILTER)
+        assert trial.quaternions is None
+        np.testing.assert_allclose(trial.gravity, [0, 0, -9.80665], atol=1e-9)
+        rest = trial.positions[-1] - [[0, 0, -0.106], [0, 0, -0.203], [0, 0, -0.322]]
+        assert np.abs(rest).max() < 0.04, "the hose hangs along -z again"
+        assert 0 <= trial.start < 1.5

@@ -1,0 +1,443 @@
+"""Data that read well and are wrong: each fault is named, with trial and body or key; sound sessions are left alone."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from demo.instruments import measure
+from demo.recorder import write_log, write_session
+from tests.support.folders import SHARED, with_recordings
+from tests.support.sessions import (
+    SEGMENTS,
+    TENDONS,
+    curl_truth,
+    instruments,
+    motion_truth,
+    pull_truth,
+    record,
+    release_truth,
+    static_truth,
+)
+from trunkline.errors import InputError
+from trunkline.recordings.cleaning.checks import Findings, Limits
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.sanity_checks import Plausible, check_plausible
+from trunkline.recordings.cleaning.session_checks import gather
+from trunkline.recordings.session.session import read_session
+
+LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+PLAUSIBLE = Plausible(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
+NO_TEST = "splits: no trial of the split test: no error is of trials that nothing was decided on"
+
+
+def truths():
+    """Each experiment in both splits."""
+    return [
+        static_truth(0.0),
+        static_truth(60.0, "validate"),
+        replace(static_truth(30.0), name="tilt_30"),
+        release_truth(),
+        replace(release_truth("validate"), name="release_b"),
+        curl_truth(40.0, "identify"),
+        curl_truth(60.0),
+        pull_truth((40.0, -20.0, -20.0)),
+        pull_truth((20.0, -10.0, -10.0), "validate", load=0.05),
+        motion_truth(),
+        motion_truth("validate", 30.0),
+    ]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sound")
+    record(folder, truths(), instruments())
+    return folder
+
+
+@pytest.fixture(scope="module")
+def sound(folder):
+    """What `take_in` gives of a sound session; by trial."""
+    return {trial.name: (trial, take, found) for trial, take, found in take_in(folder, read_session(folder), LIMITS)}
+
+
+def judged(sound, base="base", **changed):
+    """(what is said of each trial, of the session) after `changed` takes, by trial."""
+    takes = [changed.get(name, take) for name, (_, take, _) in sound.items()]
+    findings = [Findings() for _ in takes]
+    session = check_plausible(takes, findings, base, PLAUSIBLE)
+    return {take.name: found.faults for take, found in zip(takes, findings, strict=True) if found.faults}, session
+
+
+def take_of(sound, name):
+    return sound[name][1]
+
+
+def every(sound, change):
+    return {name: change(take) for name, (_, take, _) in sound.items()}
+
+
+def moved(take, body, offset):
+    positions = take.positions.copy()
+    positions[:, body] += offset
+    return replace(take, positions=positions)
+
+
+def test_a_sound_session_has_no_fault_and_no_warning(folder, sound):
+    assert judged(sound) == ({}, [])
+    gathered = gather(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
+    assert [found.repairs + found.warnings for found in gathered.findings] == [[NO_TEST]] * len(sound)
+
+
+@with_recordings
+def test_real_recordings_have_no_fault(tmp_path):
+    logs = sorted((SHARED / "asl_trunk").glob("*.mcap"))
+    for log in logs:
+        (tmp_path / log.name).symlink_to(log)
+    lines = [f"  - {{file: {log.name}, experiment: release, split: identify}}" for log in logs]
+    head = ["frame: {up: [0, 1, 0]}", "base: {position: [0.1015, 0.0, 0.105]}", "trials:"]
+    (tmp_path / "session.yaml").write_text("\n".join(head + lines) + "\n")
+    session = read_session(tmp_path)
+    gathered = gather(take_in(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
+    assert len(gathered.takes) == 13
+    for found in gathered.findings:
+        no_validate, no_test, no_others = found.warnings
+        assert no_validate == "splits: no trial of the split validate: no error is of trials that were not fitted"
+        assert no_test == NO_TEST
+        assert no_others.startswith("experiments: no static_tilt, curl, static_pull, motion in the session: data/raw")
+
+
+@pytest.mark.parametrize("name", ["tilt_30", "release_a", "release_b", "curl_60"])
+@pytest.mark.parametrize("body", range(4))
+def test_a_body_that_is_off_is_named(sound, name, body):
+    trials, session = judged(sound, **{name: moved(take_of(sound, name), body, [0.0, 0.3, 0.4])})
+    assert list(trials) == [name]
+    (said,) = [said for said in trials[name] if "expected neighbours at distances" in said]
+    assert said.startswith(f"{SEGMENTS[body]!r} is ")
+    assert session == []
+
+
+def test_a_body_that_is_off_by_little_is_left(sound):
+    assert judged(sound, release_a=moved(take_of(sound, "release_a"), 2, [0.0, 0.01, 0.0])) == ({}, [])
+
+
+def test_a_body_that_stands_still_beside_the_arm_is_named(sound):
+    def stands(take):
+        positions = take.positions.copy()
+        positions[:, 2] = take.base_positions + [0.0, -0.25, 0.0]
+        return replace(take, positions=positions)
+
+    _, session = judged(sound, **every(sound, stands))
+    assert any(said.startswith("'unit_06' ") and said.endswith("is it on the arm?") for said in session), session
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3])
+def test_one_log_in_another_unit_is_named(sound, factor):
+    take = take_of(sound, "release_b")
+    other = replace(take, positions=factor * take.positions, base_positions=factor * take.base_positions)
+    trials, _ = judged(sound, release_b=other)
+    assert list(trials) == ["release_b"]
+    found = re.match(r"unit: bodies are ([\d.]+) times as far apart as", trials["release_b"][0])
+    assert found
+    assert float(found[1]) == pytest.approx(factor, rel=0.05)
+
+
+@pytest.mark.parametrize("order", [(1, 0, 2, 3), (0, 2, 1, 3), (0, 1, 3, 2), (2, 1, 0, 3)])
+def test_exchanged_segments_of_the_whole_session_are_named(sound, order):
+    names = tuple(SEGMENTS[place] for place in order)
+    trials, session = judged(sound, **every(sound, lambda take: replace(take, segments=names)))
+    assert trials == {}
+    assert len(session) == 1
+    assert "check `segments` in session.yaml" in session[0]
+    for found, name in zip(SEGMENTS, names, strict=True):
+        assert (found == name) or repr(name) in session[0]
+
+
+@pytest.mark.parametrize("names", [SEGMENTS[::-1], ("root", "a", "b", "tip"), ("7", "b8", "c9", "1")])
+def test_segments_named_from_the_tip_or_without_numbers_are_left(sound, names):
+    assert judged(sound, **every(sound, lambda take: replace(take, segments=names))) == ({}, [])
+
+
+def test_a_base_that_moves_while_a_segment_rests_is_named(sound):
+    def exchange(take):
+        positions, quaternions = take.positions.copy(), take.quaternions.copy()
+        positions[:, 0], quaternions[:, 0] = take.base_positions, take.base_quaternions
+        changed = {"base_positions": take.positions[:, 0], "base_quaternions": take.quaternions[:, 0]}
+        names = ("base", *take.segments[1:])
+        return replace(take, positions=positions, quaternions=quaternions, segments=names, **changed)
+
+    _, session = judged(sound, base="unit_02", **every(sound, exchange))
+    assert session[-1].startswith("base: 'unit_02' moves by ")
+    assert "while 'base' moves by" in session[-1]
+
+
+@pytest.mark.parametrize(
+    ("name", "experiment", "level", "message"),
+    [
+        ("release_a", "static_tilt", 0.0, r"expected at most 2 % in a static_tilt: is it another experiment \(release"),
+        ("curl_40", "static_tilt", 0.0, "expected at most 2 % in a static_tilt"),
+        ("tilt_00", "release", None, "expected more than 2 % in a release: is it another experiment"),
+        ("curl_40", "release", None, "commands: 'tendon_1' is wound by 40 mm, expected a release without actuation"),
+        ("tilt_00", "curl", 40.0, "expected more than 2 % in a curl"),
+        ("curl_40", "static_pull", None, "expected at most 2 % in a static_pull: is it another experiment"),
+        ("motion_identify", "static_pull", None, "commands: 'tendon_1' is wound by .* expected a static_pull to hold"),
+        ("pull_40_-20_-20", "motion", None, "expected more than 2 % in a motion"),
+        (
+            "pull_40_-20_-20",
+            "static_tilt",
+            0.0,
+            "experiment: commands: 'tendon_1' is drawn in by 40 mm, expected a static_tilt without actuation",
+        ),
+        ("motion_identify", "release", None, "commands: 'tendon_1' is wound by"),
+    ],
+)
+def test_a_trial_labelled_as_another_experiment_is_named(sound, name, experiment, level, message):
+    trials, _ = judged(sound, **{name: replace(take_of(sound, name), experiment=experiment, level=level)})
+    assert list(trials) == [name]
+    assert any(re.search(message, said) for said in trials[name]), trials
+
+
+def with_tendons(take, commands_mm, positions_mm):
+    """The take beside motors that log these pulls of the three tendons throughout; nothing where None."""
+    time = np.arange(-0.5, take.time[-1] + 0.5, 0.01)
+    rows = [
+        np.empty((0, 3)) if pulls is None else 1e-3 * np.tile(pulls, (len(time), 1))
+        for pulls in (commands_mm, positions_mm)
+    ]
+    times = {"command_time": time[: len(rows[0])], "tendon_time": time[: len(rows[1])]}
+    return replace(take, tendons=TENDONS, commands=rows[0], tendon_positions=rows[1], **times)
+
+
+SLACK, PULLED = (-300.0, -300.0, -300.0), (-300.0, 40.0, -300.0)
+
+
+@pytest.mark.parametrize("name", ["tilt_30", "release_a"])
+@pytest.mark.parametrize(
+    ("commands", "positions", "key"),
+    [
+        (PULLED, None, "commands"),
+        (PULLED, PULLED, "commands"),
+        (PULLED, SLACK, "commands"),
+        (None, PULLED, "tendon positions"),
+        (SLACK, PULLED, "tendon positions"),
+    ],
+)
+def test_a_pull_that_is_held_where_nothing_is_to_pull_is_named(sound, name, commands, positions, key):
+    trials, _ = judged(sound, **{name: with_tendons(take_of(sound, name), commands, positions)})
+    assert list(trials) == [name]
+    (said,) = trials[name]
+    found = rf"experiment: {key}: 'tendon_2' is drawn in by 40\.?\d* mm, expected a \w+ without actuation"
+    assert re.fullmatch(found, said), said
+
+
+@pytest.mark.parametrize("name", ["tilt_30", "release_a"])
+@pytest.mark.parametrize("commands", [None, (0.0, 0.0, 0.0), (2.0, -1.0, -1.0), SLACK])
+def test_loose_tendons_where_nothing_is_to_pull_are_left(sound, name, commands):
+    assert judged(sound, **{name: with_tendons(take_of(sound, name), commands, SLACK)}) == ({}, [])
+    assert judged(sound, **{name: with_tendons(take_of(sound, name), commands, None)}) == ({}, [])
+
+
+def test_loose_tendons_of_encoders_that_start_anywhere_are_left(sound):
+    def shifted(name, millimetres):
+        take = take_of(sound, name)
+        return replace(take, tendon_positions=take.tendon_positions + 1e-3 * millimetres)
+
+    driven = [name for name in sound if name.startswith(("curl", "pull", "motion"))]
+    loose = with_tendons(take_of(sound, "tilt_30"), SLACK, (200.0, 200.0, 200.0))
+    same = {name: shifted(name, 500.0) for name in driven}  # slack is 200 mm then
+    assert judged(sound, tilt_30=loose, **same) == ({}, [])
+    anywhere = {name: shifted(name, 100.0 * index) for index, name in enumerate(driven)}
+    assert judged(sound, tilt_30=loose, **anywhere) == ({}, [])
+    drawn_in = with_tendons(take_of(sound, "tilt_30"), SLACK, (200.0, 540.0, 200.0))
+    (said,) = judged(sound, tilt_30=drawn_in, **same)[0]["tilt_30"]
+    assert said.startswith("experiment: tendon positions: 'tendon_2' is drawn in by 40")
+
+
+def test_a_static_tilt_in_which_the_arm_swings_is_named(sound):
+    take = take_of(sound, "tilt_30")
+    swing = np.sin(2 * np.pi * 1.5 * take.time)[:, None, None] * [[0.01], [0.02], [0.03], [0.035]] * [1.0, 0.0, 0.0]
+    trials, _ = judged(sound, tilt_30=replace(take, positions=take.positions + swing))
+    assert list(trials) == ["tilt_30"]
+    assert "experiment: 'unit_08' moves by 6" in trials["tilt_30"][-1] or "moves by 7" in trials["tilt_30"][-1]
+
+
+def pulls(take, commands, positions):
+    return replace(take, commands=commands(take.commands), tendon_positions=positions(take.tendon_positions))
+
+
+def same(values):
+    return values
+
+
+@pytest.mark.parametrize(
+    ("commands", "positions", "message"),
+    [
+        (lambda c: 1e3 * c, same, r"commands: found pulls from -20 to 40 m, expected about 0.04 m.*are they in mm?"),
+        (lambda c: 1e3 * c, lambda p: 1e3 * p, "are they in mm?"),
+        (lambda c: -c, same, "commands: found pulls from -0.04 to 0.02 m, .*: is the sign reversed?"),
+        (lambda c: -c, lambda p: -p, "is the sign reversed?"),
+        (lambda c: 0 * c, same, "commands: found pulls from -?0 to 0 m"),
+        (same, lambda p: -p, "tendon positions: .* is the sign reversed?"),
+        (same, lambda p: p / 10, "tendon positions: found pulls from -0.002.* to 0.004"),
+        (same, lambda p: p[:, [1, 0, 2]], "tendons: 'tendon_1' moves against its commands"),
+        (
+            lambda c: c * [1, 0, 0],
+            lambda p: p[:, [1, 0, 2]] * [0, 1, 0],
+            "'tendon_2' follows the commands of 'tendon_1",
+        ),
+    ],
+)
+def test_tendons_that_cannot_be_are_named(sound, commands, positions, message):
+    take = take_of(sound, "curl_40")
+    take = replace(take, commands=take.commands - take.commands[0])
+    trials, _ = judged(sound, curl_40=pulls(take, commands, positions))
+    assert list(trials) == ["curl_40"]
+    assert any(re.search(message, said) for said in trials["curl_40"]), trials
+
+
+def test_pulls_from_an_encoder_that_starts_anywhere_are_left(sound):
+    take = take_of(sound, "curl_40")
+    assert judged(sound, curl_40=replace(take, tendon_positions=take.tendon_positions + 1.7)) == ({}, [])
+    half = len(take.command_time) // 2
+    wound = take.tendon_time > take.command_time[half]
+    later = {"command_time": take.command_time[half:], "commands": take.commands[half:]}
+    later |= {"tendon_time": take.tendon_time[wound], "tendon_positions": take.tendon_positions[wound]}
+    assert judged(sound, curl_40=replace(take, **later)) == ({}, []), "a window that begins with the arm curled"
+
+
+@pytest.mark.parametrize("name", ["pull_40_-20_-20", "motion_identify"])
+def test_pulls_without_a_level_that_are_in_mm_are_named(sound, name):
+    take = take_of(sound, name)
+    trials, _ = judged(sound, **{name: replace(take, commands=1e3 * take.commands)})
+    assert list(trials) == [name]
+    (said,) = trials[name]
+    found = r"commands: found pulls up to \d+.* m, expected less than the arm's length of 0\.\d+ m: are they in mm"
+    assert re.match(found, said)
+    both = pulls(take, lambda c: 1e3 * c, lambda p: 1e3 * p)
+    if name.startswith("motion"):
+        assert any("tendon positions: found pulls up to" in said for said in judged(sound, **{name: both})[0][name])
+
+
+def test_a_static_pull_whose_window_touches_the_way_to_the_next_is_left(sound):
+    take = take_of(sound, "pull_40_-20_-20")
+    next_time = take.command_time[-1] + np.arange(1, 80) / 100
+    ramp = take.commands[-1] + np.linspace(0, 0.02, 79)[:, None]
+    commanded = np.concatenate([take.command_time, next_time]), np.concatenate([take.commands, ramp])
+    seen = np.concatenate([take.tendon_time, next_time]), np.concatenate([take.tendon_positions, ramp])
+    for ahead in (0.0, 0.5):  # s, of the motors' clock
+        later = {"command_time": commanded[0] - ahead, "tendon_time": seen[0] - ahead}
+        later = replace(take, commands=commanded[1], tendon_positions=seen[1], **later)
+        assert judged(sound, **{take.name: later}) == ({}, [])
+
+
+def test_static_pulls_have_no_say_in_the_clocks(tmp_path):
+    """A ramp beside the window would fit any offset at which it is not seen."""
+    truth = pull_truth()
+    held = truth.commands.copy()
+    truth.commands = held * np.clip(np.arange(len(held)) / 40, 0, 1)[:, None]
+    truth.tendon_positions = truth.tendon_positions * np.clip(np.arange(len(truth.time)) / 200, 0, 1)[:, None]
+    record(tmp_path, [truth], instruments())
+    ((_, _, found),) = take_in(tmp_path, read_session(tmp_path), LIMITS)
+    assert found.by_motion is None
+
+
+def test_exchanged_topics_are_named(sound):
+    take = take_of(sound, "curl_40")
+    assert take.tendons == TENDONS
+    time = {"command_time": take.tendon_time, "tendon_time": take.command_time}
+    noisy = replace(take, commands=take.tendon_positions, tendon_positions=take.commands, **time)
+    assert "commands are noisier" in judged(sound, curl_40=noisy)[0]["curl_40"][0]
+    early = replace(take, tendon_time=take.tendon_time - 0.05)
+    (said,) = judged(sound, curl_40=early)[0]["curl_40"]
+    assert said.startswith("topics: what is measured comes 50 ms before its command: are `commands` and")
+    late = replace(take, tendon_time=take.tendon_time + 0.05)
+    assert judged(sound, curl_40=late) == ({}, [])
+
+
+def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
+    trial, take, found = sound["release_a"]
+    session = read_session(folder)
+
+    def gathered(otherwise, refused_trials):
+        taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
+        taken["release_a"] = trial, moved(take, 2, 0.5), replace(found, warnings=[], faults=[])
+        return gather(taken.values(), session, replace(PLAUSIBLE, otherwise=otherwise), refused_trials, "here")
+
+    with pytest.raises(InputError, match=r"release_a\.mcap: trial release_a: 'unit_06' is "):
+        gathered("refuse", "stop")
+    left = gathered("refuse", "leave_out")
+    assert list(left.refused) == ["release_a"]
+    assert "'unit_06' is " in left.refused["release_a"]
+    assert "release_a" not in [take.name for take in left.takes]
+    kept = gathered("warn", "stop")
+    said = {take.name: found.warnings for take, found in zip(kept.takes, kept.findings, strict=True)}["release_a"]
+    assert said[0].startswith("'unit_06' is ")
+
+
+def test_a_level_that_the_base_contradicts_is_said(folder, sound):
+    trial, take, _ = sound["tilt_60"]
+    taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
+    taken["tilt_60"] = trial, replace(take, level=10.0), taken["tilt_60"][2]
+    gathered = gather(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
+    said = {take.name: found.warnings for take, found in zip(gathered.takes, gathered.findings, strict=True)}
+    assert said["tilt_60"][1].startswith("level: found 10, but the base is tilted by 60°")
+    assert all(said[name] == [NO_TEST] for name in said if name != "tilt_60")
+
+
+def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
+    kept = [trial for name, trial in sound.items() if name != "curl_60"]
+    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in kept]
+    gathered = gather(taken, read_session(folder), PLAUSIBLE, "stop", "here")
+    said = [NO_TEST, "splits: no curl of the split validate, which the session has"]
+    assert all(found.warnings == said for found in gathered.findings)
+
+
+@pytest.mark.parametrize(
+    ("kept", "said"),
+    [
+        (
+            lambda take: take.split == "identify",
+            ["splits: no trial of the split validate: no error is of trials that were not fitted", NO_TEST],
+        ),
+        (
+            lambda take: take.split == "validate",
+            ["splits: no trial of the split identify: nothing can be identified", NO_TEST],
+        ),
+        (
+            lambda take: take.experiment != "curl",
+            [NO_TEST, "experiments: no curl in the session: data/raw/README.md tells which settings do without"],
+        ),
+        (
+            lambda take: take.experiment != "motion",
+            [
+                NO_TEST,
+                "experiments: no motion in the session: in params.yaml `experiments: [curl]` under "
+                "identify_control: data/raw/README.md",
+            ],
+        ),
+    ],
+    ids=["identify alone", "validate alone", "no curl", "no motion"],
+)
+def test_a_split_or_an_experiment_that_the_session_lacks_is_said(folder, sound, kept, said):
+    taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in sound.values() if kept(some)]
+    for found in gather(taken, read_session(folder), PLAUSIBLE, "stop", "here").findings:
+        assert [one for one in found.warnings if one.startswith(("splits:", "experiments:"))] == said
+
+
+def test_usual_distances_of_other_splits_are_said(tmp_path):
+    record(tmp_path, [release_truth("validate"), static_truth(0.0, "validate")], instruments())
+    for _, _, found in take_in(tmp_path, read_session(tmp_path), LIMITS):
+        assert "no trial of the split identify can be read: the unit and the usual" in found.warnings[0]
+
+
+@pytest.mark.parametrize("value", [0.0, 1e300])
+def test_a_body_nowhere_is_not_taken_for_seen(tmp_path, value):
+    m = measure(release_truth(), instruments(occlusions_per_s=0, outliers=0), np.random.default_rng(0))
+    m.positions[:, 3] = value
+    write_log(tmp_path / f"{m.name}.mcap", m)
+    write_session(tmp_path, [m], instruments())
+    ((_, error, found),) = take_in(tmp_path, read_session(tmp_path), LIMITS)
+    assert isinstance(error, InputError)
+    assert "trial release_a: 'unit_06' is seen in 0.0 %" in str(error)
+    assert any("(unit_06)" in said for said in found.repairs)

@@ -1,0 +1,230 @@
+"""Logs whose bytes are whole and whose content is wrong: each mistake is named, and put right where that is safe."""
+
+import json
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from demo.instruments import measure
+from demo.recorder import write_log, write_session
+from stages import ingest
+from tests.support.sessions import SEGMENTS, all_truths, curl_truth, instruments, record, release_truth, static_truth
+from tests.support.workbench import ROOT
+from trunkline.pipeline.stage import run_stage
+from trunkline.recordings.cleaning.checks import Limits
+from trunkline.recordings.cleaning.clock_offset import settle_vertical
+from trunkline.recordings.cleaning.label_swaps import find_swaps, usual_distances
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.stale_poses import frozen
+from trunkline.recordings.session.session import read_session
+
+LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+CLEAN = instruments(occlusions_per_s=0.3, outliers=0)
+
+
+def session(folder, change=None, truths=None, settings=CLEAN):
+    """(takes, findings) of a session, the first of whose measurements went through `change`."""
+    folder.mkdir(exist_ok=True)
+    measured = [
+        measure(truth, settings, np.random.default_rng(seed), 30.0 * seed)
+        for seed, truth in enumerate(truths or [release_truth(), static_truth(30.0), curl_truth(split="identify")])
+    ]
+    if change:
+        change(measured[0])
+    for m in measured:
+        write_log(folder / f"{m.name}.mcap", m)
+    write_session(folder, measured, settings)
+    return taken(folder)
+
+
+def taken(folder):
+    found = read_session(folder)
+    _, takes, findings = zip(*take_in(folder, found, LIMITS), strict=True)
+    settle_vertical(takes, findings, found)
+    return takes, findings
+
+
+def edit(folder, old, new):
+    path = folder / "session.yaml"
+    assert old in path.read_text()
+    path.write_text(path.read_text().replace(old, new))
+
+
+@pytest.fixture(scope="module")
+def right(tmp_path_factory):
+    """The takes of the session to which nothing happened."""
+    return session(tmp_path_factory.mktemp("session") / "right")[0]
+
+
+def test_of_three_discs_one_may_be_lost_as_another_takes_its_place():
+    """As in a real log: disc 3 is at disc 1's place while nothing is said of disc 1, so two distances have to do."""
+    discs = np.array([[0, 0, 0], [0, 0, -0.1], [0, 0, -0.2], [0, 0, -0.32]])
+    swing = 0.1 * np.sin(np.linspace(0, 9, 200))[:, None, None] * np.array([1.0, 0, 0]) * [[0], [0.2], [0.5], [1]]
+    seen = discs + swing
+    usual = usual_distances([seen])
+    wrong = seen.copy()
+    wrong[50:56, 3], wrong[50:56, 1] = seen[50:56, 1], np.nan
+    wrong[90, 3], wrong[90, 1] = seen[90, 1], np.nan  # for a frame alone, it may be an outlier
+    (found,) = find_swaps(wrong, usual, marked_base=False)
+    assert (found.bodies, np.flatnonzero(found.frames).tolist()) == ((1, 3), list(range(50, 56)))
+    seen[60:70, 1] = np.nan
+    assert find_swaps(seen, usual, marked_base=False) == []
+
+
+@pytest.mark.parametrize("frames", [slice(60, 110), slice(60, 61), slice(200, None), slice(0, 250)])
+@pytest.mark.parametrize("bodies", [(1, 2), (2, 3), (3, 4), (1, 2, 3)])
+def test_bodies_taken_for_each_other_are_put_right(tmp_path, right, frames, bodies):
+    """Each label on the next one's pose: pairs, the base among them, and rounds of three."""
+
+    def swap(m):
+        for values in (m.positions, m.quaternions):
+            values[frames, list(bodies)] = values[frames, [*bodies[1:], bodies[0]]]
+
+    takes, findings = session(tmp_path / "wrong", swap)
+    names = " and ".join(repr(("base", *SEGMENTS)[body]) for body in bodies)
+    (told,) = [line for line in findings[0].repairs if "taken for each other" in line]
+    assert told.startswith(f"{names} were taken for each other in ")
+    begin, end = map(float, told.partition(" between ")[2].removesuffix(" s, put right").split(" and "))
+    times = takes[0].time[frames]
+    assert begin == pytest.approx(times[0], abs=0.02)
+    assert end == pytest.approx(times[-1], abs=0.02)
+    assert findings[1].repairs == findings[2].repairs == []
+    # a body beside a hidden one may lack the neighbours that would tell
+    same = np.isclose(takes[0].positions, right[0].positions, equal_nan=True).all(axis=(1, 2))
+    assert same.mean() > 0.97
+    np.testing.assert_array_equal(takes[0].quaternions[same], right[0].quaternions[same])
+    np.testing.assert_array_equal(takes[0].base_positions[same], right[0].base_positions[same])
+    np.testing.assert_array_equal(takes[0].base_quaternions[same], right[0].base_quaternions[same])
+
+
+def test_a_segment_taken_for_the_base_is_put_right(tmp_path, right):
+    test_bodies_taken_for_each_other_are_put_right(tmp_path, right, slice(60, 110), (0, 1))
+
+
+@pytest.mark.parametrize("bodies", [(2, 3, 4, 5), (0, 2, 1, 3), (4, 7, 5, 6)])
+def test_rounds_of_four_are_told_too(bodies):
+    """On a tapering arm of nine segments that swings; for two frames, and for one."""
+    rng = np.random.default_rng(0)
+    along = np.concatenate([[0], np.cumsum(0.06 * 0.9 ** np.arange(9))])
+    angle = 2.0 * np.sin(0.1 * np.arange(300))[:, None] * along / along[-1] + 1e-9
+    arc = np.stack([1 - np.cos(angle), 0 * angle, -np.sin(angle)], axis=-1) / (angle[:, -1:, None] / along[-1])
+    right = arc + rng.normal(scale=3e-4, size=arc.shape)
+    usual, positions = usual_distances([right]), right.copy()
+    wrong = np.isin(np.arange(300), [50, 51, 120])
+    positions[np.ix_(wrong, bodies)] = right[np.ix_(wrong, [*bodies[1:], bodies[0]])]
+    assert find_swaps(right, usual) == []
+    for swap in find_swaps(positions, usual):
+        positions[np.ix_(swap.frames, [*swap.bodies[1:], swap.bodies[0]])] = positions[np.ix_(swap.frames, swap.bodies)]
+    np.testing.assert_array_equal(positions, right)
+
+
+def test_memory_for_finding_swaps_hardly_grows_with_the_rounds_that_are_tried():
+    """Beside the distances between all bodies, only what is kept of each frame."""
+    frames, bodies = 2000, 19
+    positions = np.linspace([0, 0, 0], [0, 0, -0.5], bodies) + np.random.default_rng(0).normal(0, 3e-4, (frames, 1, 3))
+    usual = usual_distances([positions])
+    tracemalloc.start()
+    find_swaps(positions, usual)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 2 * 8 * frames * bodies**2
+
+
+@pytest.mark.parametrize("truth", [release_truth(), static_truth(60.0), curl_truth(100.0)])
+def test_nothing_is_swapped_where_nothing_was(tmp_path, truth):
+    for seed in range(3):
+        settings = instruments(occlusions_per_s=2.0, outliers=0.01)
+        m = measure(truth, settings, np.random.default_rng(seed))
+        assert find_swaps(m.positions, usual_distances([m.positions])) == []
+
+
+def test_repeated_poses_are_dropped_as_frozen(tmp_path):
+    def freeze(m):
+        m.positions[100:140, 3], m.quaternions[100:140, 3] = m.positions[100, 3], m.quaternions[100, 3]
+
+    takes, findings = session(tmp_path, freeze)
+    assert findings[0].repairs == ["39 samples that only repeat the one before, to the last bit, dropped (unit_06)"]
+    assert np.isnan(takes[0].positions[101:140, 2]).all()
+    assert np.isfinite(takes[0].positions[100, 2]).all()
+
+
+def test_all_bodies_frozen_at_once_and_float32(tmp_path):
+    def freeze(m):
+        m.positions[:] = m.positions.astype(np.float32)
+        m.positions[100:140] = m.positions[100]
+
+    takes, _ = session(tmp_path, freeze, settings=instruments(occlusions_per_s=0, outliers=0))
+    assert np.isnan(takes[0].positions[101:140]).all()
+    assert np.isfinite(takes[0].positions[140:]).all()
+
+
+def test_rounded_and_constant_positions_are_not_frozen():
+    rng = np.random.default_rng(0)
+    noise = rng.normal(scale=3e-4, size=(600, 2, 3))
+    rounded = np.round(noise, 3)
+    assert not frozen(rounded).any(), "noise of 0.3 mm rounded to 1 mm repeats itself"
+    assert not frozen(np.zeros((600, 2, 3))).any()
+    assert not frozen(noise).any()
+
+
+@pytest.mark.parametrize(("factor", "declared", "taken_as"), [(1000.0, "m", "mm"), (1.0, "mm", "m")])
+def test_wrong_unit_is_recognised(tmp_path, factor, declared, taken_as):
+    right, _ = session(tmp_path / "right")
+    truths = [release_truth(), static_truth(30.0), curl_truth()]
+    folder = tmp_path / "wrong"
+    folder.mkdir()
+    measured = [measure(t, CLEAN, np.random.default_rng(i), 30.0 * i) for i, t in enumerate(truths)]
+    for m in measured:
+        m.positions *= factor
+        write_log(folder / f"{m.name}.mcap", m)
+    write_session(folder, measured, CLEAN)
+    edit(folder, "unit: m}", f"unit: {declared}}}")
+    takes, findings = taken(folder)
+    for one, other, found in zip(takes, right, findings, strict=True):
+        np.testing.assert_allclose(one.positions, other.positions, rtol=1e-12)
+        assert f"are no arm in {declared}, as declared; taken as {taken_as}" in found.repairs[0]
+
+
+def test_wrong_vertical_is_put_right_by_the_tilts(tmp_path):
+    truths = [static_truth(0.0), static_truth(30.0), static_truth(60.0), release_truth()]
+    takes, findings = session(tmp_path, truths=truths)
+    assert [found.repairs + found.warnings for found in findings] == [[]] * 4
+    edit(tmp_path, "up: [0, 1, 0]", "up: [0, 0, 1]")
+    takes, findings = taken(tmp_path)
+    for take, found in zip(takes, findings, strict=True):
+        np.testing.assert_array_equal(take.up, [0, 1, 0])
+        assert "with [0, 0, 1]" in found.repairs[-1]
+        assert "with [0, 1, 0], which was taken" in found.repairs[-1]
+
+
+def test_wrong_levels_are_named_and_change_nothing(tmp_path):
+    session(tmp_path, truths=[static_truth(0.0), static_truth(30.0), static_truth(60.0)])
+    for old, new in (("level: 30", "level: 85"), ("level: 0", "level: 50"), ("level: 60", "level: 10")):
+        edit(tmp_path, old, new)
+    takes, findings = taken(tmp_path)
+    assert all(found.repairs == [] and "no other axis fits" in found.warnings[0] for found in findings)
+    np.testing.assert_array_equal(takes[0].up, [0, 1, 0])
+
+
+def test_releases_alone_only_warn_of_a_wrong_vertical(tmp_path):
+    session(tmp_path, truths=[release_truth()])
+    edit(tmp_path, "up: [0, 1, 0]", "up: [0, 0, 1]")
+    takes, (found,) = taken(tmp_path)
+    assert "released arms come to rest" in found.warnings[0]
+    assert "with [0, 1, 0]: check `frame.up`" in found.warnings[0]
+    np.testing.assert_array_equal(takes[0].up, [0, 0, 1])
+
+
+def test_the_report_names_what_was_found(tmp_path, monkeypatch, capsys):
+    (tmp_path / "conf").symlink_to(ROOT / "conf")
+    (tmp_path / "params.yaml").write_text((ROOT / "params.yaml").read_text())
+    monkeypatch.chdir(tmp_path)
+    record(tmp_path / "data/raw/demo", all_truths(), instruments())
+    edit(tmp_path / "data/raw/demo", "up: [0, 1, 0]", "up: [1, 0, 0]")
+    run_stage("ingest", ingest.Config, ingest.main)
+    report = json.loads((ingest.ARTIFACTS / "quality.json").read_text())["trials"]
+    for trial in report.values():
+        assert "which was taken" in trial["repairs"][-1]
+        assert abs(trial["stamps_over_log_times"]["drift_ppm"]) < 2000
+        assert any("the vertical is by the tilts of other splits too" in said for said in trial["warnings"])

@@ -1,0 +1,166 @@
+"""A certificate says what was found, refuses what does not belong together, and its page asks nothing of a network."""
+
+import base64
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from stages.report import CHECKOUT, code
+from tests.report.certificate.sample import ASKED, INGESTED, sample, sample_trials, table, write
+from tests.support.matched_plant import small_model
+from trunkline.errors import InputError
+from trunkline.recordings.trials.splits import DECIDING, TEST
+from trunkline.report.certificate.certificate import COMMAND, check_fitted, digest_of_code, inputs_of
+from trunkline.report.certificate.poses import Conditions
+from trunkline.report.certificate.replays import LOST, UNIT
+from trunkline.report.certificate.words import NOTHING, limits_of, open_lines, strong_pairs, verdict
+
+IDENTIFIED = {"e_position_mm": 4.0, "e_position_pct": 0.8, "e_tip_mm": 9.0}
+
+
+@pytest.fixture(scope="module")
+def certificate():
+    return sample()
+
+
+@pytest.fixture(scope="module")
+def html(tmp_path_factory):
+    file = tmp_path_factory.mktemp("page") / "certificate.html"
+    write(file)
+    return file.read_text(encoding="utf-8")
+
+
+def test_every_split_has_its_errors_beside_null_cad_and_noise_floor(certificate):
+    rows = [row for row in certificate.facts["errors"] if row["kind"] is None]
+    assert {row["split"] for row in rows} == {*DECIDING, TEST}
+    for row in rows:
+        assert {"identified", "CAD", "null: mean rest shape", "noise floor"} <= set(row["errors"])
+        assert row["errors"]["noise floor"]["e_position_mm"] < row["errors"]["null: mean rest shape"]["e_position_mm"]
+
+
+def test_the_verdict_is_of_the_trials_that_decided_nothing(certificate):
+    assert f"({TEST})" in certificate.facts["verdict"]
+    (row,) = [r for r in certificate.facts["errors"] if r["split"] == TEST and r["kind"] is None]
+    assert f"{row['errors']['identified']['e_position_mm']:.2g} mm" in certificate.facts["verdict"]
+
+
+@pytest.mark.parametrize(
+    ("share", "null", "says"),
+    [(0.8, 40.0, "good for previewing reaches;"), (2.5, 40.0, "good for showing how it moves;"),
+     (5.0, 40.0, NOTHING), (0.8, 10.0, NOTHING)],
+)  # fmt: skip
+def test_what_it_is_good_for_follows_from_numbers(share, null, says):
+    identified = IDENTIFIED | {"e_position_pct": share}
+    told = verdict("On some", identified, {"e_position_mm": null}, ASKED.uses, ASKED.factor, 7.0, ["loads at the tip"])
+    assert says in told
+    assert told.endswith("not for loads at the tip.")
+
+
+def test_what_it_is_not_good_for_is_what_no_trial_had(certificate):
+    conditions = certificate.facts["uncertainty"]["conditions"]
+    assert conditions["pull"] == pytest.approx(0.02)
+    assert conditions["pulls"] == pytest.approx(0.02)
+    assert conditions["tilt_deg"] == pytest.approx(60)
+    limits = "loads at the tip, pulls above 20 mm at rest, pulls while the mount is tilted"
+    assert limits in certificate.facts["verdict"]
+    assert limits_of(Conditions(5.0, 0.0, 0.0, 0.0), [0.0, 0.05])[0] == "loads above 50 g"
+    assert "a tilted mount" in limits_of(Conditions(5.0, 0.0, 0.0, 0.0), [])
+
+
+def test_what_is_open_comes_with_the_experiments_that_would_tell_it():
+    told = table(sample_trials(small_model(4))[:1])
+    (line,) = open_lines(told)
+    assert line.startswith("mount_tilt_y is not determined; told by static tilts")
+    assert strong_pairs(told) == ["mount_tilt_x and mount_tilt_y rise together (+0.95)"]
+
+
+def test_an_interval_that_ends_with_its_range_is_open():
+    told = table(sample_trials(small_model(4))[:1])
+    told["parameters"]["mount_tilt_x"]["interval_95_given_model"] = [-0.02, 0.1]
+    assert open_lines(told)[0].startswith("mount_tilt_x is told to one side alone: its interval ends with its range;")
+
+
+def test_the_held_out_trials_at_rest_tell_what_the_model_lacks(certificate):
+    """Springs that are too stiff by so much make tips be off by a share of the way that gravity moves them."""
+    truth = small_model(4)
+    trials, found = sample_trials(truth), []
+    for factor in (1.0, 1.1, 1.3):
+        model = truth.__copy__()
+        model.jnt_stiffness[:] *= factor
+        inputs = inputs_of(model, trials, {}, INGESTED, 2, np.random.default_rng(0))
+        assert inputs.lacking
+        assert inputs.lacking.trials == 3
+        found.append(inputs.lacking.rms[0])
+    assert found[0] < 0.5 * found[1] < 0.25 * found[2] * 1.5
+    assert certificate.metrics["open"] == 1
+
+
+def test_too_few_held_out_trials_tell_nothing_and_the_page_says_so():
+    trials = [trial for trial in sample_trials(small_model(4)) if trial.split != DECIDING[1]]
+    assert inputs_of(small_model(4), trials, {}, INGESTED, 2, np.random.default_rng(0)).lacking is None
+
+
+def test_replays_are_the_trials_to_a_twentieth_of_a_millimetre(certificate):
+    packed, trials = certificate.replays, sample_trials(small_model(4))
+    numbers = np.frombuffer(base64.b64decode(packed["data"]), "<i2")
+    names = [row["name"] for row in packed["trials"]]
+    assert names == [trial.name for trial in trials]
+    points = len(packed["radii_m"])
+    assert points == len(trials[0].segments) + 1
+    row, trial = packed["trials"][0], trials[0]
+    first = numbers[row["offset"] : row["offset"] + 3 * points].reshape(points, 3) * UNIT
+    np.testing.assert_allclose(first[1:], trial.positions[0], atol=UNIT)
+    assert not first[0].any()
+    hidden = [replace(trials[0], measured=np.arange(len(trial.segments))[None] > 0), *trials[1:]]
+    lost = np.frombuffer(base64.b64decode(sample(trials=hidden).replays["data"]), "<i2")
+    assert (lost == LOST).sum() == 3
+
+
+def test_a_model_of_another_session_is_refused_in_one_line():
+    trials = sample_trials(small_model(4))
+    with pytest.raises(InputError, match="fitted to trial tilt_0_identify .* found no trial tilt_0_identify"):
+        check_fitted({"identify_stiffness": table(trials)}, trials[1:])
+    moved = replace(trials[0], positions=trials[0].positions + 1e-3)
+    with pytest.raises(InputError, match="digest .* in data/processed/filter, expected the session"):
+        check_fitted({"identify_stiffness": table(trials)}, [moved, *trials[1:]])
+
+
+def test_a_model_of_another_arm_is_refused_in_one_line():
+    with pytest.raises(InputError, match="session.yaml: segments: trial tilt_0_identify: found 'unit_04'"):
+        sample(model=small_model(3), trials=None)
+
+
+def test_the_code_has_one_digest_which_every_change_of_it_changes(tmp_path):
+    (tmp_path / "rooms/__pycache__").mkdir(parents=True)
+    (tmp_path / "stage.py").write_text("a")
+    (tmp_path / "rooms/one.py").write_text("b")
+    parts, found = ["stage.py", "rooms"], set()
+    found.add(digest_of_code(tmp_path, parts))
+    (tmp_path / "rooms/__pycache__/one.pyc").write_text("left by Python")
+    assert {digest_of_code(tmp_path, parts[::-1])} == found
+    (tmp_path / "rooms/one.py").write_text("c")
+    found.add(digest_of_code(tmp_path, parts))
+    (tmp_path / "rooms/one.py").rename(tmp_path / "rooms/two.py")
+    found.add(digest_of_code(tmp_path, parts))
+    assert len(found) == 3
+
+
+def test_the_committed_certificate_names_the_committed_code():
+    facts = json.loads((CHECKOUT / "artifacts/report/facts.json").read_text())
+    assert facts["code"] == digest_of_code(CHECKOUT, code())
+
+
+def test_the_page_stands_by_itself(html):
+    assert not re.findall(r"""(?:src|href)=["'](?!data:)""", html)
+    assert "default-src 'none'" in html
+    assert html.count("<h1>") == 1
+    assert "small arm &lt;of tests&gt;" in html
+    assert "<of tests>" not in html
+    told = json.loads(re.search(r'id="replays">(.*?)</script>', html, re.DOTALL)[1])
+    assert told["trials"]
+    for words in ("Errors", "Replay", "Parameters", "Uncertainty of the tip", "Data quality", COMMAND, "Signature"):
+        assert words in html, words
+    assert len(html) < 15e6

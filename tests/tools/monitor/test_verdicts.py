@@ -1,0 +1,237 @@
+"""When a chart raises an alarm, which trials it suspects, and how far an explanation is to be trusted: by hand."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.special import stdtrit
+from scipy.stats import chi2
+
+from trunkline.tools.monitor.attribution import APART, explain
+from trunkline.tools.monitor.baseline import POWERS, Departure, Group
+from trunkline.tools.monitor.chart import ALONE, FORGETTING, LONG_RUN, Chart, Charted, Line
+from trunkline.tools.monitor.scores import Score
+
+LIMIT = 4.0
+
+
+def group(degrees: int = 10, spread: float = 1.0, error: float = 0.0) -> Group:
+    return Group(("release",), np.zeros(1), np.full((1, 1), error), 0.0, 1.0, spread, degrees)
+
+
+def departure(z: float, deviation: float = 1.0) -> Departure:
+    return Departure(z * deviation, deviation, z, group())
+
+
+@pytest.mark.parametrize("z", [3.0, 12.0, 20.0, 1e3, 1e9, np.inf, -20.0, -np.inf])
+@pytest.mark.parametrize("deviation", [1.0, 0.5, 3.0])
+def test_one_trial_moves_a_chart_by_a_share_of_the_limit_at_most(z, deviation):
+    """However far off it is, and however well it tells the parameter; two of them are beyond the limit."""
+    line = Line(LIMIT, best=1.0)
+    line.add(departure(z, deviation))
+    assert abs(line.level) <= ALONE * LIMIT + 1e-12
+    assert np.sign(line.level) == np.sign(z)
+    assert not line.beyond
+    if abs(z) > 1e2:
+        assert abs(line.level) == pytest.approx(ALONE * LIMIT)
+        line.add(departure(z, deviation))
+        assert line.beyond
+
+
+def test_a_usual_trial_moves_it_by_its_weight():
+    """A ← (1 - λ) A + λ w z, with w the best deviation over its own, 1 at most."""
+    for deviation, weight in ((1.0, 1.0), (4.0, 0.25), (0.25, 1.0)):
+        line = Line(LIMIT, best=1.0, mean=0.4)
+        line.add(departure(1.0, deviation))
+        assert line.mean == pytest.approx((1 - FORGETTING) * 0.4 + FORGETTING * weight)
+        assert line.variance == pytest.approx((1 - FORGETTING) ** 2 * LONG_RUN + (FORGETTING * weight) ** 2)
+
+
+@pytest.mark.parametrize(
+    ("level", "beyond"),
+    [(0.0, False), (3.999, False), (LIMIT, False), (4.001, True), (-LIMIT, False), (-4.001, True), (np.nan, False)],
+)
+def test_beyond_the_limit_is_more_than_it_to_either_side(level, beyond):
+    line = Line(LIMIT, best=1.0, mean=level, variance=1.0)
+    assert line.beyond is beyond
+
+
+def score(kind: str = "release", curvature=((1.0,),)) -> Score:
+    curvature = np.array(curvature)
+    return Score("trial", kind, None, 0.0, np.zeros(len(curvature)), curvature)
+
+
+class Told:
+    """A baseline that says of each trial in turn how far it is off, z by the number of the parameter."""
+
+    def __init__(self, *rows: dict[int, float]) -> None:
+        self.rows = iter(rows)
+
+    def departures(self, one: Score) -> dict[int, Departure]:
+        return {p: departure(z) for p, z in next(self.rows).items()}
+
+
+def charted(*rows: dict[int, float], limits=(LIMIT, LIMIT), restart: bool = False) -> Chart:
+    lines = {p: Line(limit, 1.0) for p, limit in enumerate(limits)}
+    chart = Chart(Told(*rows), lines, restart)  # type: ignore[arg-type]
+    for _ in rows:
+        chart.add(score())
+    return chart
+
+
+FAR = 1e6
+
+
+@pytest.mark.parametrize(
+    ("rows", "alarms", "changed"),
+    [
+        ([{0: 0.0}, {0: 1.0}], [[], []], None),
+        ([{0: FAR}, {0: 0.0}, {0: FAR}], [[], [], [0]], 2),
+        ([{0: FAR}, {0: FAR}, {0: FAR}], [[], [0], [0]], 1),
+        ([{0: FAR}, {0: -FAR}], [[], []], None),
+        ([{0: FAR, 1: FAR}, {0: FAR, 1: FAR}], [[], [0, 1]], 1),
+        ([{0: FAR}, {1: FAR}, {0: FAR}], [[], [], [0]], 2),  # a trial of another parameter is no trial of this one
+        ([{0: FAR}, {0: FAR}, {1: 0.0}], [[], [0], []], 1),  # nor repeats its alarm
+        ([{7: FAR}, {7: FAR}, {7: FAR}], [[], [], []], None),  # without a chart
+    ],
+)
+def test_alarms_are_of_the_parameters_that_a_trial_tells(rows, alarms, changed):
+    chart = charted(*rows)
+    assert [one.alarms for one in chart.trials] == alarms
+    assert chart.changed() == changed
+
+
+@pytest.mark.parametrize(("restart", "alarms"), [(True, [[], [0], [], [0]]), (False, [[], [0], [0], [0]])])
+def test_a_chart_that_begins_anew_after_an_alarm_takes_two_again(restart, alarms):
+    chart = charted(*[{0: FAR}] * 4, restart=restart)
+    assert [one.alarms for one in chart.trials] == alarms
+
+
+def standing(levels: list[dict[int, float]], limits=(LIMIT, LIMIT)) -> Chart:
+    """A chart that stood at these levels after its trials; alarms where they are beyond the limits."""
+    lines = {p: Line(limit, 1.0) for p, limit in enumerate(limits)}
+    trials = [Charted(score(), {}, row, [p for p, level in row.items() if abs(level) > limits[p]]) for row in levels]
+    return Chart(None, lines, trials=trials)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("levels", "suspects"),
+    [
+        ([{0: 0.0}, {0: 3.0}], None),
+        ([{0: 5.0}], (0, 0)),
+        ([{0: 0.5}, {0: 2.0}, {0: 5.0}], (1, 2)),
+        ([{0: 1.0}, {0: 2.0}, {0: 5.0}], (1, 2)),  # within a standard deviation is near the middle
+        ([{0: 1.001}, {0: 2.0}, {0: 5.0}], (0, 2)),
+        ([{0: 2.0}, {0: -2.0}, {0: 5.0}], (2, 2)),  # on the other side it was not this change
+        ([{0: -2.0}, {0: -3.0}, {0: -5.0}], (0, 2)),
+        ([{0: 0.0}, {0: 2.0}, {1: 0.3}, {0: 5.0}], (1, 3)),  # between those that tell
+        ([{0: 0.0}, {0: 5.0}, {0: 9.0}], (1, 1)),  # up to the first alarm
+        ([{0: 0.0, 1: 2.0}, {0: 4.5, 1: 6.0}], (0, 1)),  # the chart that is furthest beyond
+        ([{0: 0.0, 1: 2.0}, {0: 7.0, 1: 6.0}], (1, 1)),
+        ([{0: 0.0, 1: -2.0}, {0: 4.5, 1: -6.0}], (0, 1)),  # to whichever side
+    ],
+)
+def test_suspects_begin_where_the_furthest_chart_was_last_near_its_middle(levels, suspects):
+    chart = standing(levels)
+    expected = [] if suspects is None else chart.trials[suspects[0] : suspects[1] + 1]
+    assert chart.suspects() == expected
+
+
+def test_how_far_beyond_is_told_against_each_chart_s_own_limit():
+    chart = standing([{0: 0.0, 1: 2.0}, {0: 7.0, 1: 6.0}], limits=(6.0, 3.0))
+    assert chart.suspects() == chart.trials
+
+
+PLAIN = SimpleNamespace(reference=[score(curvature=np.eye(2))], odd={}, departures=lambda _: {})
+
+
+def of_changes(*rows: dict[int, float], curvature=((1.0, 0.0), (0.0, 1.0)), own: Group | None = None):
+    """What explains trials with such changes, by the number of the parameter, each of variance 1."""
+    own = own or group()
+    trials = [Charted(score(curvature=curvature), {p: Departure(change, 1.0, change, own) for p, change in row.items()},
+                      {}, []) for row in rows]  # fmt: skip
+    return explain(trials, PLAIN, sorted({p for row in rows for p in row}))  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("scatter", [0.0, 0.5, 1.0, 2.0, 6.0])
+def test_an_interval_is_widened_where_trials_disagree_by_more_than_chance(scatter):
+    """By the ratio of Birge: of n trials that scatter by s about their mean, ± t s / √n, and never less than t / √n."""
+    signs = np.array([1, -1, 1, -1, 0])
+    spread = signs * scatter / np.std(signs, ddof=1)
+    found = of_changes(*({0: 7.0 + off} for off in spread))
+    assert found.best.size == pytest.approx(7.0)
+    assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * max(scatter, 1.0) / np.sqrt(5))
+
+
+@pytest.mark.parametrize(("excess", "whole"), [(0.99, True), (1.01, False)])
+def test_what_is_left_is_chance_up_to_its_quantile(excess, whole):
+    """χ² of five trials about their mean: above its 99.9th percentile, one change does not explain them."""
+    signs = np.array([1, -1, 1, -1, 0])
+    spread = signs * np.sqrt(excess * chi2.ppf(0.999, 4) / 4)
+    assert of_changes(*({0: 7.0 + off} for off in spread)).whole is whole
+
+
+@pytest.mark.parametrize(("other", "wider"), [(0.5, 1.0), (1.0, 1.0), (2.0, 4.0), (3.0, 9.0)])
+@pytest.mark.parametrize(("share", "alike"), [(0.99, True), (1.01, False)])
+def test_parameters_are_told_apart_by_more_than_chance_leaves(other, wider, share, alike):
+    """Two that are independent: what one explains of χ² more than the other must be above 3.84 times the ratio."""
+    best = np.sqrt(other**2 + share * APART * wider)
+    found = of_changes({0: best, 1: other})
+    assert found.best.parameter == 0
+    assert [one.parameter for one in found.alike] == ([1] if alike else [])
+
+
+def test_few_degrees_of_freedom_widen_an_interval_and_those_of_the_worst_trial_count():
+    few, many = group(degrees=4), group(degrees=60)
+    trials = [Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, own)}, {}, []) for own in (many, few)]
+    found = explain(trials, PLAIN, [0])  # type: ignore[arg-type]
+    assert found.best.half_width == pytest.approx(stdtrit(4, 0.975) / np.sqrt(2))
+
+
+def test_what_the_reference_itself_gets_wrong_is_shared_by_its_trials():
+    """Of n trials beside one mean that is uncertain by e: variance 1 / n + e², which more trials do not lower."""
+    own = group(error=0.5)
+    assert own.shared(None).tolist() == [0.5] + [0.0] * (POWERS - 1)
+    for count in (1, 4, 100):
+        found = of_changes(*[{0: 5.0}] * count, own=own)
+        assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * np.sqrt(1 / count + 0.25))
+
+
+def test_a_change_of_one_shows_in_the_estimate_of_another_that_moves_the_arm_alike():
+    found = of_changes({0: 6.0, 1: 3.0}, curvature=((1.0, 0.5), (0.5, 1.0)))
+    assert found.best.parameter == 0
+    assert found.best.size == pytest.approx(6.0)
+    assert found.whole
+
+
+def test_the_best_explanation_need_not_be_asked_first():
+    found = of_changes({0: 1.0, 1: 6.0})
+    assert (found.best.parameter, found.best.size) == (1, pytest.approx(6.0))
+    assert [one.parameter for one in found.alike] == []
+
+
+def test_a_parameter_that_no_trial_tells_of_explains_nothing():
+    trial = Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, group())}, {}, [])
+    found = explain([trial], PLAIN, [1, 0])  # type: ignore[arg-type]
+    assert (found.best.parameter, found.alike) == (0, [])
+
+
+@pytest.mark.parametrize(("spread", "information", "deviation"), [(3.0, 1.0, 3.0), (1.0, 4.0, 0.5), (3.0, 4.0, 1.5)])
+def test_chance_is_the_reference_s_spread_over_the_root_of_what_a_trial_tells(spread, information, deviation):
+    found = of_changes({0: 5.0}, curvature=np.eye(2) * information, own=group(spread=spread))
+    assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * deviation)
+
+
+@pytest.mark.parametrize(("more", "alike"), [(3.7, [1]), (4.0, [])])
+def test_two_are_told_apart_at_the_95th_percentile_of_one_degree_of_freedom(more, alike):
+    found = of_changes({0: np.sqrt(1 + more), 1: 1.0})
+    assert [one.parameter for one in found.alike] == alike
+
+
+def test_groups_of_another_condition_share_no_error():
+    """Beside two means, each uncertain by 1/2, two trials have a variance of (1 + 1/4) / 2."""
+    groups = [replace(group(error=0.5), key=("release", level)) for level in (1, 2)]
+    trials = [Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, own)}, {}, []) for own in groups]
+    found = explain(trials, PLAIN, [0])  # type: ignore[arg-type]
+    assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * np.sqrt(1.25 / 2))

@@ -1,0 +1,100 @@
+"""The log of a live session as channels on one clock, that of its stamps, and as steps of what was wanted."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from trunkline.ar.session.log_format import INPUT, JOINTS, JOINTS_SENT, TENDONS, TENDONS_SENT
+from trunkline.ar.session.log_reader import Logbook, read_logbook, tip_path
+from trunkline.ar.teleop.messages import Input, Intent, from_json
+from trunkline.errors import InputError
+from trunkline.recordings.logs.joint_stream import joint_stream
+from trunkline.recordings.logs.log import Log, read_log
+
+
+class Channel(NamedTuple):
+    """times: ns, in order. Shape (T,). values: (T, C), of the C `names`."""
+
+    times: np.ndarray
+    values: np.ndarray
+    names: tuple[str, ...]
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """The last values that were told by then; NaN before the first. Shape (n, C)."""
+        rows = np.searchsorted(self.times, times, side="right") - 1
+        return np.where(rows[:, None] < 0, np.nan, self.values[np.maximum(rows, 0)])
+
+
+class Step(NamedTuple):
+    """Of the core of teleoperation: what it was given at `time`, ns, and wanted."""
+
+    time: int
+    given: Input
+    intent: Intent
+
+
+@dataclass(frozen=True)
+class Recording:
+    """sent: the robot's axes as commanded, the rigid joints', rad, and pulls of cables, m. measured: the same as
+    measured; an axis that nobody measures is as it was sent, its name ends in `.sent`. tip: where the arm's tip was in
+    the rigid base, m; of a real machine where its twin had it, as nobody sees the arm: its names end in `.twin`."""
+
+    path: Path
+    logbook: Logbook
+    steps: list[Step]
+    sent: Channel
+    measured: Channel
+    tip: Channel
+
+
+def read_recording(path: Path) -> Recording:
+    """
+    Raises:
+        InputError: it is no log of a live session, or of none in which a robot was seen.
+    """
+    logbook, log = read_logbook(path), read_log(path)
+    zero = int(log.topics[INPUT].log_times[0])  # of the steps' times
+    steps = [
+        Step(zero + round(1e9 * step.time), from_json(Input, step.given), from_json(Intent, step.intent))
+        for step in logbook.steps
+    ]
+    sent = [_axes(path, log, topic) for topic in (JOINTS_SENT, TENDONS_SENT)]
+    measured = [
+        _named(_axes(path, log, topic), ".pos") if topic in log.topics else _named(instead, ".sent")
+        for topic, instead in zip((JOINTS, TENDONS), sent, strict=True)
+    ]
+    return Recording(
+        path, logbook, steps, _joined([_named(one, ".pos") for one in sent]), _joined(measured), _tip(path, logbook)
+    )
+
+
+def _axes(path: Path, log: Log, topic: str) -> Channel:
+    if topic not in log.topics:
+        raise InputError(f"{path}: {topic}: found no such topic, expected the log of a session with a robot")
+    found = joint_stream(log.topics[topic])
+    order = np.argsort(found.stamps, kind="stable")
+    return Channel(found.stamps[order], found.positions[order], found.names)
+
+
+def _named(axes: Channel, ending: str) -> Channel:
+    return axes._replace(names=tuple(f"{name}{ending}" for name in axes.names))
+
+
+def _joined(parts: list[Channel]) -> Channel:
+    """One channel of all, at all their times."""
+    times = np.unique(np.concatenate([part.times for part in parts]))
+    values = np.concatenate([part.at(times) for part in parts], axis=1)
+    return Channel(times, values, tuple(name for part in parts for name in part.names))
+
+
+def _tip(path: Path, logbook: Logbook) -> Channel:
+    told, poses, ending = logbook.begin["tip"], logbook.drawn, "" if logbook.twin is None else ".twin"
+    if poses is None or poses.quaternions is None or told["body"] not in poses.names:
+        raise InputError(f"{path}: /tf: found no body {told['body']!r}, which has the tip, expected its poses")
+    row = poses.names.index(told["body"])
+    there = poses.present[:, row]
+    path_of = np.concatenate([poses.positions[there, row], poses.quaternions[there, row]], axis=1)
+    names = tuple(f"tip.{axis}{ending}" for axis in "xyz")
+    return Channel(poses.stamps[there], tip_path(path_of, told["place"]), names)

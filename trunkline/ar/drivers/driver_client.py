@@ -1,0 +1,143 @@
+"""A limb, seen from the machine's process: its adapter, a process of its own.
+
+An adapter is started with a socket, over which it tells of itself every few ms, and hears where its axes shall be. Once
+nobody is at the other end, it brings its limb to rest, and gives it back.
+"""
+
+import math
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from trunkline.ar.drivers.driver import CONNECTING
+from trunkline.ar.drivers.driver_frames import Line, Setpoint, Told
+from trunkline.ar.drivers.driver_process import AXES
+from trunkline.errors import InputError
+
+ROOT = Path(__file__).parents[3]
+SILENT = 0.1  # s without a frame of the adapter
+CLOSING = 3.0  # s
+
+
+@dataclass(frozen=True)
+class ArmSettings:
+    """python: the Python of the environment with the robot's library, "" for this one. address: of the robot. astray:
+    rad that a joint may be from where it is sent."""
+
+    python: Annotated[str, Field(max_length=4096)]
+    address: Annotated[str, Field(min_length=1, max_length=255)]
+    astray: Annotated[float, Field(gt=0, le=0.5)]
+
+
+class Adapted:
+    """A `Limb` of so many `axes` whose adapter is this `command`, with the socket's descriptor behind it.
+
+    Attributes:
+        told: the adapter's newest frame, None before the first.
+
+    Raises:
+        OSError: the command is not there.
+    """
+
+    told: Told | None
+
+    def __init__(
+        self, command: Sequence[str], axes: int, patience: float = CONNECTING, astray: float = math.inf, at: str = ""
+    ) -> None:
+        """patience: s that the adapter has to be ready. astray: rad that a joint may be from where it is sent. at: what
+        is said of where the limb should be."""
+        self._axes, self._astray, self._at, self.fault, self.told = axes, astray, at, "", None
+        self._patience, self._until = patience, time.monotonic() + patience
+        ours, theirs = socket.socketpair()
+        self.line, path = Line(ours, Told.size(axes)), os.environ.get("PYTHONPATH", "")
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, (str(ROOT), path)))}
+        try:
+            self.process = subprocess.Popen(
+                [*command, str(theirs.fileno())], pass_fds=[theirs.fileno()], env=environment,
+                stdin=subprocess.DEVNULL, start_new_session=True,  # Ctrl-C is for whoever sends
+            )  # fmt: skip
+        finally:
+            theirs.close()
+
+    @property
+    def ready(self) -> bool:
+        return self.told is not None
+
+    @property
+    def sent(self) -> np.ndarray:
+        assert self.told is not None
+        return np.array(self.told.sent)
+
+    @property
+    def measured(self) -> np.ndarray:
+        return np.full(self._axes, np.nan) if self.told is None else np.array(self.told.measured)
+
+    def send(self, due: float, axes: np.ndarray) -> None:
+        try:
+            self.line.send(Setpoint(due, tuple(axes.tolist())).pack())
+        except OSError as error:
+            self._hear()  # an adapter that has ended has told why
+            self._fail(f"its adapter takes no setpoints ({error.strerror})")
+
+    def turn(self, now: float) -> None:
+        """Hear what the adapter tells, at `now`, s."""
+        self._hear()
+        if self.told is None:
+            if now > self._until:
+                self._fail(f"its adapter is not ready after {self._patience:.0f} s{self._at}")
+            return
+        if (silent := now - self.told.time) > SILENT:
+            self._fail(f"its adapter is silent for {1e3 * silent:.0f} ms")
+
+    def close(self) -> None:
+        """The adapter hears no more: it brings its limb to rest, and gives it back."""
+        self.line.close()
+        try:
+            self.process.wait(CLOSING)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self.process.wait()
+
+    def _hear(self) -> None:
+        for frame in self.line.heard():
+            told = Told.unpack(frame)
+            if told.fault:
+                self._fail(told.fault)
+            if self.told is not None or not told.fault:
+                self.told = told
+                self._look(told)
+        if not self.line.open:
+            self._fail("its adapter has ended")
+
+    def _look(self, told: Told) -> None:
+        """Whether each joint is where it is sent."""
+        off = np.abs(np.subtract(told.measured, told.sent))
+        if not off.max() <= self._astray:  # or no number
+            where = f"found {off.max():.3g} rad from where it is sent, expected at most {self._astray:g}"
+            self._fail(f"joint {int(off.argmax()) + 1}: {where}")
+
+    def _fail(self, fault: str) -> None:
+        self.fault = self.fault or fault
+
+
+def panda(settings: ArmSettings, robot: str) -> Adapted:
+    """A robot, "panda", "fr3" or "fake".
+
+    Raises:
+        InputError: its Python is not there.
+    """
+    python = settings.python or sys.executable
+    command = [python, "-m", "trunkline.ar.drivers.driver_process", robot, settings.address]
+    try:
+        return Adapted(command, AXES, astray=settings.astray, at=f", expected {robot} at {settings.address}")
+    except OSError as error:
+        raise InputError(f"arm.python: found {python} ({error.strerror}), expected a Python") from error

@@ -1,0 +1,43 @@
+"""The assistant: a few places of the mount near the user's own, tried in one batch.
+
+A mount that is elsewhere, turned alike, is an object that is elsewhere the other way. So one composed model and one
+plan serve all places, each with the same futures: places differ by what they are, not by their luck.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from trunkline.ar.hybrid.posterior import Doubts, Draws, draw
+from trunkline.ar.hybrid.preview import Holding, asked, joined
+from trunkline.ar.hybrid.rollouts import Twin, Way, futures
+
+
+def try_places(
+    twin: Twin,
+    way: Way,
+    doubts: Doubts,
+    holding: Holding,
+    offsets: np.ndarray,
+    count: int,
+    seed: int = 0,
+    go_on: Callable[[], None] = lambda: None,
+) -> np.ndarray:
+    """Share of `count` futures that hold the object, for each place. Shape (P,).
+
+    Args:
+        offsets: where the mount of each place is, less that of the plan, world axes, m. Shape (P, 3).
+        go_on: as `preview`.
+    """
+    one, places = draw(doubts, twin.arm, count, seed), len(offsets)
+    moved = np.tile(one.offsets, (places, 1)) - np.repeat(offsets, count, axis=0)
+    values = {name: np.tile(column, places) for name, column in one.values.items()}
+    many = Draws(values, np.tile(one.friction, places), moved, np.tile(one.turns, places))
+    motion = joined(list(asked(futures(twin, way, many), go_on)))
+    return holding.holds(motion).reshape(places, count).mean(axis=1)
+
+
+def best(offsets: np.ndarray, shares: np.ndarray) -> int:
+    """The place that holds most surely, the nearest to the plan's own among equals."""
+    away = np.linalg.norm(offsets, axis=1)
+    return int(np.lexsort((away, -shares))[0])

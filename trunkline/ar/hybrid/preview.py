@@ -1,0 +1,163 @@
+"""A preview that knows what it does not know: not one twin tries a plan but a batch of them.
+
+The nominal twin, with all as it is believed, goes first and is shown as it is simulated. Then come futures, drawn from
+what is not known (`trunkline/ar/hybrid/posterior.py`): how far their tips spread, and the share of them that holds the
+object is the probability that the grasp holds, with Wilson's interval. That interval says how many futures were asked,
+not how true the model is.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Annotated, Protocol
+
+import numpy as np
+from pydantic import Field
+
+from trunkline.ar.hybrid.posterior import Doubts, Draws, draw, nominal_draw
+from trunkline.ar.hybrid.rates import wilson
+from trunkline.ar.hybrid.rollouts import FRAME, Piece, Twin, Way, futures
+
+Metres = Annotated[float, Field(gt=0, le=1)]
+WITHIN = 0.9  # share of futures whose tips are within the spread
+EVERY = 0.1  # s between the times at which a spread is stated
+
+
+class Outcome(Protocol):
+    """What is asked of a plan: `Holding`, or `trunkline.ar.hybrid.released.Resting`."""
+
+    def holds(self, motion: Piece) -> np.ndarray:
+        """In which futures it comes true. Shape (B,)."""
+        ...
+
+
+@dataclass(frozen=True)
+class Holding:
+    """What counts as held, from the time `since`, s, when the object loses its support or is lifted, to the end.
+
+    Attributes:
+        sag: m, by which what the arm wraps of the object may move against the mount, which the arm bears: it gives way
+            and swings. What is lifted must be lifted by more.
+        slip: m, by which it may move away from the nearest unit.
+        lifted: m, by which it must be higher then than at first.
+    """
+
+    since: float
+    sag: Metres = 0.08
+    slip: Metres = 0.02
+    lifted: Annotated[float, Field(ge=-1, le=1)] | None = None
+
+    def holds(self, motion: Piece) -> np.ndarray:
+        """Which futures hold the object. Shape (B,)."""
+        first = int(np.argmin(np.abs(motion.time - self.since)))
+        beside = motion.grip - motion.mount
+        with np.errstate(invalid="ignore"):
+            stays = np.linalg.norm(beside[:, -1] - beside[:, first], axis=1) < self.sag
+            stays &= motion.away[:, -1] < motion.away[:, first] + self.slip
+            if self.lifted is not None:
+                stays &= motion.grip[:, first, 2] - motion.grip[:, 0, 2] > self.lifted
+        return stays & motion.sound
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What people are told of the tip: at `times` (n,), s, it is within `radii` (n,), m, of `tips` (n, 3), m, in WITHIN
+    of sound futures."""
+
+    times: np.ndarray
+    tips: np.ndarray
+    radii: np.ndarray
+
+
+@dataclass(frozen=True)
+class Preview:
+    """What may come of a plan. Positions in the world, m.
+
+    Attributes:
+        nominal: the motion of the twin as it is believed, B = 1.
+        motion: of the B futures.
+        draws: what each future has.
+        held: which of them hold the object, or do what else was asked; None if nobody asked. Shape (B,).
+    """
+
+    nominal: Piece
+    motion: Piece
+    draws: Draws
+    held: np.ndarray | None
+
+    @property
+    def median(self) -> np.ndarray:
+        """Path of the tip, the median of each coordinate, of sound futures. Shape (F, 3)."""
+        return np.median(self.motion.tip[self.motion.sound], axis=0)
+
+    @property
+    def middle(self) -> int:
+        """The future whose tip is nearest to the median on the whole: one that may be shown, its `qpos` is a pose."""
+        away = np.linalg.norm(self.motion.tip - self.median, axis=2).mean(axis=1)
+        return int(np.argmin(np.where(self.motion.sound, away, np.inf)))
+
+    @property
+    def spread(self) -> np.ndarray:
+        """Distance from the median within which the tips of WITHIN of sound futures are, m. Shape (F,)."""
+        away = np.linalg.norm(self.motion.tip[self.motion.sound] - self.median, axis=2)
+        return np.quantile(away, WITHIN, axis=0)
+
+    @property
+    def stated(self) -> Stated:
+        """Every EVERY s, as a page shows it; the last is of where the tip ends."""
+        every = max(round(EVERY / FRAME), 1)
+        return Stated(self.motion.time[::every], self.median[::every], self.spread[::every])
+
+    @property
+    def probability(self) -> float | None:
+        """Share of the futures that hold the object; one that MuJoCo warned of does not."""
+        return None if self.held is None else float(self.held.mean())
+
+    @property
+    def interval(self) -> tuple[float, float] | None:
+        """Of the probability, 95 %, Wilson's."""
+        return None if self.held is None else wilson(int(self.held.sum()), len(self.held))
+
+
+def nominal(twin: Twin, way: Way) -> Iterator[Piece]:
+    """The motion as it is believed, in pieces of a quarter of a second, each as soon as it is simulated."""
+    return futures(twin, way, nominal_draw())
+
+
+def preview(
+    twin: Twin,
+    way: Way,
+    doubts: Doubts,
+    holding: Outcome | None = None,
+    count: int = 32,
+    seed: int = 0,
+    show: Callable[[Piece], None] = lambda piece: None,
+    go_on: Callable[[], None] = lambda: None,
+) -> Preview:
+    """Try a plan in `count` futures.
+
+    Args:
+        holding: what is asked of the plan; None where nothing is grasped.
+        show: called with each piece of the nominal motion, before any future is simulated.
+        go_on: called before each piece, and after the last; what it raises ends the preview.
+    """
+    begun, draws = [], draw(doubts, twin.arm, count, seed)
+    for piece in asked(nominal(twin, way), go_on):
+        show(piece)
+        begun.append(piece)
+    motion = joined(list(asked(futures(twin, way, draws), go_on)))
+    return Preview(joined(begun), motion, draws, holding.holds(motion) if holding is not None else None)
+
+
+def asked(pieces: Iterator[Piece], go_on: Callable[[], None]) -> Iterator[Piece]:
+    """The pieces, `go_on` called before each and after the last."""
+    go_on()
+    for piece in pieces:
+        yield piece
+        go_on()
+
+
+def joined(pieces: list[Piece]) -> Piece:
+    """Pieces one after the other; sound is what is so at last."""
+    along = {name: np.concatenate([getattr(piece, name) for piece in pieces], axis=1)
+             for name in ("qpos", "tip", "mount", "object", "grip", "away")}  # fmt: skip
+    return Piece(time=np.concatenate([piece.time for piece in pieces]), sound=pieces[-1].sound, **along)

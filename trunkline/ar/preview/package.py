@@ -1,0 +1,112 @@
+"""All that a client has: the Unity package, and nothing else. Network, maps and model come out of its files."""
+
+import json
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from trunkline.ar.hybrid.grasp_poses import Grip, SideGrip
+from trunkline.ar.teleop.alignment import base_quaternion
+from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.grasping import Grasping
+from trunkline.ar.teleop.messages import Targets
+from trunkline.ar.teleop.planner import Planner
+from trunkline.ar.teleop.reach import MapReach
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.tendons import Network
+from trunkline.ar.teleop.trajectory import limits_of
+from trunkline.ar.teleop.vectors import DOWN, Vector, conjugate, rotate
+from trunkline.ar.teleop.vibration import shaper_for, slowest, swings
+from trunkline.errors import InputError
+from trunkline.frames import STANDARD_GRAVITY
+from trunkline.model.arm.contact_geometry import read_geometry
+from trunkline.model.arm.geometry import ChainGeometry
+from trunkline.model.simulation.rest import settle
+from trunkline.model.statics.chain import Chain, read_chain
+from trunkline.unity import unpacked
+from trunkline.unity.package import MANIFEST, MODEL
+
+PACKAGES = Path("artifacts/package_unity")
+
+
+@dataclass(frozen=True)
+class Package:
+    """`straight`: the motors' commands (K,), m, that leave the arm straight; a command is a path length, so a pull is
+    `straight` less the command. `rate_limit`: m/s, of the winches, 0 for none. `files`: contents by path."""
+
+    digest: str
+    reach: MapReach
+    network: Network
+    model: mujoco.MjModel
+    chain: Chain
+    geometry: ChainGeometry
+    straight: np.ndarray
+    rate_limit: float
+    files: dict[str, bytes] = field(repr=False)
+
+    def planner(self, config: Config) -> Planner:
+        """The planner that this package and the settings of teleoperation make."""
+        limits = limits_of(config.motors, self.rate_limit, len(self.straight))
+        shaper, rigid = shaper_for(self.model, config.shaping), RigidIK(config.mount_offset)
+        grasping = Grasping(rigid, config.mount_offset, self.straight, self.grips(config), config.handling)
+        return Planner(
+            rigid, self.network, self.straight, limits, config.mount_offset, shaper=shaper, chain=self.chain,
+            grasping=grasping,
+        )  # fmt: skip
+
+    def grips(self, config: Config) -> dict[str, Grip]:
+        """The ways of grasping things, by their names."""
+        return {"hanging": SideGrip(config.hanging, self.geometry), "basket": SideGrip(config.basket, self.geometry)}
+
+    @cached_property
+    def period(self) -> float:
+        """s, of the slowest swing of the straight arm that a moved mount gives its tip; 0 where there is none."""
+        gravity = np.array([0.0, 0.0, -STANDARD_GRAVITY])
+        return float(max(slowest(swings(self.model, self.straight, None, gravity), 1).periods, default=0.0))
+
+    def tip(self, mount: Vector, targets: Targets, commands: np.ndarray) -> np.ndarray:
+        """Where the twin's tip comes to rest, base frame, m (3,): the arm at `mount` as `targets` turn it, its motors
+        at `commands` (K,)."""
+        turn = base_quaternion(targets.pointing, targets.heading)
+        gravity = STANDARD_GRAVITY * np.array(rotate(conjugate(turn), DOWN))
+        x, y, z = (float(value) for value in settle(self.model, commands[None], gravity).position[0])
+        return np.array(mount) + np.array(rotate(turn, (x, y, z)))
+
+
+def only_package(folder: Path = PACKAGES) -> Path:
+    """The package that the pipeline made.
+
+    Raises:
+        InputError: there is none, or more than one.
+    """
+    found = sorted(folder.glob("*.tgz"))
+    if len(found) != 1:
+        raise InputError(f"{folder}: found {len(found)} packages (*.tgz), expected one: `make demo` makes it")
+    return found[0]
+
+
+def read_package(path: Path) -> Package:
+    """From a package's folder, or its .tgz.
+
+    Raises:
+        InputError: there is none, or a file of it, its network too, is not what its manifest says.
+    """
+    files = unpacked.read_package(path)
+    digest = unpacked.package_digest(files)
+    manifest = json.loads(files[MANIFEST])
+    network, model = manifest["network"], manifest["model"]
+    compiled = unpacked.model_of(files)
+    return Package(
+        digest,
+        MapReach.from_arrays(unpacked.maps_of(files)),
+        unpacked.network_of(files),
+        compiled,
+        read_chain(compiled).smooth,
+        read_geometry(mujoco.MjSpec.from_string(files[MODEL].decode())),
+        np.array([compiled.tendon_length0[compiled.tendon(name).id] for name in network["output_order"]]),
+        float(model["rate_limit"]),
+        files,
+    )

@@ -1,0 +1,145 @@
+"""The twin that plans are tried on: the identified arm on the Panda, the world as the client believes it, the thing."""
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from trunkline.ar.hybrid.compose import Placed, compose, panda_joints
+from trunkline.ar.hybrid.objects import Thing as Shaped
+from trunkline.ar.hybrid.posterior import Contact, Doubts
+from trunkline.ar.hybrid.rollouts import Twin
+from trunkline.ar.hybrid.string import hang
+from trunkline.ar.hybrid.worlds import Surface
+from trunkline.ar.hybrid.worlds import World as Room
+from trunkline.ar.preview.settings import Previewing
+from trunkline.ar.teleop.messages import Box, Thing, World
+from trunkline.ar.teleop.vectors import Quaternion, unit
+from trunkline.errors import InputError
+from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
+from trunkline.kinematics.panda.kinematics import mount_pose
+from trunkline.kinematics.panda.mounts import PandaRobot
+from trunkline.model.simulation.rest import settle
+from trunkline.unity import unpacked
+
+GRAVITY = np.array([[0.0, 0.0, -STANDARD_GRAVITY]])  # m/s², where the arm hangs straight down
+
+LEANS = 4  # times that it is corrected: each leaves a tenth or less
+
+
+@dataclass(frozen=True)
+class Believed:
+    """What the package says. doubts: about the arm's parameters, contacts and places."""
+
+    arm: mujoco.MjSpec
+    doubts: Doubts
+    robot: PandaRobot
+
+    def lean(self, hangs: np.ndarray | None) -> Rotation | None:
+        """How the arm is turned on its mount, by the least turns, so that its tip, straight down, comes to rest in the
+        direction of `hangs` (3,), m, in the base frame: what leans sags back a little. None where that is not seen."""
+        if hangs is None:
+            return None
+        arm = self.arm.copy().compile()
+        straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
+        found = Rotation.identity()
+        for _ in range(LEANS):
+            own = settle(arm, straight[None], found.inv().apply(GRAVITY)).position
+            found = Rotation.align_vectors(hangs[None], found.apply(own))[0] * found  # of one pair the least
+        return found
+
+
+def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
+    """Out of the files of a package.
+
+    Raises:
+        InputError: it has nothing to preview with, or holds the arm by another robot.
+    """
+    x, y, z = settings.place
+    contact = Contact(settings.friction, (x, y, z), float(np.radians(settings.turn_deg)))
+    robot = unpacked.robot_of(files)
+    if not isinstance(robot, PandaRobot):
+        raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
+    return Believed(unpacked.arm_of(files), unpacked.doubts_of(files, contact), robot)
+
+
+def compose_twin(
+    known: Believed,
+    world: World,
+    thing: Thing | None,
+    joints: np.ndarray,
+    commands: np.ndarray,
+    settings: Previewing,
+    lean: Rotation | None = None,
+    left: np.ndarray | None = None,
+) -> Twin:
+    """The twin at rest at `joints` (7,), rad, its motors at `commands` (K,), m, beside a thing that hangs or stands;
+    `lean` is how its arm is turned on its mount, None where nobody has seen that. With a thing in the arm all is as an
+    earlier preview `left` it: the pose (nq,) at its end, of a model with a string or without."""
+    robot = replace(known.robot, ready=joints.tolist())
+    boards, placed = {box.name: _surface(box) for box in world.boxes}, None
+    if thing is not None:
+        place, turn = np.array(thing.position), thing.quaternion
+        shaped = Shaped(thing.shape, thing.diameter, thing.height, thing.mass, settings.material, thing.basket)
+        if thing.support == "standing":
+            turn = _upright(turn)
+            _stand(place, shaped.half_height, list(boards.values()))
+        placed = Placed(shaped, place, turn)
+    spec = compose(known.arm, robot, Room(None, boards, None), placed)
+    lean = lean or Rotation.identity()
+    spec.body("base").quat = wxyz_from_rotation(lean)
+    if thing is not None and thing.support == "hanging":
+        hang(spec, np.array(thing.position), thing.diameter / 2, settings.string)
+    twin = Twin(spec.compile(), known.arm.copy().compile()).stepped(settings.step)
+    if left is None:
+        return at_rest(twin, joints, commands, robot.mount_offset, lean)
+    return replace(twin, start=left[: twin.model.nq].copy())  # a string, which comes last, is left out
+
+
+def at_rest(
+    twin: Twin, joints: np.ndarray, commands: np.ndarray, mount_offset: float, lean: Rotation | None = None
+) -> Twin:
+    """The same twin, its arm at rest at other `joints` (7,), rad, and `commands` (K,), m."""
+    start = _start(twin.model, twin.arm, joints, commands, mount_offset, lean or Rotation.identity())
+    return replace(twin, start=start)
+
+
+def _start(
+    model: mujoco.MjModel,
+    arm: mujoco.MjModel,
+    joints: np.ndarray,
+    commands: np.ndarray,
+    mount_offset: float,
+    lean: Rotation,
+) -> np.ndarray:
+    """The composed model's pose (nq,) with the arm at rest."""
+    flange = mount_pose(joints[None], mount_offset)[1][0]
+    gravity = lean.inv().apply((flange @ np.diag([1.0, -1.0, -1.0])).T @ GRAVITY[0])
+    rest = settle(arm, commands[None], gravity).qpos[0]
+    pose = model.qpos0.copy()
+    pose[model.jnt_qposadr[panda_joints(model)]] = joints
+    for number in range(arm.njnt):
+        name = arm.joint(number).name
+        if name:
+            pose[model.joint(name).qposadr[0]] = rest[arm.jnt_qposadr[number]]
+    return pose
+
+
+def _upright(quaternion: Quaternion) -> Quaternion:
+    """Its turn about the vertical alone."""
+    w, _, _, z = quaternion
+    return unit((w, 0.0, 0.0, z))
+
+
+def _stand(place: np.ndarray, half_height: float, surfaces: list[Surface]) -> None:
+    """Put the board under `place` (3,), m, to where what stands there says that it is: both are seen not quite true."""
+    under = [board for board in surfaces if (np.abs(place[:2] - board.top[:2]) <= np.array(board.size[:2]) / 2).all()]
+    if under:
+        highest = max((board for board in under if board.top[2] < place[2]), key=lambda board: board.top[2])
+        highest.top[2] = float(place[2] - half_height)
+
+
+def _surface(box: Box) -> Surface:
+    low, high = np.array(box.low), np.array(box.high)
+    return Surface([*((low + high) / 2)[:2].tolist(), float(high[2])], (high - low).tolist(), "wood")

@@ -1,0 +1,271 @@
+"""How one client's room comes to stand in the robot's base, step by step: by eye, by touches, by an anchor.
+
+It has no sockets and no clock. What it gives the core is None until the base's place may be relied on.
+
+    place → tip → touch → done          touched anew: where the tip is, then six places
+    place → done                        put there by eye, where the settings allow it
+    place → (tip →) check → done        an anchor of another day, and one touch that says whether it still holds
+    done → lost → done                  an anchor that was lost, and is back
+"""
+
+from datetime import UTC, datetime
+from typing import NamedTuple
+
+import numpy as np
+
+from trunkline.ar.session import messages
+from trunkline.ar.session.alignment import (
+    POSES,
+    Dwell,
+    after,
+    expected_error,
+    fit,
+    in_base,
+    inverse,
+    residuals,
+    suspect,
+    tilt,
+    tip_of,
+)
+from trunkline.ar.session.anchors import Anchor
+from trunkline.ar.session.settings import Alignment
+from trunkline.ar.teleop.messages import Pose, Vector
+from trunkline.ar.teleop.vectors import Quaternion, add, angle_between, distance, rotate
+from trunkline.errors import InputError
+
+TURNED = 0.01  # rad by which a pose must differ from the last to tell of the tip
+UNTRACKED = "The controller is not tracked, its position at most a guess: no touch."
+UNIT = 1e-2  # by which the length of a quaternion may differ from 1
+CREEP, CREEP_TURN = 0.002, 0.002  # m and rad that an anchor may creep: a new alignment voids a plan
+
+NEXT: dict[messages.AligningStep, str] = {
+    "place": "Hold both grips to carry the robot to its place. A: it stands there. Stick pressed: touch it instead.",
+    "tip": "Rest the controller’s tip in a dent, and turn the controller about it, every way.",
+    "touch": "Hold the tip still on the flange’s mark, touch {0} of {1}. Move the robot between touches.",
+    "check": "Hold the tip still on the flange’s mark once: it says whether the base still is where it was. "
+    "Stick pressed: align anew. A: put it there by eye.",
+    "lost": "The headset has lost the robot’s place. Look around; the robot holds until it is found.",
+    "done": "",
+}
+
+
+class Held(NamedTuple):
+    """A tracked controller, in the reference frame."""
+
+    position: Vector
+    quaternion: Quaternion
+
+
+class Aligner:
+    """Of one client. `known`: its anchor of another day, to be restored; None where there is none.
+
+    `alignment`: pose of the reference frame in the base, None where it must not be relied on. `expected`: error where
+    it is told, m; None where nothing tells.
+    """
+
+    def __init__(self, settings: Alignment, known: Anchor | None = None) -> None:
+        self.settings = settings
+        self.known = known if self._is_trusted(known) else None
+        self.reset()
+
+    def reset(self) -> None:
+        """Nothing is known of the room any more, but the anchors."""
+        self.step: messages.AligningStep = "place"
+        self.said, self.place, self.fasten = "", None, False
+        self.tip: Vector | None = None
+        self.expected: float | None = None
+        self.residual: float | None = None
+        self.anchor: Anchor | None = None
+        self._seen: Pose | None = None  # the anchor's pose
+        self._then: messages.AligningStep = "touch"  # after the tip
+        self._back: messages.AligningStep = "done"  # once a lost anchor is
+        self._former = ""  # id of the anchor that was left
+        self._forget()
+
+    def _forget(self) -> None:
+        self._poses: list[Held] = []
+        self._dwell = Dwell()
+        self._reference: list[np.ndarray] = []
+        self._base: list[np.ndarray] = []
+
+    @property
+    def alignment(self) -> Pose | None:
+        return inverse(self.place) if self.step == "done" and self.place is not None else None
+
+    @property
+    def unfit(self) -> str:
+        """Why nothing may be executed though it is aligned, "" where it may."""
+        limit = self.settings.limit
+        if self.step != "done" or self.expected is None or self.expected <= limit:
+            return ""
+        found = f"expected error {_mm(self.expected)}, more than {_mm(limit)}"
+        return f"alignment: {found}: align anew; nothing is executed"
+
+    def told(self) -> messages.Aligning:
+        words = NEXT[self.step].format(len(self._base) + 1, self.settings.places)
+        anchor = self.anchor or (self.known if self.step == "place" else None)
+        id = anchor.id if anchor is not None else ""
+        return messages.Aligning(self.step, words, self.said, self.place, self.expected, self.residual, id, self.fasten)
+
+    # --- what the user wants
+
+    def by_eye(self, place: Pose) -> str:
+        """The base stands at `place` of the reference frame, as the user sees it; why that does not count."""
+        if not self.settings.by_eye:
+            return "alignment: by eye is for a simulated robot alone; touch it"
+        if not _is_pose(place):
+            return "alignment: found what is no pose"
+        self._placed(place, None, None, "Put there by eye: good enough for a simulated robot alone.")
+        return ""
+
+    def touch(self) -> None:
+        """Align anew, by touches."""
+        self._forget()
+        self.step, self._then, self.said, self.fasten = "tip", "touch", "", False
+        self.expected = self.residual = None
+        self._leave_anchor()
+
+    # --- what is seen
+
+    def hear(self, time: float, held: Held | None, mark: np.ndarray | None) -> None:
+        """At `time`, s, the touching hand, None where it is not tracked; the flange's mark in the base, m (3,), None
+        where the robot moves."""
+        if self.step in ("tip", "touch", "check") and held is None:
+            self.said = UNTRACKED
+        elif self.said == UNTRACKED:
+            self.said = ""
+        if self.step == "tip":
+            self._turned(held)
+        elif self.step in ("touch", "check"):
+            point = None
+            if held is not None and self.tip is not None:
+                point = np.array(add(held.position, rotate(held.quaternion, self.tip)))
+            touched = self._dwell.hear(time, point, mark)
+            if touched is not None and mark is not None:
+                self._checked(touched, mark) if self.step == "check" else self._touched(touched, mark)
+
+    def anchored(self, id: str, seen: Pose | None, known: Anchor | None) -> str:
+        """The anchor `id` is at `seen` of the reference frame, None where it is lost; `known`: what is kept of it. Why
+        that does not count. One that nobody asked for does nothing."""
+        if seen is not None and not _is_pose(seen):
+            return "anchor: found what is no pose"
+        if self.fasten and seen is not None and self.place is not None and id != self._former:
+            kept = after(inverse(seen), self.place)
+            date = datetime.now(UTC).isoformat(timespec="seconds")
+            self.anchor, self.fasten = Anchor(id, kept, self.residual, self.tip, date), False
+            self._seen = seen
+            return ""
+        if self.anchor is None and self._is_trusted(known) and self.step == "place" and seen is not None:
+            assert known is not None
+            self.anchor, self.tip, self.residual = known, known.tip, known.residual
+            self._then = "check"
+            self.step = "tip" if self.tip is None else "check"
+        if self.anchor is None or self.anchor.id != id:
+            return ""
+        if seen is None:
+            if self.step in ("done", "check"):
+                self._back, self.step, self._seen = self.step, "lost", None
+            return ""
+        if self._seen is None or _crept(self._seen, seen):
+            self._seen, self.place = seen, after(seen, self.anchor.transform)
+        self.step = self._back if self.step == "lost" else self.step
+        return ""
+
+    def _is_trusted(self, anchor: Anchor | None) -> bool:
+        """One that was put there by eye is for a simulated robot too: one touch tells nothing of its turn."""
+        return anchor is not None and (anchor.residual is not None or self.settings.by_eye)
+
+    def lose(self) -> None:
+        """It is not known whether all is still where it was: an anchor tells, once it is seen again."""
+        if self.anchor is None:
+            self.reset()
+        else:
+            self.anchored(self.anchor.id, None, None)
+
+    def _leave_anchor(self) -> None:
+        self._former = self.anchor.id if self.anchor is not None else self._former
+        self.anchor = self._seen = None
+
+    # --- steps
+
+    def _turned(self, held: Held | None) -> None:
+        poses = self._poses
+        if held is None or (poses and angle_between(poses[-1].quaternion, held.quaternion) < TURNED):
+            return
+        poses.append(held)
+        if len(poses) < POSES:
+            return
+        try:
+            found = tip_of(*(np.array([one[index] for one in poses]) for index in (0, 1)))
+        except InputError as error:
+            self.said = f"{str(error)[:1].upper()}{str(error)[1:]}."
+            del poses[: POSES // 4]  # it may rest by now
+            return
+        x, y, z = (float(value) for value in found.place)
+        self.tip, self.step, self.said = (x, y, z), self._then, f"The tip is found, within {_mm(found.missed)}."
+        self._poses = []
+
+    def _touched(self, point: np.ndarray, mark: np.ndarray) -> None:
+        reference, base = self._reference, self._base
+        if any(np.linalg.norm(mark - other) < self.settings.apart for other in base):
+            self.said = "Move the robot further before the next touch."
+            return
+        reference.append(point)
+        base.append(mark)
+        self.said = f"Touch {len(base)} is heard."
+        if len(base) < self.settings.places:
+            return
+        touched, known = np.array(reference), np.array(base)
+        wrong = suspect(touched, known)
+        if wrong is not None:
+            self.said = f"Touch {wrong.index + 1} is {_mm(wrong.off)} off the others; touch there again."
+            del reference[wrong.index], base[wrong.index]
+            return
+        try:
+            pose = fit(touched, known)
+        except InputError as error:
+            self.said = f"{str(error)[:1].upper()}{str(error)[1:]}."
+            del reference[-1], base[-1]
+            return
+        level, most = np.degrees(tilt(pose)), self.settings.level_deg
+        if level > most:
+            self._forget()
+            self.said = f"The headset’s vertical is {level:.1f}° off the robot’s, more than {most:g}°: touch again."
+            return
+        self.expected = expected_error(pose, touched, known, np.array(self.settings.at))
+        missed = float(np.sqrt(np.mean(residuals(pose, touched, known) ** 2)))
+        said = f"Aligned; expected error {_mm(self.expected)} where the arm works."
+        self._placed(inverse(pose), missed, self.expected, self.unfit or said)
+        self.said = self.unfit or said
+
+    def _checked(self, point: np.ndarray, mark: np.ndarray) -> None:
+        assert self.place is not None
+        off, limit = float(np.linalg.norm(in_base(inverse(self.place), point) - mark)), self.settings.limit
+        self.expected = off
+        if off <= limit:
+            self.step, self.said = "done", f"The base is within {_mm(off)} of where it was."
+            return
+        self.touch()
+        self.step = "touch"  # the tip is known
+        self.said = f"The touch is {_mm(off)} off, more than {_mm(limit)}: align again."
+
+    def _placed(self, place: Pose, residual: float | None, expected: float | None, said: str) -> None:
+        self.place, self.residual, self.expected, self.said = place, residual, expected, said
+        self.step = "done"
+        self.fasten = not self.unfit  # what is not good enough today is not kept for tomorrow
+        self._leave_anchor()
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.1f} mm"
+
+
+def _is_pose(pose: Pose) -> bool:
+    found = np.array([*pose.position, *pose.quaternion])
+    return bool(np.isfinite(found).all() and abs(np.linalg.norm(found[3:]) - 1) <= UNIT)
+
+
+def _crept(before: Pose, now: Pose) -> bool:
+    """Whether an anchor has moved by more than it may."""
+    turned = angle_between(before.quaternion, now.quaternion)
+    return distance(before.position, now.position) > CREEP or turned > CREEP_TURN

@@ -1,0 +1,73 @@
+"""Anchors that a headset has fastened to the room near the robot's base, kept from one session to the next."""
+
+import os
+import threading
+from pathlib import Path
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic.dataclasses import dataclass
+
+from trunkline.ar.teleop.messages import Pose, Vector
+from trunkline.errors import InputError
+
+MOST = 8  # a headset keeps no more of one page
+
+
+@dataclass(frozen=True)
+class Anchor:
+    """id: the headset's. transform: pose of the robot's base in the anchor. residual: root mean square of the touches,
+    m, None where it was put there by eye. tip: of the controller that touched, in its frame, m; None likewise. date: of
+    the alignment, ISO 8601."""
+
+    id: str
+    transform: Pose
+    residual: float | None
+    tip: Vector | None
+    date: str
+
+
+_FILE: TypeAdapter[list[Anchor]] = TypeAdapter(list[Anchor])
+
+
+class Anchors:
+    """Those in a JSON file, the newest last."""
+
+    def __init__(self, path: Path) -> None:
+        """
+        Raises:
+            InputError: the file holds something else.
+        """
+        self.path, self.kept, self._saving = path, tuple[Anchor, ...](), threading.Lock()
+        if not path.is_file():
+            return
+        try:
+            self.kept = tuple(_FILE.validate_json(path.read_bytes()))
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join(map(str, first["loc"])) or "the whole"
+            raise InputError(f"{path}: {where}: {first['msg']}, expected anchors of live sessions") from error
+
+    def find(self, id: str) -> Anchor | None:
+        return next((anchor for anchor in self.kept if anchor.id == id), None)
+
+    @property
+    def newest(self) -> str:
+        """Its id, "" where there is none."""
+        return self.kept[-1].id if self.kept else ""
+
+    def keep(self, anchor: Anchor) -> None:
+        """From now on; the oldest goes where there are too many. `save` writes them."""
+        others = [one for one in self.kept if one.id != anchor.id]
+        self.kept = (*others, anchor)[-MOST:]
+
+    def save(self) -> None:
+        """Whole or not at all.
+
+        Raises:
+            OSError: it cannot be written.
+        """
+        with self._saving:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            part = self.path.with_name(f"{self.path.name}.part")
+            part.write_bytes(_FILE.dump_json(list(self.kept), indent=1) + b"\n")
+            os.replace(part, self.path)

@@ -1,0 +1,121 @@
+"""A session made of a package: core, processes, scene. Everything comes out of the package's file."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from trunkline.ar.preview.package import Package, read_package
+from trunkline.ar.preview.preview_twin import believed, compose_twin
+from trunkline.ar.preview.world_model import make_world
+from trunkline.ar.session import preview_process, simulated
+from trunkline.ar.session.bodies import drawn
+from trunkline.ar.session.controller import Desk
+from trunkline.ar.session.hardware import Hardware
+from trunkline.ar.session.log_format import SIMULATED, Subject
+from trunkline.ar.session.log_writer import JournalProcess, new_path
+from trunkline.ar.session.preview_process import ForeseerProcess
+from trunkline.ar.session.robot import RobotProcess
+from trunkline.ar.session.scene import Shells, scene
+from trunkline.ar.session.settings import Config
+from trunkline.ar.session.simulated import Simulation
+from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.core import Teleoperation
+from trunkline.ar.teleop.messages import Box
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.trajectory import limits_of
+from trunkline.ar.teleop.vectors import DOWN
+from trunkline.kinematics.panda.shipped import JOINTS
+from trunkline.model.elements import actuators
+from trunkline.unity import unpacked
+
+SEARCH = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.8, 0.785])  # rad, where the search for the ready pose begins
+BELOW, AROUND = 1.0, 3.0  # m, of the floor as a solid
+
+
+@dataclass(frozen=True)
+class Made:
+    """What a server serves, and the processes behind it."""
+
+    desk: Desk
+    package: str
+    scene: dict
+    shells: Shells | None
+    robot: RobotProcess
+    planning: ForeseerProcess
+    journal: JournalProcess
+
+    def close(self) -> None:
+        self.robot.close()  # first: it may be moving
+        self.planning.close()
+        self.journal.close()
+
+
+def make(
+    path: Path,
+    teleop: Teleop,
+    config: Config,
+    heard: Callable[[preview_process.Answer | None], None],
+    hardware: Hardware | None = None,
+) -> Made:
+    """Of the package at `path`, the robot simulated, or as `hardware` has it.
+
+    Args:
+        heard: called with every answer of the process that plans, by a thread of its own.
+
+    Raises:
+        InputError: there is no package, or it cannot be previewed with.
+    """
+    package = read_package(path)
+    joints = RigidIK(teleop.mount_offset).solve(SEARCH, config.ready, DOWN, 0.0)
+    simulation, maps = simulation_of(package, teleop, config, joints), unpacked.maps_of(package.files)
+    world = make_world(solids(config), () if config.thing is None else (config.thing,))
+    setup = path.resolve(), teleop, config.preview, simulation.bodies, world
+    planning = ForeseerProcess(preview_process.run, setup, heard)  # first: it takes longest until it is ready
+    drawing = scene(simulation.twin.model, simulation.bodies, maps, package.geometry.length)
+    subject = subject_of(simulation, hardware)
+    journal = JournalProcess(new_path(Path(config.journal.folder)), subject, config.journal.period)
+    robot = robot_of(simulation, hardware)
+    core = Teleoperation(teleop.core, package.reach, package.digest, teleop.mount_offset)
+    desk = Desk(core, robot, planning, world, teleop.handling.lift, journal, package.period)
+    desk.begin(config.rate)
+    journal.await_begun()
+    return Made(desk, package.digest, drawing, Shells.of(maps), robot, planning, journal)
+
+
+def subject_of(simulation: Simulation, hardware: Hardware | None = None) -> Subject:
+    """Whom a log is about: the simulated robot, or the real one, of which a twin is drawn."""
+    model = simulation.twin.model
+    tendons = tuple(model.tendon(number).name for number in model.actuator_trnid[actuators(model), 0])
+    site = model.site("tip")
+    x, y, z = (float(value) for value in site.pos)
+    tip = model.body(site.bodyid[0]).name, (x, y, z)
+    words = SIMULATED if hardware is None else hardware.words()
+    return Subject(simulation.bodies, tuple(JOINTS), tendons, simulation.commands, tip, words)
+
+
+def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
+    """The simulated robot's process, or the real one's."""
+    if hardware is not None:
+        from trunkline.ar.session.real import RealRobot  # with what hardware needs installed
+
+        return RealRobot(hardware, simulation)
+    tendons, bodies = len(simulation.commands), len(simulation.bodies)
+    return RobotProcess(simulated.run, (simulation,), tendons, bodies, simulation.limits, simulation.package)
+
+
+def simulation_of(package: Package, teleop: Teleop, config: Config, joints: np.ndarray) -> Simulation:
+    """The simulated robot, at rest at `joints` (7,), rad, with its arm straight."""
+    known = believed(config.preview, package.files)
+    world = make_world(solids(config))
+    twin = compose_twin(known, world, config.thing, joints, package.straight, config.preview)
+    limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))
+    bodies, offset = drawn(twin.model), teleop.mount_offset
+    return Simulation(twin, joints, package.straight, bodies, limits, package.digest, offset)
+
+
+def solids(config: Config) -> tuple[Box, ...]:
+    """What stands around the robot: the floor, and the boxes."""
+    floor = Box("the floor", (-AROUND, -AROUND, config.floor - BELOW), (AROUND, AROUND, config.floor))
+    return floor, *config.boxes

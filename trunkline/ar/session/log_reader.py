@@ -1,0 +1,124 @@
+"""The log of a live session read back: the core's steps, byte for byte, events, and the arm's bodies."""
+
+import json
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from trunkline.ar.session.log_format import EVENTS, INPUT, INTENT, JOINTS, POSES, SIMULATED, TWIN
+from trunkline.errors import InputError
+from trunkline.recordings.logs.cdr import HEADER
+from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
+from trunkline.recordings.logs.log import Log, read_log
+from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
+
+GIVEN = b',"given":'
+
+
+class Step(NamedTuple):
+    """Of the core: `time`, s since the log's first step, `dt`, s, and the bytes of its `Input` and `Intent`."""
+
+    time: float
+    dt: float
+    given: bytes
+    intent: bytes
+
+
+@dataclass(frozen=True)
+class Logbook:
+    """`damage`: what is lost, in sentences. zero: ns since 1970 at 0 s of the events' `time`. events: in their order,
+    each with its kind as `event`. poses: of the robot's bodies; of a real machine None, as nobody sees them. twin: as a
+    twin drew them of a real machine. joints: the rigid robot's, as measured."""
+
+    path: Path
+    damage: list[str]
+    zero: int
+    events: list[dict]
+    steps: list[Step]
+    poses: PoseStream | None
+    twin: PoseStream | None
+    joints: JointStream | None
+
+    @property
+    def begin(self) -> dict:
+        """The event with which a session begins.
+
+        Raises:
+            InputError: there is none.
+        """
+        found = next((event for event in self.events if event["event"] == "begin"), None)
+        if found is None:
+            raise InputError(f"{self.path}: {EVENTS}: found no event 'begin', expected the log of a live session")
+        return found
+
+    @property
+    def drawn(self) -> PoseStream | None:
+        """The bodies as a page draws them: as they were seen, or where nobody saw them, as a twin drew them."""
+        return self.poses if self.twin is None else self.twin
+
+    @property
+    def hardware(self) -> str:
+        """What was real, in words; older logs do not say, and are of simulated robots."""
+        return self.begin.get("hardware", SIMULATED)
+
+
+def read_logbook(path: Path) -> Logbook:
+    """All of it that can be trusted.
+
+    Raises:
+        InputError: it is no log of a live session.
+    """
+    log = read_log(path)
+    try:
+        events = [json.loads(text) for text, _ in _texts(log, EVENTS)]
+        zero = next((logged - round(1e9 * json.loads(text)["time"]) for text, logged in _texts(log, EVENTS)), 0)
+        steps = _steps(log)
+    except ValueError as error:
+        raise InputError(f"{path}: {error}, expected the log of a live session") from error
+    if not steps:
+        raise InputError(f"{path}: {INPUT}: found no step of the core, expected the log of a live session")
+    poses, twin = (pose_stream({None: log.topics[name]}) if name in log.topics else None for name in (POSES, TWIN))
+    joints = joint_stream(log.topics[JOINTS]) if JOINTS in log.topics else None
+    return Logbook(Path(path), log.damage, zero, events, steps, poses if twin is None else None, twin, joints)
+
+
+def _steps(log: Log) -> list[Step]:
+    """A last input whose intent was lost is left out."""
+    found, since = [], None
+    for (heard, logged), (intent, _) in zip(_texts(log, INPUT), _texts(log, INTENT), strict=False):
+        before, there, given = heard.partition(GIVEN)
+        if not there:
+            raise ValueError(f"{INPUT}: found no input in {heard[:40]!r}")
+        since = logged if since is None else since
+        found.append(Step(1e-9 * (logged - since), float(before.removeprefix(b'{"dt":')), given[:-1], intent))
+    return found
+
+
+def _texts(log: Log, topic: str) -> list[tuple[bytes, int]]:
+    """Each message's text, and its log time, ns.
+
+    Raises:
+        ValueError: one is no std_msgs/String.
+    """
+    found = log.topics.get(topic)
+    if found is None:
+        return []
+    return [(_text(m, topic), int(t)) for m, t in zip(found.messages, found.log_times, strict=True)]
+
+
+def _text(message: bytes, topic: str) -> bytes:
+    try:
+        (size,) = struct.unpack_from("<I", message, HEADER)
+    except struct.error as error:
+        raise ValueError(f"{topic}: found a message of {len(message)} bytes") from error
+    return message[HEADER + 4 : HEADER + 4 + size].rstrip(b"\0")
+
+
+def tip_path(poses: np.ndarray, place: tuple[float, float, float]) -> np.ndarray:
+    """Of the point at `place` (m) of a body with `poses` (T, 7), w first. Shape (T, 3)."""
+    w, u = poses[:, 3:4], poses[:, 4:]
+    t = 2 * np.cross(u, np.array(place))
+    return poses[:, :3] + np.array(place) + w * t + np.cross(u, t)

@@ -1,0 +1,291 @@
+"""What is rare, in JSON: every message of both directions, each with a `type`; what is not in here is refused.
+
+Positions in m and quaternions (w, x, y, z), in the rigid base frame unless said otherwise; times in s.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
+
+from trunkline.ar.session.binary import VERSION
+from trunkline.ar.teleop.messages import Mode, Motion, Offer, Pose, Targets, World
+from trunkline.errors import InputError
+
+STRICT = {"extra": "forbid", "ser_json_inf_nan": "null"}
+LONGEST = 64  # characters of a name
+
+
+def _text(value: Any) -> Any:
+    """Text without what would spoil a line of the terminal."""
+    return "".join(c for c in value if c.isprintable()) if isinstance(value, str) else value
+
+
+Name = Annotated[str, BeforeValidator(_text), Field(max_length=LONGEST)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+# --- from the client
+
+
+@dataclass(frozen=True)
+class Hello:
+    """First of all, within 3 s: the `version` of this protocol, and `token` or `code`, one of them.
+
+    id: of a connection before, to be the same client again; "" for a new one. space: "base" for poses in the rigid base
+    frame, "room" for poses in a frame that stands still, y up, as WebXR's `local-floor`, which has to be aligned
+    (`aligning`).
+    """
+
+    __pydantic_config__ = STRICT
+    version: int
+    token: Name = ""
+    code: Name = ""
+    id: Name = ""
+    name: Name = ""
+    space: Literal["base", "room"] = "base"
+    type: Literal["hello"] = "hello"
+
+
+@dataclass(frozen=True)
+class Pong:
+    """Answers a `ping` at once: its `number`, and the client's clock, `stamp`."""
+
+    __pydantic_config__ = STRICT
+    number: int
+    stamp: Finite
+    type: Literal["pong"] = "pong"
+
+
+@dataclass(frozen=True)
+class LeaseWish:
+    """Who controls: `ask` for it, `release` it, or `give` it `to` another client's id."""
+
+    __pydantic_config__ = STRICT
+    action: Literal["ask", "release", "give"]
+    to: Name = ""
+    type: Literal["lease"] = "lease"
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Of a client in the "room": the base stands at `pose` of its reference frame as the user sees it, which is for a
+    simulated robot alone. `pose` null: its reference frame has leapt, and where the base is is not known any more."""
+
+    __pydantic_config__ = STRICT
+    pose: Pose | None
+    type: Literal["alignment"] = "alignment"
+
+
+@dataclass(frozen=True)
+class Touching:
+    """Of a client in the "room": align by touches, from the beginning. What is touched is seen in its `input`."""
+
+    __pydantic_config__ = STRICT
+    type: Literal["touch"] = "touch"
+
+
+@dataclass(frozen=True)
+class Anchored:
+    """Of a client in the "room": its anchor `id` is at `pose` of its reference frame; null: it is lost, or that frame
+    has leapt, and the robot holds until it is back."""
+
+    __pydantic_config__ = STRICT
+    id: Annotated[str, Field(max_length=LONGEST)]
+    pose: Pose | None
+    type: Literal["anchor"] = "anchor"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """The preview of the plan `digest` has been shown to its end. Only of whom controls, and not sooner than the
+    preview lasts."""
+
+    __pydantic_config__ = STRICT
+    digest: Annotated[str, Field(max_length=LONGEST)]
+    type: Literal["shown"] = "shown"
+
+
+Said = Hello | Pong | LeaseWish | Alignment | Touching | Anchored | Shown
+
+
+# --- from the server
+
+
+@dataclass(frozen=True)
+class Welcome:
+    """Answers `hello`. token: for `GET /scene.json` (`Authorization: Bearer …`), and to come again. package: digest.
+    rate: Hz, of frames of the robot."""
+
+    id: str
+    token: str
+    package: str
+    rate: float
+    version: int = VERSION
+    type: Literal["welcome"] = "welcome"
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """One line: why what the client sent does nothing. `closing`: the connection ends."""
+
+    reason: str
+    closing: bool = False
+    type: Literal["error"] = "error"
+
+
+@dataclass(frozen=True)
+class Ping:
+    """To be answered by `pong` at once."""
+
+    number: int
+    type: Literal["ping"] = "ping"
+
+
+@dataclass(frozen=True)
+class Clock:
+    """server = client + offset, s; of the smallest of the last ten `round_trip`s, s. Input counts from the first on,
+    where neither it is more than 0.25 s late nor that `round_trip` longer."""
+
+    offset: float
+    round_trip: float
+    type: Literal["clock"] = "clock"
+
+
+@dataclass(frozen=True)
+class Person:
+    """A client."""
+
+    id: str
+    name: str
+
+
+@dataclass(frozen=True)
+class Lease:
+    """Who controls: `holder`'s id, "" for nobody; who is `asking`, in their order; all `clients`."""
+
+    holder: str
+    asking: tuple[str, ...] = ()
+    clients: tuple[Person, ...] = ()
+    type: Literal["lease"] = "lease"
+
+
+AligningStep = Literal["place", "tip", "touch", "check", "lost", "done"]
+
+
+@dataclass(frozen=True)
+class Aligning:
+    """To a client in the "room", how far its alignment is: the `step`, what is to be done `next` and what was `said` of
+    the last, in words.
+
+    place: pose of the base in the client's reference frame, null where it is not known yet. expected: error of it where
+    the arm works, or of the one touch, m; residual: of the touches, rms, m; null where nothing tells. anchor: id of the
+    one to be restored, or that is followed; "" for none. fasten: an anchor shall be fastened at `place`, and told.
+    """
+
+    step: AligningStep
+    next: str
+    said: str
+    place: Pose | None
+    expected: float | None
+    residual: float | None
+    anchor: str
+    fasten: bool
+    type: Literal["aligning"] = "aligning"
+
+
+@dataclass(frozen=True)
+class State:
+    """What the core wants and the robot does; sent when it changes, at most ten times a second but for its `mode`.
+
+    notice: one line for the user, "" for none. next: the one next action in words, for whom controls; keys: the same at
+    mouse and keyboard. countdown: s to the execution, when this was sent. preview, execute: digests. targets: as the
+    core has them; where they are now, the markers of the robot's frames say. robot: what it does; fault: in words.
+    """
+
+    mode: Mode
+    motion: Motion
+    notice: str
+    next: str
+    keys: str
+    countdown: float
+    preview: str
+    execute: str
+    targets: Targets | None
+    robot: Literal["idle", "running", "done", "fault"]
+    fault: str
+    type: Literal["state"] = "state"
+
+
+@dataclass(frozen=True)
+class Preview:
+    """A plan is there: its `digest`, and the preview that follows in binary pieces: `step` s between frames, `duration`
+    s in all, which a client shows at that pace. begins: s of the plan at the first frame. phases: name and s of the
+    plan."""
+
+    digest: str
+    step: float
+    duration: float
+    begins: float
+    phases: tuple[tuple[str, float], ...]
+    type: Literal["preview"] = "preview"
+
+
+@dataclass(frozen=True)
+class Foreseen:
+    """What the batch of futures says of the plan `digest`, once they are simulated.
+
+    probability: that the grasp holds, with its interval `low` to `high`; null where nothing is grasped. times: s of the
+    preview, at which `tip` is the median path of the tip and `spread` the distance from it within which `within` of the
+    futures are, m. offer: the assistant's. futures: how many.
+    """
+
+    digest: str
+    probability: float | None
+    low: float | None
+    high: float | None
+    times: tuple[float, ...]
+    tip: tuple[tuple[float, float, float], ...]
+    spread: tuple[float, ...]
+    within: float
+    futures: int
+    offer: Offer | None = None
+    type: Literal["foreseen"] = "foreseen"
+
+
+@dataclass(frozen=True)
+class Around:
+    """The world as it is believed: solids and things."""
+
+    world: World
+    type: Literal["world"] = "world"
+
+
+Answer = Welcome | Refusal | Ping | Clock | Lease | Aligning | State | Preview | Foreseen | Around
+
+SAID: tuple[type, ...] = (Hello, Pong, LeaseWish, Alignment, Touching, Anchored, Shown)
+ANSWERS: tuple[type, ...] = (Welcome, Refusal, Ping, Clock, Lease, Aligning, State, Preview, Foreseen, Around)
+
+_SAID: TypeAdapter[Said] = TypeAdapter(Annotated[Said, Field(discriminator="type")])
+_ANSWERS = {kind: TypeAdapter(kind) for kind in ANSWERS}
+
+
+def hear(text: str) -> Said:
+    """A client's message.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        return _SAID.validate_json(text)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(map(str, first["loc"])) or "the whole"
+        raise InputError(f"message: {where}: {first['msg']}") from error
+    except (RecursionError, UnicodeError) as error:
+        raise InputError("message: found what is no JSON") from error
+
+
+def tell(answer: Answer) -> str:
+    """One line of JSON; what is no number is null."""
+    return _ANSWERS[type(answer)].dump_json(answer).decode()

@@ -1,0 +1,210 @@
+"""What was foreseen in a live session against what happened, from its log alone.
+
+    python -m trunkline.ar.session.preview_validation LOG…
+
+A line for each plan that was executed: how far the tip was from the preview's, whether it ended within the spread, and
+what was said of the grasp against what came of it. The robot begins a plan some ms after it was told to; by how many,
+is where both paths are nearest, and is said. Of a real machine nobody sees the arm: the mount stands in for the tip, by
+the joints as measured, and neither spread nor grasp is judged.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from trunkline.ar.session.log_format import SIMULATED, WRIST
+from trunkline.ar.session.log_reader import Logbook, read_logbook, tip_path
+from trunkline.errors import in_one_line
+from trunkline.kinematics.panda.kinematics import FLANGE, mount_pose
+from trunkline.kinematics.panda.shipped import JOINTS
+
+LATEST = 0.25  # s that a robot may need to begin
+FEWEST = 5  # poses of a path that is compared
+
+
+@dataclass(frozen=True)
+class Execution:
+    """Of a plan, `digest`, begun at `time`, s since the session began.
+
+    end: what the robot said at last. median, worst: distance of the tip from the preview's, m, over `seconds` of it;
+    delay: s by which the robot was later; NaN where no path was kept. within: whether the tip ended within the spread;
+    None where it did not come so far. probability: of the grasp as foreseen; held: whether it came about. None where
+    nothing was to be grasped, or it was not tried to its end. seen: whether anybody saw the arm; where not, distances
+    are the mount's, and `within` and `held` are None.
+    """
+
+    digest: str
+    time: float
+    end: str
+    seconds: float
+    median: float
+    worst: float
+    delay: float
+    within: bool | None
+    probability: float | None
+    held: bool | None
+    seen: bool = True
+
+
+def executions(logbook: Logbook) -> Iterator[Execution]:
+    """In their order, of those that the robot began."""
+    events, begin = logbook.events, logbook.begin
+    seen = logbook.hardware == SIMULATED
+    rows, place = ("poses", begin["tip"]["place"]) if seen else (WRIST, (0.0, 0.0, FLANGE + begin["mount_offset"]))
+    times, path = _seen(logbook, begin["tip"]["body"], place) if seen else _measured(logbook, begin["mount_offset"])
+    for index, event in enumerate(events):
+        if event["event"] != "execute" or event["refused"]:
+            continue
+        digest, since = event["digest"], event["time"]
+        later = [other for other in events[index + 1 :]]
+        end, until = _end(later, digest, float(times[-1]) if len(times) else since)
+        preview, shown = _preview(events[:index], digest, rows, place)
+        done = end == "done"
+        seconds, median, worst, delay, last = _compared(times - since, path, preview, shown, until - since, done)
+        told = next((e["foreseen"] for e in reversed(events[:index]) if _is_of(e, "foreseen", digest)), None)
+        within = None
+        if seen and told is not None and last is not None and told["spread"]:
+            within = bool(np.linalg.norm(last - np.array(told["tip"][-1])) <= told["spread"][-1])
+        probability = None if told is None else told["probability"]
+        held = _held(events[:index], later) if seen and done and probability is not None else None
+        since_begin = since - begin["time"]
+        yield Execution(digest, since_begin, end, seconds, median, worst, delay, within, probability, held, seen)
+
+
+def _is_of(event: dict, kind: str, digest: str) -> bool:
+    return event["event"] == kind and event[kind]["digest"] == digest
+
+
+def _seen(logbook: Logbook, body: str, place) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the journal's clock, s (T,), and the tip as it was seen (T, 3)."""
+    poses = logbook.poses
+    if poses is None or body not in poses.names or poses.quaternions is None:
+        return np.empty(0), np.empty((0, 3))
+    row = poses.names.index(body)
+    there = poses.present[:, row]
+    path = np.concatenate([poses.positions[there, row], poses.quaternions[there, row]], axis=1)
+    return 1e-9 * (poses.stamps[there] - logbook.zero), tip_path(path, place)
+
+
+def _measured(logbook: Logbook, mount_offset: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the journal's clock, s (T,), and the mount by the joints as measured (T, 3); none where nobody does."""
+    joints = logbook.joints
+    if joints is None or not set(JOINTS) <= set(joints.names):
+        return np.empty(0), np.empty((0, 3))
+    found = joints.positions[:, [joints.names.index(name) for name in JOINTS]]
+    there = np.isfinite(found).all(axis=1)
+    return 1e-9 * (joints.stamps[there] - logbook.zero), mount_pose(found[there], mount_offset)[0]
+
+
+def _preview(before: list[dict], digest: str, rows: str, place) -> tuple[np.ndarray, np.ndarray]:
+    """Times of the plan (F,), s, and the previewed point (F, 3) at `place`, m, of the body whose poses are `rows`."""
+    begun = max((i for i, e in enumerate(before) if _is_of(e, "preview", digest)), default=None)
+    if begun is None:
+        return np.empty(0), np.empty((0, 3))
+    step, times, poses = before[begun]["preview"]["step"], [], []
+    for event in before[begun:]:
+        if event["event"] == "piece":
+            times += [event["begins"] + step * frame for frame in range(len(event[rows]))]
+            poses += event[rows]
+    return np.array(times), tip_path(np.array(poses).reshape(-1, 7), place)
+
+
+def _end(later: list[dict], digest: str, last: float) -> tuple[str, float]:
+    """What the robot said at the end of a plan, and when it did something else, s."""
+    said, until = "the log ends", last
+    for event in later:
+        if event["event"] == "execute":
+            return said, min(until, event["time"])
+        robot = event.get("robot") if event["event"] == "robot" else None
+        if robot is None or said != "the log ends":
+            continue
+        if robot["mode"] in ("done", "fault") or (robot["mode"] == "idle" and robot["digest"] == digest):
+            said = str(robot["fault"] or ("held" if robot["mode"] == "idle" else robot["mode"]))
+            until = last if said == "done" else event["time"]
+    return said, until
+
+
+def _compared(
+    times: np.ndarray, tips: np.ndarray, shown: np.ndarray, path: np.ndarray, until: float, done: bool
+) -> tuple[float, float, float, float, np.ndarray | None]:
+    """s compared, median and largest distance, delay, and where the tip was at the preview's end, if it came there."""
+    if len(shown) < FEWEST:
+        return 0.0, np.nan, np.nan, np.nan, None
+
+    def away(delay: float) -> np.ndarray:
+        rows = (times - delay >= shown[0]) & (times - delay <= shown[-1]) & (times <= until)
+        foreseen = np.stack([np.interp(times[rows] - delay, shown, axis) for axis in path.T], axis=1)
+        return np.linalg.norm(tips[rows] - foreseen, axis=1)
+
+    if len(away(0.0)) < FEWEST or len(away(LATEST)) < FEWEST:
+        return 0.0, np.nan, np.nan, np.nan, None
+    found = minimize_scalar(lambda delay: float(np.mean(away(delay) ** 2)), bounds=(0.0, LATEST), method="bounded")
+    far, delay = away(float(found.x)), float(found.x)
+    seconds = min(until, float(times[-1])) - delay - float(shown[0])
+    arrived = done and times[-1] >= shown[-1] and until >= shown[-1]
+    last = tips[np.searchsorted(times, shown[-1])] if arrived else None
+    return min(seconds, float(shown[-1] - shown[0])), float(np.median(far)), float(far.max()), delay, last
+
+
+def _held(before: list[dict], later: list[dict]) -> bool:
+    """Whether the arm holds something that it did not, as believed until the next plan is asked for."""
+    held = _holds(before)
+    for event in later:
+        if event["event"] == "request":
+            break
+        held = _holds([event]) if event["event"] == "world" else held
+    return held
+
+
+def _holds(events: list[dict]) -> bool:
+    world = next((event["world"] for event in reversed(events) if event["event"] == "world"), {"things": []})
+    return any(thing["support"] == "held" for thing in world["things"])
+
+
+def lines(found: list[Execution]) -> list[str]:
+    """For people to read."""
+    told = []
+    for one in found:
+        parts = [f"{one.time:8.1f} s  {one.digest[:12]}  {one.end}"]
+        if np.isfinite(one.median):
+            apart = f"{'tip' if one.seen else 'mount'} {1e3 * one.median:.1f} mm, at most {1e3 * one.worst:.1f} mm"
+            parts.append(f"{apart} from the preview over {one.seconds:.1f} s, {1e3 * one.delay:.0f} ms later")
+        if one.within is not None:
+            parts.append("ended within the spread" if one.within else "ended beyond the spread")
+        if one.probability is not None:
+            came = "not tried to its end" if one.held is None else "held" if one.held else "not held"
+            came = came if one.seen else "which nobody saw"
+            parts.append(f"grasp foreseen at {one.probability:.2f}, {came}")
+        told.append("; ".join(parts))
+    judged = [(one.probability, one.held) for one in found if one.probability is not None and one.held is not None]
+    ended = [one.within for one in found if one.within is not None]
+    told.append(f"{len(found)} executed")
+    if ended:
+        told[-1] += f"; {sum(ended)} of {len(ended)} tips ended within the spread"
+    if judged:
+        agreed = sum((probability >= 0.5) == held for probability, held in judged)
+        brier = sum((probability - held) ** 2 for probability, held in judged) / len(judged)
+        told[-1] += f"; outcome as foreseen in {agreed} of {len(judged)}, Brier score {brier:.3f}"
+    if not all(one.seen for one in found):
+        told.append("nobody saw the arm: its shape, its tip and its grasps are not judged")
+    return told
+
+
+@in_one_line
+def main(arguments: list[str]) -> int:
+    summary = (__doc__ or "").split("\n")[0]
+    parser = argparse.ArgumentParser(prog="python -m trunkline.ar.session.preview_validation", description=summary)
+    parser.add_argument("logs", type=Path, nargs="+", metavar="log")
+    for path in parser.parse_args(arguments).logs:
+        logbook = read_logbook(path)
+        print("\n".join([f"{path}", *(f"  {line}" for line in [*logbook.damage, *lines(list(executions(logbook)))])]))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

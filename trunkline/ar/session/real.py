@@ -1,0 +1,208 @@
+"""A real machine's process, and what is drawn of it: the calls are those of the simulated robot.
+
+The machine's process turns 1000 times a second and knows no physics. What is drawn is the twin, moved in a process of
+its own by what the axes are sent: nothing measures the soft arm's shape here, nor where a thing is.
+"""
+
+import gc
+import multiprocessing
+import os
+import signal
+import sys
+import time
+from dataclasses import dataclass, replace
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from trunkline.ar.drivers.driver import Limb
+from trunkline.ar.drivers.driver_client import panda
+from trunkline.ar.drivers.driver_host import hosted
+from trunkline.ar.drivers.motors import MotorsOnBus
+from trunkline.ar.drivers.realtime_priority import be_urgent
+from trunkline.ar.drivers.robot import Machine
+from trunkline.ar.drivers.time_scaling import PacedRobot
+from trunkline.ar.session.hardware import Hardware
+from trunkline.ar.session.robot import POSE, READY, TIME, Channel, RobotProcess, Standing
+from trunkline.ar.session.simulated import Loop, Plant, Simulation, drive
+from trunkline.ar.teleop.following import Follower, Following
+from trunkline.ar.teleop.messages import ExecutorReport
+from trunkline.ar.teleop.trajectory import Limits
+from trunkline.compute.processes import end_with_parent, leave_signals_to_parent, parent_pid
+from trunkline.errors import InputError
+from trunkline.kinematics.panda.shipped import JOINTS
+
+DELAY, MEAN = 0.15, 0.1  # s that the twin is behind the machine, and over which it takes the mean of what it hears
+RESTS, STILL, LEAST = 2.0, 2e-4, 1e-9  # s in which no pose (m) and no axis (rad, m) changes by more: the twin rests
+NICE = 5  # of the twin: a picture may wait
+UNSEEN = 0.5  # s without a picture, after which nobody sees what moves
+
+
+@dataclass(frozen=True)
+class Beginning:
+    """Where the twin begins: `joints` (7,), rad, and `commands` (K,), m, of the straight arm."""
+
+    joints: np.ndarray
+    commands: np.ndarray
+    limits: Limits
+    package: str
+
+
+class Moved(Machine):
+    """A machine as `Loop` turns it; it knows no poses."""
+
+    def poses(self) -> np.ndarray:
+        return np.empty((0, POSE))
+
+    def thing(self) -> np.ndarray:
+        return np.full(POSE, np.nan)
+
+
+class RealRobot(RobotProcess):
+    """An `Executor` whose robot is a machine."""
+
+    def __init__(self, hardware: Hardware, simulation: Simulation) -> None:
+        begins = Beginning(simulation.joints, simulation.commands, simulation.limits, simulation.package)
+        tendons = len(simulation.commands)
+        if hardware.bus and len(hardware.motors.numbers) != tendons:
+            raise InputError(f"motors.numbers: found {len(hardware.motors.numbers)}, expected {tendons}, one a tendon")
+        super().__init__(run, (hardware, begins), tendons, 0, simulation.limits, simulation.package)
+        context = multiprocessing.get_context("spawn")
+        self._drawn = Channel(context, tendons, len(simulation.bodies))
+        self._twin = context.Process(
+            target=draw, args=(self._drawn, self.channel, simulation), daemon=True, name="twin"
+        )
+        self._twin.start()
+
+    @property
+    def alive(self) -> bool:
+        return super().alive and self._twin.is_alive()
+
+    @property
+    def ready(self) -> bool:
+        return super().ready and self._drawn.hear()[0][READY] > 0
+
+    def standing(self) -> Standing:
+        poses = self._drawn.hear()[0][-POSE * (1 + self._drawn.bodies) :].reshape(-1, POSE)
+        return replace(super().standing(), thing=poses[0], bodies=poses[1:])
+
+    def state(self) -> ExecutorReport:
+        found, (drawn, said) = super().state(), self._drawn.hear()
+        silent = time.monotonic() - drawn[TIME]
+        if drawn[READY] > 0 and silent > UNSEEN:
+            said = f"silent for {silent:.2f} s"
+        if said and found.mode != "fault":
+            return ExecutorReport("fault", found.digest, f"the twin that is drawn: {said}")
+        return found
+
+    def close(self) -> None:
+        super().close()
+        self._twin.kill()
+        self._twin.join()
+
+
+def run(channel: Channel, hardware: Hardware, begins: Beginning) -> None:
+    """The machine's process: until its parent is gone, or it is ended."""
+    leave_signals_to_parent()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
+    parent = parent_pid()
+    threadpool_limits(1)
+    machine = None
+    try:
+        arm = arm_of(hardware)
+        machine = Moved(arm, motors_of(hardware), begins.commands)
+        joints = machine.begin(begins.joints, lambda: os.getppid() != parent)
+        moved = machine
+        robot = PacedRobot(
+            joints, begins.commands, begins.limits, begins.package, lambda q, c, _: moved.move(q, c), hardware.limits
+        )  # fmt: skip
+        gc.freeze()
+        be_urgent()
+        drive(Loop(channel, robot, machine), parent, lambda: moved.behind)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr, flush=True)
+        sys.exit(1)
+    finally:
+        if machine is not None:
+            machine.close()
+
+
+def arm_of(hardware: Hardware) -> Limb | None:
+    """The robot, None where none is named."""
+    if hardware.robot == "ros2":
+        return hosted(hardware.ros)
+    return panda(hardware.arm, hardware.robot) if hardware.robot else None
+
+
+def motors_of(hardware: Hardware) -> Limb | None:
+    """The tendons' motors, None where none are named."""
+    if not hardware.bus:
+        return None
+    return hosted(MotorsOnBus(hardware.motors, hardware.bus, hardware.interface))
+
+
+class Pursuit:
+    """After the axes of a machine, DELAY s later, within the limits of a plan. `here`: where the twin's axes are sent,
+    (7 + K,), rad and m."""
+
+    def __init__(self, simulation: Simulation, tick: float) -> None:
+        self._simulation, self._tick = simulation, tick
+        self._begin(np.append(simulation.joints, simulation.commands))
+
+    @property
+    def there(self) -> bool:
+        """Whether `here` is where the machine was last heard of."""
+        return bool(np.abs(self._follower.goal - self.here).max() <= LEAST)
+
+    def hear(self, now: float, axes: np.ndarray) -> None:
+        """That the machine's axes, rad and m, are at (7 + K,) at `now`, s."""
+        self._follower.hear(now, axes)
+
+    def go(self, now: float) -> None:
+        """A tick on, at `now`, s."""
+        try:
+            self.here = np.append(*self._follower.tick(now))
+            lost = self._follower.rests  # it braked, as it would have touched itself
+        except InputError:  # there is no way that keeps the limits
+            lost = True
+        if lost:
+            self._begin(self.here)  # on from here, at rest
+
+    def _begin(self, here: np.ndarray) -> None:
+        following = Following(DELAY, MEAN, self._simulation.mount_offset)
+        joints, commands = np.split(here, [len(JOINTS)])
+        self.here, limits = here, self._simulation.limits
+        self._follower = Follower(limits, following, joints, commands, self._tick)
+
+
+def draw(channel: Channel, machine: Channel, simulation: Simulation) -> None:
+    """The twin's process: it follows what the machine's axes are sent, DELAY s later, as a robot follows targets: this
+    process hears of them unevenly, and a jump from one to the next would throw the twin about. Once it rests where they
+    rest, it is left alone: a preview needs the processor more."""
+    leave_signals_to_parent()
+    os.environ["TRUNKLINE_THREADS"] = "1"
+    os.nice(NICE)
+    threadpool_limits(1)
+    end_with_parent()
+    plant = Plant(simulation)
+    pursuit = Pursuit(simulation, plant.tick)
+    due, poses, since = time.monotonic(), np.append(plant.thing(), plant.poses()), 0.0
+    while True:
+        numbers, before = machine.hear()[0], pursuit.here
+        if numbers[READY] > 0:
+            pursuit.hear(time.monotonic(), numbers[5 : 5 + len(before)])
+        if pursuit.there and due - since > RESTS:
+            time.sleep(plant.tick)
+        else:
+            pursuit.go(due)
+            here = pursuit.here
+            plant.move(here[: len(JOINTS)], here[len(JOINTS) :])
+            now = np.append(plant.thing(), plant.poses())
+            if np.abs(here - before).max() > LEAST or np.nanmax(np.abs(now - poses)) > STILL:
+                poses, since = now, due
+        told = np.zeros(channel.size)
+        told[TIME], told[READY] = time.monotonic(), 1.0
+        told[-POSE * (1 + channel.bodies) :] = poses
+        channel.tell(told, plant.fault)
+        due = max(due + plant.tick, time.monotonic() - plant.tick)
+        time.sleep(max(due - time.monotonic(), 0.0))

@@ -1,0 +1,180 @@
+"""A live session: its processes, its port, its address."""
+
+import argparse
+import asyncio
+import contextlib
+import functools
+import gc
+import signal
+import socket
+import ssl
+import sys
+from collections.abc import AsyncIterator, Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from aiohttp import web
+
+from trunkline.ar.drivers.settings import Config as Execution
+from trunkline.ar.session.anchors import Anchors
+from trunkline.ar.session.auth import CODE_SECONDS, Origins, make_token
+from trunkline.ar.session.composition import Made, make
+from trunkline.ar.session.hardware import Hardware, hardware_of
+from trunkline.ar.session.preview_process import Answer
+from trunkline.ar.session.server import PARTING, House, Server
+from trunkline.ar.session.settings import Alignment, Config
+from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.errors import InputError
+from trunkline.pipeline.config import PROJECT, load_folder
+
+PAGE = Path(__file__).parent / "page"
+
+
+def alignment_for(hardware: Hardware | None, settings: Alignment) -> Alignment:
+    """As set; where anything real moves, never by eye."""
+    return replace(settings, by_eye=False) if hardware is not None and hardware.real else settings
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where a session is found. names: of this machine, as others may call it. context: of its TLS, None without."""
+
+    port: int
+    host: str = "127.0.0.1"
+    names: tuple[str, ...] = ("127.0.0.1",)
+    context: ssl.SSLContext | None = None
+
+    @property
+    def origins(self) -> Origins:
+        return Origins.of(list(self.names), self.port, self.context is not None)
+
+    @property
+    def url(self) -> str:
+        return f"{self.origins.scheme}://{self.names[0]}:{self.port}"
+
+
+@contextlib.asynccontextmanager
+async def listening(server: Server, address: Address) -> AsyncIterator[None]:
+    """
+    Raises:
+        InputError: the address cannot be had.
+    """
+    runner = web.AppRunner(server.app(), access_log=None, handle_signals=False, shutdown_timeout=PARTING)
+    await runner.setup()
+    try:
+        try:
+            await web.TCPSite(runner, address.host, address.port, ssl_context=address.context).start()
+        except OSError as error:
+            raise refused(address, error) from error
+        yield
+    finally:
+        await runner.cleanup()
+
+
+def refused(address: Address, error: OSError) -> InputError:
+    return InputError(f"--host {address.host} --port {address.port}: {error.strerror}; does a session run there?")
+
+
+def expect_free(address: Address) -> None:
+    """
+    Raises:
+        InputError: the address cannot be had.
+    """
+    family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+    with contextlib.closing(socket.socket(family)) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((address.host, address.port))
+        except OSError as error:
+            raise refused(address, error) from error
+
+
+@contextlib.asynccontextmanager
+async def opened(
+    package: Path,
+    address: Address,
+    log: Callable[[str], None],
+    hardware: Hardware | None = None,
+    config: Config | None = None,
+    teleop: Teleop | None = None,
+) -> AsyncIterator[tuple[Server, Made]]:
+    """A session that is ready, on the simulated robot where there is no hardware, by conf/live and conf/teleop where
+    there is no `config` and `teleop`; its processes end with it.
+
+    Raises:
+        InputError: no package, a process that ends, a log that cannot be written, an address that cannot be had.
+    """
+    loop, servers = asyncio.get_running_loop(), []
+
+    def heard(answer: Answer | None) -> None:
+        loop.call_soon_threadsafe(lambda: [server.foreseen(answer) for server in servers])
+
+    config = config or load_folder(Config, PROJECT / "conf/live")
+    teleop = teleop or load_folder(Teleop, PROJECT / "conf/teleop")
+    if hardware is not None:
+        teleop = hardware.kept_by(teleop)
+    alignment = alignment_for(hardware, config.alignment)
+    anchors = Anchors(Path(alignment.anchors))
+    made = await asyncio.to_thread(make, package, teleop, config, heard, hardware)
+    try:
+        house = House(
+            made.desk, make_token(), address.origins, made.package, made.scene, made.shells, config.rate, PAGE, log,
+            alignment, anchors,
+        )  # fmt: skip
+        while not (made.robot.ready and made.planning.ready.is_set()):
+            if not (made.robot.alive and made.planning.alive):
+                raise InputError("a process of the session has ended before it began")
+            if made.journal.fault:
+                raise InputError(made.journal.fault)
+            await asyncio.sleep(0.05)
+        server = Server(house)
+        servers.append(server)
+        gc.collect()
+        gc.freeze()  # a collection of all that is loaded takes longer than a robot goes on without a permit
+        async with listening(server, address):
+            yield server, made
+    finally:
+        gc.unfreeze()
+        await asyncio.to_thread(made.close)
+
+
+async def serve(options: argparse.Namespace, names: list[str], context: ssl.SSLContext | None) -> None:
+    """Until it is interrupted or told to end: either way robot and log are closed in order."""
+    task = asyncio.current_task()
+    assert task is not None, "asyncio runs it"
+    for told in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(told) is not signal.SIG_IGN:  # `nohup` has it ignored
+            asyncio.get_running_loop().add_signal_handler(told, task.cancel)
+    log = functools.partial(print, flush=True)
+    hardware = hardware_of(
+        options.robot, options.motors, options.bus, options.interface,
+        load_folder(Execution, PROJECT / "conf/execution"),
+    )  # fmt: skip
+    if hardware is not None and hardware.real:
+        log(f"REAL: {hardware.words()}. Nobody has tried this on real ones yet (docs/execution.md).")
+        if hardware.real_motors:
+            log("The motors wind up their cables now, before the page is there: stand clear. Ctrl-C lets them go.")
+    address = Address(options.port, options.host, tuple(names), context)
+    expect_free(address)  # what a session needs takes long to load
+    async with opened(options.package, address, log, hardware) as (server, made):
+        log(f"log: {made.journal.path}")
+        log(f"{address.url}/#token={server.house.token}")
+        _pair(server, log, asyncio.get_running_loop())
+        await asyncio.Event().wait()
+
+
+def _pair(server: Server, log, loop: asyncio.AbstractEventLoop) -> None:
+    """A pairing code now, and another at every line that is typed."""
+
+    def renew() -> None:
+        log(f"pairing code, for {CODE_SECONDS:.0f} s: {server.code.renew(server.now())} (Enter for another)")
+
+    def typed() -> None:
+        if sys.stdin.readline():
+            renew()
+        else:
+            loop.remove_reader(sys.stdin)
+
+    renew()
+    if sys.stdin is not None and sys.stdin.isatty():
+        loop.add_reader(sys.stdin, typed)

@@ -1,0 +1,52 @@
+"""All settings of conf/live/config.yaml."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+from trunkline.ar.preview.settings import Previewing
+from trunkline.ar.teleop.messages import Box, Thing
+from trunkline.settings import settings
+
+Metres = Annotated[float, Field(ge=-5, le=5)]
+
+
+@dataclass(frozen=True)
+class Journaling:
+    """folder: for the logs. period: s of a session that may be lost where its process is killed."""
+
+    folder: Annotated[str, Field(min_length=1, max_length=4096)]
+    period: Annotated[float, Field(ge=0.05, le=0.8)]
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """by_eye: whether the base may be put in place by eye. places: that are touched, `apart` m from each other at
+    least. limit: m, of the expected error, and of the touch with which a session begins. level_deg: by which the
+    headset's vertical may differ from the robot's. mark: what is touched, m, in the flange's frame. at: where the
+    expected error is told, m, in the base. anchors: file in which they are kept."""
+
+    by_eye: bool
+    places: Annotated[int, Field(ge=4, le=20)]
+    apart: Annotated[float, Field(ge=0.01, le=1)]
+    limit: Annotated[float, Field(gt=0, le=0.1)]
+    level_deg: Annotated[float, Field(gt=0, le=10)]
+    mark: tuple[Metres, Metres, Metres]
+    at: tuple[Metres, Metres, Metres]
+    anchors: Annotated[str, Field(min_length=1, max_length=4096)]
+
+
+@settings
+class Config:
+    """rate: Hz. ready: of the mount at first, m. floor: its height, m. boxes: solids that stand there,
+    upright. thing: what may be grasped, or None."""
+
+    rate: Annotated[float, Field(ge=20, le=240)]
+    ready: Annotated[tuple[Metres, Metres, Metres], Field()]
+    floor: Metres
+    boxes: tuple[Box, ...]
+    thing: Thing | None
+    journal: Journaling
+    alignment: Alignment
+    preview: Previewing

@@ -1,0 +1,26 @@
+"""All settings of conf/teleop/config.yaml: of the core (`conf/shared/core/`), of the motors, of what shapes a plan."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from trunkline.ar.hybrid.grasp_poses import SideSettings
+from trunkline.ar.teleop.grasping import Handling
+from trunkline.ar.teleop.settings import Teleop
+from trunkline.ar.teleop.shaping import Shaping
+from trunkline.ar.teleop.trajectory import MotorLimits
+from trunkline.settings import settings
+
+
+@settings
+class Config:
+    """`hanging`, `basket`: how what hangs and what has a handle is grasped. `mount_offset`: m, from the Panda's flange
+    to the soft arm's mount."""
+
+    core: Teleop
+    motors: MotorLimits
+    shaping: Shaping
+    handling: Handling
+    hanging: SideSettings
+    basket: SideSettings
+    mount_offset: Annotated[float, Field(ge=0, le=0.5)]

@@ -1,0 +1,54 @@
+"""The network's answer made exact: a few steps nearer to the target, and where the arm then really comes to rest.
+
+Up to three Gauss-Newton steps of `ik.polish` bring the tip nearer, its orientation left free. What is said of the tip
+is the equilibrium under the commands themselves, as they are sent (`statics.equilibria.actuated`).
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from trunkline.ar.teleop.vectors import IDENTITY, Vector
+from trunkline.frames import STANDARD_GRAVITY
+from trunkline.kinematics.ik.refine import polish
+from trunkline.model.statics.chain import Chain
+from trunkline.model.statics.equilibria import actuated
+
+LEVER = 1e-6  # m that a turn of the tip by 1 rad counts: nothing
+SURPRISE = 5e-3  # m by which the tip may be further from its target than foreseen before another start is tried
+
+
+class Bent(NamedTuple):
+    """`commands` of the motors and the tendons' `lengths` (K,), m, and where the `tip` is foreseen, m, (3,), in the
+    base frame."""
+
+    commands: np.ndarray
+    lengths: np.ndarray
+    tip: np.ndarray
+
+
+def corrected(chain: Chain, first: Bent, tip: Vector, gravity: Vector) -> Bent | None:
+    """An answer by which the tip rests nearer to `tip` (m) than by the `first`, where it can; None where the arm finds
+    no rest. `gravity` is a unit vector; all in the soft arm's base frame.
+
+    Tendons slide without friction: real ones stay within what it holds on either side.
+    """
+    chain, pull, target = chain.smooth, STANDARD_GRAVITY * np.array(gravity), np.array([[*gravity, *tip, *IDENTITY]])
+
+    def sent(lengths: np.ndarray) -> Bent | None:
+        better = polish(chain, target, lengths[None], lever=LEVER)
+        return _rest(chain, better.commands if better.converged[0] else first.commands[None], pull)
+
+    foreseen, found = np.linalg.norm(first.tip - tip), sent(first.lengths)
+    if found is not None and np.linalg.norm(found.tip - tip) <= foreseen + SURPRISE:
+        return found
+    # cables of lengths that do not belong together may hold another shape than motors with those commands do
+    held = _rest(chain, first.commands[None], pull)
+    again = [one for one in (found, held and sent(held.lengths), held) if one is not None]
+    return min(again, key=lambda one: float(np.linalg.norm(one.tip - tip)), default=None)
+
+
+def _rest(chain: Chain, commands: np.ndarray, pull: np.ndarray) -> Bent | None:
+    """Where the arm rests under `commands` (1, K); None where it finds none."""
+    rest = actuated(chain, commands, pull)
+    return Bent(commands[0], rest.lengths[0], rest.position[0]) if rest.converged[0] else None

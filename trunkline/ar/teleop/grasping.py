@@ -1,0 +1,174 @@
+"""The legs of a grasp and of a hand-over: what all ten axes do one after the other, each from rest to rest."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from trunkline.ar.hybrid.grasp_poses import Grip, Placement
+from trunkline.ar.hybrid.objects import Shape
+from trunkline.ar.teleop.alignment import base_quaternion
+from trunkline.ar.teleop.messages import Targets, Thing, World
+from trunkline.ar.teleop.object_shapes import below_grip, beneath, grip_of, way_of_grasping
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.vectors import DOWN, Vector, conjugate, rotate
+from trunkline.errors import InputError
+from trunkline.frames import rotation_from_wxyz
+from trunkline.kinematics.panda.kinematics import mount_pose
+
+UP = np.array([0.0, 0.0, 1.0])
+Seconds = Annotated[float, Field(ge=0, le=30)]
+Metres = Annotated[float, Field(gt=0, le=1)]
+Mass = Annotated[float, Field(ge=0, le=20)]
+
+
+@dataclass
+class Handling:
+    """How things are grasped and brought elsewhere.
+
+    close: s, at least, for the cables to close. calm: s for which all waits before it and after it.
+    lift: m. carry: m/s, of the mount with something in the arm, on the average. above: m over its place from which a
+    thing comes down. open: s, at least, in which the arm opens while the mount rises. beneath: m, at most, that a
+    thing may fall as it is let go. payload: of each shape, rows of diameter, m, and the heaviest mass, kg, that is
+    grasped, linear between.
+    """
+
+    close: Seconds
+    calm: Seconds
+    lift: Metres
+    carry: Metres
+    above: Metres
+    open: Seconds
+    beneath: Metres
+    payload: dict[Shape, Annotated[list[tuple[Metres, Mass]], Field(min_length=1, max_length=50)]]
+
+    def __post_init__(self):
+        for name, rows in self.payload.items():
+            diameters = [diameter for diameter, _ in rows]
+            if diameters != sorted(set(diameters)):
+                raise ValueError(f"payload.{name}: found diameters {diameters}, expected them rising")
+
+    def heaviest(self, shape: Shape, diameter: float) -> float:
+        """kg, of an object of `diameter` m; none of a shape that is not told of, or wider than its last row, can be
+        held."""
+        diameters, masses = zip(*self.payload.get(shape, [(diameter, 0.0)]), strict=True)
+        return float(np.interp(diameter, diameters, masses, right=0.0))
+
+
+@dataclass(frozen=True)
+class Leg:
+    """To `joints` (7,), rad, and `commands` (K,), m, in `seconds` at least, then at rest for `calm` s; `gentle` with
+    something in the arm.
+
+    `gravity`: in the arm's base frame, for legs that are shaped so that the arm does not swing on; None for the others.
+    `change` (K,): m, what swings it: a command's change, or zero, the mount's way.
+    """
+
+    phase: str
+    joints: np.ndarray
+    commands: np.ndarray
+    gravity: np.ndarray | None = None
+    change: np.ndarray | None = None
+    seconds: float = 0.0
+    calm: float = 0.0
+    gentle: bool = False
+
+
+@dataclass(frozen=True)
+class Grasping:
+    """grips: by the way of grasping. straight (K,): m, commands of the straight arm."""
+
+    rigid: RigidIK
+    mount_offset: float
+    straight: np.ndarray
+    grips: dict[str, Grip]
+    handling: Handling
+
+    def grasp(self, targets: Targets, thing: Thing, joints: np.ndarray, beside: float = 0.0) -> list[Leg]:
+        """Approach with the arm opened, close while the mount goes down, lift.
+
+        Args:
+            beside: m, by which the straight arm's tip is seen beside the bending plane, towards its base's y: the mount
+                makes up for it, as a narrow coil must meet a thing in its middle.
+
+        Raises:
+            InputError: the thing is too heavy, nobody knows how to grasp it, or the rigid robot cannot be there.
+        """
+        h, name = self.handling, way_of_grasping(thing)
+        if name not in self.grips:
+            raise InputError(f"grasp: {thing.name} is {thing.support}, expected {' or '.join(self.grips)}")
+        most = h.heaviest(thing.shape, thing.diameter)
+        if thing.mass > most:
+            raise InputError(
+                f"payload: {thing.name} weighs {thing.mass:g} kg, expected at most {most:.3g} kg "
+                f"at a diameter of {1e3 * thing.diameter:.0f} mm"
+            )
+        placement = self.placement(targets, thing)
+        centre = np.array(grip_of(thing)) - beside * placement.rotation[:, 1]
+        opened = self.straight - placement.opened
+        closed, still, gravity = self.straight - placement.closed, np.zeros(len(opened)), _gravity(targets)
+
+        def at(start: np.ndarray, place: np.ndarray) -> np.ndarray:
+            return self._solve(start, centre + place, targets)
+
+        come = at(joints, placement.come)
+        there = at(come, placement.mount)
+        sunk = at(there, placement.mount - placement.sink * UP)
+        up = h.lift + placement.sink
+        return [
+            Leg("approach", come, opened, gravity, still),
+            Leg("approach", there, opened, gravity, still, calm=h.calm),
+            Leg("curl", sunk, closed, seconds=h.close, calm=h.calm),
+            Leg("lift", at(sunk, placement.mount + h.lift * UP), closed, seconds=up / h.carry, gentle=True),
+        ]
+
+    def placement(self, targets: Targets, thing: Thing) -> Placement:
+        """Of the user's own targets."""
+        centre = np.array(grip_of(thing))
+        rotation = rotation_from_wxyz(np.array(base_quaternion(targets.pointing, targets.heading))).as_matrix()
+        return self.grips[way_of_grasping(thing)].placed(rotation, np.array(targets.rigid.position) - centre)
+
+    def bring(
+        self, targets: Targets, thing: Thing, world: World, joints: np.ndarray, commands: np.ndarray
+    ) -> list[Leg]:
+        """Transfer what is held to above its place, down, open and rise.
+
+        Raises:
+            InputError: nothing is beneath the place, or the rigid robot cannot be there.
+        """
+        h, place = self.handling, np.array(targets.rigid.position)
+        _require_ground(thing, targets.tip.position, world, h.beneath)
+        opened, rise = np.maximum(commands, self.straight), self.grips[way_of_grasping(thing)].rise
+        above = self._solve(joints, place + h.above * UP, targets)
+        there = self._solve(above, place, targets)
+        away = np.linalg.norm(place + h.above * UP - mount_pose(joints[None], self.mount_offset)[0][0])
+        return [
+            Leg("transfer", above, commands, seconds=float(away) / h.carry, calm=h.calm, gentle=True),
+            Leg("transfer", there, commands, seconds=h.above / h.carry, calm=h.calm, gentle=True),
+            Leg("release", self._solve(there, place + rise * UP, targets), opened, seconds=h.open),
+        ]
+
+    def _solve(self, start: np.ndarray, mount: np.ndarray, targets: Targets) -> np.ndarray:
+        x, y, z = (float(value) for value in mount)
+        return self.rigid.solve(start, (x, y, z), targets.pointing, targets.heading)
+
+
+def _gravity(targets: Targets) -> np.ndarray:
+    return np.array(rotate(conjugate(base_quaternion(targets.pointing, targets.heading)), DOWN))
+
+
+def _require_ground(thing: Thing, place: Vector, world: World, most: float) -> None:
+    """Refuse to release a thing at `place`, m, where nothing is beneath it.
+
+    Raises:
+        InputError: telling what is missing.
+    """
+    x, y, z = place[0], place[1], place[2] - below_grip(thing)
+    box = beneath((x, y, z), world)
+    gap = np.inf if box is None else z - box.high[2]
+    if gap > most:
+        found = "nothing" if box is None else f"{1e3 * gap:.0f} mm"
+        raise InputError(
+            f"release: found {found} between {thing.name} and what is beneath it, expected at most {1e3 * most:.0f} mm"
+        )

@@ -1,0 +1,111 @@
+"""From targets to a plan: rigid inverse kinematics, the network, jerk-limited ways, shaped, and what forbids them."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from trunkline.ar.teleop.alignment import base_quaternion
+from trunkline.ar.teleop.grasping import Grasping, Leg
+from trunkline.ar.teleop.messages import Request, Targets, World
+from trunkline.ar.teleop.obstacles import refuse
+from trunkline.ar.teleop.plan import Plan
+from trunkline.ar.teleop.rigid_ik import RigidIK
+from trunkline.ar.teleop.shaping import Shaper, shaped
+from trunkline.ar.teleop.tendons import Network, bend
+from trunkline.ar.teleop.trajectory import JOINTS, Limits, gentle, point_to_point
+from trunkline.ar.teleop.vectors import DOWN, Vector, add, conjugate, rotate, subtract
+from trunkline.errors import InputError
+from trunkline.model.statics.chain import Chain
+
+# The shaper for the arm's swings: of a gravity direction (3,) in its base frame, the commands at the end (K,), and by
+# how much they change (K,), m; `trunkline.ar.teleop.vibration` has it of a MuJoCo model.
+ShaperOf = Callable[[np.ndarray, np.ndarray, np.ndarray], Shaper]
+
+
+@dataclass(frozen=True)
+class Planner:
+    """What plans are made with. `straight`: commands that leave the arm straight, m, (K,). `tolerance`: m, how far
+    from its target the tip may be foreseen. `step`: s, between a plan's rows. `chain`: the arm's statics, by which the
+    network's answers are corrected, and no solid may be in the arm's way. `grasping`: how things are grasped."""
+
+    rigid: RigidIK
+    network: Network
+    straight: np.ndarray
+    limits: Limits
+    mount_offset: float
+    tolerance: float = 0.02
+    step: float = 0.002
+    shaper: ShaperOf | None = None
+    chain: Chain | None = None
+    grasping: Grasping | None = None
+
+    def plan(
+        self, request: Request, world: World, joints: np.ndarray, commands: np.ndarray, beside: float = 0.0
+    ) -> Plan:
+        """From rest at `joints` (7,), rad, and `commands` (K,), m: approach with a straight arm and curl; of a thing
+        that the tip target marks, approach, curl and lift; of one that the arm holds, transfer and release.
+
+        Args:
+            beside: m, by which the straight arm's tip is seen beside the bending plane (`Grasping.grasp`).
+
+        Raises:
+            InputError: beginning with what forbids it: limit, self-collision, out of reach, gravity, world, payload,
+                grasp or release.
+        """
+        rows, phases = [np.append(joints, commands)[None]], []
+        for leg in self._legs(request.targets, world, joints, commands, beside):
+            here, end = rows[-1][-1], np.append(leg.joints, leg.commands)
+            profile = gentle if leg.gentle else point_to_point
+            way = profile(here, end, self.limits, self.step, leg.seconds)
+            if self.shaper is not None and leg.gravity is not None:
+                change = leg.commands - here[JOINTS:] if leg.change is None else leg.change
+                way = shaped(way, self.step, self.shaper(leg.gravity, leg.commands, change))
+            if not phases or phases[-1][0] != leg.phase:
+                phases.append((leg.phase, sum(map(len, rows)) - 1))
+            rows.append(np.concatenate([way[1:], np.tile(end, (round(leg.calm / self.step), 1))]))
+        every = np.concatenate(rows)
+        found = Plan(self.step, every[:, :JOINTS], every[:, JOINTS:], tuple(phases), request.package, request.world)
+        refuse(found, world, self.mount_offset, self.chain)
+        return found
+
+    def _legs(
+        self, targets: Targets, world: World, joints: np.ndarray, commands: np.ndarray, beside: float
+    ) -> list[Leg]:
+        if targets.thing:
+            thing = world.thing(targets.thing)
+            if self.grasping is None:
+                raise InputError(f"grasp: found no way of grasping {thing.name}, expected a planner that has one")
+            if thing.support == "held":
+                return self.grasping.bring(targets, thing, world, joints, commands)
+            return self.grasping.grasp(targets, thing, joints, beside)
+        there, curled = self.goal(targets, joints)
+        gravity = np.array(_soft_target(targets)[1])
+        return [Leg("approach", there, self.straight, gravity), Leg("curl", there, curled, gravity)]
+
+    def goal(self, targets: Targets, joints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Joints (7,), rad, the nearest to `joints`, and commands (K,), m, that bring mount and tip to their targets.
+
+        Raises:
+            InputError: beginning with what forbids it, as `plan`.
+        """
+        mount, curled = self._curled(targets)
+        return self.rigid.solve(joints, mount, targets.pointing, targets.heading), curled
+
+    def _curled(self, targets: Targets) -> tuple[Vector, np.ndarray]:
+        """Where the mount goes, m, and the commands (K,) that then bring the tip to its target.
+
+        An arm that only bends passes its target by some mm, within `tolerance`: the mount makes up for what is
+        foreseen.
+        """
+        tip, gravity = _soft_target(targets)
+        bent = bend(self.network, tip, gravity, self.tolerance, self.chain)
+        turn = base_quaternion(targets.pointing, targets.heading)
+        missed = rotate(turn, subtract(tip, (float(bent.tip[0]), float(bent.tip[1]), float(bent.tip[2]))))
+        return add(targets.rigid.position, missed), bent.commands
+
+
+def _soft_target(targets: Targets) -> tuple[Vector, Vector]:
+    """Tip target and gravity direction in the soft arm's base frame."""
+    back = conjugate(base_quaternion(targets.pointing, targets.heading))
+    return rotate(back, subtract(targets.tip.position, targets.rigid.position)), rotate(back, DOWN)

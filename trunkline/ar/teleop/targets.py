@@ -1,0 +1,145 @@
+"""Targets: where both rays want the robot, tested against what it can reach and what stands in the way."""
+
+import math
+from dataclasses import replace
+
+from trunkline.ar.teleop.alignment import Aligned, Wrist, align, base_quaternion, carried_heading
+from trunkline.ar.teleop.messages import Offer, Target, Targets, Thing, World
+from trunkline.ar.teleop.object_shapes import grip_of
+from trunkline.ar.teleop.reach import Reach, Reading
+from trunkline.ar.teleop.settings import Orientation, Teleop
+from trunkline.ar.teleop.vectors import (
+    DOWN,
+    Vector,
+    add,
+    conjugate,
+    cross,
+    distance,
+    dot,
+    norm,
+    rotate,
+    scale,
+    subtract,
+)
+
+
+def place(
+    rigid: Vector,
+    tip: Vector,
+    pointing: Vector,
+    limited: bool,
+    wrist: Wrist,
+    last: Aligned,
+    world: World,
+    reach: Reach,
+    settings: Teleop,
+) -> Targets:
+    """Both targets (base frame, m) with their reach under the gravity that the arm will have there.
+
+    A tip target that marks a thing is where the arm grips it. Whether it can be grasped no map tells: plan and preview
+    do.
+    """
+    thing = marked(tip, world, settings.mark)
+    tip = tip if thing is None else grip_of(thing)
+    aligned = align(tip, rigid, pointing, wrist, last, settings.bending_plane)
+    turn = base_quaternion(pointing, aligned.heading)
+    back = conjugate(turn)
+    found = Reading("unknown")
+    if thing is None:
+        found = reach.soft(rotate(back, subtract(tip, rigid)), rotate(back, DOWN))
+    offer = None if found.offer is None else add(rigid, rotate(turn, found.offer))
+    return Targets(
+        _target(rigid, reach.rigid(rigid, pointing), world),
+        _target(tip, found._replace(offer=offer), world),
+        pointing,
+        aligned.heading,
+        aligned.half_plane,
+        aligned.turned,
+        limited,
+        "" if thing is None else thing.name,
+    )
+
+
+def bring(
+    held: Thing,
+    rigid: Vector,
+    pointing: Vector,
+    limited: bool,
+    wrist: Wrist,
+    half_plane: int,
+    world: World,
+    reach: Reach,
+) -> Targets:
+    """Targets of an arm that holds a thing: the mount goes to `rigid`, the wrist as joint 1 carries it, and the tip
+    target is where what it grips comes to."""
+    heading = carried_heading(rigid, wrist)
+    there = base_quaternion(pointing, heading)
+    here = base_quaternion(wrist.pointing, wrist.heading)
+    beside = rotate(conjugate(here), subtract(grip_of(held), wrist.position))
+    tip = add(rigid, rotate(there, beside))
+    return Targets(
+        _target(rigid, reach.rigid(rigid, pointing), world),
+        _target(tip, Reading("unknown"), world),
+        pointing,
+        heading,
+        half_plane,
+        0.0,
+        limited,
+        held.name,
+    )
+
+
+def marked(tip: Vector, world: World, within: float) -> Thing | None:
+    """The thing nearest to the tip target, at most `within` m from it."""
+    near = [thing for thing in world.things if distance(tip, grip_of(thing)) <= within]
+    return min(near, key=lambda thing: distance(tip, grip_of(thing)), default=None)
+
+
+def offered(targets: Targets, offer: Offer | None) -> Targets:
+    """The targets with the assistant's offer, where it is for the thing that they mark."""
+    return replace(targets, better=offer) if offer is not None and offer.thing == targets.thing else targets
+
+
+def _target(position: Vector, reading: Reading, world: World) -> Target:
+    for box in world.boxes:
+        if all(low <= x <= high for low, x, high in zip(box.low, position, box.high, strict=True)):
+            return Target(position, "blocked", solid=box.name)
+    return Target(position, *reading)
+
+
+def tilted(pointing: Vector, toward: Vector, dt: float, settings: Orientation) -> tuple[Vector, bool]:
+    """Where the end effector points after `dt` s of following the direction `toward`, and whether that is tilted
+    further than it may be: then it stays at the largest tilt in that direction."""
+    tilt = math.acos(min(max(dot(toward, DOWN), -1.0), 1.0))
+    limited = tilt > settings.most_tilt
+    if limited:
+        toward = _turned(DOWN, toward, settings.most_tilt)
+    angle = math.acos(min(max(dot(pointing, toward), -1.0), 1.0))
+    step = settings.rate * dt
+    return (toward if angle <= step else _turned(pointing, toward, step)), limited
+
+
+def _turned(a: Vector, b: Vector, angle: float) -> Vector:
+    """`a` turned by `angle`, rad, towards `b`, both of unit length."""
+    axis = cross(a, b)
+    length = norm(axis)
+    if length < 1e-12:  # opposite: any way is as short
+        axis, length = (1.0, 0.0, 0.0), 1.0
+    side = cross(scale(axis, 1 / length), a)
+    found = add(scale(a, math.cos(angle)), scale(side, math.sin(angle)))
+    return scale(found, 1 / norm(found))
+
+
+def why_not(targets: Targets | None) -> str:
+    """Why no plan can be asked for, in one line; "" where one can."""
+    if targets is None:
+        return "both targets are needed: hold a grip to set each"
+    for name, target in (("rigid", targets.rigid), ("tip", targets.tip)):
+        if target.reach == "blocked":
+            return f"{name} target is inside {target.solid}"
+        if target.reach == "outside":
+            offered = "; primary button takes the nearest point that is within" if target.offer else ""
+            return f"{name} target is {1e3 * target.outside_by:.0f} mm out of reach{offered}"
+    if targets.turned is None:
+        return "wrist cannot turn the arm's bending plane to the tip target"
+    return ""

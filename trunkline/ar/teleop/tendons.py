@@ -1,0 +1,95 @@
+"""The tendons' commands for a tip target, by the network.
+
+The network wants a whole tip pose, the user gives a position: of an arm that only bends, the one says the other. In the
+target's plane through the arm's axis the tip's orientation is a turn by the bend. The network is asked for the target
+at many bends, and the one for which it foresees the tip nearest to the target is taken. With the arm's statics, that is
+corrected; the tip may still pass the target by some mm, as an arm that only bends reaches a surface.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+import onnxruntime
+from onnxruntime.capi.onnxruntime_pybind11_state import Fail, InvalidGraph, InvalidProtobuf
+
+from trunkline.ar.teleop.correction import Bent, corrected
+from trunkline.ar.teleop.tilt_reach import AZIMUTH, STRAIGHT_DOWN, SYMMETRY
+from trunkline.ar.teleop.vectors import Vector
+from trunkline.errors import InputError
+from trunkline.kinematics.ik.inference import ask
+from trunkline.kinematics.ik.inputs import TILT
+from trunkline.model.statics.chain import Chain
+
+NO_NETWORK = Fail, InvalidGraph, InvalidProtobuf  # what a file that is none ends with
+BENDS = np.radians(np.arange(-330.0, 331.0, 2.0))  # of the tip in its plane; a spiral curls further than a turn
+
+
+@dataclass(frozen=True)
+class Network:
+    """`ask`: as `trunkline.kinematics.ik.inference.ask`, of one network. `inputs`: how many numbers it takes, 8 or 10,
+    which says in what form it is told of gravity (`trunkline/kinematics/ik/inputs.py`)."""
+
+    ask: Callable[[np.ndarray], dict[str, np.ndarray]]
+    inputs: int
+
+
+def session_of(file: str | bytes) -> onnxruntime.InferenceSession:
+    """Of an ONNX file of `train_ik`: its path, or its contents."""
+    return onnxruntime.InferenceSession(file, providers=["CPUExecutionProvider"])
+
+
+def network_of(session: onnxruntime.InferenceSession) -> Network:
+    return Network(partial(ask, session), session.get_inputs()[0].shape[1])
+
+
+def bend(network: Network, tip: Vector, gravity: Vector, tolerance: float, chain: Chain | None = None) -> Bent:
+    """Commands that bring the tip to `tip`, m, within `tolerance` m, under `gravity` (unit vector), all in the base
+    frame. With `chain`, the arm's statics correct the network's answer, and the tip foreseen is theirs.
+
+    Raises:
+        InputError: no bend comes so near, or a network of one tilt is asked about gravity out of its plane.
+    """
+    found = _at_tilt(network, tip, gravity) if network.inputs == len(TILT) else _asked(network, tip, gravity)
+    if chain is not None:
+        better = corrected(chain, found, tip, gravity)
+        if better is None:
+            raise InputError("out of reach: the soft arm finds no rest under the commands for its target")
+        found = better
+    missed = float(np.linalg.norm(found.tip - tip))
+    if missed > tolerance:
+        raise InputError(f"out of reach: the soft arm's tip comes no nearer to its target than {1e3 * missed:.0f} mm")
+    return found
+
+
+def _asked(network: Network, tip: Vector, told: tuple[float, ...]) -> Bent:
+    """The answer that is foreseen nearest to `tip`, gravity being `told` as the network takes it."""
+    plane = math.atan2(tip[1], tip[0])
+    axis = [-math.sin(plane), math.cos(plane), 0.0]
+    poses = np.empty((len(BENDS), len(told) + 7))
+    poses[:, : len(told)], poses[:, -7:-4] = told, tip
+    poses[:, -4], poses[:, -3:] = np.cos(BENDS / 2), np.outer(np.sin(BENDS / 2), axis)
+    answer = network.ask(poses)
+    best = int(np.argmin(np.linalg.norm(answer["tip"] - np.array(tip), axis=1)))
+    return Bent(*(answer[name][best].astype(float) for name in ("commands", "lengths", "tip")))
+
+
+def _at_tilt(network: Network, tip: Vector, gravity: Vector) -> Bent:
+    """Of a network that knows tilts about +y alone: gravity in another tendon's plane is the same arm, turned."""
+    level = math.hypot(gravity[0], gravity[1])
+    angle, turns = math.atan2(level, -gravity[2]), 0
+    if angle > STRAIGHT_DOWN:
+        azimuth = math.atan2(gravity[1], gravity[0])
+        turns = round(azimuth / SYMMETRY)
+        off = azimuth - turns * SYMMETRY
+        if level * abs(math.sin(off)) > math.sin(AZIMUTH):
+            raise InputError(f"gravity: comes {math.degrees(off):.0f}° beside a tendon's plane, which the package does "
+                             "not know")  # fmt: skip
+    cos, sin = math.cos(turns * SYMMETRY), math.sin(turns * SYMMETRY)
+    found = _asked(network, (cos * tip[0] + sin * tip[1], -sin * tip[0] + cos * tip[1], tip[2]), (angle,))
+    x, y, z = found.tip
+    # A tendon that stands where another one did does what that one did.
+    commands, lengths = np.roll(found.commands, turns), np.roll(found.lengths, turns)
+    return Bent(commands, lengths, np.array([cos * x - sin * y, sin * x + cos * y, z]))

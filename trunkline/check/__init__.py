@@ -1,5 +1,0 @@
-"""What a session will and will not tell, before hours of fits: `python -m trunkline.check`."""
-
-from trunkline.arithmetic import hold_arithmetic
-
-hold_arithmetic()  # also so that the stages and this share what Numba has compiled

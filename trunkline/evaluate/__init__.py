@@ -1,5 +1,0 @@
-"""A model against a session, without a fit: `python -m trunkline.evaluate`."""
-
-from trunkline.arithmetic import hold_arithmetic
-
-hold_arithmetic()  # also so that the stages and this share what Numba has compiled

@@ -1,5 +1,0 @@
-"""The pipeline for many arms or sessions, and one table and picture over all of them: `python -m trunkline.fleet`."""
-
-from trunkline.arithmetic import hold_arithmetic
-
-hold_arithmetic()  # also so that the stages and this share what Numba has compiled

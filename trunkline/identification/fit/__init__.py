@@ -1,0 +1,1 @@
+"""The search for parameters: problem, optimizers, and how sure the result is."""

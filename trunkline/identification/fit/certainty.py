@@ -1,0 +1,114 @@
+"""How sure the identified parameters are."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, stdtrit
+
+from trunkline.identification.fit.linearisation import Linearisation
+
+RESAMPLINGS = 20_000  # of which some twenty lie beyond each end of an interval of six trials
+Moves = Callable[[np.ndarray], np.ndarray]  # weights of T trials (B, T) → by how much the estimate moves (B, P)
+ALONE = 1e-9  # share of a parameter's information; if all other trials have less, one determines it alone
+
+
+@dataclass
+class Certainty:
+    """95 % intervals around an estimate z, and how well its directions are determined.
+
+    Attributes:
+        standard_error: of each parameter; infinite where nothing, or one trial alone, depends on it. Shape (P,).
+        half_width: of its 95 % interval. Shape (P,).
+        correlation: of the estimates. Shape (P, P).
+        condition: of the Jacobian with columns of unit length; 1 is ideal.
+        weakest: unit vector, in scaled columns, of the direction that the data determine least. Shape (P,).
+    """
+
+    standard_error: np.ndarray
+    half_width: np.ndarray
+    correlation: np.ndarray
+    condition: float
+    weakest: np.ndarray
+
+
+def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves | None = None) -> Certainty:
+    """Jackknife over trials: how far the estimate moves when one is left out (CV3; MacKinnon, Nielsen, Webb 2023).
+
+    Residuals of one trial hang together (the model is wrong in the same way from frame to frame), so a formula for
+    independent ones, as in `mujoco.sysid`, promises far too much: where a handful of trials tells a mean, its
+    intervals seldom hold the truth, these as often as they should (`python -m studies.intervals`). The sandwich over
+    trials (Liang, Zeger 1986) answers a trial's weight as if the others' curvature were all of it; a trial that weighs
+    much has drawn the estimate to itself, and with a handful of trials that makes it too sure. Trials are taken as
+    independent, with T - 1 degrees of freedom. What one trial alone determines has no interval.
+
+    Args:
+        linear: of the residuals, at the estimate.
+        prior_deviation: standard deviation of the truth around the prior's mean, towards which the estimate is pulled
+            where the trials say little; it widens the interval there.
+        moves: how the estimate answers weights of the trials; a Gauss-Newton step of `linear` if not given.
+    """
+    normals = linear.normals()
+    trials, normal = len(normals), normals.sum(axis=0)
+    left_out = (moves or linear.moves)(1 - np.eye(trials))
+    left_out = left_out - left_out.mean(axis=0)
+    covariance = left_out.T @ left_out * (trials - 1) / trials
+    if linear.prior is not None:
+        normal = normal + np.diag(linear.prior**2)
+    scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scaling = np.outer(scale, scale)
+    if linear.prior is not None:
+        pulled = np.linalg.pinv(normal * scaling, hermitian=True) * scaling @ np.diag(linear.prior**2)
+        covariance = covariance + prior_deviation**2 * pulled @ pulled.T
+    error = np.sqrt(np.diag(covariance))
+    error = np.where(_told_by_one(normal, normals), np.inf, error)
+    safe = np.where(error > 0, error, 1.0)
+    singular, directions = np.linalg.eigh(normal * scaling)
+    return Certainty(
+        standard_error=error,
+        half_width=error * float(stdtrit(max(trials - 1, 1), 0.975)),
+        correlation=covariance / np.outer(safe, safe),
+        condition=float(np.sqrt(singular[-1] / max(singular[0], 1e-300))),
+        weakest=directions[:, 0],
+    )
+
+
+def _told_by_one(normal: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Which parameters have no information in `normal` (P, P) without one of the trials' `normals` (T, P, P). (P,)."""
+    least = np.min([np.diag(normal - own) for own in normals], axis=0)
+    return least <= ALONE * np.diag(normal)
+
+
+def bootstrap(linear: Linearisation, seed: int, moves: Moves | None = None) -> np.ndarray:
+    """95 % intervals of the estimate by giving trials random weights, again and again (Rubin 1981).
+
+    It cross-checks `certainty`: it takes no symmetry for granted, and no formula for what a trial's weight does.
+    scipy's `bootstrap` (BCa) draws whole trials; with a handful of them it holds the truth too seldom
+    (`python -m studies.intervals`). What the fits to so many weights cost with `Surrogate.moves`, and would by scipy:
+    `python -m benchmarks.surrogate`.
+    Draws scatter too little, by √((T - 1)/(T + 1)), and their percentiles know of no degrees of freedom. So these are
+    taken further out, as Hesterberg (2015, expanded percentiles) does, where a mean of T numbers would get Student's
+    interval: Φ(-√((T + 1)/(T - 1)) t). Below five trials that is further out than any draw, and too narrow.
+
+    Args: as for `certainty`.
+
+    Returns:
+        Lowest and highest z, infinite where nothing, or one trial alone, depends on a parameter. Shape (2, P).
+    """
+    normals = linear.normals()
+    trials = len(normals)
+    weights = np.random.default_rng(seed).standard_exponential((RESAMPLINGS, trials))
+    degrees = max(trials - 1, 1)
+    tail = ndtr(-np.sqrt((trials + 1) / degrees) * stdtrit(degrees, 0.975))
+    interval = linear.vector + np.quantile((moves or linear.moves)(weights), [tail, 1 - tail], axis=0)
+    return np.where(_told_by_one(normals.sum(axis=0), normals), [[-np.inf], [np.inf]], interval)
+
+
+def weakest_in_words(names: list[str], weakest: np.ndarray) -> str:
+    """The weakest direction as a sentence on the parameters that take part in it."""
+    order = np.argsort(-np.abs(weakest))
+    if len(names) == 1 or np.abs(weakest[order[1]]) < 0.3:
+        return f"{names[order[0]]} is determined least"
+    first, second = names[order[0]], names[order[1]]
+    same = weakest[order[0]] * weakest[order[1]] > 0
+    return f"{first} and {second} {'rise together' if same else 'trade off'}"

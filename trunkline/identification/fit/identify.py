@@ -1,0 +1,228 @@
+"""One function for the three stages: they differ in their experiments and in their parameters."""
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from trunkline.compute.progress import progress
+from trunkline.identification.evaluation.evaluation import segment_positions
+from trunkline.identification.fit.certainty import Certainty, bootstrap, certainty
+from trunkline.identification.fit.fit import Fit, Polish
+from trunkline.identification.fit.influence import Influence, influence
+from trunkline.identification.fit.linearisation import linearise
+from trunkline.identification.fit.optimizers import Optimizer
+from trunkline.identification.fit.problem import Problem
+from trunkline.identification.fit.robust import reweighted
+from trunkline.identification.fit.search import Convergence, Found, descend, search
+from trunkline.identification.fit.surrogate import Surrogate, surrogate
+from trunkline.identification.parameters.parameters import candidate_fields, follow_rest, parameter_named, set_fields
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.resting import RestShape, spring_references
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.splits import IDENTIFY
+
+SEEN = 0.05  # share of the losses by which a surrogate may mistake those at a new estimate, and still serve there
+REWEIGHINGS, SAME_WEIGHT = 4, 0.05  # at most; weights that change by less leave the minimum where it is
+BOUND_TOLERANCE = 0.01  # of the range: closer to an end counts as on it; least squares stays just inside
+
+
+@dataclass
+class Identification:
+    """Result of a stage.
+
+    models: "initial", "coarse" and "identified", each a compiled model.
+    values: identified scalars. factors: per-joint factors (units,) by parameter, empty if there are none.
+    certainty: of the scalars, on the axes of the search, before joints got factors. bootstrap: their 95 % intervals
+        by resampling trials, lowest and highest z, shape (2, P).
+    factor_certainty: of all factors, given the scalars; None without factors.
+    influence: of every trial on every scalar.
+    at_bound: names of what ended on a bound.
+    converged: which searches stopped for that reason; the rough one, if its starts agree too.
+    agreeing, starts: of so many distinct starts of the rough search, how many end at its least loss.
+    """
+
+    models: dict[str, mujoco.MjModel]
+    values: dict[str, float]
+    factors: dict[str, np.ndarray]
+    certainty: Certainty
+    bootstrap: np.ndarray
+    factor_certainty: Certainty | None
+    influence: Influence
+    at_bound: list[str]
+    converged: dict[str, bool]
+    agreeing: int
+    starts: int
+    convergence: dict[str, Convergence]
+    evaluations: int
+    diverged: int
+    steps: int
+
+
+def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], fit: Fit) -> Identification:
+    """Fit the parameters to the `identify` split among `experiments`; the others are never looked at.
+
+    Args:
+        label: shown with the progress.
+        model: the model that the stage begins with.
+    """
+    method, parameters, per_joint, rest = fit.method, fit.parameters, fit.per_joint, fit.rest
+    seen = [e for e in experiments if e.split == IDENTIFY]
+    short = [e.shortened(method.rough.frames) for e in _few(seen, method.rough.trials)]
+    rough, exact = fit.problem(model, short, method.rough.step_factor), fit.problem(model, seen)
+    searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}
+    problems, found = [rough, exact], searches["coarse"]
+    near, last = exact, "polish"
+    if method.rough.step_factor > 1 and not all(is_static(e.kind) for e in seen):  # at rest, the step changes nothing
+        near, last = fit.problem(model, seen, method.rough.step_factor), "whole"
+        problems.append(near)
+    found = _polish(near, found, method.polish, f"{label} near")
+    # what outlies, and by how much an estimate answers a trial, is as plain at a coarser step, which costs less
+    searches[last], around = _reweigh(near, found, fit, f"{label} {last}")
+    found = searches[last]
+    if near is not exact:
+        exact.trial_weights = near.trial_weights
+        searches["polish"] = found = _polish(exact, found, method.polish, f"{label} polish")
+    values = values_of(parameters, found.vector)
+    coarse = with_parameters(model, values, rest=rest)
+    at_bound = _at_bound(parameters, found.vector, *exact.bounds())
+    linear = found.linear
+    assert linear is not None, "least squares ends on its own linearisation"
+
+    factors: dict[str, np.ndarray] = {}
+    factor_certainty = None
+    if per_joint:
+        # trials count as independent, each with the coarse fit's loss for its variance
+        prior_weight = np.sqrt(2 * found.loss / len(seen)) / method.per_joint_deviation
+        joints = replace(
+            replace(fit, parameters={}).problem(coarse, seen),
+            per_joint=per_joint, per_joint_range=method.per_joint_range, prior_weight=prior_weight,
+            trial_weights=exact.trial_weights,
+        )  # fmt: skip
+        searches["per_joint"] = found = _search(joints, method.fine, method.seed, f"{label} per joint")
+        factor_certainty = certainty(found.linear or linearise(joints, found.vector), method.per_joint_deviation)
+        factors = dict(zip(per_joint, found.vector.reshape(len(per_joint), -1), strict=True))
+        at_bound += _factors_at_bound(factors, method.per_joint_range)
+        problems.append(joints)
+
+    return Identification(
+        models={"initial": model, "coarse": coarse, "identified": with_parameters(coarse, {}, factors, rest)},
+        values=values,
+        factors=factors,
+        certainty=certainty(linear, moves=around.moves),
+        bootstrap=bootstrap(linear, method.seed, around.moves),
+        factor_certainty=factor_certainty,
+        influence=influence(around, [e.name for e in seen], list(parameters)),
+        at_bound=at_bound,
+        converged={name: search.converged for name, search in searches.items()},
+        agreeing=searches["coarse"].agreeing,
+        starts=searches["coarse"].starts,
+        convergence={name: search.convergence for name, search in searches.items()},
+        evaluations=sum(p.evaluations for p in problems),
+        diverged=sum(p.diverged for p in problems),
+        steps=sum(p.steps for p in problems),
+    )
+
+
+def values_of(parameters, vector: np.ndarray) -> dict[str, float]:
+    """What the scalars at the head of a candidate z are, in their units."""
+    return {name: float(parameter_named(name).value(z)) for name, z in zip(parameters, vector, strict=False)}
+
+
+def _few(experiments: list[Experiment], count: int) -> list[Experiment]:
+    """`count` of them, from the one that swings out least to the one that swings out most, evenly between."""
+    order = np.argsort([np.linalg.norm(e.positions[..., :2], axis=-1).max() for e in experiments], kind="stable")
+    places = np.linspace(0, len(order) - 1, min(count, len(order))).round().astype(int)
+    return [experiments[i] for i in order[places]]
+
+
+def _search(problem: Problem, optimizer: Optimizer, seed: int, label: str) -> Found:
+    with progress(optimizer.steps(), label, "iterations") as bar:
+        return search(problem, optimizer, seed, lambda best: bar.update(1, best_loss=best, **problem.effort()))
+
+
+def _polish(problem: Problem, rough: Found, polish: Polish, label: str) -> Found:
+    """Least squares from the best, by this problem, of the minima that the rough search found."""
+    start = rough.vector
+    if rough.others:
+        minima = np.stack([rough.vector, *rough.others])
+        start = minima[np.argmin(problem.losses(minima))]
+    with progress(polish.iterations, label, "iterations") as bar:
+        return descend(
+            problem, start, polish.iterations, polish.tolerance,
+            lambda best: bar.update(1, best_loss=best, **problem.effort()),
+        )  # fmt: skip
+
+
+def _reweigh(problem: Problem, found: Found, fit: Fit, label: str) -> tuple[Found, Surrogate]:
+    """The minimum in which outlying trials count less, from near it, and the surrogate around it.
+
+    The surrogate says which, and about where the minimum then is; least squares goes there, until the weights stay. A
+    surrogate is made anew where it has not foreseen the losses found.
+    """
+    kinds, polish = [e.kind for e in problem.experiments], fit.method.polish
+    straight = segment_positions(problem.model, problem.segments, problem.model.qpos0)
+    bends = np.array([np.square(e.positions - straight).sum(axis=2)[e.measured].mean() for e in problem.experiments])
+    around = made = surrogate(problem, found.vector, found.linear.residuals if found.linear else None)
+    made_at = found.vector
+    for turn in range(REWEIGHINGS):
+        weights, place = reweighted(around, kinds, bends, fit.weights.outlying)
+        if turn and np.abs(weights - problem.trial_weights).max() < SAME_WEIGHT:
+            break
+        problem.trial_weights = weights
+        tried = np.stack([found.vector, np.clip(found.vector + place, *problem.bounds())])
+        start = tried[np.argmin(problem.losses(tried))]
+        with progress(polish.iterations, label, "iterations") as bar:
+            found = descend(
+                problem, start, polish.iterations, polish.tolerance,
+                lambda best, bar=bar: bar.update(1, best_loss=best, **problem.effort()),
+            )  # fmt: skip
+        assert found.linear is not None, "least squares ends on its own linearisation"
+        moved, losses = found.vector - made_at, _trial_losses(problem, found.linear.residuals)
+        if np.abs(made.losses(moved[None])[0] - losses).sum() <= SEEN * losses.sum():
+            around = made.moved(moved, weights)
+        else:
+            around = made = surrogate(problem, found.vector, found.linear.residuals)
+            made_at = found.vector
+    return found, around
+
+
+def _trial_losses(problem: Problem, residuals: list[np.ndarray]) -> np.ndarray:
+    """Of every trial by itself, whatever its weight in the sum. Shape (T,)."""
+    return np.array([0.5 * block @ block for block in residuals]) / problem.trial_weights
+
+
+def with_parameters(
+    model: mujoco.MjModel,
+    values: dict[str, float],
+    factors: dict[str, np.ndarray] | None = None,
+    rest: RestShape | None = None,
+) -> mujoco.MjModel:
+    """A copy of `model` with these scalars and these factors of its units, which hangs in the shape `rest`."""
+    factors = factors or {}
+    changed = model.__copy__()
+    if values or factors:
+        fields = candidate_fields(
+            model,
+            {name: np.array([value]) for name, value in values.items()},
+            {name: factor[None] for name, factor in factors.items()},
+        )
+        set_fields(changed, fields)
+    if rest is not None:
+        fields = {"qpos_spring": spring_references({}, changed, rest)}
+        follow_rest(fields, changed)
+        set_fields(changed, fields)
+    return changed
+
+
+def _at_bound(parameters, vector: np.ndarray, low: np.ndarray, high: np.ndarray) -> list[str]:
+    margin = BOUND_TOLERANCE * (high - low)
+    return [p for p, z, a, b, m in zip(parameters, vector, low, high, margin, strict=True) if z < a + m or z > b - m]
+
+
+def _factors_at_bound(factors: dict[str, np.ndarray], span: float) -> list[str]:
+    return [
+        f"{name} of unit {index + 1}"
+        for name, values in factors.items()
+        for index in np.flatnonzero(np.abs(values - 1) > span * (1 - 2 * BOUND_TOLERANCE))  # the range is 2 spans
+    ]

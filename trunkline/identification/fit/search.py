@@ -1,0 +1,235 @@
+"""Two ways to the minimum: differential evolution (the paper's) and least squares, both a batch at a time."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.optimize import OptimizeResult, differential_evolution, least_squares
+
+from trunkline.identification.fit.linearisation import Linearisation, linearise
+from trunkline.identification.fit.optimizers import DifferentialEvolution, Optimizer
+from trunkline.identification.fit.problem import Problem
+
+PLATEAU_SCAN = 12  # values over the range of a parameter that does not matter
+PLATEAU_LEVEL = 1e-6  # relative change of the loss that matters
+STEP_TOLERANCE = 1e-5  # of a candidate z, relative: a smaller step of least squares is no step
+STARTS = 3  # of least squares, at least, that have to agree
+APART = 0.15  # as a share of a range, in one parameter at least, from one another
+CANDIDATES = 12  # drawn beside what differential evolution found, for the other starts
+ITERATIONS, TOLERANCE = 25, 1e-3  # of least squares after differential evolution
+AGREEING = 1.05  # times the least loss
+Report = Callable[[float], None]  # called with the best loss after each generation or iteration
+
+
+@dataclass
+class Convergence:
+    """Best loss so far and mean loss of each generation's trials; for least squares both are the iterate's."""
+
+    best: list[float] = field(default_factory=list)
+    mean: list[float] = field(default_factory=list)
+
+
+@dataclass
+class Found:
+    """Result of a search.
+
+    vector: the best candidate z. loss: its. converged: stopped for that reason, not because its time was up.
+    agreeing, starts: of so many distinct starts, how many ended at a loss as small; 0 of 0 if there was only one.
+    linear: the residuals around it, if least squares ended there. others: worse minima that were found on the way,
+    which whole trials may rank otherwise than the few that a search is made on.
+    """
+
+    vector: np.ndarray
+    loss: float
+    convergence: Convergence
+    converged: bool
+    linear: Linearisation | None = None
+    others: tuple[np.ndarray, ...] = ()
+    agreeing: int = 0
+    starts: int = 0
+
+
+def search(problem: Problem, optimizer: Optimizer, seed: int, report: Report) -> Found:
+    """The minimum within bounds, from the problem's own start or with it among the first candidates."""
+    rng = np.random.default_rng(seed)
+    if isinstance(optimizer, DifferentialEvolution):
+        evolved = _evolve(problem, optimizer, rng, report)
+        if not problem.parameters:
+            return evolved
+        drawn = _latin_hypercube(rng, CANDIDATES, *problem.bounds())
+        ranks = np.argsort(problem.losses(drawn, rough=True), kind="stable")
+        candidates = np.concatenate([evolved.vector[None], drawn[ranks]])
+        found = _several(problem, _apart(problem, candidates, STARTS), ITERATIONS, TOLERANCE, report)
+        return replace(found, convergence=evolved.convergence, converged=evolved.converged and found.agreeing > 1)
+    candidates, count = problem.start()[None], 1
+    if optimizer.starts:  # else it goes on from what is known
+        drawn = _latin_hypercube(rng, optimizer.starts, *problem.bounds())
+        candidates = np.concatenate([candidates, drawn])
+        candidates = candidates[np.argsort(problem.losses(candidates, rough=True), kind="stable")]
+        count = max(optimizer.descents, STARTS) if problem.parameters else optimizer.descents
+    starts = _apart(problem, candidates, count)
+    found = _several(problem, starts, optimizer.iterations, optimizer.tolerance, report)
+    if count == 1:
+        return replace(found, agreeing=0, starts=0)
+    return replace(found, converged=found.converged and found.agreeing > 1)
+
+
+def _apart(problem: Problem, candidates: np.ndarray, count: int) -> list[np.ndarray]:
+    """The first of the candidates (C, P) and those of the next that are far from it and from one another."""
+    low, high = problem.bounds()
+    chosen = [candidates[0]]
+    for start in candidates[1:]:
+        apart = min(np.abs((start - other) / (high - low)).max() for other in chosen)
+        if apart > APART and len(chosen) < count:
+            chosen.append(start)
+    return chosen
+
+
+def _several(
+    problem: Problem, starts: list[np.ndarray], iterations: int, tolerance: float, report: Report
+) -> Found:
+    """The best end of least squares from several starts, the best of them first, and how many of them end as well.
+
+    A search that ends for its own reasons may still have ended beside the minimum. It has converged if distinct starts
+    agree with it: at least two ends, its own included, as good as the best. What counts is where each start leads once
+    it has left the plateaus on its way: on one, a start would end beside the minimum that it might have found.
+    """
+    ends = [_ends(problem, start, iterations, tolerance, report, index > 0) for index, start in enumerate(starts)]
+    losses = [min(end.loss for end in each) for each in ends]
+    every = sorted((end for each in ends for end in each), key=lambda end: end.loss)
+    agreeing = sum(loss <= AGREEING * every[0].loss for loss in losses)
+    others = tuple(end.vector for end in every[1:])
+    return replace(every[0], others=others, agreeing=agreeing, starts=len(starts))
+
+
+def _ends(
+    problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report, hasty: bool
+) -> list[Found]:
+    """Where least squares ends from `start`, and from where parameters begin to matter that do not matter there.
+
+    A force range that no pull reaches is one: the loss is flat above the largest tension, so nothing leads from
+    there to a smaller minimum below.
+
+    Args:
+        hasty: leave a plateau at once, not from its own minimum, unless nothing better is found outside.
+    """
+    ends = [descend(problem, start, iterations, tolerance, report, hasty)]
+    if not problem.parameters:
+        return ends
+    (low, high), found = problem.bounds(), ends[0]
+    plateaus = np.flatnonzero(_flat(found.linear or linearise(problem, found.vector)))
+    for index in plateaus:
+        scan = np.repeat(found.vector[None], PLATEAU_SCAN, axis=0)
+        scan[:, index] = np.linspace(low[index], high[index], PLATEAU_SCAN)
+        losses = problem.losses(scan)
+        matters = np.abs(losses - found.loss) > PLATEAU_LEVEL * found.loss
+        if matters.any():
+            edge = scan[np.argmin(np.where(matters, losses, np.inf))]
+            ends.append(descend(problem, edge, iterations, tolerance, report))
+    if hasty and len(plateaus) and min(ends, key=lambda end: end.loss) is found:
+        ends[0] = descend(problem, found.vector, iterations, tolerance, report)
+    return ends
+
+
+def _flat(linear: Linearisation) -> np.ndarray:
+    """Which parameters do not matter at all. Shape (P,)."""
+    return np.asarray(~np.concatenate(linear.jacobians).any(axis=0))
+
+
+def descend(
+    problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report, hasty: bool = False
+) -> Found:
+    """Least squares on the loss's residuals. Only a step that is taken costs a Jacobian.
+
+    It ends with the first step that gains less than `tolerance` of the loss, also where less was gained than expected:
+    there scipy's own rule goes on, in ever smaller steps along a kink. If `hasty`, with the first iterate after the
+    start at which a parameter does not matter, too.
+    """
+    convergence = Convergence()
+    known: dict[bytes, list[np.ndarray]] = {}
+    accepted: list[Linearisation] = []
+    low, high = problem.bounds()
+
+    def blocks_at(vector: np.ndarray) -> list[np.ndarray]:
+        key = vector.tobytes()
+        if key not in known:
+            known[key] = [block[0] for block in problem.residuals(vector[None])]
+        return known[key]
+
+    def residuals(vector: np.ndarray) -> np.ndarray:
+        return np.concatenate([*blocks_at(vector), problem.prior(vector[None])[0]])
+
+    def derivatives(vector: np.ndarray) -> np.ndarray:
+        found = linearise(problem, vector, blocks_at(vector))
+        known.clear()  # steps before this iterate are not tried again
+        known[vector.tobytes()] = found.residuals
+        accepted[:] = [found]  # scipy asks for derivatives at its iterates alone
+        blocks = [*found.residuals, problem.prior(vector[None])[0]]
+        loss = 0.5 * sum(float(block @ block) for block in blocks)
+        convergence.best.append(loss)
+        convergence.mean.append(loss)
+        report(loss)
+        prior = np.zeros(len(vector)) if found.prior is None else found.prior
+        return np.concatenate([*found.jacobians, np.diag(prior)])
+
+    def enough(_: OptimizeResult) -> None:
+        if len(best := convergence.best) > 1 and best[-2] - best[-1] < tolerance * best[-2]:
+            raise StopIteration
+        if hasty and _flat(accepted[0]).any():
+            raise StopIteration
+
+    inside = np.clip(start, low + 1e-9, high - 1e-9)
+    result = least_squares(
+        residuals, inside, derivatives, bounds=(low, high), max_nfev=iterations, ftol=tolerance, xtol=STEP_TOLERANCE,
+        callback=enough,
+    )  # fmt: skip
+    if result.cost != convergence.best[-1]:
+        convergence.best.append(float(result.cost))
+        convergence.mean.append(float(result.cost))
+    last = accepted[0]
+    if not np.array_equal(last.vector, result.x):
+        last = linearise(problem, result.x, blocks_at(result.x))
+    return Found(result.x, float(result.cost), convergence, result.status != 0, last)
+
+
+def _evolve(
+    problem: Problem, optimizer: DifferentialEvolution, rng: np.random.Generator, report: Report
+) -> Found:
+    convergence, last = Convergence(), []
+    low, high = problem.bounds()
+
+    def losses(columns: np.ndarray) -> np.ndarray:
+        values = problem.losses(np.ascontiguousarray(columns.T), rough=True)
+        last[:] = [values]
+        return values
+
+    def note(intermediate_result) -> None:
+        convergence.best.append(float(intermediate_result.fun))
+        convergence.mean.append(float(last[0].mean()))
+        report(convergence.best[-1])
+
+    first = _latin_hypercube(rng, optimizer.population + optimizer.population_per_parameter * len(low), low, high)
+    first[0] = problem.start()
+    result = differential_evolution(
+        losses,
+        list(zip(low, high, strict=True)),
+        strategy="best1bin",
+        init=first,
+        maxiter=optimizer.generations,
+        tol=optimizer.tolerance,
+        mutation=(0.4, 0.9),
+        recombination=0.9,
+        rng=rng,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+        callback=note,
+    )
+    return Found(result.x, float(result.fun), convergence, bool(result.success))
+
+
+def _latin_hypercube(rng: np.random.Generator, count: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """`count` candidates, one in each of as many slices of every axis. Shape (count, P)."""
+    from scipy.stats import qmc  # half of a stage's time to import, so not before its first line
+
+    return low + qmc.LatinHypercube(len(low), rng=rng).random(count) * (high - low)

@@ -1,0 +1,100 @@
+"""From settings, trials and a model to what a stage of identification works on."""
+
+from dataclasses import replace
+
+import mujoco
+
+from trunkline.errors import InputError
+from trunkline.identification.fit.fit import Fit
+from trunkline.identification.fit.problem import Bounds
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.parameters.parameters import EVERY, PARAMETERS, names_of, parameter_named
+from trunkline.identification.parameters.per_session import names_in, other_sessions
+from trunkline.identification.simulate.experiment import Experiment, prepare
+from trunkline.identification.simulate.markers import with_measured_markers
+from trunkline.identification.simulate.resting import resting_shape
+from trunkline.model.elements import BACKLASH, PRELOAD, RATE_LIMIT, WINDING
+from trunkline.recordings.trials.splits import IDENTIFY
+from trunkline.recordings.trials.trial import Trial
+
+EVERY_ANGLE = f"tendon_angle{EVERY}"
+
+
+def set_up(
+    config: IdentificationSettings, trials: list[Trial], model: mujoco.MjModel
+) -> tuple[mujoco.MjModel, list[Experiment], Fit]:
+    """What `identify` works on: the model to begin with, its markers where they were measured if that is asked for,
+    an experiment for each trial, and what to fit to those of the kinds to identify from."""
+    if config.markers == "measured":
+        model = with_measured_markers(model, [t for t in trials if t.experiment in config.experiments])
+    experiments = [prepare(trial, model, config.frames, config.command_delay) for trial in trials]
+    fit = fit_of(config, trials[0].segments)
+    names = names_in(model, config.parameters)
+    fit.parameters = fit.parameters | {name: config.parameters[shared] for name, shared in names.items()}
+    if config.rest_shape == "measured" and (others := other_sessions(trials)):
+        expected = "expected one, or rest_shape: unchanged"
+        raise InputError(f"rest_shape: measured: found {1 + len(others)} sessions, {expected}")
+    if config.rest_shape == "measured":
+        fitted = [e for e in experiments if e.kind in config.experiments]
+        fit.rest = resting_shape(model, fitted, fit.segments)
+    return model, experiments, fit
+
+
+def fit_of(config: IdentificationSettings, segments: tuple[str, ...]) -> Fit:
+    """What a stage's settings ask for, with the shape at rest that the model has."""
+    return Fit(
+        segments, config.parameters, tuple(config.per_joint), config.loss.kind, weights=config.loss, method=config
+    )
+
+
+def with_every(config: IdentificationSettings, model: mujoco.MjModel) -> IdentificationSettings:
+    """The settings with a parameter for each of the arm's tendons or sections where a name stands for all of them. The
+    range of an angle is then about where the arm has each."""
+    spans: dict[str, Bounds] = {}
+    for name, span in config.parameters.items():
+        for one in names_of(name, model) or [name]:
+            middle = PARAMETERS[one].read(model) if name == EVERY_ANGLE else 0.0
+            spans[one] = Bounds(middle + span.low, middle + span.high)
+    return replace(config, parameters=spans)
+
+
+def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.MjModel) -> None:
+    """Refuse parameters of what the arm has not got: tendons, motors, joints' elements, units of some length."""
+    for name in config.parameters:
+        parameter, where = parameter_named(name), f"params.yaml: {stage}.parameters.{name}"
+        if not parameter.belongs_to(model):
+            raise InputError(f"{where}: {_lacking(parameter.part)}")
+        try:
+            parameter.read(model)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+
+
+def _lacking(part: str) -> str:
+    if part == "tendons":
+        found = "found it for an arm without tendons, expected parameters of joints alone"
+        return f"{found}; such an arm's pipeline ends with `dvc repro identify_damping`"
+    if part.startswith("motor "):
+        return f"found it for an arm without {part}, expected a ratio for each motor that it has but the first"
+    if part == "dead time":
+        found = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0"
+        return f"{found}; of an arm that comes as MJCF, expected `delay` and `nsample` of its actuators in that file"
+    if part in (RATE_LIMIT, BACKLASH):
+        return f"found it for winches without, expected build_mjcf.actuation.{part} of more than 0"
+    kind = part.partition(" ")[0]
+    if kind in (WINDING, PRELOAD):
+        return "found it for evenly spread tendons, expected tendons that are described one by one in build_mjcf.arm"
+    if kind == "tendon":
+        return f"found it for an arm without {part}, expected one for each tendon that it has"
+    if kind == "section":
+        return f"found it for an arm without {part}, expected build_mjcf.arm of the kind sections"
+    if part == "holes":
+        return "found it for cables that do not rub, expected build_mjcf.holes: rubbing"
+    return f"found it for joints without {part}, expected build_mjcf.joints with one"
+
+
+def check_folds(stage: str, folds: int, fitted: list[Experiment]) -> None:
+    """Refuse to leave out more groups of trials than there are trials to identify from."""
+    trials = sum(e.split == IDENTIFY for e in fitted)
+    if folds > trials:
+        raise InputError(f"{stage}.cross_validation_folds: found {folds}, expected at most {trials}, one a trial")

@@ -1,0 +1,1 @@
+"""Parameters that can be identified: what each changes in a model, and how it is written back."""

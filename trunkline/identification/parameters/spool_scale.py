@@ -1,0 +1,30 @@
+"""From what a log says was commanded to the lengths of cable that a model's motors are sent.
+
+A log counts pulls from the straight arm's path lengths, L = L_0 - u. Drums may be of another size than session.yaml
+has it, and cables tight or slack where commands are 0: a model that says so (`winding` w, `preload` p) is sent
+
+    L = L_0 - w u - p
+"""
+
+import mujoco
+import numpy as np
+
+from trunkline.identification.parameters.parameters import Fields
+from trunkline.model.elements import PRELOAD, WINDING, numbers_place, numeric_place
+
+
+def wound(model: mujoco.MjModel, controls: np.ndarray) -> np.ndarray:
+    """Lengths that the actuators of `model` are sent where a log commands `controls`, m. Shapes (T, nu)."""
+    return wound_by_each(model, {"numeric_data": model.numeric_data[None]}, controls[None])[0]
+
+
+def wound_by_each(model: mujoco.MjModel, fields: Fields, controls: np.ndarray) -> np.ndarray:
+    """As `wound`, by every candidate: (E, T, nu) of E trials → (E C, T, nu), a trial's candidates one after another."""
+    place, count = numeric_place(model, WINDING), len(next(iter(fields.values())))
+    each = np.repeat(controls, count, axis=0)
+    if place is None:
+        return each
+    numbers = fields.get("numeric_data", np.repeat(model.numeric_data[None], count, axis=0))
+    numbers = np.tile(numbers, (len(controls), 1))[:, None]
+    straight = model.tendon_length0[model.actuator_trnid[:, 0]]
+    return straight - numbers[..., [place]] * (straight - each) - numbers[..., numbers_place(model, PRELOAD)]

@@ -1,0 +1,1 @@
+"""What an identification stage writes: tables, curves, scores."""

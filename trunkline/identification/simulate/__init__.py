@@ -1,0 +1,1 @@
+"""Trials as simulations: set up, at rest or in motion, all candidates at once."""

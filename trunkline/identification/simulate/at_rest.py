@@ -1,0 +1,101 @@
+"""Trials at rest: where candidates of a model have their segments, by the statics."""
+
+import copy
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from trunkline.identification.parameters.parameters import Fields, set_fields
+from trunkline.identification.parameters.spool_scale import wound
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.model.elements import BACKLASH, actuators, arm_hinges, numeric
+from trunkline.model.simulation.winch import wind
+from trunkline.model.statics.chain import read_chain
+from trunkline.model.statics.equilibria import actuated
+from trunkline.model.statics.restart import actuated_from
+
+
+class Shapes(NamedTuple):
+    """Of every trial its segments for C candidates, m, NaN where one finds no rest. Each (C, T, S, 3).
+
+    angles: of the arm's hinges for the first candidate, rad, NaN likewise. Each (T, n). iterations: of Newton's method.
+    """
+
+    positions: list[np.ndarray]
+    angles: list[np.ndarray]
+    iterations: int
+
+
+def shapes_at_rest(
+    model: mujoco.MjModel, fields: Fields, experiments: list[Experiment], sites: np.ndarray,
+    near: list[np.ndarray] | None,
+) -> Shapes:  # fmt: skip
+    """The stable equilibrium of every candidate to which Newton's method comes from where the trial was measured, or
+    from `near`, as `Shapes.angles` has it; where it comes to none, and where every frame is a shape of its own, the one
+    that is reached from the arm without pull, or from its neighbours on the path. Cables do not rub: rest is in the
+    middle of what friction can hold.
+
+    Args:
+        fields: of the candidates, as `parameters.candidate_fields`.
+        sites: numbers of the segments' sites. Shape (S,).
+    """
+    count = len(next(iter(fields.values())))
+    own, data = copy.copy(model), mujoco.MjData(model)
+    trial = np.repeat(np.arange(len(experiments)), [e.frames for e in experiments])  # of each of R rows
+    starts = np.concatenate([_starts(e) for e in experiments])
+    if near is not None:
+        known = np.concatenate(near)
+        starts = np.where(np.isfinite(known), known, starts)
+    gravity, loads = (np.array([getattr(e, name) for e in experiments])[trial] for name in ("gravity", "load"))
+    places = np.full((count, len(trial), len(sites), 3), np.nan)
+    angles, iterations = np.full((len(trial), arm_hinges(model)), np.nan), 0
+    for candidate in range(count):
+        set_fields(own, fields, candidate)
+        if "jnt_pos" in fields:  # what softens joint limits follows, as when such a model is compiled
+            mujoco.mj_setConst(own, data)
+        chain = read_chain(own).smooth
+        mujoco.mj_kinematics(own, data)
+        turned = gravity @ data.xmat[own.body("base").id].reshape(3, 3)  # into the mount's frame, which may be tilted
+        sent = np.concatenate([_sent(own, e) for e in experiments])
+        qpos = np.full(angles.shape, np.nan)
+        for load in np.unique(loads):
+            chosen, loaded = np.flatnonzero(loads == load), chain.loaded(load)
+            guessed = chosen[np.isfinite(starts[chosen]).all(axis=1)]
+            found = actuated_from(loaded, starts[guessed], sent[guessed], turned[guessed])
+            qpos[guessed[found.converged]] = found.qpos[found.converged]
+            left = chosen[np.isnan(qpos[chosen, 0])]
+            followed = actuated(loaded, sent[left], turned[left])
+            qpos[left[followed.converged]] = followed.qpos[followed.converged]
+            iterations += int(found.iterations.sum() + followed.iterations.sum())
+            for aside in (1, -1):  # of a path, from the shape before, or after
+                beside = (chosen - aside) % len(trial)
+                lost = np.isnan(qpos[chosen, 0]) & np.isfinite(qpos[beside, 0]) & (trial[chosen] == trial[beside])
+                again = actuated_from(loaded, qpos[beside[lost]], sent[chosen[lost]], turned[chosen[lost]])
+                qpos[chosen[lost][again.converged]] = again.qpos[again.converged]
+                iterations += int(again.iterations.sum())
+        for row in np.flatnonzero(np.isfinite(qpos[:, 0])):
+            data.qpos[: qpos.shape[1]] = qpos[row]
+            mujoco.mj_kinematics(own, data)
+            places[candidate, row] = data.site_xpos[sites]
+        if candidate == 0:
+            angles = qpos
+    edges = np.cumsum([e.frames for e in experiments])[:-1]
+    return Shapes(np.split(places, edges, axis=1), np.split(angles, edges), iterations)
+
+
+def _starts(experiment: Experiment) -> np.ndarray:
+    """Where to begin looking, rad, NaN where that is not known. Shape (T, n)."""
+    start = experiment.start if experiment.frames == 1 else np.full(len(experiment.start), np.nan)
+    return np.tile(start, (experiment.frames, 1))
+
+
+def _sent(model: mujoco.MjModel, experiment: Experiment) -> np.ndarray:
+    """Lengths of cable at which the motors of `model` stand, m: what winches with backlash have delivered by each
+    frame, of a trial that has several. Shape (T, K)."""
+    controls = wound(model, experiment.controls)[:, actuators(model)]
+    play = numeric(model, BACKLASH)
+    if play and experiment.frames > 1:
+        held = controls[:1].copy()
+        controls = wind(controls[None], held, held.copy(), np.array([np.inf]), np.array([play]))[0]
+    return controls

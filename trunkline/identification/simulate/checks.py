@@ -1,0 +1,165 @@
+"""Whether trials are of this arm: its segments and tendons, each where its name says and pulled as far as it says."""
+
+import mujoco
+import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.optimize import linear_sum_assignment
+
+from trunkline.errors import InputError
+from trunkline.frames import tilt_of_gravity
+from trunkline.identification.simulate.experiment import SEEN_SHARE, check_names, measured_pose, start_frames
+from trunkline.identification.simulate.pose_fit import fit_pose
+from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.recordings.trials.trial import Trial
+
+WOUND = 5e-3  # m, from which on a tendon counts as wound, and the arm as bent by it
+PLACES = 12  # frames of a trial in which several tendons pull in turn
+SHORTER = 0.75  # of the cables' stretch that other names may leave at least, where those given are right
+STRETCH = 2.5e-3  # m, all tendons together, in the mean over frames, from which on more stretch than need be counts
+ALIKE = 0.5  # of how well pulls and path lengths agree at best; two of three tendons exchanged: -0.5, out of six: 0.5
+SHORTEST, LONGEST = 0.4, 1.5  # of a pull, by which its path is shorter: weak motors and cables that stretch take of it
+OFF = 1e-2  # m between a pull and its path, which an arm bent at rest may have too
+APART = 0.1  # s between a command and what the arm does about it
+UPRIGHT = np.radians(15)  # up to which gravity does not bend the arm by itself
+HELD_FRAMES = 6  # of a trial, with deep pulls
+NAMED = 3  # trials in a message, before the others are counted
+
+
+def check_trials(trials: list[Trial], model: mujoco.MjModel) -> None:
+    """Refuse trials whose names are not those of the model, then those that bend to the side of other tendons, and
+    then those that bend by another amount.
+
+    Raises:
+        InputError: naming the key of session.yaml, the trial, what was found and what was expected.
+    """
+    for trial in trials:
+        check_names(trial, model)
+    trials = [trial for trial in trials if len(trial.segments) > 1]  # of a tip alone, many shapes lead there
+    for trial in trials:
+        if trial.tendons:
+            kind = EXPERIMENTS[trial.experiment]
+            (check_lengths if kind.needs_motors and kind.level is None else check_sides)(trial, model)
+    check_scales([trial for trial in trials if trial.tendons and EXPERIMENTS[trial.experiment].needs_motors], model)
+
+
+def check_sides(trial: Trial, model: mujoco.MjModel) -> None:
+    """Refuse a trial in which the arm bends to another side than that of the tendons that are wound.
+
+    At the frame with the deepest pull, the model's tendons are threaded through the pose that was measured, which
+    needs no model of forces: how much each is shorter than at the start is compared with how much each was wound.
+    """
+    tendons = [model.tendon(name).id for name in trial.tendons]
+    start = start_frames(trial)[1]
+    taken_in = np.maximum(trial.commands, 0)
+    wound = taken_in - taken_in[start]
+    seen = trial.measured.mean(axis=1) >= SEEN_SHARE
+    deepest = int(np.argmax(np.where(seen, wound.max(axis=1), -np.inf)))
+    pulls = wound[deepest]
+    shorter = (_path_lengths(trial, model, start) - _path_lengths(trial, model, deepest))[tendons]
+    if min(np.ptp(pulls), np.ptp(shorter)) < WOUND:
+        return
+    agreement, best = _agreement(pulls, shorter), _agreement(np.sort(pulls), np.sort(shorter))
+    if agreement >= ALIKE * best:
+        return
+    most, bent = trial.tendons[int(np.argmax(pulls))], trial.tendons[int(np.argmax(shorter))]
+    found = f"found {most!r} wound by {1e3 * pulls.max():.0f} mm while the arm bends to the side of {bent!r}"
+    raise InputError(
+        f"session.yaml: tendons: trial {trial.name}: {found}, expected it to bend to the side of what is wound: "
+        "are names exchanged, signs reversed, or is the base body turned about the arm?"
+    )
+
+
+def check_lengths(trial: Trial, model: mujoco.MjModel) -> None:
+    """Refuse a trial in which tendons are longer than commanded by far, and other tendons are not.
+
+    A tendon may be slack, but is hardly longer than its motor lets it be, whatever else bends the arm: gravity, other
+    tendons, its own momentum. The model's tendons are threaded through poses that were measured. By how much each
+    would be stretched in all is compared with what is left if names are exchanged in the best way; tendons that all
+    pull against each other leave the same with any names.
+    """
+    seen = np.flatnonzero(trial.measured.mean(axis=1) >= SEEN_SHARE)
+    frames = seen[:: max(len(seen) // PLACES, 1)]
+    tendons = [model.tendon(name).id for name in trial.tendons]
+    shorter = np.array([model.tendon_length0 - _path_lengths(trial, model, frame) for frame in frames])[:, tendons]
+    stretch = np.maximum(trial.commands[frames, :, None] - shorter[:, None, :], 0).mean(axis=0)  # (K names, K paths)
+    named, best = np.trace(stretch), stretch[linear_sum_assignment(stretch)].sum()
+    if named - best < STRETCH or best >= SHORTER * named:
+        return
+    worst = int(np.argmax(np.diag(stretch)))
+    found = f"found the path of {trial.tendons[worst]!r} {1e3 * stretch[worst, worst]:.0f} mm longer than commanded"
+    mirrored = np.maximum(-trial.commands[frames] - shorter, 0).mean(axis=0).sum()
+    cause = "signs reversed" if mirrored < best else "names exchanged"
+    raise InputError(
+        f"session.yaml: tendons: trial {trial.name}: {found}, which fits with {cause}, expected a tendon to be "
+        "slack or about as long as its command: are names exchanged, signs reversed, or is the base body turned about "
+        "the arm?"
+    )
+
+
+def check_scales(trials: list[Trial], model: mujoco.MjModel) -> None:
+    """Refuse trials whose tendons' paths are shorter by much less or much more than the pulls that are commanded.
+
+    So are those of commands, and of measured positions with them, that have the sign reversed or are in another unit.
+    """
+    off = {trial.name: scale for trial in trials if (scale := path_scale(trial, model)) is not None}
+    if not off:
+        return
+    names, scales = list(off), sorted(off.values())
+    who = f"trial{'s' if len(names) > 1 else ''} {', '.join(names[:NAMED])}"
+    who += f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    by = " to ".join(dict.fromkeys(f"{scale:.3g}" for scale in (scales[0], scales[-1])))
+    raise InputError(
+        f"session.yaml: tendons: {who}: found paths that are shorter by {by} times the pulls that are commanded, "
+        f"expected {SHORTEST:g} to {LONGEST:g} times: are signs reversed, are commands in another unit than m, or is "
+        "the model of another arm?"
+    )
+
+
+def path_scale(trial: Trial, model: mujoco.MjModel) -> float | None:
+    """By how many times its deep pulls the paths of a trial's tendons are shorter, if that cannot be; else None.
+
+    The model's tendons are threaded through poses that were measured, and ratios over deep pulls have a median. A path
+    is longer than commanded only if it is longer than by all commands shortly before and after, and shorter likewise.
+    Of a trial with a level, which says how deep pulls are, only too short paths are of interest: a weak motor may not
+    reach it. Where gravity bends the arm by itself, slack tendons have any shorter path.
+    """
+    pulls = np.maximum(trial.commands, 0)
+    step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 else np.inf
+    width = 2 * int(APART / step) + 1
+    low, high = minimum_filter1d(pulls, width, axis=0), maximum_filter1d(pulls, width, axis=0)
+    seen = trial.measured.mean(axis=1) >= SEEN_SHARE
+    deepest = np.where(seen, low.max(axis=1), 0.0)
+    held = np.flatnonzero(seen & (deepest > 0) & (deepest >= deepest.max() / 2))
+    if not len(held):
+        return None
+    frames = held[:: -(-len(held) // HELD_FRAMES)]
+    tendons = [model.tendon(name).id for name in trial.tendons]
+    shorter = np.array([model.tendon_length0 - _path_lengths(trial, model, frame) for frame in frames])[:, tendons]
+
+    def compared(asked: np.ndarray) -> tuple[float, float]:
+        """Paths over the deep pulls of `asked` (N, K), and how much deeper those are, m; medians."""
+        deep = asked >= asked.max() / 2
+        return float(np.median(shorter[deep] / asked[deep])), float(np.median(asked[deep] - shorter[deep]))
+
+    ratio, deeper = compared(low[frames])
+    if EXPERIMENTS[trial.experiment].level is None and ratio < SHORTEST and deeper > OFF:
+        return ratio
+    ratio, deeper = compared(high[frames])
+    if ratio > LONGEST and -deeper > OFF and tilt_of_gravity(trial.gravity) < UPRIGHT:
+        return ratio
+    return None
+
+
+def _agreement(pulls: np.ndarray, shorter: np.ndarray) -> float:
+    return float((pulls - pulls.mean()) @ (shorter - shorter.mean()))
+
+
+def _path_lengths(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
+    """Of the model's tendons through the pose of a frame, m. Shape (nt,)."""
+    data = mujoco.MjData(model)
+    pose = fit_pose(model, trial.segments, *measured_pose(trial, frame)).qpos
+    data.qpos[: len(pose)] = pose
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_tendon(model, data)
+    return data.ten_length.copy()

@@ -1,0 +1,246 @@
+"""A trial set up for simulation: where it starts, what drives it, what it is compared with."""
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.identification.parameters.per_session import model_in
+from trunkline.identification.simulate.loss import LossWeights
+from trunkline.identification.simulate.pose_fit import PoseFit, fit_pose
+from trunkline.model.elements import arm_hinges, cables
+from trunkline.recordings.trials.experiments import is_static, is_stepwise
+from trunkline.recordings.trials.trial import Trial
+
+SLACK = 0.3  # m of tendon paid out where nothing pulls, more than any bend takes up
+
+
+QUIET_FRAMES = 3  # before the start: there the low-pass has not yet smeared the motion into the hold
+REACH = 2  # frames to either side for the velocity at the start; the low-pass leaves nothing finer
+SWAY_FRAMES = 8  # between the poses that tell how a hand moves the arm that it is about to let go
+LOOK_BACK = 30  # frames in which to look for a start pose that enough cameras saw
+GEOMETRY = ("jnt_pos", "jnt_axis", "body_pos", "body_quat", "site_pos")
+SAME_PLACE = 1e-5  # m, and of a quaternion; what MJCF rounds away is less
+SEEN_SHARE = 0.6  # of the segments that must be measured in the frame of the start pose
+
+
+@dataclass
+class Experiment:
+    """One simulation per candidate, of T frames at `frame_step` seconds. A static trial has T = 1, or T shapes at rest
+    with a `frame_step` of 0.
+
+    Attributes:
+        name, kind, split: as in the trial; kind is its experiment.
+        gravity: m/s², base frame. Shape (3,).
+        load: kg at the tip, beside the model's own.
+        start: angles of the arm's hinges from which it starts. Shape (n,).
+        velocity: with which it starts, rad/s; 0 unless the trial's arm moves then. Shape (n,).
+        lead: s from the start to the first frame.
+        controls: commanded tendon lengths, m, held from one frame to the next: row 0 from the start to the first
+            frame, row t from frame t - 1 to frame t. Shape (T, nu).
+        positions: measured segments, m, base frame. Shape (T, S, 3).
+        measured: where they count. Shape (T, S).
+        fit: how well the start matches the measurement.
+        repaired: whether `ingest` changed anything in the trial.
+        session: to which the trial belongs.
+    """
+
+    name: str
+    kind: str
+    split: str
+    gravity: np.ndarray
+    start: np.ndarray
+    velocity: np.ndarray
+    lead: float
+    controls: np.ndarray
+    positions: np.ndarray
+    measured: np.ndarray
+    frame_step: float
+    fit: PoseFit
+    repaired: bool = False
+    load: float = 0.0
+    session: str = ""
+
+    @property
+    def frames(self) -> int:
+        return len(self.positions)
+
+    def slack(self, model: mujoco.MjModel) -> bool:
+        """Whether all cables of `model` are let out throughout, as where the trial commands nothing."""
+        straight = model.tendon_length0[model.actuator_trnid[:, 0]]
+        return bool((self.controls > straight + 0.9 * SLACK).all())
+
+    def shortened(self, frames: int) -> "Experiment":
+        """Its first `frames` frames."""
+        parts = {name: getattr(self, name)[:frames] for name in ("controls", "positions", "measured")}
+        return replace(self, **parts)
+
+
+def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: float = 0.0) -> Experiment:
+    """Set up one trial: from its detected start, for at most `frames` frames.
+
+    Args:
+        command_delay: s from a logged command to the motor that acts on it.
+
+    Raises:
+        InputError: if its segments and tendons are not those of the model, or too little was measured.
+    """
+    check_names(trial, model)
+    static, stepwise = is_static(trial.experiment), is_stepwise(trial.experiment)
+    step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 and not static else 0.0
+    held, seen = start_frames(trial)
+    window = slice(None) if stepwise else slice(0, 1) if static else slice(held + 1, held + 1 + frames)
+    positions, measured = trial.positions[window], trial.measured[window]
+    if not measured.any():
+        raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
+    fit, start, velocity = _start(trial, model_in(trial.session, model), seen)
+    lengths = commanded_lengths(trial, model)
+    if command_delay and model.nu:
+        lengths = np.stack(
+            [np.interp(trial.time - command_delay, trial.time, column) for column in lengths.T], axis=1
+        )
+    return Experiment(
+        name=trial.name,
+        kind=trial.experiment,
+        split=trial.split,
+        gravity=trial.gravity,
+        start=start,
+        velocity=velocity,
+        lead=0.0 if static else _lead(trial, held),
+        controls=lengths[window] if static else 0.5 * (lengths[:-1] + lengths[1:])[held : held + len(positions)],
+        positions=positions,
+        measured=measured,
+        frame_step=step,
+        fit=fit,
+        repaired=trial.repairs > 0,
+        load=trial.load,
+        session=trial.session,
+    )
+
+
+def weights_for(experiment: Experiment, weights: LossWeights) -> LossWeights:
+    """Those of the loss that are for a trial: shapes at rest that follow each other have no velocity."""
+    return replace(weights, weight_velocity=0.0) if is_stepwise(experiment.kind) else weights
+
+
+def own_starts(
+    experiments: list[Experiment], trials: list[Trial], fitted: mujoco.MjModel, model: mujoco.MjModel
+) -> list[Experiment]:
+    """Experiments that were prepared with the model `fitted`, from where `model` has its hinges in the measured poses.
+
+    They stay as they are if both models have the same geometry. So do trials at rest, whose start decides nothing.
+
+    Args:
+        experiments, trials: the same ones, in the same order.
+    """
+    same = {
+        session: all(
+            np.allclose(getattr(one, name), getattr(other, name), rtol=0, atol=SAME_PLACE) for name in GEOMETRY
+        )
+        for session in {trial.session for trial in trials}
+        for one, other in [(model_in(session, fitted), model_in(session, model))]
+    }
+    if all(same.values()):
+        return experiments
+    own = []
+    for experiment, trial in zip(experiments, trials, strict=True):
+        if not is_static(experiment.kind) and not same[trial.session]:
+            fit, start, velocity = _start(trial, model_in(trial.session, model), start_frames(trial)[1])
+            experiment = replace(experiment, fit=fit, start=start, velocity=velocity)
+        own.append(experiment)
+    return own
+
+
+def _start(trial: Trial, model: mujoco.MjModel, seen: int) -> tuple[PoseFit, np.ndarray, np.ndarray]:
+    """The model's pose in frame `seen`, and joint angles, rad, and velocities, rad/s, to start from. Shape (n,)."""
+    fit = _fit_frame(trial, model, seen)
+    if trial.in_motion:
+        return fit, fit.qpos, _velocity(trial, model, seen)
+    if trial.swaying:
+        return fit, *_foreseen(trial, model, seen)
+    return fit, fit.qpos, np.zeros(arm_hinges(model))
+
+
+def start_frames(trial: Trial) -> tuple[int, int]:
+    """The last frame that is not compared, the arm being still held then, and the one of the pose to start from."""
+    static = is_static(trial.experiment)
+    held = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
+    seen = _seen_frame(trial, held if trial.in_motion else max(held - QUIET_FRAMES, 0))
+    return (seen if trial.in_motion else held), seen  # of an arm in motion, pose and velocity hold in that frame
+
+
+def _lead(trial: Trial, held: int) -> float:
+    """Time to simulate until the first frame: from the start, or from the frame whose velocity is known, s."""
+    begin = trial.time[held] if trial.in_motion else max(trial.start, trial.time[held])
+    return max(float(trial.time[held + 1] - begin), 1e-4)
+
+
+def measured_pose(trial: Trial, frame: int) -> tuple[np.ndarray, np.ndarray | None]:
+    """Positions (S, 3) of a frame, m, nan where not measured, and orientations (S, 4) if the trial has any."""
+    positions = np.where(trial.measured[frame][:, None], trial.positions[frame], np.nan)
+    return positions, None if trial.quaternions is None else trial.quaternions[frame]
+
+
+def _fit_frame(trial: Trial, model: mujoco.MjModel, frame: int) -> PoseFit:
+    return fit_pose(model, trial.segments, *measured_pose(trial, frame))
+
+
+def _velocity(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
+    """Joint velocities at a frame, rad/s, from the poses a few frames before and after it. Shape (nv,)."""
+    before, after = max(frame - REACH, 0), min(frame + REACH, len(trial.time) - 1)
+    turned = _fit_frame(trial, model, after).qpos - _fit_frame(trial, model, before).qpos
+    return turned / (trial.time[after] - trial.time[before])
+
+
+def _foreseen(trial: Trial, model: mujoco.MjModel, seen: int) -> tuple[np.ndarray, np.ndarray]:
+    """Joint angles, rad, and velocities, rad/s, at the start of an arm that a hand still moves then: a parabola through
+    its poses up to frame `seen`, before the low-pass smears in what comes after. Each of shape (n,)."""
+    apart = min(SWAY_FRAMES, seen // 2)
+    if not apart:
+        return _fit_frame(trial, model, seen).qpos, _velocity(trial, model, seen)
+    frames = seen - apart * np.arange(3)
+    poses = np.stack([_fit_frame(trial, model, frame).qpos for frame in frames.tolist()])
+    parabola = np.polyfit(trial.time[frames] - trial.start, poses, 2)
+    return parabola[2], parabola[1]
+
+
+def _seen_frame(trial: Trial, latest: int) -> int:
+    """The last frame up to `latest` in which enough segments were measured."""
+    for frame in range(latest, max(latest - LOOK_BACK, -1), -1):
+        if trial.measured[frame].mean() >= SEEN_SHARE:
+            return frame
+    raise InputError(
+        f"trial {trial.name}: found {int(trial.measured[latest].sum())} of {len(trial.segments)} segments measured at "
+        f"its start, {trial.time[latest]:.2f} s, expected {SEEN_SHARE:.0%} of them"
+    )
+
+
+def commanded_lengths(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+    """Tendon lengths that the trial commands, m; slack where it commands nothing. Shape (T, nu)."""
+    lengths = np.empty((len(trial.time), model.nu))
+    for index in range(model.nu):
+        tendon = model.actuator_trnid[index, 0]
+        name = model.tendon(tendon).name
+        pull = trial.commands[:, trial.tendons.index(name)] if name in trial.tendons else -SLACK
+        lengths[:, index] = model.tendon_length0[tendon] - pull
+    return lengths
+
+
+def check_names(trial: Trial, model: mujoco.MjModel) -> None:
+    """Refuse a trial whose segments or tendons the model does not have, or that has only some of its tendons: those
+    that it leaves out may have pulled."""
+    sites = [model.site(i).name for i in range(model.nsite)]
+    units = [name.removesuffix("_center") for name in sites if name.endswith("_center") and name != "base_center"]
+    tendons = [model.tendon(i).name for i in cables(model)]
+    for key, found, names in (("segments", trial.segments, units), ("tendons", trial.tendons, tendons)):
+        unknown = [name for name in found if name not in names]
+        if unknown:
+            valid = f"names of the model: {', '.join(names)}" if names else "none, as the arm has none"
+            if key == "tendons" and names:
+                valid += "; under `tendons` or `motors`, what moves which"
+            raise InputError(f"session.yaml: {key}: trial {trial.name}: found {unknown[0]!r}, expected {valid}")
+    if trial.tendons and len(trial.tendons) < len(tendons):
+        expected = f"expected all of the model: {', '.join(tendons)}; slack ones as let out"
+        found = f"found {', '.join(trial.tendons)} alone"
+        raise InputError(f"session.yaml: tendons: trial {trial.name}: {found}, {expected}")

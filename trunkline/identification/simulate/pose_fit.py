@@ -1,0 +1,164 @@
+"""Joint angles that put the model's segments where motion capture saw them."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from mujoco import minimize
+
+from trunkline.frames import rotation_from_wxyz
+from trunkline.model.elements import arm_hinges, segment_sites
+
+POSITION_SIGMA = 0.5e-3  # m, what a tracked position is trusted to
+ROTATION_SIGMA = np.radians(1.0)  # what a tracked orientation is trusted to, axis misalignment included
+BEND_CHANGE_SIGMA = np.radians(6.0)  # how much neighbouring joints differ in a smooth bend
+LIMIT_GIVE = 1.5  # a limit is soft: units give when they are pressed on each other
+UNLIMITED = 2 * np.pi  # rad, of hinges without limits
+STEP_TOLERANCE = 1e-5  # relative step at convergence
+GRADIENT_TOLERANCE = 1e-3  # of the cost in units of sigma², with columns of unit length
+AT_A_TIME = 3  # segments: half the time of one by one, to the same poses
+
+
+@dataclass
+class PoseFit:
+    """Joint angles of one frame.
+
+    qpos: of the arm's hinges, rad, shape (n,). residuals: distance of each segment from its measurement, m, shape (S,).
+    iterations: of the last descent, on all segments. converged: whether it ended before they ran out.
+    """
+
+    qpos: np.ndarray
+    residuals: np.ndarray
+    iterations: int
+    converged: bool
+
+
+class PoseProblem:
+    """Residuals of joint angles: positions, orientations, and the change of bend from joint to joint.
+
+    The last term decides what the tracked segments leave open (units without markers) and is weak beside them.
+
+    Args:
+        segments: names of the tracked bodies, whose frames are the sites `<name>_center`.
+        positions: m, base frame. Shape (S, 3); rows that are not finite are left out.
+        quaternions: wxyz. Shape (S, 4), or None for positions alone.
+
+    Attributes:
+        seen: indices of the measured segments, from the base on.
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        segments: tuple[str, ...],
+        positions: np.ndarray,
+        quaternions: np.ndarray | None = None,
+    ):
+        self.model, self.data = model, mujoco.MjData(model)
+        self.sites = segment_sites(model, segments)
+        self.positions = positions
+        self._targets = None if quaternions is None else rotation_from_wxyz(quaternions).as_matrix()
+        seen = np.flatnonzero(np.isfinite(positions).all(axis=1))
+        self.seen = seen[np.argsort(model.site_bodyid[self.sites[seen]])]  # the chain numbers its bodies from the base
+        self.hinges = int(np.bincount(model.jnt_bodyid).max())  # of each joint
+        self.angles = arm_hinges(model)
+        rows = np.eye(self.angles, k=self.hinges)[: -self.hinges] - np.eye(self.angles)[: -self.hinges]
+        self._smooth = rows / BEND_CHANGE_SIGMA
+
+    def linearise(self, qpos: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Jacobian (R, n) and residuals (R,) in units of sigma, against the segments `seen`, by the arm's n angles.
+
+        First the changes of bend; then of every segment three rows for its position, and three for its orientation
+        if it has one.
+        """
+        model, data = self.model, self.data
+        data.qpos[: self.angles] = qpos
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        rows, residuals = [self._smooth], [self._smooth @ qpos]
+        jac_position, jac_rotation = np.empty((3, model.nv)), np.empty((3, model.nv))
+        for index in seen:
+            site = self.sites[index]
+            mujoco.mj_jacSite(model, data, jac_position, jac_rotation, site)
+            rows.append(jac_position[:, : self.angles] / POSITION_SIGMA)
+            residuals.append((data.site_xpos[site] - self.positions[index]) / POSITION_SIGMA)
+            if self._targets is not None:
+                error = _rotation_vector(data.site_xmat[site].reshape(3, 3) @ self._targets[index].T)
+                rows.append(jac_rotation[:, : self.angles] / ROTATION_SIGMA)
+                residuals.append(error / ROTATION_SIGMA)
+        return np.concatenate(rows), np.concatenate(residuals)
+
+    def position_rows(self) -> np.ndarray:
+        """Which residuals are those of the positions of `seen`, all of them given. Shape (len(seen), 3)."""
+        each = 3 if self._targets is None else 6
+        return len(self._smooth) + each * np.arange(len(self.seen))[:, None] + np.arange(3)
+
+
+def fit_pose(
+    model: mujoco.MjModel,
+    segments: tuple[str, ...],
+    positions: np.ndarray,
+    quaternions: np.ndarray | None = None,
+    max_iterations: int = 300,
+) -> PoseFit:
+    """Least squares over the residuals of a `PoseProblem`, whose arguments these are, by `mujoco.minimize`."""
+    problem = PoseProblem(model, segments, positions, quaternions)
+    seen, hinges, angles = problem.seen, problem.hinges, problem.angles
+    qpos = np.zeros(angles)
+    # From the base on, a few segments at a time, each new joint first bent as the one before it: a coil of more
+    # than one turn has many wrong answers near the straight arm, and none on this way.
+    for known in [*range(AT_A_TIME, len(seen), AT_A_TIME), len(seen)]:
+        free = model.jnt_bodyid[:angles] <= model.site_bodyid[problem.sites[seen[known - 1]]]
+        first = int(free.sum())
+        fit = _descend(problem, qpos, seen[:known], free, max_iterations)
+        qpos = fit.qpos
+        if 0 < first < angles:
+            qpos[first:] = np.resize(qpos[first - hinges : first], angles - first)
+    return fit
+
+
+def _descend(
+    problem: PoseProblem, qpos: np.ndarray, seen: np.ndarray, free: np.ndarray, max_iterations: int
+) -> PoseFit:
+    """Least squares over the hinges `free` (n,), against the segments `seen`, from `qpos`, within the limits' give."""
+    model = problem.model
+    known: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+
+    def linear(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Jacobian and residuals at some angles; MuJoCo asks for both at each iterate."""
+        key = angles.tobytes()
+        if key not in known:
+            while len(known) > 1:  # the iterate and the step tried from it
+                known.pop(next(iter(known)))
+            pose = qpos.copy()
+            pose[free] = angles
+            known[key] = problem.linearise(pose, seen)
+        return known[key]
+
+    arm = len(free)
+    limits = model.jnt_range[:arm].T * LIMIT_GIVE
+    lower, upper = np.where(model.jnt_limited[:arm], limits, [[-UNLIMITED], [UNLIMITED]])
+    angles, steps = minimize.least_squares(
+        qpos[free],
+        lambda columns: np.stack([linear(column)[1] for column in columns.T], axis=1),
+        [lower[free], upper[free]],
+        lambda column, _: linear(column[:, 0])[0][:, free],
+        xtol=STEP_TOLERANCE,
+        gtol=GRADIENT_TOLERANCE,
+        max_iter=max_iterations,
+        x_scale="jac",
+        verbose=minimize.Verbosity.SILENT,
+    )
+    qpos = qpos.copy()
+    qpos[free] = angles
+    problem.data.qpos[: len(qpos)] = qpos
+    mujoco.mj_kinematics(model, problem.data)
+    offsets = np.linalg.norm(problem.data.site_xpos[problem.sites] - problem.positions, axis=1)
+    return PoseFit(qpos, offsets, len(steps), len(steps) < max_iterations)
+
+
+def _rotation_vector(matrix: np.ndarray) -> np.ndarray:
+    quaternion, vector = np.empty(4), np.empty(3)
+    mujoco.mju_mat2Quat(quaternion, matrix.ravel())
+    mujoco.mju_quat2Vel(vector, quaternion, 1.0)
+    return vector

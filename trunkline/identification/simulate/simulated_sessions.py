@@ -1,0 +1,48 @@
+"""Trials of several sessions: each simulated with the arm as it was in its own."""
+
+from collections.abc import Callable
+
+import mujoco
+import numpy as np
+
+from trunkline.identification.parameters.parameters import Fields
+from trunkline.identification.parameters.per_session import model_in
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.population import Population, Simulated
+
+
+class Sessions:
+    """A `Population` for each session of the experiments; arguments as there."""
+
+    def __init__(
+        self, model: mujoco.MjModel, experiments: list[Experiment], segments: tuple[str, ...], step_factor: float = 1.0
+    ):
+        self._parts = []
+        for session in dict.fromkeys(e.session for e in experiments):
+            places = [i for i, e in enumerate(experiments) if e.session == session]
+            own = model_in(session, model)
+            population = Population(own, [experiments[i] for i in places], segments, step_factor)
+            self._parts.append((session, own, places, population))
+
+    def simulate(
+        self,
+        fields: Callable[[str, mujoco.MjModel], Fields],
+        rests: list[np.ndarray] | None = None,
+        rough: bool = False,
+    ) -> Simulated:
+        """As `Population.simulate`. Args: fields: of the candidates, for a session and its model."""
+        found = {}
+        for session, model, places, population in self._parts:
+            near = None if rests is None else [rests[i] for i in places]
+            found[session] = population.simulate(fields(session, model), near, rough)
+        if len(found) == 1:
+            return next(iter(found.values()))
+        trials = {
+            place: (one.positions[i], one.rests[i])
+            for (_, _, places, _), one in zip(self._parts, found.values(), strict=True)
+            for i, place in enumerate(places)
+        }
+        order = [trials[place] for place in sorted(trials)]
+        diverged = np.logical_or.reduce([one.diverged for one in found.values()])
+        steps = sum(one.steps for one in found.values())
+        return Simulated([places for places, _ in order], diverged, steps, [rest for _, rest in order])

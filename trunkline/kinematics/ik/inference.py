@@ -1,0 +1,62 @@
+"""Asking the network's file: a pose that is none is an error, not plausible lengths."""
+
+import json
+
+import numpy as np
+import onnxruntime
+
+from trunkline.errors import InputError
+from trunkline.kinematics.ik.inputs import position_of, told_of_gravity
+
+UNIT = 1e-3  # by which the length of a quaternion or direction may differ from 1: that of one written with three digits
+
+
+def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, np.ndarray]:
+    """What the network of `train_ik` answers, by the name of the output.
+
+    "commands" and "lengths" (N, K) and "tip" (N, 3) as in `network.Answer`, m, and "doubtful" (N,): whether the tip is
+    foreseen so far from its target that the arm cannot take the pose.
+
+    Args:
+        poses: gravity (angle in rad, or a unit vector), tip position (m) and unit quaternion (w first, either sign) in
+            the base frame, as the file's `inputs` name them. Shape (N, 7, 8 or 10).
+
+    Raises:
+        InputError: the shape is another, a number is not finite, a quaternion or direction is not of unit length, or
+            the network has no finite answer.
+    """
+    (taken,), meaning = runtime.get_inputs(), runtime.get_modelmeta().custom_metadata_map
+    for key in ("inputs", "doubt_beyond_m"):
+        if key not in meaning:
+            raise InputError(f"found no {key!r} in the file's metadata, expected a network of train_ik")
+    names = [output.name for output in runtime.get_outputs()]
+    given = {taken.name: checked(poses, json.loads(meaning["inputs"]))}
+    answers = dict(zip(names, runtime.run(names, given), strict=True))
+    for name, values in answers.items():
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+        if len(bad):
+            raise InputError(f"pose {bad[0]}: found {name} {values[bad[0]]}, expected finite numbers")
+    missed = np.linalg.norm(answers["tip"] - position_of(given[taken.name]), axis=1)
+    return answers | {"doubtful": missed > float(meaning["doubt_beyond_m"])}
+
+
+def checked(poses: np.ndarray, inputs: list[str]) -> np.ndarray:
+    """The poses in the network's precision, if they are poses; `inputs` names their columns, the quaternion last."""
+    try:
+        poses = np.asarray(poses, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise InputError(f"poses: {error}, expected numbers of shape (N, {len(inputs)})") from None
+    if poses.ndim != 2 or poses.shape[1] != len(inputs):
+        raise InputError(f"poses: found shape {poses.shape}, expected (N, {len(inputs)}): {', '.join(inputs)}")
+    with np.errstate(over="ignore"):
+        single = poses.astype(np.float32)
+    for row, column in np.argwhere(~np.isfinite(single)):
+        raise InputError(f"pose {row}: {inputs[column]}: found {poses[row, column]:g}, expected a finite number")
+    units = {"quaternion": poses[:, -4:]}
+    if len(inputs) > 8:
+        units["direction of gravity"] = told_of_gravity(poses)
+    for name, vectors in units.items():
+        lengths = np.linalg.norm(vectors, axis=1)
+        for row in np.flatnonzero(np.abs(lengths - 1) > UNIT):
+            raise InputError(f"pose {row}: found a {name} of length {lengths[row]:.4g}, expected unit length")
+    return single

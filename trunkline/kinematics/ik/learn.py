@@ -1,0 +1,223 @@
+"""From samples to a network that is trained, exported and scored by forward kinematics."""
+
+from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
+
+import mujoco
+import numpy as np
+import onnx
+import onnxruntime
+import pandas as pd
+import torch
+from pydantic import Field
+
+from trunkline.compute.progress import progress
+from trunkline.frames import downwards
+from trunkline.kinematics.dataset.columns import command_columns, length_columns, tension_columns
+from trunkline.kinematics.dataset.sampling import sections
+from trunkline.kinematics.dataset.table import command_by_tension, sample_table, tip_by_tension, turn_by_tension
+from trunkline.kinematics.ik.as_controls import DOUBT, AsControls, Rig, score
+from trunkline.kinematics.ik.inference import ask
+from trunkline.kinematics.ik.inputs import draw_gravity, inputs_of, position_of, told_of_gravity
+from trunkline.kinematics.ik.network import OUTPUTS, InverseKinematics
+from trunkline.kinematics.ik.onnx import to_onnx
+from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.score import (
+    TipErrors,
+    beyond_range,
+    largest_difference,
+    length_errors,
+    outside_targets,
+    tip_errors,
+)
+from trunkline.kinematics.ik.tip_loss import tip_loss
+from trunkline.kinematics.ik.training import Training, train
+from trunkline.model.statics.chain import Chain
+
+FALSE_ALARMS = 0.05  # of reachable targets, that may be doubted
+
+
+@dataclass
+class Unseen:
+    """Targets between the gravities of the data set: of how many, where there is more than a tilt; pulls around the
+    arm, tips along each, how many in all. Without gravity, targets that are drawn anew."""
+
+    gravities: Annotated[int, Field(ge=1, le=10_000)]
+    directions: Annotated[int, Field(ge=8, le=10000)]
+    steps: Annotated[int, Field(ge=8, le=10_000)]
+    samples: Annotated[int, Field(ge=100, le=1_000_000)]
+
+
+@dataclass
+class Polish:
+    """Gauss-Newton from the network's answers: for how many held-out targets, and of how many steps at most."""
+
+    targets: Annotated[int, Field(ge=1, le=1_000_000)]
+    steps: Annotated[int, Field(ge=1, le=100)]
+
+
+@dataclass(kw_only=True)
+class Learning(Training):
+    """The training and what it is scored on, see conf/train_ik/config.yaml.
+
+    lever: m; the loss counts a turn of the tip by 1 rad as this much distance. outside: targets far off.
+    rig: module whose `reach` drives the arm itself, as `as_controls.Rig`; none for an arm that no module drives.
+    """
+
+    lever: Annotated[float, Field(ge=0, le=1)]
+    unseen: Unseen
+    as_controls: AsControls
+    polish: Polish
+    outside: Annotated[int, Field(ge=1, le=1_000_000)]
+    rig: str | None
+
+
+@dataclass
+class Learned:
+    """A network, also as ONNX, and its learning curve: epoch, train_mm, validate_mm.
+
+    held_out: the samples that no training saw. errors: of the exported network's commands, for them ("held out") and
+    for targets under "unseen angles". as_lengths: of its lengths, for the latter, held by cables. as_controls: what
+    comes of its commands in MuJoCo, on_plant: on the arm itself. polished: of some held-out targets after Gauss-Newton
+    steps.
+    outside: how many targets far off there are, beyond_range: how far (m) any answer to them leaves the tendons' range.
+    difference: between the network and what was exported, m, at most.
+    """
+
+    network: InverseKinematics
+    exported: onnx.ModelProto
+    curve: pd.DataFrame
+    held_out: pd.DataFrame
+    errors: dict[str, TipErrors]
+    as_lengths: TipErrors
+    as_controls: dict
+    on_plant: dict | None
+    polished: TipErrors
+    outside: int
+    beyond_range: float
+    difference: float
+
+
+def learn(
+    model: mujoco.MjModel, chain: Chain, table: pd.DataFrame, learning: Learning, rig: Rig | None = None
+) -> Learned:
+    """Train on the samples of `table` that are not held out, and score on those that are and on others.
+
+    Args:
+        model: whose `chain` it is. rig: what drives the arm itself.
+    """
+    network, curve = fit(table, chain, learning)
+    columns = inputs_of(table)
+    held_out = table[table["split"] == "validate"]
+    known = known_gravities(table)
+    sent_before = table.loc[table["split"] == "train", command_columns(chain.tendons)].to_numpy()
+    deepest = chain.straight_lengths - sent_before.min(axis=0)
+    unseen = unseen_targets(chain, known, learning.unseen, learning.seed, deepest)
+    doubtful = doubt_beyond(network, held_out[columns].to_numpy(), chain.length)
+    exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], doubtful)
+    runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
+    errors, difference, found = {}, 0.0, {}
+    for name, targets in (("held out", held_out), ("unseen angles", unseen)):
+        inputs = targets[columns].to_numpy()
+        found = ask(runtime, inputs)
+        with torch.no_grad():
+            told = network(torch.tensor(inputs, dtype=torch.float32))._asdict()
+        difference = max(difference, *(largest_difference(found[key], told[key].numpy()) for key in OUTPUTS))
+        print(f"train_ik: forward kinematics of {len(inputs)} answers, {name}", flush=True)
+        errors[name] = tip_errors(chain, inputs, found["commands"].astype(float))
+    as_lengths = length_errors(chain, unseen[columns].to_numpy(), found["lengths"].astype(float))
+    polished = polished_errors(chain, held_out[columns], runtime, learning.polish, learning.seed)
+    rng = np.random.default_rng(learning.seed)
+    far = ask(runtime, outside_targets(learning.outside, chain.length, rng, known.shape[1]))["commands"]
+    print("train_ik: sending commands to MuJoCo until the arm rests", flush=True)
+    sent, on_plant = score(model, chain, partial(ask, runtime), known, deepest, learning.as_controls, rng, rig)
+    return Learned(
+        network=network,
+        exported=exported,
+        curve=curve,
+        held_out=held_out,
+        errors=errors,
+        as_lengths=as_lengths,
+        as_controls=sent,
+        on_plant=on_plant,
+        polished=polished,
+        outside=len(far),
+        beyond_range=beyond_range(far, sent_before),
+        difference=difference,
+    )
+
+
+def fit(table: pd.DataFrame, chain: Chain, learning: Learning) -> tuple[InverseKinematics, pd.DataFrame]:
+    """The trained network and its learning curve: epoch, train_mm, validate_mm."""
+    tendons = chain.tendons
+    turn = learning.lever * turn_by_tension(table, tendons)
+    loss = tip_loss(
+        table[tension_columns(tendons)].to_numpy(),
+        np.concatenate([tip_by_tension(table, tendons), turn], axis=1),
+        command_by_tension(table, chain.gain),
+    )
+    curve = []
+    with progress(learning.epochs, "train_ik", "epochs") as bar:
+
+        def report(epoch: int, train_error: float, validate_error: float) -> None:
+            curve.append({"epoch": epoch, "train_mm": train_error * 1e3, "validate_mm": validate_error * 1e3})
+            bar.update(1, **{k: v for k, v in curve[-1].items() if k != "epoch"})
+
+        network = train(
+            table[inputs_of(table)].to_numpy(),
+            table[command_columns(tendons)].to_numpy(),
+            table[length_columns(tendons)].to_numpy(),
+            loss,
+            (table["split"] == "train").to_numpy(),
+            learning,
+            report,
+        )
+    return network, pd.DataFrame(curve)
+
+
+def doubt_beyond(network: InverseKinematics, reachable: np.ndarray, length: float) -> float:
+    """How far from its target a foreseen tip is a reason to doubt, m: DOUBT of the arm's `length`, and no less than
+    leaves all but FALSE_ALARMS of `reachable` targets (N, 7, 8 or 10) without doubt."""
+    with torch.no_grad():
+        tips = network(torch.tensor(reachable, dtype=torch.float32)).tip.numpy()
+    missed = np.linalg.norm(tips - position_of(reachable), axis=1)
+    return max(DOUBT * length, float(np.quantile(missed, 1 - FALSE_ALARMS)))
+
+
+def polished_errors(chain: Chain, held_out: pd.DataFrame, runtime, polishing: Polish, seed: int) -> TipErrors:
+    """Errors of some held-out targets after Gauss-Newton steps from the network's answers."""
+    count = min(polishing.targets, len(held_out))
+    inputs = held_out.sample(count, random_state=seed).to_numpy()
+    print(f"train_ik: up to {polishing.steps} Gauss-Newton steps for {count} answers", flush=True)
+    answer = {name: values.astype(float) for name, values in ask(runtime, inputs).items()}
+    commands = answer["commands"] if len(sections(chain)) > 1 else None
+    found = polish(chain, inputs, answer["lengths"], polishing.steps, commands=commands)
+    return TipErrors(found.position_error, found.orientation_error)
+
+
+def known_gravities(table: pd.DataFrame) -> np.ndarray:
+    """What the samples tell of gravity, each once. Shape (G, 0, 1 or 3)."""
+    columns = inputs_of(table)
+    told = table.drop_duplicates(columns[:-7]) if columns[:-7] else table[:1]
+    return told_of_gravity(told[columns].to_numpy())
+
+
+def unseen_targets(
+    chain: Chain, known: np.ndarray, unseen: Unseen, seed: int, deepest: np.ndarray | None = None
+) -> pd.DataFrame:
+    """Targets under gravities that the data set has none of, `known` (G, 0, 1 or 3): half way between its angles, or
+    at random. `deepest` as for `sample_table`."""
+    rng = np.random.default_rng(seed)
+    if known.shape[1] == 0:
+        between = np.zeros((1, 3))
+    elif known.shape[1] == 1:
+        angles = np.sort(known[:, 0])
+        between = downwards((angles[1:] + angles[:-1]) / 2, np.zeros(len(angles) - 1))
+    else:
+        between = draw_gravity(known, unseen.gravities, rng)
+    count = unseen.samples // max(1, len(between))
+    tables = [
+        sample_table(chain, down, count, unseen.directions, unseen.steps, rng, deepest)[0] for down in between
+    ]
+    return pd.concat(tables, ignore_index=True)

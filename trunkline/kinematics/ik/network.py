@@ -1,0 +1,148 @@
+"""The inverse kinematics: a small network from gravity and tip pose to the commands of the motors."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import torch
+from torch import nn
+from torch.autograd.function import FunctionCtx
+
+from trunkline.kinematics.ik.inputs import position_of
+
+OUTPUTS = ("commands", "lengths", "tip")
+# products of quaternion components: a rotation matrix is linear in them, and q and -q give the same ones. The
+# quaternion is the last of the inputs.
+FIRST = [-4, -4, -4, -4, -3, -3, -3, -2, -2, -1]
+SECOND = [-4, -3, -2, -1, -3, -2, -1, -2, -1, -1]
+
+
+class Answer(NamedTuple):
+    """What the network says of B targets.
+
+    Attributes:
+        commands: of the position actuators, m. Shape (B, K).
+        lengths: path length of each tendon at rest, m; a slack one may be given more. Shape (B, K).
+        tip: where the tip will come to rest, m, base frame. Shape (B, 3). If that is not where it was asked to be, the
+            arm cannot take the pose.
+    """
+
+    commands: torch.Tensor
+    lengths: torch.Tensor
+    tip: torch.Tensor
+
+
+class _Affine(torch.autograd.Function):
+    """x Wᵀ + b by OpenBLAS, whose digits `trunkline.compute.numerics` holds; PyTorch's own products (MKL) are others on
+    each kind of processor, and training makes other networks of other last digits."""
+
+    @staticmethod
+    @np.errstate(over="ignore", invalid="ignore")  # `train` tells of errors that are not finite
+    def forward(ctx: FunctionCtx, x: torch.Tensor, weight: torch.Tensor, bias: torch.Tensor) -> torch.Tensor:
+        ctx.save_for_backward(x, weight)
+        return torch.from_numpy(x.detach().numpy() @ weight.detach().numpy().T + bias.detach().numpy())
+
+    @staticmethod
+    @np.errstate(over="ignore", invalid="ignore")
+    def backward(ctx: Any, *slopes: torch.Tensor) -> tuple[torch.Tensor | None, torch.Tensor, torch.Tensor]:
+        x, weight = (saved.detach().numpy() for saved in ctx.saved_tensors)
+        slope = slopes[0].numpy()
+        back = torch.from_numpy(slope @ weight) if ctx.needs_input_grad[0] else None
+        return back, torch.from_numpy(slope.T @ x), torch.from_numpy(slope.sum(axis=0))
+
+
+class Linear(nn.Linear):
+    """The same digits on every processor."""
+
+    def forward(self, input: torch.Tensor) -> torch.Tensor:
+        return _Affine.apply(input, self.weight, self.bias)
+
+
+class InverseKinematics(nn.Module):
+    """(θ_G or g_x, g_y, g_z, x, y, z, q_w, q_x, q_y, q_z) to an `Answer`: features, normalisation, three hidden layers,
+    ReLU.
+
+    SI units; gravity is told as in `inputs`; the quaternion is of unit length, of either sign. Commands stay within
+    those of the training set. The tip is foreseen by layers of their own from gravity and the commands alone: they
+    do not know the pose that was asked.
+    """
+
+    mean: torch.Tensor  # of the features over the training set, as is 1 / scale their standard deviation
+    scale: torch.Tensor
+    middle: torch.Tensor  # of the commands' range, m
+    half_range: torch.Tensor
+    most_stretch: torch.Tensor  # of lengths over commands, m
+    tip_middle: torch.Tensor  # of the tips' range, m
+    tip_half_range: torch.Tensor
+
+    def __init__(self, width: int, inputs: np.ndarray, commands: np.ndarray, lengths: np.ndarray):
+        """Args: width: of each hidden layer; inputs (N, 7, 8 or 10), commands, lengths (N, K): the training set."""
+        super().__init__()
+        raw = features(torch.tensor(inputs, dtype=torch.float64))
+        buffers = {"mean": raw.mean(dim=0), "scale": 1 / raw.std(dim=0).clamp_min(1e-6)}
+        buffers["middle"], buffers["half_range"] = _range(commands)
+        buffers["tip_middle"], buffers["tip_half_range"] = _range(position_of(inputs))
+        buffers["most_stretch"] = torch.tensor((lengths - commands).max(axis=0))
+        for name, values in buffers.items():
+            self.register_buffer(name, values.to(torch.float32))
+        tendons, told = commands.shape[1], inputs.shape[1] - 7
+        self.inputs = inputs.shape[1]
+        self.layers = nn.Sequential(
+            Linear(raw.shape[1], width), nn.ReLU(),
+            Linear(width, width), nn.ReLU(),
+            Linear(width, width), nn.ReLU(),
+            Linear(width, 2 * tendons),
+        )  # fmt: skip
+        self.tip_layers = nn.Sequential(
+            Linear((2 if told == 1 else told) + tendons, width), nn.ReLU(),
+            Linear(width, width), nn.ReLU(),
+            Linear(width, width), nn.ReLU(),
+            Linear(width, 3),
+        )  # fmt: skip
+
+    def normalise(self, inputs: torch.Tensor) -> torch.Tensor:
+        return (features(inputs) - self.mean) * self.scale
+
+    def unclipped(self, normalised: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        """Commands and stretches (lengths over commands), m, not yet kept within range: what is trained."""
+        commands, stretches = self.layers(normalised).chunk(2, dim=1)
+        return self.middle + self.half_range * commands, self.most_stretch * stretches
+
+    def foresee(self, pulling: torch.Tensor, pulls: torch.Tensor) -> torch.Tensor:
+        """Where the tip rests, m, under the `gravity_features` (B, 0, 2 or 3) and commands as shares of their range,
+        (B, K)."""
+        return self.tip_middle + self.tip_half_range * self.tip_layers(torch.cat([pulling, pulls], dim=1))
+
+    def forward(self, inputs: torch.Tensor) -> Answer:
+        """From inputs (B, 7, 8 or 10)."""
+        commands, stretches = self.layers(self.normalise(inputs)).chunk(2, dim=1)
+        pulls = commands.clamp(-1, 1)
+        commands = self.middle + self.half_range * pulls
+        lengths = commands + self.most_stretch * stretches.clamp(0, 1)
+        return Answer(commands, lengths, self.foresee(gravity_features(inputs), pulls))
+
+
+def _range(values: np.ndarray) -> tuple[torch.Tensor, torch.Tensor]:
+    """Middle and half of the range of columns (N, C)."""
+    low, high = values.min(axis=0), values.max(axis=0)
+    return torch.tensor((low + high) / 2), torch.tensor((high - low) / 2)
+
+
+def features(inputs: torch.Tensor) -> torch.Tensor:
+    """Gravity, position, products of quaternion components, and of a direction of gravity with these: where gravity
+    pulls as the tip sees it is linear in them. Shape (B, 13, 15 or 55) from (B, 7, 8 or 10)."""
+    gravity = gravity_features(inputs)
+    pose = torch.cat([inputs[:, -7:-4], inputs[:, FIRST] * inputs[:, SECOND]], dim=1)
+    parts = [gravity, pose]
+    if gravity.shape[1] == 3:
+        parts.append((gravity[:, :, None] * pose[:, None, :]).flatten(1))
+    return torch.cat(parts, dim=1)
+
+
+def gravity_features(inputs: torch.Tensor) -> torch.Tensor:
+    """sin θ_G, cos θ_G of inputs (B, 8), the direction of gravity of inputs (B, 10), nothing of inputs (B, 7). Shape
+    (B, 2, 3 or 0)."""
+    told = inputs[:, :-7]
+    if told.shape[1] != 1:
+        return told
+    angle = told.to(torch.float64)  # a sine's last digit is each processor's own (MKL): here it is rounded away
+    return torch.cat([torch.sin(angle), torch.cos(angle)], dim=1).to(told.dtype)

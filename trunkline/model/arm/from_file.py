@@ -1,0 +1,98 @@
+"""A chain that somebody else drew: any MJCF that MuJoCo loads, with the names that later stages look for."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import mujoco
+import numpy as np
+from pydantic import Field
+
+from trunkline.errors import InputError
+from trunkline.model.arm.cad import CadArm
+from trunkline.model.arm.mjcf import Actuation, Solver
+
+CENTER = "_center"  # ends the name of a tracked point's site
+
+
+@dataclass
+class FromFile:
+    """file: MJCF below the folder of models, taken as it is, with its own tendons, actuators and time step."""
+
+    kind: Literal["mjcf"]
+    file: Annotated[str, Field(min_length=1)]
+
+    def build(self, actuation: Actuation, solver: Solver, models: Path) -> CadArm:
+        """The chain in `models / file`; `actuation` and `solver` are idle.
+
+        Raises:
+            InputError: one line that says what the file lacks, or why MuJoCo refuses it.
+        """
+        path = models / self.file
+        if not path.resolve().is_relative_to(models.resolve()):
+            raise InputError(f"build_mjcf.arm.file: found {self.file}, expected a file in {models}, which DVC watches")
+        if not path.is_file():
+            raise InputError(f"build_mjcf.arm.file: {path}: no such file")
+        try:
+            spec = mujoco.MjSpec.from_file(str(path))
+            model = spec.compile()
+        except ValueError as error:
+            raise InputError(f"{path}: not a model that MuJoCo reads: {str(error).splitlines()[0]}") from error
+        if found := _missing(model) or _unlike(model):
+            raise InputError(f"{path}: {found}")
+        return CadArm(spec, _metrics(model))
+
+
+def _missing(model: mujoco.MjModel) -> str | None:
+    """What the files that later stages write and read would have no name for."""
+    for count, what in ((model.nmesh, "meshes"), (model.nhfield, "height fields"), (model.ntex, "textures")):
+        if count:
+            return f"found {count} {what}, expected none: the model goes on as one file"
+    counts = {"joint": model.njnt, "site": model.nsite, "tendon": model.ntendon, "actuator": model.nu}
+    for kind, count in counts.items():
+        for index in range(count):
+            if not getattr(model, kind)(index).name:
+                article = "an" if kind == "actuator" else "a"
+                return f"found {article} {kind} without a name (number {index + 1}), expected names for all"
+    if "base" not in [model.body(index).name for index in range(model.nbody)]:
+        return "found no body `base`, expected one: the mount, which carries the first unit"
+    sites = [model.site(index).name for index in range(model.nsite)]
+    for name, where in (("base_center", "in the mount"), ("tip", "on the last unit")):
+        if name not in sites:
+            return f"found no site {name!r}, expected one {where}"
+    if not any(name.endswith(CENTER) and name != "base_center" for name in sites):
+        return f"found no site <segment>{CENTER}, expected one in every tracked segment"
+    return None
+
+
+def _unlike(model: mujoco.MjModel) -> str | None:
+    """Where the model is none of a chain that hangs from `base` by hinges in pairs."""
+    if not model.njnt:
+        return "found no hinges, expected two on each unit"
+    for body in range(1, model.nbody):
+        name, joints = model.body(body).name, model.body_jntnum[body]
+        types = model.jnt_type[model.body_jntadr[body] :][:joints]
+        if joints not in (0, 2) or np.any(types != mujoco.mjtJoint.mjJNT_HINGE):
+            return f"body {name!r}: found {joints} joints, expected two hinges, or none to be part of its parent"
+    if np.any(model.jnt_stiffness <= 0) or np.any(model.dof_damping <= 0):
+        weak = int(np.flatnonzero((model.jnt_stiffness <= 0) | (model.dof_damping <= 0))[0])
+        return f"joint {model.joint(weak).name!r}: found no stiffness or no damping, expected a guess to begin with"
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    mount = data.site("base_center")
+    if not (np.allclose(mount.xpos, 0, atol=1e-9) and np.allclose(mount.xmat, np.eye(3).ravel(), atol=1e-9)):
+        return "site 'base_center': found it moved or turned, expected it in the world's origin and along its axes"
+    return None
+
+
+def _metrics(model: mujoco.MjModel) -> dict[str, float]:
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    metrics = {
+        "length_m": np.linalg.norm(data.site("tip").xpos - data.site("base_center").xpos),
+        "mass_kg": model.body_mass[model.body_weldid > 0].sum(),
+        "units": np.count_nonzero(model.body_jntnum),
+        "stiffness_base": model.jnt_stiffness[0],
+        "damping_base": model.dof_damping[0],
+    }
+    return metrics | ({"joint_range_deg": np.degrees(model.jnt_range[0, 1])} if model.jnt_limited[0] else {})

@@ -1,0 +1,140 @@
+"""What a compiled model may hold for the static chain to stand for it; everything else is refused by name."""
+
+import mujoco
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.model.elements import BRANCH, DIAGONAL, SLIDER, all_elements, cables, holes
+
+_POSITION_DYNAMICS = (
+    mujoco.mjtDyn.mjDYN_NONE,
+    mujoco.mjtDyn.mjDYN_FILTER,
+    mujoco.mjtDyn.mjDYN_FILTEREXACT,
+)  # all of these have activation = control at rest
+_FORCES_OFF = (
+    mujoco.mjtDisableBit.mjDSBL_CONSTRAINT,
+    mujoco.mjtDisableBit.mjDSBL_LIMIT,
+    mujoco.mjtDisableBit.mjDSBL_SPRING,
+    mujoco.mjtDisableBit.mjDSBL_GRAVITY,
+    mujoco.mjtDisableBit.mjDSBL_ACTUATION,
+)
+
+
+def require_supported(model: mujoco.MjModel) -> None:
+    """Raise InputError, one line with the element's name, if `model` has a static force that the chain lacks."""
+    _require_plain_options(model)
+    _require_unbranched_hinges(model)
+    _require_no_contacts(model)
+    _require_site_tendons(model)
+    _require_pulling_actuators(model)
+
+
+def _require_plain_options(model: mujoco.MjModel) -> None:
+    for count, what in ((model.neq, "equality constraints"), (model.nflex, "flexes"), (model.nplugin, "plugins")):
+        if count:
+            raise InputError(f"model: found {count} {what}, expected none")
+    for bit in _FORCES_OFF:
+        if model.opt.disableflags & bit:
+            raise InputError(f"model: option flag: found {bit.name[8:].lower()} disabled, expected enabled")
+    if model.opt.enableflags & mujoco.mjtEnableBit.mjENBL_DIAGEXACT:
+        raise InputError("model: option flag: found diagexact enabled, expected disabled")
+    if np.any(model.body_gravcomp):
+        name = model.body(int(np.flatnonzero(model.body_gravcomp)[0])).name
+        raise InputError(f"model: body {name!r}: found gravity compensation, expected none")
+
+
+def _require_unbranched_hinges(model: mujoco.MjModel) -> None:
+    if model.njnt == 0:
+        raise InputError("model: found no joints, expected two hinges a unit")
+    for joint in range(model.njnt):
+        name = model.joint(joint).name
+        if model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_HINGE:
+            kind = mujoco.mjtJoint(model.jnt_type[joint]).name[6:].lower()
+            raise InputError(f"model: joint {name!r}: found type {kind}, expected hinge")
+        if model.jnt_actfrclimited[joint]:
+            raise InputError(f"model: joint {name!r}: found an actuator force range, expected none")
+    units = unit_bodies(model)
+    for index, body in enumerate(units):
+        name, joints, first = model.body(body).name, model.body_jntnum[body], model.body_jntadr[body]
+        if joints != 2:
+            raise InputError(f"model: body {name!r}: found {joints} hinges, expected 2")
+        if not np.allclose(model.jnt_pos[first], model.jnt_pos[first + 1], atol=1e-12):
+            found = f"{model.jnt_pos[first]} and {model.jnt_pos[first + 1]}"
+            raise InputError(f"model: body {name!r}: found hinges at {found}, expected one point")
+        parent = model.body_weldid[model.body_parentid[body]]
+        expected = units[index - 1] if index else 0
+        if parent != expected:
+            found, wanted = model.body(parent).name, model.body(expected).name
+            raise InputError(f"model: body {name!r}: found parent {found!r}, expected {wanted!r}: no branches")
+
+
+def unit_bodies(model: mujoco.MjModel) -> np.ndarray:
+    """Bodies that have joints, base first, but those of Maxwell branches, which bear nothing at rest. Bodies without
+    joints belong to the unit they are welded to."""
+    branches = [model.jnt_bodyid[one.own] for one in all_elements(model, BRANCH)]
+    return np.setdiff1d(np.flatnonzero(model.body_jntnum > 0), np.concatenate([[], *branches]).astype(int))
+
+
+def _require_no_contacts(model: mujoco.MjModel) -> None:
+    if model.npair:
+        raise InputError(f"model: found {model.npair} contact pairs, expected none")
+    if model.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT:
+        return
+    for geom in range(model.ngeom):
+        meets = (model.geom_contype[geom] & model.geom_conaffinity) | (
+            model.geom_conaffinity[geom] & model.geom_contype
+        )
+        meets[model.body_weldid[model.geom_bodyid] == model.body_weldid[model.geom_bodyid[geom]]] = 0
+        if np.any(meets):
+            one, other = (_geom_name(model, index) for index in (geom, int(np.flatnonzero(meets)[0])))
+            raise InputError(f"model: {one}: may touch {other}, expected no contacts (contype and conaffinity 0)")
+
+
+def _geom_name(model: mujoco.MjModel, geom: int) -> str:
+    """Few geoms have names of their own."""
+    name = model.geom(geom).name
+    return f"geom {name!r}" if name else f"a geom of body {model.body(model.geom_bodyid[geom]).name!r}"
+
+
+def _require_site_tendons(model: mujoco.MjModel) -> None:
+    parts = [one.tendon for kind in (BRANCH, SLIDER, DIAGONAL) for one in all_elements(model, kind)]
+    parts.append(holes(model).ravel())
+    for tendon in np.setdiff1d(np.arange(model.ntendon), np.concatenate(parts)):
+        name = model.tendon(tendon).name
+        path = slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])
+        for kind in model.wrap_type[path]:
+            if kind != mujoco.mjtWrap.mjWRAP_SITE:
+                kind = mujoco.mjtWrap(kind).name[7:].lower()
+                raise InputError(f"model: tendon {name!r}: found a {kind} on its path, expected sites only")
+        if model.tendon_stiffness[tendon] or np.any(model.tendon_stiffnesspoly[tendon]):
+            raise InputError(f"model: tendon {name!r}: found stiffness, expected 0")
+        if model.tendon_limited[tendon]:
+            raise InputError(f"model: tendon {name!r}: found a length limit, expected none")
+
+
+def _require_pulling_actuators(model: mujoco.MjModel) -> None:
+    for actuator in range(model.nu):
+        name = model.actuator(actuator).name
+        if model.actuator_trntype[actuator] != mujoco.mjtTrn.mjTRN_TENDON:
+            raise InputError(f"model: actuator {name!r}: found no tendon, expected one that pulls a tendon")
+        if model.actuator_gaintype[actuator] != mujoco.mjtGain.mjGAIN_FIXED:
+            raise InputError(f"model: actuator {name!r}: found a gain that varies, expected a fixed one")
+        if model.actuator_biastype[actuator] != mujoco.mjtBias.mjBIAS_AFFINE:
+            raise InputError(f"model: actuator {name!r}: found no affine bias, expected a position actuator")
+        if mujoco.mjtDyn(model.actuator_dyntype[actuator]) not in _POSITION_DYNAMICS:
+            raise InputError(f"model: actuator {name!r}: found other dynamics, expected none or a filter")
+        gain, gear = model.actuator_gainprm[actuator, 0], model.actuator_gear[actuator, 0]
+        offset, slope = model.actuator_biasprm[actuator, :2]
+        if gain <= 0 or offset != 0 or not np.isclose(slope, -gain) or gear != 1:
+            raise InputError(
+                f"model: actuator {name!r}: found gain {gain:g}, bias {offset:g} {slope:g}, gear {gear:g}, "
+                "expected a position actuator: kp, bias 0 -kp, gear 1"
+            )
+        low, high = model.actuator_forcerange[actuator]
+        if not model.actuator_forcelimited[actuator] or high > 0 or low >= 0:
+            raise InputError(f"model: actuator {name!r}: found force range {low:g} {high:g}, expected -F 0: it pulls")
+    pulled = model.actuator_trnid[:, 0] if model.nu else np.zeros(0, int)
+    for tendon in cables(model):
+        count = int(np.sum(pulled == tendon))
+        if count != 1:
+            raise InputError(f"model: tendon {model.tendon(tendon).name!r}: found {count} actuators, expected 1")

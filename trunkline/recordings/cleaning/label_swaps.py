@@ -1,0 +1,115 @@
+"""Segments taken for one another: labels that change places, told by the distances along the arm.
+
+The distance between nearby segments hardly depends on the arm's shape. Where two labels are exchanged, both are
+at the other's usual distances from their neighbours. What is found here, `repairs` puts back.
+"""
+
+from dataclasses import dataclass
+from itertools import permutations
+
+import numpy as np
+
+from trunkline.recordings.signals.runs import lasting
+
+LONGEST = 4  # labels in a round
+NEIGHBOURS = 2  # nearest segments with which one may be exchanged
+REFERENCES = 4  # nearest other bodies by whose distances two segments are told apart
+LEAST_CONTRAST = 3e-3  # m by which the distances of two segments must differ
+LONE = 3  # frames that one of the two, alone, has to be at the other's place
+CLEAR = 0.3  # the exchanged labels must fit this many times better
+SAMPLE = 200  # frames of a log that tell the usual distances
+
+
+@dataclass
+class Swap:
+    """bodies: by index, each label on the next one's pose, the last on the first's. frames: (T,) in which they are."""
+
+    bodies: tuple[int, ...]
+    frames: np.ndarray
+
+
+def usual_distances(logs: list[np.ndarray]) -> np.ndarray:
+    """Median distances (B, B) in m between the bodies of logs (T, B, 3); NaN where two are never seen together."""
+    samples = []
+    for positions in logs:
+        some = positions[:: max(1, len(positions) // SAMPLE)]
+        some = np.where(np.isfinite(some), some, np.nan)
+        samples.append(np.linalg.norm(some[:, :, None] - some[:, None], axis=-1))
+    together = np.concatenate(samples)
+    distances = np.full(together.shape[1:], np.nan)
+    for first, second in zip(*np.triu_indices(len(distances), 1), strict=True):
+        seen = together[:, first, second]
+        seen = seen[np.isfinite(seen)]
+        if len(seen):
+            distances[first, second] = distances[second, first] = np.median(seen)
+    return distances
+
+
+def find_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = True) -> list[Swap]:
+    """Labels that changed places, up to `LONGEST` at a time, among the bodies of (T, B, 3) m, the base first.
+
+    Args:
+        usual: distances (B, B) m.
+        marked_base: whether a body marks the base, whose label may then be exchanged as well.
+    """
+    candidates = _candidates(usual, marked_base)
+    if not candidates:
+        return []
+    distances = np.empty((len(positions), *usual.shape))
+    for body in range(len(usual)):  # one by one, as all differences at once take three times the memory
+        distances[:, body] = np.linalg.norm(positions - positions[:, [body]], axis=-1)
+    least, best = np.full(len(positions), np.inf), np.full(len(positions), -1)  # the first that leaves least
+    for place, bodies in enumerate(candidates):
+        flagged = np.flatnonzero(_exchanged(distances, usual, bodies))
+        left = _misfit(distances[flagged], usual, bodies)
+        better = left < least[flagged]
+        least[flagged[better]], best[flagged[better]] = left[better], place
+    return [Swap(bodies, best == place) for place, bodies in enumerate(candidates) if (best == place).any()]
+
+
+def _candidates(usual: np.ndarray, marked_base: bool) -> list[tuple[int, ...]]:
+    """Rounds of near bodies, the shortest first, in every order."""
+    nearness = np.where(np.isfinite(usual), usual, np.inf)
+    bodies = range(0 if marked_base else 1, len(usual))
+    order = np.argsort(nearness, axis=1, kind="stable").tolist()
+    near = {first: [other for other in order[first] if other in bodies and other != first] for first in bodies}
+    near = {first: others[:NEIGHBOURS] for first, others in near.items()}
+    rounds, sets = [], {frozenset((a, b)) for a in bodies for b in near[a] if np.isfinite(usual[a, b])}
+    for _ in range(2, LONGEST + 1):
+        ordered = sorted(map(sorted, sets))
+        rounds += [(first, *others) for first, *rest in ordered for others in permutations(rest)]
+        sets = {some | {more} for some in sets for body in some for more in near[body] if more not in some}
+    return rounds
+
+
+def _misfit(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -> np.ndarray:
+    """Mean misfit (T,) m of all distances (T, B, B), each of the labels `bodies` taken for the next."""
+    order = np.arange(len(usual))
+    order[[*bodies[1:], bodies[0]]] = bodies
+    first, second = np.triu_indices(len(usual), 1)
+    return np.nanmean(np.abs(distances[:, order[first], order[second]] - usual[first, second]), axis=1)
+
+
+def _exchanged(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]) -> np.ndarray:
+    """(T,) frames in which the labels `bodies` fit their neighbours only when each is taken for the next.
+
+    Where but one of them is seen, an outlier may look like it, and it has to last; then two distances are enough.
+    """
+    nearness = np.where(np.isfinite(usual), usual, np.inf)[list(bodies)].sum(axis=0)
+    others = [b for b in np.argsort(nearness, kind="stable").tolist() if b not in bodies]
+    others = [b for b in others if np.isfinite(usual[list(bodies), b]).all()][:REFERENCES]
+    if len(others) < 2:
+        return np.zeros(len(distances), bool)
+    kept, exchanged, contrast, terms, both = (np.zeros(len(distances)) for _ in range(5))
+    for label, pose in zip(bodies, (*bodies[1:], bodies[0]), strict=True):
+        own, other = usual[label, others], usual[pose, others]
+        found = distances[:, label, others]
+        seen = np.isfinite(found)
+        kept += np.sum(np.where(seen, abs(found - own), 0), axis=1)
+        exchanged += np.sum(np.where(seen, abs(found - other), 0), axis=1)
+        contrast += np.sum(np.where(seen, abs(own - other), 0), axis=1)
+        terms += seen.sum(axis=1)
+        both += seen.any(axis=1)
+    told = ((terms >= 3) | ((terms == 2) & (both == 1))) & (contrast > LEAST_CONTRAST * terms)
+    flagged = told & (kept > 0.5 * contrast) & (exchanged < CLEAR * kept)
+    return flagged & ((both == len(bodies)) | lasting(flagged, LONE))

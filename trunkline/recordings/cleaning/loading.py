@@ -1,0 +1,124 @@
+"""From the logs of a session to checked takes: what is usable, what was repaired, what had to be refused."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.recordings.cleaning.bag_time import logged_offset
+from trunkline.recordings.cleaning.checks import Findings, Limits
+from trunkline.recordings.cleaning.motors import check_motors, read_motors
+from trunkline.recordings.cleaning.reference import Reference, reference_of
+from trunkline.recordings.cleaning.repairs import drop_frozen, good_samples, longest_part, untangle, with_lost_time
+from trunkline.recordings.cleaning.trial_window import Stretch, check_seen, columns_of, read_stretch, split_base
+from trunkline.recordings.session.session import Session, TrialEntry
+from trunkline.recordings.session.source import Source, open_log
+from trunkline.recordings.signals.clock import OffsetFit, estimate_offset
+from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
+from trunkline.recordings.trials.raw_trial import Take
+
+
+def take_in(folder: Path, session: Session, limits: Limits) -> Iterator[tuple[TrialEntry, Take | InputError, Findings]]:
+    """Read trial by trial. A trial that cannot be used comes as the error that says why.
+
+    Every take has the same segments: those that session.yaml maps, or all that any log shows.
+    """
+    logs: dict[str, Source | InputError] = {}
+    read: list[tuple[Source, Stretch] | InputError] = []
+    findings = [Findings(warnings=list(session.shared.get(trial.name, []))) for trial in session.trials]
+    for trial, found in zip(session.trials, findings, strict=True):
+        try:
+            if trial.file not in logs:
+                logs[trial.file] = _opened(folder / trial.file, session)
+            source = logs[trial.file]
+            if isinstance(source, InputError):
+                raise source
+            found.where = f"{source.log.path}: trial {trial.name}"
+            found.log = source.log
+            found.repairs += [f"log: {damage}" for damage in source.log.damage]
+            read.append((source, read_stretch(source, trial, session, limits, found)))
+        except InputError as error:
+            read.append(error)
+    usable = [(trial, *some) for trial, some in zip(session.trials, read, strict=True) if isinstance(some, tuple)]
+    reference = reference_of(session, usable)
+    for trial, some, found in zip(session.trials, read, findings, strict=True):
+        if isinstance(some, InputError):
+            yield trial, some, found
+            continue
+        try:
+            yield trial, _take(*some, trial, session, reference, limits, found), found
+        except InputError as error:
+            yield trial, error, found
+
+
+def _opened(path: Path, session: Session) -> Source | InputError:
+    """A log, decoded; or why it cannot be, for all of its trials."""
+    try:
+        return open_log(path, session)
+    except InputError as error:
+        return error
+
+
+def _take(
+    source: Source,
+    stretch: Stretch,
+    trial: TrialEntry,
+    session: Session,
+    reference: Reference,
+    limits: Limits,
+    findings: Findings,
+) -> Take:
+    """Check and repair one trial.
+
+    Raises:
+        InputError: naming the file, and what is missing in it.
+    """
+    where = findings.where
+    findings.repairs += reference.repairs
+    findings.warnings += reference.warnings
+    bodies = reference.bodies
+    columns = columns_of(source, bodies, where)
+    positions, quaternions = good_samples(source.poses, stretch.rows, columns, reference, findings)
+    drop_frozen(positions, quaternions, bodies, findings)
+    check_seen(positions, bodies, limits.coverage, where, findings)
+    base_positions, base_quaternions, positions, quaternions = split_base(
+        session, positions, quaternions, f"{where}: {source.pose_topic}"
+    )
+    untangle((base_positions, base_quaternions), positions, quaternions, stretch.time, reference, findings)
+    if not is_stepwise(trial.experiment):  # there the arm jumps from frame to frame
+        stretch.time = with_lost_time(stretch.time, positions, bool(source.joint_topics), findings)
+        if not source.joint_topics:
+            part = longest_part(stretch.time, positions, findings)
+            positions, base_positions, base_quaternions = positions[part], base_positions[part], base_quaternions[part]
+            quaternions = None if quaternions is None else quaternions[part]
+            stretch = stretch.part(part)
+    motors = read_motors(source, session, stretch, limits, where, findings)
+    if EXPERIMENTS[trial.experiment].needs_motors:
+        check_motors(source, session, reference.joint_topics, motors, stretch, limits, where)
+    take = Take(
+        name=trial.name,
+        experiment=trial.experiment,
+        split=trial.split,
+        level=trial.level,
+        load=trial.load,
+        up=session.frame.up_direction() if session.frame.gravity == "standard" else np.zeros(3),
+        time=stretch.time,
+        segments=tuple(reference.segments.values()),
+        positions=positions,
+        quaternions=quaternions,
+        base_positions=base_positions,
+        base_quaternions=base_quaternions,
+        **vars(motors),
+    )
+    findings.by_log_times, findings.by_motion = logged_offset(source, session, stretch), _by_motion(take, limits)
+    return take
+
+
+def _by_motion(take: Take, limits: Limits) -> OffsetFit | None:
+    """By how much the motors' clock is off, by what was wound, or else by what was commanded, while the arm moves."""
+    if EXPERIMENTS[take.experiment].static:
+        return None
+    wound = (take.tendon_time, take.tendon_positions)
+    motion = wound if len(take.tendon_time) else (take.command_time, take.commands)
+    return estimate_offset(take.time, take.positions, *motion, limits.clock_offset)

@@ -1,0 +1,74 @@
+"""What all logs of a session together say of their bodies: which there are, in which unit, how far apart."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from trunkline.recordings.cleaning.checks import deciding
+from trunkline.recordings.cleaning.label_swaps import usual_distances
+from trunkline.recordings.cleaning.trial_window import Stretch
+from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
+from trunkline.recordings.session.source import Source
+from trunkline.recordings.signals.units import extent, likely_unit
+
+FARTHEST = 1e6  # m or mm; no camera sees farther, and squares of what is farther overflow at last
+UNIT = {"m": 1.0, "mm": 1e-3}
+
+
+@dataclass
+class Reference:
+    """What each trial is read and repaired by.
+
+    segments: name in the log to name in the model, in the order of every take. base: the body that marks the mount,
+    None where none does. scale: m per unit of the logs' positions.
+    distances: between the base and the segments, see `usual_distances`; None where there is too little to compare.
+    joint_topics: of all logs. repairs, warnings: what is to be said of every trial; see `Findings`.
+    """
+
+    segments: dict[str, str]
+    base: str | None
+    scale: float
+    distances: np.ndarray | None
+    joint_topics: tuple[str, ...]
+    repairs: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def bodies(self) -> list[str]:
+        """Names in the log of the bodies that a trial needs: the base, where one marks it, then the segments."""
+        return list(self.segments) if self.base is None else [self.base, *self.segments]
+
+
+def reference_of(session: Session, trials: list[tuple[TrialEntry, Source, Stretch]]) -> Reference:
+    """Compare the logs of a session: the trials of the split `identify`, or all where none of those can be read."""
+    base = None if isinstance(session.base, FixedBase) else session.base
+    segments, sources = session.segments, [source for _, source, _ in trials]
+    if segments is None:
+        names = {name for source in sources for name in source.poses.names if name != session.base}
+        segments = {name: name for name in sorted(names)}
+    joint_topics = tuple(sorted({name for source in sources for name in source.joint_topics}))
+    reference = Reference(segments, base, UNIT[session.frame.unit], None, joint_topics)
+    bodies = reference.bodies
+    complete = [some for some in trials if set(bodies) <= set(some[1].poses.names)]
+    chosen, fallback = deciding(complete, lambda some: some[0].split)
+    if fallback:
+        told = "the unit and the usual distances between bodies are of trials of other splits"
+        reference.warnings.append(f"no trial of the split identify can be read: {told}")
+    logs = [
+        source.poses.positions[np.ix_(stretch.rows, np.array([source.poses.names.index(name) for name in bodies], int))]
+        for _, source, stretch in chosen
+    ]
+    logs = [np.where(np.abs(positions) < FARTHEST, positions, np.nan) for positions in logs]
+    found = likely_unit(logs)
+    if found is not None and found != session.frame.unit:
+        apart = np.median([extent(positions) for positions in logs])
+        said = f"bodies {apart:.4g} apart are no arm in {session.frame.unit}, as declared"
+        reference.scale = UNIT[found]
+        reference.repairs.append(f"unit: {said}; taken as {found}")
+    if logs and len(bodies) >= 3:
+        logs = [reference.scale * positions for positions in logs]
+        if isinstance(session.base, FixedBase):
+            mount = np.array(session.base.position)
+            logs = [np.insert(positions, 0, mount, axis=1) for positions in logs]
+        reference.distances = usual_distances(logs)
+    return reference

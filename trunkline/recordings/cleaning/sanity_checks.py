@@ -1,0 +1,211 @@
+"""Whether a trial can be what session.yaml says: its bodies against the arm, its motion against the experiment.
+
+Lengths are measured against the arm's own, which is the largest of the segments' usual distances from the base. Every
+check compares a trial with that, with the session's other trials, or with what its kind of experiment means.
+"""
+
+import re
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field
+
+from trunkline.frames import rotation_from_wxyz
+from trunkline.recordings.cleaning.checks import Findings, deciding
+from trunkline.recordings.cleaning.label_swaps import usual_distances
+from trunkline.recordings.cleaning.pulls import check_pulls, encoder_zeros
+from trunkline.recordings.signals.smoothing import fill_gaps
+from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
+from trunkline.recordings.trials.raw_trial import Take
+
+NEAREST = 4  # other bodies by whose distances a body's place is told
+BLOCK = 12  # frames whose median is a sample of motion: few outliers are left, and a third of the noise
+CLEAR = 3.0  # times the motion of another body, by which a base moves that is none
+OTHER_UNIT = 3.0  # ratio of sizes that no two shapes of one arm have
+LONGER = 0.01  # share of the arm's length by which the way along the named order has to be longer than need be
+
+
+@dataclass
+class Plausible:
+    """What a trial must be like. Shares are of the arm's length.
+
+    still: by how much an arm at rest may move, as a share; an arm in motion moves by more.
+    distance: by how much a body's distances to its neighbours may differ from the usual ones, as a share.
+    pull: factor by which pulls may differ from the trial's level, and measured ones from commanded ones.
+    clock: s, by which the arm may move after its tendons, by log times, and by which its lags in trials may differ.
+    otherwise: what becomes of a trial, or a session, that is not: "refuse", or "warn" and go on with it.
+    """
+
+    still: Annotated[float, Field(gt=0, le=0.2)]
+    distance: Annotated[float, Field(gt=0, le=0.5)]
+    pull: Annotated[float, Field(ge=1.5, le=100)]
+    clock: Annotated[float, Field(gt=0, le=1)]
+    otherwise: Literal["refuse", "warn"]
+
+
+def check_plausible(takes: list[Take], findings: list[Findings], base: str | None, settings: Plausible) -> list[str]:
+    """Add to each take's findings what cannot be true of it; returned: what cannot be true of the session.
+
+    What is usual is what the takes of the split `identify` say, or all where there are none of it.
+
+    Args: base: the name of the body that marks the mount, None where none does.
+    """
+    chosen, _ = deciding(takes, lambda take: take.split)
+    usual = usual_distances([_bodies(take) for take in chosen])
+    length = float(np.nanmax(usual[0]))
+    names, idle = (base or "base", *takes[0].segments), settings.still * length
+    zeros = encoder_zeros(chosen, idle)
+    for take, found in zip(takes, findings, strict=True):
+        found.faults += _misplaced(take, usual, names, settings.distance * length)
+        found.faults += _motion(take, length, settings.still)
+        found.faults += check_pulls(take, length, idle, settings.pull, zeros)
+    said = _order(takes[0].segments, usual) + _loose(chosen, usual, settings, length)
+    return said if base is None else said + _base_at_rest(chosen, base)
+
+
+def _bodies(take: Take) -> np.ndarray:
+    """The base and the segments, (T, 1 + S, 3) m."""
+    return np.insert(take.positions, 0, take.base_positions, axis=1)
+
+
+def _misplaced(take: Take, usual: np.ndarray, names: tuple[str, ...], least: float) -> list[str]:
+    """Bodies that are not where the session's other trials have them, by the distances from their neighbours."""
+    found = usual_distances([_bodies(take)])
+    ratio = float(np.nanmedian((found / usual)[~np.eye(len(usual), dtype=bool)]))
+    if not 1 / OTHER_UNIT < ratio < OTHER_UNIT:
+        told = f"bodies are {ratio:.4g} times as far apart as in the session's trials of identify"
+        return [f"unit: {told}, expected all logs of a session in one unit"]
+    if len(names) == 2:  # one point alone comes as near to the base as the arm bends
+        return []
+    said = []
+    for body, name in enumerate(names):
+        others = np.argsort(usual[body])[:NEAREST]
+        others = others[np.isfinite((found - usual)[body, others])]
+        off = np.abs(found - usual)[body, others]
+        if len(off) and np.median(off) > least:
+            near, worst = others[0], others[int(np.argmax(off))]
+            told = f"{_mm(found[body, worst])} from {names[worst]!r} for the usual {_mm(usual[body, worst])}"
+            if near != worst:
+                told += f", {_mm(found[body, near])} from {names[near]!r} for {_mm(usual[body, near])}"
+            said.append(f"{name!r} is {told}, expected neighbours at distances that differ by less than {_mm(least)}")
+    return said
+
+
+def _motion(take: Take, length: float, still: float) -> list[str]:
+    """Whether an experiment at rest rests, and another moves."""
+    if is_stepwise(take.experiment):
+        return []
+    static, blocks = EXPERIMENTS[take.experiment].static, _blocks(take.positions)
+    travel = np.linalg.norm(np.ptp(blocks, axis=0), axis=1)
+    most = int(np.argmax(travel))
+    if static == (travel[most] <= still * length):
+        return []
+    share = 100 * travel[most] / length
+    found = f"{take.segments[most]!r} moves by {_mm(travel[most])}, {share:.2g} % of the arm's length"
+    expected = f"expected {'at most' if static else 'more than'} {100 * still:g} % in a {take.experiment}"
+    others = ", ".join(name for name, kind in EXPERIMENTS.items() if kind.static != static)
+    return [f"experiment: {found}, {expected}: is it another experiment ({others})?"]
+
+
+def _order(segments: tuple[str, ...], usual: np.ndarray) -> list[str]:
+    """Numbered segments that do not follow each other along the arm as their numbers do, up or down.
+
+    From the base on, the next segment along an arm is the nearest of those that are left. Along any other order the
+    way from body to body is longer.
+    """
+    numbered = [re.fullmatch(r"(.*?)(\d+)", name) for name in segments]
+    parts = [match.groups() for match in numbered if match is not None]
+    if len(parts) < len(segments) or len({stem for stem, _ in parts}) > 1 or len(parts) < 3:
+        return []
+    if not np.isfinite(usual).all(where=~np.eye(len(usual), dtype=bool)):
+        return []
+    left, along = set(range(1, len(usual))), [0]
+    while left:
+        along.append(min(left, key=lambda body: usual[along[-1], body]))
+        left.remove(along[-1])
+    named = sorted(range(len(segments)), key=lambda place: int(parts[place][1]))
+    length = float(usual[0].max(where=np.isfinite(usual[0]), initial=0.0))
+    orders = [[0, *(place + 1 for place in order)] for order in (named, named[::-1])]
+    order = min(orders, key=lambda order: _way(usual, order))
+    if _way(usual, order) - _way(usual, along) <= LONGER * length:
+        return []
+    places = [(segments[a - 1], segments[b - 1]) for a, b in zip(order[1:], along[1:], strict=True) if a != b]
+    told = ", ".join(f"{found!r} where {name!r} is expected" for name, found in places)
+    return [f"segments: along the arm lies {told}, by the distances between them: check `segments` in session.yaml"]
+
+
+def _way(usual: np.ndarray, order: list[int]) -> float:
+    return float(sum(usual[a, b] for a, b in pairwise(order)))
+
+
+def _loose(takes: list[Take], usual: np.ndarray, settings: Plausible, length: float) -> list[str]:
+    """Segments that are not fixed to the arm: in most trials in which it moves they keep no distance from any other
+    segment, or rest while one nearer to the base moves."""
+    least, still, count = settings.distance * length, settings.still * length, len(takes[0].segments)
+    apart, farther = [], usual[0, 1:, None] > usual[0, None, 1:]
+    rests = []
+    for take in takes:
+        if EXPERIMENTS[take.experiment].static or count < 3:
+            continue
+        blocks = _blocks(take.positions)
+        distances = np.linalg.norm(blocks[:, :, None] - blocks[:, None], axis=-1)
+        spread = np.quantile(distances, 0.95, axis=0) - np.quantile(distances, 0.05, axis=0)
+        apart.append(np.min(spread + np.where(np.eye(count), np.inf, 0.0), axis=1) > least)
+        travel = np.linalg.norm(np.ptp(blocks, axis=0), axis=1)
+        rests.append((travel < still) & (farther & (travel > least)).any(axis=1))
+    said = []
+    for flags, told in (
+        (apart, f"keeps no distance from any other segment, to within {_mm(least)}, while the arm moves"),
+        (rests, f"rests, to within {_mm(still)}, while segments nearer to the base move"),
+    ):
+        most = np.mean(flags, axis=0) > 0.5 if flags else np.zeros(count, bool)
+        hit = [name for name, some in zip(takes[0].segments, most, strict=True) if some]
+        said += [f"{name!r} {told}: is it on the arm?" for name in hit]
+    return said
+
+
+def _base_at_rest(takes: list[Take], base: str) -> list[str]:
+    """A base that moves or turns while a segment rests."""
+    motion = []
+    for take in takes:
+        if EXPERIMENTS[take.experiment].static or take.quaternions is None:
+            continue
+        turns = _turns(np.insert(take.quaternions, 0, take.base_quaternions, axis=1))
+        motion.append([_spread(_blocks(_bodies(take))), _spread(_blocks(turns))])
+    if not motion:
+        return []
+    for moved, unit, scale in zip(np.median(motion, axis=0), ("mm", "°"), (1e3, np.degrees(1)), strict=True):
+        rests = int(np.argmin(moved[1:])) + 1
+        if moved[0] > CLEAR * moved[rests]:
+            found = f"moves by {scale * moved[0]:.2f} {unit} while {takes[0].segments[rests - 1]!r} moves by"
+            expected = "expected the body at the mount, which rests"
+            return [f"base: {base!r} {found} {scale * moved[rests]:.2f} {unit}, {expected}"]
+    return []
+
+
+def _turns(quaternions: np.ndarray) -> np.ndarray:
+    """Rotation vectors (T, B, 3) rad from each body's mean orientation, NaN where not seen."""
+    turns = np.full((*quaternions.shape[:2], 3), np.nan)
+    for body in range(quaternions.shape[1]):
+        seen = np.isfinite(quaternions[:, body, 0])
+        rotations = rotation_from_wxyz(quaternions[seen, body])
+        turns[seen, body] = (rotations.mean().inv() * rotations).as_rotvec()
+    return turns
+
+
+def _blocks(values: np.ndarray) -> np.ndarray:
+    """Medians of stretches of `BLOCK` frames of (T, B, 3), gaps bridged: (T // BLOCK, B, 3)."""
+    filled = fill_gaps(np.arange(len(values), dtype=float), values.reshape(len(values), -1)).reshape(values.shape)
+    count = len(values) // BLOCK
+    return np.median(filled[: count * BLOCK].reshape(count, BLOCK, *values.shape[1:]), axis=1)
+
+
+def _spread(blocks: np.ndarray) -> np.ndarray:
+    """Standard deviation (B,) of the places (n, B, 3)."""
+    return np.sqrt(np.sum(np.var(blocks, axis=0), axis=1))
+
+
+def _mm(metres: float) -> str:
+    return f"{1e3 * metres:.4g} mm"

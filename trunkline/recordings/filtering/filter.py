@@ -1,0 +1,217 @@
+"""A take becomes a trial: outliers out, gaps bridged, one uniform clock, filtered, in the base frame."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Annotated, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+from scipy.ndimage import binary_dilation
+
+from trunkline.errors import InputError
+from trunkline.frames import make_continuous, tilt_of_gravity
+from trunkline.recordings.filtering.effect import Effect
+from trunkline.recordings.signals.base_frame import BasePose, average_base, gravity_from_up, to_base_frame
+from trunkline.recordings.signals.smoothing import bridged, fill_gaps, low_pass, outliers, resample
+from trunkline.recordings.trials.experiments import EXPERIMENTS, Kind
+from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.trial import Trial
+
+
+@dataclass
+class Filter:
+    """rate: Hz of the uniform clock. cutoff: Hz, order: of the Butterworth low-pass.
+
+    longest_bridge: s, longer gaps are filled and marked as not measured.
+    outlier_deviations: see `smoothing.outliers`.
+    release: where a release starts: at its "onset", or once the arm is "free" and moves already, see `start`.
+    """
+
+    rate: Annotated[float, Field(ge=1, le=2000)]
+    cutoff: Annotated[float, Field(gt=0, le=1000)]
+    order: Annotated[int, Field(ge=1, le=10)]
+    longest_bridge: Annotated[float, Field(ge=0, le=2)]
+    outlier_deviations: Annotated[float, Field(ge=1, le=1000)]
+    release: Literal["onset", "free"]
+
+    def __post_init__(self):
+        if self.cutoff >= self.rate / 2:
+            raise ValueError(f"cutoff: found {self.cutoff} Hz, expected less than half the rate of {self.rate} Hz")
+
+
+def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
+    """Filter one take.
+
+    Quaternions are filtered by component and normalised again: they are continuous in sign, and within the
+    bandwidth of the filter the arm turns by little, so that this differs from the sphere in second order.
+
+    Raises:
+        InputError: if a segment has too few good samples.
+    """
+    base = average_base(take.base_positions, take.base_quaternions)
+    positions, quaternions = to_base_frame(base, take.positions, take.quaternions)
+    kind, motion = EXPERIMENTS[take.experiment], None
+    if kind.stepwise:
+        return _settled(take, positions, quaternions, base)
+    grid = np.arange(int(take.time[-1] * settings.rate) + 1) / settings.rate
+    frames, count = len(grid), len(take.segments)
+    width = 3 if quaternions is None else 7
+    columns, measured = np.empty((frames, count, width)), np.empty((frames, count), bool)
+    filled, dropped, removed = 0, 0, []
+    for index, name in enumerate(take.segments):
+        samples = positions[:, index]
+        if quaternions is not None:
+            samples = np.hstack([samples, quaternions[:, index]])
+        found = _segment(take.time, samples, grid, settings, f"trial {take.name}: {name!r}")
+        columns[:, index], measured[:, index] = found.columns, found.measured
+        filled, dropped = filled + found.filled, dropped + found.dropped
+        removed.append(found.removed)
+    noise = np.sqrt(np.mean(removed, axis=0))
+    if width == 7:
+        columns[..., 3:] /= np.linalg.norm(columns[..., 3:], axis=-1, keepdims=True)
+
+    commands, wound = _on_pose_clock(take, grid)
+    gravity = gravity_from_up(base, take.up)
+    quaternions = None if quaternions is None else columns[..., 3:]
+    trial = _trial(take, gravity, grid, columns[..., :3], quaternions, measured, commands, wound)
+    if kind.static:
+        motion = float(np.sqrt(np.mean(np.var(trial.positions, axis=0))))
+        trial = average_static(trial)
+    trial = replace(trial, **start_of(trial, kind, settings))
+    effect = Effect(
+        samples=frames * count,
+        gap_share=1 - float(measured.mean()),
+        filled_share=filled / (frames * count),
+        outliers=dropped,
+        position_noise=float(np.sqrt(np.mean(noise[:3] ** 2))),
+        # half an angle is in the vector part; of its square mean, four components see what three axes bring
+        angle_noise=None if width == 3 else float(2 * np.sqrt(np.sum(noise[3:] ** 2) / 3)),
+        tilt=tilt_of_gravity(gravity),
+        motion=motion,
+        base_shift=base.shift,
+        base_turn=base.turn,
+    )
+    return trial, effect
+
+
+def _trial(
+    take: Take, gravity: np.ndarray, time: np.ndarray, positions: np.ndarray, quaternions: np.ndarray | None,
+    measured: np.ndarray, commands: np.ndarray, wound: np.ndarray,
+) -> Trial:  # fmt: skip
+    """What the take was planned as, with these samples, shapes as in `Trial`."""
+    return Trial(
+        name=take.name,
+        experiment=take.experiment,
+        split=take.split,
+        level=take.level,
+        load=take.load,
+        session=take.session,
+        gravity=gravity,
+        time=time,
+        segments=take.segments,
+        positions=positions,
+        quaternions=quaternions,
+        measured=measured,
+        tendons=take.tendons,
+        commands=commands,
+        tendon_positions=wound,
+        repairs=take.repairs,
+    )
+
+
+def start_of(trial: Trial, kind: Kind, settings: Filter) -> dict:
+    """When a trial that went through the low-pass begins: its start and start_sigma, s, in_motion and swaying."""
+    if kind.start is None:
+        return {}
+    smooth = partial(low_pass, rate=1 / (trial.time[1] - trial.time[0]), cutoff=settings.cutoff, order=settings.order)
+    begun = kind.start(trial, smooth)
+    found = {"start": begun.time, "start_sigma": begun.sigma, "in_motion": begun.in_motion, "swaying": begun.swaying}
+    if kind.free is not None and settings.release == "free":
+        found |= {"start": kind.free(trial, begun.time), "in_motion": True, "swaying": False}
+    return found
+
+
+def _settled(
+    take: Take, positions: np.ndarray, quaternions: np.ndarray | None, base: BasePose
+) -> tuple[Trial, Effect]:
+    """A trial whose every frame is a shape at rest of its own: nothing to filter, and no clock but the frames' own."""
+    columns = positions if quaternions is None else np.concatenate([positions, quaternions], axis=2)
+    measured = np.isfinite(columns[..., 0]) & np.isfinite(columns[..., -1])
+    commands, wound = _on_pose_clock(take, take.time)
+    trial = _trial(take, gravity_from_up(base, take.up), take.time, positions, quaternions, measured, commands, wound)
+    effect = Effect(
+        samples=measured.size, gap_share=1 - float(measured.mean()), filled_share=0.0, outliers=0, position_noise=0.0,
+        angle_noise=None, tilt=tilt_of_gravity(trial.gravity), motion=0.0, base_shift=base.shift, base_turn=base.turn,
+    )  # fmt: skip
+    return trial, effect
+
+
+class _Segment(NamedTuple):
+    """columns (G, C), filtered, and measured (G,), where they may be trusted. filled, dropped: samples on the uniform
+    clock between others that are further apart, and outliers. removed: mean square of what the filter took. (C,)."""
+
+    columns: np.ndarray
+    measured: np.ndarray
+    filled: int
+    dropped: int
+    removed: np.ndarray
+
+
+def _segment(time: np.ndarray, samples: np.ndarray, grid: np.ndarray, settings: Filter, where: str) -> _Segment:
+    """Filter one segment's samples (T, 3) or (T, 7), position and quaternion, NaN where unseen, onto `grid` (G,)."""
+    oriented = samples.shape[1] == 7
+    good = np.isfinite(samples).all(axis=1)
+    time, samples = time[good], samples[good]
+    if oriented:
+        samples[:, 3:] = make_continuous(samples[:, 3:])
+    inliers = ~outliers(time, samples[:, :3], settings.outlier_deviations)
+    if oriented:
+        inliers &= ~outliers(time, samples[:, 3:], settings.outlier_deviations)
+    time, samples = time[inliers], samples[inliers]
+    if len(time) < 2 * settings.order:
+        raise InputError(f"{where}: found {len(time)} good samples, expected more")
+    smooth = low_pass(resample(time, samples, grid), settings.rate, settings.cutoff, settings.order)
+    # the low-pass carries what fills a gap some frames beyond its edges
+    reach = round(settings.rate / settings.cutoff / 2)
+    return _Segment(
+        columns=smooth,
+        measured=~binary_dilation(~bridged(time, grid, settings.longest_bridge), iterations=reach),
+        filled=int(np.sum(~bridged(time, grid, 1.5 / settings.rate))),
+        dropped=int(np.sum(~inliers)),
+        removed=np.mean(np.square(samples - resample(grid, smooth, time)), axis=0),
+    )
+
+
+def average_static(trial: Trial) -> Trial:
+    """A trial of one frame: the mean over the frames in which each segment was measured."""
+    weight = trial.measured / np.maximum(trial.measured.sum(axis=0), 1)
+    positions = np.einsum("ts,tsi->si", weight, trial.positions)[None]
+    quaternions = trial.quaternions
+    if quaternions is not None:
+        quaternions = np.einsum("ts,tsi->si", weight, quaternions)[None]
+        quaternions /= np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    return replace(
+        trial,
+        time=trial.time[:1],
+        positions=positions,
+        quaternions=quaternions,
+        measured=np.any(trial.measured, axis=0)[None],
+        commands=trial.commands.mean(axis=0, keepdims=True),
+        tendon_positions=trial.tendon_positions.mean(axis=0, keepdims=True),
+    )
+
+
+def _on_pose_clock(take: Take, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Commands and tendon positions (G, K) m at the frames' times; a lacking one is the other, or 0."""
+    streams = []
+    for time, pulls in ((take.command_time, take.commands), (take.tendon_time, take.tendon_positions)):
+        moved = fill_gaps(time + take.clock_offset, pulls) if len(time) else pulls
+        streams.append(
+            np.stack([np.interp(grid, time + take.clock_offset, column) for column in moved.T], axis=1)
+            if moved.size
+            else None
+        )
+    commands, wound = streams
+    nothing = np.zeros((len(grid), len(take.tendons)))
+    commands = commands if commands is not None else wound if wound is not None else nothing
+    return commands, wound if wound is not None else commands

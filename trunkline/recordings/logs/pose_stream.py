@@ -1,0 +1,209 @@
+"""A topic's messages as arrays: all poses of a log."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from trunkline.recordings.logs.cdr import short_name
+from trunkline.recordings.logs.encodings import decode
+from trunkline.recordings.logs.log import Topic
+from trunkline.recordings.logs.messages import POSES, READING, Poses
+from trunkline.recordings.logs.samples import Samples, union
+from trunkline.recordings.logs.transforms import in_one_frame
+
+
+class Batch(NamedTuple):
+    """Messages of the same S bodies. rows: (n,) in the topic. time: ns, (n,), or (n, S) where each body has its own.
+
+    positions: (n, S, 3). orientations: (n, S, 4). frame: (n,). The rest as in `Poses`.
+    """
+
+    rows: np.ndarray
+    time: np.ndarray
+    names: list[str]
+    positions: np.ndarray
+    orientations: np.ndarray | None
+    frame: np.ndarray | None
+    parents: list[str] | None
+
+
+@dataclass
+class PoseStream:
+    """T frames, B bodies. stamps, log_times: (T,) ns, of the header and the recorder. frames: (T,) or None.
+
+    present: (T, B) whether a body is in a frame. positions: (T, B, 3) in the log's unit, quaternions:
+    (T, B, 4) wxyz or None; NaN where absent. undecodable: messages that do not fit their schema, or that hold
+    another number of poses than there are names. unnamed: poses in a message that nobody names, else None.
+    parents: names of the frames that the poses are in, where messages say it for each; several, where nothing
+    connects them. twice: a name that several poses of one message have, else None; such messages do not fit either.
+    """
+
+    stamps: np.ndarray
+    log_times: np.ndarray
+    frames: np.ndarray | None
+    names: tuple[str, ...]
+    present: np.ndarray
+    positions: np.ndarray
+    quaternions: np.ndarray | None
+    undecodable: int = 0
+    unnamed: int | None = None
+    parents: tuple[str, ...] = ()
+    twice: str | None = None
+
+
+def pose_stream(
+    topics: dict[str | None, Topic],
+    bodies: Sequence[str] | None = None,
+    frame: str | None = None,
+    statics: Sequence[Topic] = (),
+) -> PoseStream:
+    """All messages of topics whose schema is in `POSES`.
+
+    Args:
+        topics: one under None, or by the name of the body that each holds.
+        bodies: names of the poses in a message that names none.
+        frame: where poses are in several frames, the one in which they are wanted, and only those below it count. By
+            default the nearest that holds all; where nothing connects them, poses stay in their own frames.
+        statics: topics of transforms that hold all the time; they connect frames, and are no bodies.
+
+    Raises:
+        ValueError: the messages cannot be read at all, or frames are no tree, or `frame` is none of them.
+    """
+    unnamed, twice, read = None, None, []
+    for name, topic in topics.items():
+        batches = list(_read_poses(topic))
+        given = bodies if name is None else [name]
+        if given is None and any(poses.names is None for _, poses in batches):
+            unnamed = max(poses.positions.shape[-2] for _, poses in batches)
+            given = [str(number + 1) for number in range(unnamed)]
+        twice = next((repeated for _, poses in batches if (repeated := _repeated(poses.names))), twice)
+        read.append((topic, [part for batch in batches for part in _batches(*batch, topic, given)]))
+    parents = {frame: None for _, batches in read for batch in batches for frame in batch.parents or ()}
+    kept = sum(len(batch.rows) for _, batches in read for batch in batches)
+    own_times = any(batch.time.ndim == 2 for _, batches in read for batch in batches)
+    if not own_times and len(read) == 1:
+        stream = _by_message(*read[0])
+    else:
+        samples = _samples(read)
+        if parents and list(parents) != [frame or next(iter(parents))]:
+            fixed = [(t, [part for batch in _read_poses(t) for part in _batches(*batch, t, ())]) for t in statics]
+            samples, parents = in_one_frame(samples, _samples(fixed), list(parents), frame)
+        stream = _gather(samples)
+    stream.undecodable = sum(len(topic.messages) for topic in topics.values()) - kept
+    stream.unnamed, stream.parents, stream.twice = unnamed, tuple(parents), twice
+    return stream
+
+
+def _repeated(names: list[str] | np.ndarray | None) -> str | None:
+    """A name that a message, or one of a batch (..., S), has more than once."""
+    for some in [] if names is None else np.atleast_2d(names).tolist():
+        if len(set(some)) < len(some):
+            return max(some, key=some.count)
+    return None
+
+
+def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, Poses]]:
+    reader = POSES[short_name(topic.schema)]
+    for rows, message in decode(topic):
+        try:
+            poses = reader(message)
+            names = poses.names
+            named = names if names is None or isinstance(names, np.ndarray) else [str(name) for name in names]
+        except READING:
+            continue
+        yield rows, poses._replace(names=named)
+
+
+def _batches(rows: np.ndarray, poses: Poses, topic: Topic, given: Sequence[str] | None) -> Iterator[Batch]:
+    """What a reader returned as batches, one a set of names; none if they do not fit."""
+    count, size = rows.size, poses.positions.shape[-2]
+    time = topic.log_times[rows] if poses.time is None else poses.time
+    own_times = poses.parents is not None or np.ndim(time) > rows.ndim
+    time = np.broadcast_to(time, (count, size) if own_times else (count,))
+    positions = np.broadcast_to(poses.positions, (count, size, 3))
+    orientations = None if poses.orientations is None else np.broadcast_to(poses.orientations, (count, size, 4))
+    frame = None if poses.frame is None else np.broadcast_to(poses.frame, (count,))
+    rows, names = np.atleast_1d(rows), poses.names if poses.names is not None else given
+    if isinstance(names, np.ndarray):
+        sets, which = np.unique(names.reshape(count, size), axis=0, return_inverse=True)
+        parts = [(list(map(str, some)), np.flatnonzero(which.ravel() == i)) for i, some in enumerate(sets)]
+    else:
+        parts = [(list(names or ()), slice(None))]
+    for some, part in parts:
+        if len(some) == size == len(set(some)):
+            yield Batch(
+                rows[part], time[part], some, positions[part],
+                None if orientations is None else orientations[part],
+                None if frame is None else frame[part], poses.parents,
+            )  # fmt: skip
+
+
+def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
+    """A frame a message."""
+    names, count = union([(batch.rows, batch.names) for batch in batches]), len(topic.messages)
+    positions = np.full((count, len(names), 3), np.nan)
+    quaternions = np.full((count, len(names), 4), np.nan)
+    present, kept = np.zeros((count, len(names)), bool), np.zeros(count, bool)
+    stamps, frames = np.zeros(count, np.int64), np.zeros(count, np.int64)
+    for batch in batches:
+        columns = np.ix_(batch.rows, np.array([names.index(name) for name in batch.names], int))
+        stamps[batch.rows], kept[batch.rows] = batch.time, True
+        present[columns], positions[columns] = True, batch.positions
+        if batch.orientations is not None:
+            quaternions[columns] = batch.orientations
+        if batch.frame is not None:
+            frames[batch.rows] = batch.frame
+    oriented = any(batch.orientations is not None for batch in batches)
+    return PoseStream(
+        stamps=stamps[kept],
+        log_times=topic.log_times[kept],
+        frames=frames[kept] if all(batch.frame is not None for batch in batches) else None,
+        names=names,
+        present=present[kept],
+        positions=positions[kept],
+        quaternions=quaternions[kept] if oriented else None,
+    )
+
+
+def _gather(samples: Samples) -> PoseStream:
+    """Frames from bodies that have times of their own, in the order in which their first sample was logged, so that a
+    clock that runs back shows."""
+    names, body = samples.bodies()
+    frame, first = samples.frames(body)
+    present = np.zeros((len(first), len(names)), bool)
+    positions = np.full((*present.shape, 3), np.nan)
+    quaternions = np.full((*present.shape, 4), np.nan) if np.isfinite(samples.quaternions).any() else None
+    present[frame, body], positions[frame, body] = True, samples.positions
+    if quaternions is not None:
+        quaternions[frame, body] = samples.quaternions
+    return PoseStream(
+        stamps=samples.stamps[first],
+        log_times=samples.logged[first],
+        frames=None,
+        names=names,
+        present=present,
+        positions=positions,
+        quaternions=quaternions,
+    )
+
+
+def _samples(read: list[tuple[Topic, list[Batch]]]) -> Samples:
+    """What batches hold, body by body."""
+    parts = [Samples.none()]
+    for topic, batches in read:
+        for batch in batches:
+            shape = (len(batch.rows), len(batch.names))
+            time = batch.time if batch.time.ndim == 2 else batch.time[:, None]
+            turned = np.full((*shape, 4), np.nan) if batch.orientations is None else batch.orientations
+            parts.append(Samples(
+                np.broadcast_to(time, shape).ravel(),
+                np.repeat(topic.log_times[batch.rows], shape[1]),
+                np.tile(np.array(batch.names, dtype=str), shape[0]),
+                np.tile(np.array(batch.parents or [""] * shape[1], dtype=str), shape[0]),
+                batch.positions.reshape(-1, 3),
+                turned.reshape(-1, 4),
+            ))  # fmt: skip
+    samples = Samples(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    return samples.take(np.argsort(samples.logged, kind="stable"))

@@ -1,0 +1,79 @@
+"""OptiTrack Motive's CSV export as MCAP logs: `python -m trunkline.recordings.preparation.motive --session
+data/raw/NAME CSV…`
+
+Up is +y. Rigid bodies become `mocap4r2_msgs/msg/RigidBodies`, and where an export has none, its markers become
+`mocap4r2_msgs/msg/Markers`. A session.yaml is proposed unless there is one.
+"""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+from mcap_ros2.writer import Writer
+
+from trunkline.errors import in_one_line
+from trunkline.program import called
+from trunkline.recordings.logs.definitions import MARKERS, RIGID_BODIES
+from trunkline.recordings.logs.pose_stream import PoseStream
+from trunkline.recordings.preparation.export import read_export
+from trunkline.recordings.preparation.proposal import propose
+from trunkline.recordings.preparation.survey import survey
+
+UP = (0, 1, 0)
+
+
+def write_log(path: Path, poses: PoseStream) -> None:
+    """Write poses as an MCAP log, whole or not at all; an occluded body is missing from its frame's message."""
+    assert poses.frames is not None, "an export numbers its frames"
+    oriented = poses.quaternions is not None
+    part = path.with_name(f".{path.name}.part")
+    with open(part, "wb") as file, Writer(file) as writer:
+        name, text = ("RigidBodies", RIGID_BODIES) if oriented else ("Markers", MARKERS)
+        schema = writer.register_msgdef(f"mocap4r2_msgs/msg/{name}", text)
+        for index, stamp in enumerate(poses.stamps.tolist()):
+            seconds, nanoseconds = divmod(stamp, 1_000_000_000)
+            bodies = [_body(poses, index, body) for body in np.flatnonzero(poses.present[index]).tolist()]
+            message = {
+                "header": {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": "mocap"},
+                "frame_number": int(poses.frames[index]),
+                "rigidbodies" if oriented else "markers": bodies,
+            }
+            writer.write_message("/rigid_bodies" if oriented else "/markers", schema, message, stamp, stamp)
+    os.replace(part, path)
+
+
+def _body(poses: PoseStream, frame: int, body: int) -> dict:
+    position = dict(zip("xyz", poses.positions[frame, body].tolist(), strict=True))
+    if poses.quaternions is None:
+        return {"id_type": 0, "marker_index": body, "marker_name": poses.names[body], "translation": position}
+    orientation = dict(zip("wxyz", poses.quaternions[frame, body].tolist(), strict=True))
+    return {"rigid_body_name": poses.names[body], "pose": {"position": position, "orientation": orientation}}
+
+
+@in_one_line
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog=called("trunkline.recordings.preparation.motive"),
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("exports", nargs="+", type=Path, metavar="CSV", help="an export of Motive's, a trial each")
+    parser.add_argument("--session", required=True, type=Path, help="folder that becomes the session")
+    chosen = parser.parse_args(arguments)
+    chosen.session.mkdir(parents=True, exist_ok=True)
+    for path in chosen.exports:
+        poses, log = read_export(path), chosen.session / f"{path.stem}.mcap"
+        write_log(log, poses)
+        seen = 100 * poses.present.mean()
+        print(f"{log}: {len(poses.stamps)} frames of {len(poses.names)} bodies, {seen:.1f} % seen")
+    target = chosen.session / "session.yaml"
+    if not target.exists():
+        target.write_text(propose([survey(log) for log in sorted(chosen.session.glob("*.mcap"))], UP))
+        print(f"{target}: proposed; check each trial's experiment, level and split")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,116 @@
+"""What a log holds, before anybody says what it is: topics, rates, bodies, gaps."""
+
+import re
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.recordings.logs.cdr import short_name
+from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
+from trunkline.recordings.logs.log import Log, Topic, read_log
+from trunkline.recordings.logs.messages import JOINTS, POSES
+from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
+from trunkline.recordings.session.source import COMMAND_WORDS, POSITION_WORDS, TWIN, choose, pose_topics, static_topics
+
+LIVE = "/core/input"  # a topic of a live session alone
+OTHERS = re.compile(r"/headset/|/joint_states$|/joints/command$")  # of people and of the rigid robot
+GAP = 1.5  # median intervals between frames that make a gap
+
+
+@dataclass
+class Survey:
+    """A log and what could be read in it. notes: why something could not. pose_topics: as in `source`."""
+
+    log: Log
+    notes: list[str] = field(default_factory=list)
+    pose_topics: dict[str | None, Topic] = field(default_factory=dict)
+    poses: PoseStream | None = None
+    command_topic: str | None = None
+    commands: JointStream | None = None
+    position_topic: str | None = None
+    tendon_positions: JointStream | None = None
+
+
+def survey(path: Path) -> Survey:
+    """Look through a log.
+
+    Raises:
+        InputError: it cannot be read at all.
+    """
+    found = Survey(read_log(path, POSES.keys() | JOINTS.keys()))
+    arms = _of_the_arm(found.log)
+    try:
+        found.pose_topics = pose_topics(arms, None)
+        if found.pose_topics:
+            found.poses = pose_stream(found.pose_topics, statics=static_topics(found.log))
+    except (InputError, ValueError) as error:
+        found.notes.append(f"poses: {error}")
+    for role, words in (("command", COMMAND_WORDS), ("position", POSITION_WORDS)):
+        try:
+            topic = choose(arms, None, JOINTS, role, words)
+            if topic is not None:
+                stream = joint_stream(topic)
+                setattr(found, f"{role}_topic", topic.name)
+                setattr(found, "commands" if role == "command" else "tendon_positions", stream)
+        except (InputError, ValueError) as error:
+            found.notes.append(f"{role}: {error}")
+    return found
+
+
+def _of_the_arm(log: Log) -> Log:
+    """A live session's log (docs/live_log.md) without the topics that are not the arm's; any other as it is."""
+    if LIVE not in log.topics:
+        return log
+    return replace(log, topics={name: topic for name, topic in log.topics.items() if not OTHERS.match(name)})
+
+
+def describe(found: Survey) -> list[str]:
+    """Lines for people to read."""
+    log = found.log
+    lines = [f"{log.path}"] + [f"  damaged: {damage}" for damage in log.damage]
+    if log.unchecked:
+        lines.append(f"  {log.unchecked} of {log.count} messages without a checksum: bits that flipped there go unseen")
+    width = max((len(name) for name in log.topics), default=0)
+    for topic in sorted(log.topics.values(), key=lambda topic: topic.name):
+        schema = short_name(topic.schema)
+        use = "poses" if schema in POSES else "joints" if schema in JOINTS else "not read"
+        use = "drawn by a twin, not read" if topic.name.endswith(TWIN) else use
+        lines.append(
+            f"  {topic.name:{width}}  {topic.schema or 'no schema'} ({topic.encoding}), {use}: "
+            f"{len(topic.log_times)} messages{_pace(topic.log_times)}"
+        )
+    lines += [f"  {note}" for note in found.notes]
+    if found.poses is not None and len(found.poses.stamps):
+        lines += _bodies(found.poses)
+    return lines
+
+
+def _pace(times: np.ndarray) -> str:
+    """How long and how often; not by the median step, which late deliveries shorten."""
+    seconds = (times[-1] - times[0]) * 1e-9
+    return f" in {seconds:.2f} s, {(len(times) - 1) / seconds:.1f} Hz" if seconds > 0 else ""
+
+
+def _bodies(poses: PoseStream) -> list[str]:
+    """One line a body: how often it is seen, and its gaps."""
+    clock = poses.stamps if poses.stamps.any() else poses.log_times
+    order = np.argsort(clock, kind="stable")
+    time = (clock[order] - clock[order[0]]) * 1e-9
+    interval = np.median(np.diff(time)) if len(time) > 1 else np.inf
+    missing = int(np.sum(np.maximum(np.round(np.diff(time) / interval) - 1, 0))) if interval > 0 else 0
+    oriented = "with" if poses.quaternions is not None else "without"
+    numbers = "" if poses.frames is None else ", with frame numbers"
+    lines = [
+        f"  {len(time)} frames of {len(poses.names)} bodies, {oriented} orientations{numbers}; "
+        f"{missing} frames missing in between; {poses.undecodable} messages unreadable"
+    ]
+    width = max(map(len, poses.names), default=0)
+    for index, name in enumerate(poses.names):
+        seen = time[poses.present[order, index]]
+        gaps = np.diff(seen)
+        gaps = gaps[gaps > GAP * interval]
+        longest = f", {len(gaps)} gaps, the longest {1e3 * gaps.max():.0f} ms" if len(gaps) else ""
+        lines.append(f"    {name:{width}}  seen in {100 * len(seen) / len(time):.1f} %{longest}")
+    return lines

@@ -1,0 +1,311 @@
+"""A session: a folder of MCAP logs and the session.yaml that says what they are."""
+
+import difflib
+import re
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from omegaconf import OmegaConf
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    FiniteFloat,
+    PrivateAttr,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from trunkline.errors import InputError, nearest
+from trunkline.recordings.session.shared_recordings import check_shared
+from trunkline.recordings.trials.experiments import EXPERIMENTS, LOAD, ExperimentName, Level
+from trunkline.recordings.trials.splits import SplitName
+from trunkline.settings import read_yaml
+
+
+def _folder_name(name: str) -> str:
+    if not name or name.startswith(".") or {"/", "\\"} & set(name):
+        raise ValueError(f"found {name!r}, expected the name of a folder, without a path")
+    return name
+
+
+SessionName = Annotated[str, AfterValidator(_folder_name)]
+
+
+def _no_list(found):
+    if isinstance(found, list):
+        names = ", ".join(map(str, found))
+        raise ValueError(
+            f"found a list, expected one folder: move these sessions into one, such as data/raw/arm_7, and write "
+            f"session: arm_7, only: [{names}]"
+        )
+    return found
+
+
+def _each_once(names: list[str]) -> list[str]:
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ValueError(f"found {twice!r} twice, expected each session once")
+    return names
+
+
+OneFolder = Annotated[SessionName, BeforeValidator(_no_list)]
+SomeSessions = Annotated[list[SessionName], AfterValidator(_each_once)]
+Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+
+
+class Entry(BaseModel):
+    """A block of session.yaml; unknown keys are refused."""
+
+    model_config = ConfigDict(extra="forbid")
+
+
+class MocapFrame(Entry):
+    """The motion-capture frame: which way is up in it, and the unit of its positions.
+
+    name: for logs of transforms between several frames, the one that the poses are wanted in; by default the nearest
+    that holds them all. gravity: "none" for an arm that is too light or too stiff to feel it; `up` then only says how
+    the frame is turned.
+    """
+
+    name: str | None = None
+    up: Vector
+    unit: Literal["m", "mm"] = "m"
+    gravity: Literal["standard", "none"] = "standard"
+
+    @model_validator(mode="after")
+    def _direction(self):
+        if np.linalg.norm(self.up) < 1e-6:
+            raise ValueError("up: found the zero vector, expected the direction against gravity")
+        return self
+
+    def up_direction(self) -> np.ndarray:
+        """(3,), a unit vector."""
+        return np.array(self.up) / np.linalg.norm(self.up)
+
+
+class FixedBase(Entry):
+    """Where no body marks the mount: its pose in the motion-capture frame. By default its z axis is up."""
+
+    position: Vector
+    quaternion: tuple[FiniteFloat, FiniteFloat, FiniteFloat, FiniteFloat] | None = None
+
+    @model_validator(mode="after")
+    def _rotation(self):
+        if self.quaternion is not None and np.linalg.norm(self.quaternion) < 1e-6:
+            raise ValueError("quaternion: found norm zero, expected (w, x, y, z) of a rotation")
+        return self
+
+
+class Topics(Entry):
+    """Topic names; what is left out is found by its schema. poses: one topic, or body to topic."""
+
+    poses: str | dict[str, str] | None = None
+    commands: str | None = None
+    tendon_positions: str | None = None
+
+
+UNITS = {"m": 1.0, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180}
+
+
+class Motor(Entry):
+    """What a motor's name in the log stands for, where that is not the pull of one tendon in metres.
+
+    unit: of its numbers. spool_radius: m, of the drum of one that turns. tendons: name in the model to how far the
+    motor winds it in, times what the number says; less than 0 for one that is paid out.
+    """
+
+    unit: Literal["m", "mm", "rad", "deg"]
+    spool_radius: Annotated[FiniteFloat, Field(gt=0, le=1)] | None = None
+    tendons: dict[str, FiniteFloat] = Field(min_length=1)
+
+    @model_validator(mode="after")
+    def _drum(self):
+        turns = self.unit in ("rad", "deg")
+        if turns and self.spool_radius is None:
+            raise ValueError(f"spool_radius: missing, expected that of a motor that counts {self.unit}, m")
+        if not turns and self.spool_radius is not None:
+            raise ValueError(f"spool_radius: found {self.spool_radius}, expected none for a motor that counts "
+                             f"{self.unit}")
+        return self
+
+    @property
+    def metres(self) -> float:
+        """Of cable for each unit of its numbers."""
+        return UNITS[self.unit] * (self.spool_radius or 1.0)
+
+
+class TrialEntry(Entry):
+    """window: s from the log's first pose. level: in the unit of the experiment. load: kg at the tip."""
+
+    name: str = ""
+    file: str
+    window: tuple[FiniteFloat, FiniteFloat] | None = None
+    experiment: ExperimentName
+    level: FiniteFloat | None = None
+    load: FiniteFloat = 0.0
+    split: SplitName
+
+    @field_validator("level", "load", mode="before")
+    @classmethod
+    def _number(cls, value):
+        if isinstance(value, bool):
+            raise ValueError(f"found {str(value).lower()}, expected a number")
+        return value
+
+    @model_validator(mode="after")
+    def _complete(self):
+        if self.window is not None and not self.window[0] < self.window[1]:
+            raise ValueError(f"window: found {list(self.window)}, expected [start, end] with start < end")
+        level = EXPERIMENTS[self.experiment].level
+        if level is not None:
+            if self.level is None:
+                raise ValueError(f"level: missing, expected the nominal level of a {self.experiment}")
+            self._check("level", self.level, level)
+        self._check("load", self.load, LOAD)
+        self.name = self.name or Path(self.file).stem
+        return self
+
+    def _check(self, key: str, value: float, level: Level) -> None:
+        if not level.low <= value <= level.high:
+            expected = f"{level.low:g} to {level.high:g}, the {level.says} of a {self.experiment}"
+            raise ValueError(f"{key}: found {value:g}, expected {expected}")
+
+
+class Session(Entry):
+    """base: the body that marks the mount, or its pose. segments, tendons: name in the log to name in the model.
+
+    bodies: names of the poses, in order, where messages hold them without. A list of tendons does the same for numbers.
+    clock: what dates a pose: its header's stamp, the recorder's log time, or its frame number at the rate
+    that the stamps show. With `log`, commands and tendon positions are dated by it too.
+    motors: name in the log to what it moves, in place of `tendons`, where motors count otherwise than in metres of a
+    tendon's pull, or move several.
+    shared: what is to be said of trials that share data, by trial; see `check_shared`.
+    """
+
+    frame: MocapFrame
+    base: str | FixedBase
+    segments: dict[str, str] | None = Field(default=None, min_length=1)
+    tendons: dict[str, str] | None = Field(default=None, min_length=1)
+    motors: dict[str, Motor] | None = Field(default=None, min_length=1)
+    topics: Topics = Topics()
+    bodies: list[str] | None = Field(default=None, min_length=1)
+    clock: Literal["stamp", "log", "frame"] = "stamp"
+    trials: list[TrialEntry] = Field(min_length=1)
+    _shared: dict[str, list[str]] = PrivateAttr(default_factory=dict)
+
+    def coupling(self) -> tuple[tuple[str, ...], np.ndarray]:
+        """Names of the tendons that `motors` moves, and by how much, m for each unit of a motor's numbers. Shape
+        (tendons, motors)."""
+        motors = list((self.motors or {}).values())
+        names = tuple(dict.fromkeys(name for motor in motors for name in motor.tendons))
+        moved = [[motor.metres * motor.tendons.get(name, 0.0) for motor in motors] for name in names]
+        return names, np.array(moved).reshape(len(names), len(motors))
+
+    @property
+    def shared(self) -> dict[str, list[str]]:
+        return self._shared
+
+    @field_validator("base", mode="before")
+    @classmethod
+    def _name_or_pose(cls, base):
+        if not isinstance(base, str | dict):
+            raise ValueError(f"found {base!r}, expected a body's name, or {{position: [x, y, z]}}")
+        return base
+
+    @field_validator("tendons", mode="before")
+    @classmethod
+    def _by_place(cls, names):
+        return {str(place): name for place, name in enumerate(names, 1)} if isinstance(names, list) else names
+
+    @model_validator(mode="after")
+    def _one_to_one(self):
+        if self.motors is not None and self.tendons is not None:
+            raise ValueError("motors: found it beside `tendons`, expected one of the two")
+        for key in ("segments", "tendons"):
+            names = list((getattr(self, key) or {}).values())
+            twice = next((name for name in names if names.count(name) > 1), None)
+            if twice is not None:
+                raise ValueError(f"{key}: found {twice!r} twice, expected each name of the model once")
+        return self
+
+
+def sessions_in(folder: Path) -> list[str]:
+    """Names of the sessions that a folder holds."""
+    return sorted(file.parent.name for file in folder.glob("[!.]*/session.yaml"))
+
+
+def session_folders(folder: Path, only: list[str] | None = None) -> dict[str, Path]:
+    """Folders of the sessions that are to be read together, by name: of several that `folder` holds all, in the order
+    of their names, or `only` those; else `folder` itself.
+
+    Raises:
+        InputError: `only` names what it does not hold.
+    """
+    inside = [] if (folder / "session.yaml").is_file() else sessions_in(folder)
+    for name in only or []:
+        if name not in inside:
+            there = f"one of the sessions in {folder}: {', '.join(inside)}{nearest(name, inside)}"
+            expected = there if inside else f"none, as {folder} holds no several sessions"
+            raise InputError(f"ingest.only: found {name!r}, expected {expected}")
+    return {name: folder / name for name in only or inside} or {folder.name: folder}
+
+
+def read_session(folder: Path) -> Session:
+    """Read and check `folder`/session.yaml.
+
+    Raises:
+        InputError: naming the file and key, what was found and what was expected.
+    """
+    folder = Path(folder)
+    path = folder / "session.yaml"
+    logs = sorted(log.name for log in folder.glob("*.mcap")) if folder.is_dir() else None
+    if logs is None:
+        there = ", ".join(sessions_in(folder.parent)) or "none yet"
+        raise InputError(f"{folder}: no such folder, expected a session of MCAP logs and a session.yaml; found {there}")
+    if not path.is_file():
+        raise InputError(f"{folder}: found {len(logs)} logs and no session.yaml, expected both")
+    content = OmegaConf.to_container(read_yaml(path), resolve=False)
+    try:
+        session = Session.model_validate(content)
+    except ValidationError as error:
+        raise InputError(f"{path}: {_describe(error)}") from error
+    for index, trial in enumerate(session.trials):
+        if trial.file not in logs:
+            close = difflib.get_close_matches(trial.file, logs, n=1) or logs[:1]
+            expected = f"one of the folder's {len(logs)} logs" + (f", such as {close[0]}" if close else "")
+            raise InputError(f"{path}: trials.{index}.file: found {trial.file!r}, expected {expected}")
+    names = [trial.name for trial in session.trials]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            raise InputError(f"{path}: trials.{index}.name: found {name!r} again, expected each name once")
+    session._shared = check_shared(folder, session.trials)
+    return session
+
+
+def _describe(error: ValidationError) -> str:
+    """The first problem in one line, and how many more there are."""
+    problems = error.errors()
+    # a union reports each of its branches; the deepest says what is wrong within the branch that was meant
+    problem = max(problems, key=lambda p: (p["type"] in ("extra_forbidden", "value_error"), -problems.index(p)))
+    loc = [part for part in problem["loc"] if part != "str" and "FixedBase" not in str(part)]  # pydantic's branches
+    key = ".".join(map(str, loc)) or "the file"
+    more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+    if problem["type"] == "missing":
+        return f"{key}: missing, expected a value{more}"
+    if problem["type"] == "extra_forbidden":
+        valid = [name for block in Entry.__subclasses__() for name in block.model_fields]
+        return f"{key}: unknown key{nearest(str(loc[-1]), valid)}{more}"
+    if problem["type"] == "value_error":
+        key = f"{key}: " if problem["loc"] else ""
+        return f"{key}{problem['msg'].removeprefix('Value error, ')}{more}"
+    expected = problem["msg"].removeprefix("Input should be ")
+    if problem["type"] == "tuple_type":
+        expected = "a list of numbers, such as [0, 1, 0]"
+    if problem["type"] == "literal_error":
+        expected += nearest(str(problem["input"]), re.findall(r"'([^']*)'", expected))
+    return f"{key}: found {problem['input']!r}, expected {expected}{more}"

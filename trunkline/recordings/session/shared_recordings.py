@@ -1,0 +1,58 @@
+"""Trials that share data: one file under two names, or windows of one file that overlap."""
+
+import hashlib
+from itertools import combinations
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from trunkline.errors import InputError
+
+if TYPE_CHECKING:
+    from trunkline.recordings.session.session import TrialEntry
+
+
+def check_shared(folder: Path, trials: list["TrialEntry"]) -> dict[str, list[str]]:
+    """What is to be said of trials of one split that share data, by trial; a sentence each.
+
+    Raises:
+        InputError: trials of different splits share data, so that one split would score what the other fitted.
+    """
+    content = _contents(folder, sorted({trial.file for trial in trials}))
+    said: dict[str, list[str]] = {}
+    for first, second in combinations(trials, 2):
+        if content[first.file] != content[second.file]:
+            continue
+        whole = (float("-inf"), float("inf"))
+        one, other = first.window or whole, second.window or whole
+        if max(one[0], other[0]) >= min(one[1], other[1]):
+            continue
+        one_name = first.file == second.file
+        files = "one file" if one_name else f"{first.file} and {second.file}, which hold the same bytes"
+        windows = "" if first.window is second.window is None else f" in {_window(one)} and {_window(other)}"
+        found = f"trials {first.name} and {second.name} share data: {files}{windows}"
+        if first.split != second.split:
+            expected = "expected no data in two splits"
+            raise InputError(
+                f"{folder / 'session.yaml'}: trials.{trials.index(second)}: {found}; {first.name} is of the split "
+                f"{first.split}, {second.name} of {second.split}, {expected}"
+            )
+        for trial in (first, second):
+            said.setdefault(trial.name, []).append(f"{found}; what they share counts twice in the split {first.split}")
+    return said
+
+
+def _window(window: tuple[float, float]) -> str:
+    return "the whole log" if window[0] == float("-inf") else f"the window [{window[0]:g}, {window[1]:g}] s"
+
+
+def _contents(folder: Path, files: list[str]) -> dict[str, str]:
+    """What tells files apart by what they hold: their names, or a digest where two are of one size."""
+    sizes = {file: (folder / file).stat().st_size for file in files}
+    alike = [size for size in sizes.values() if size]
+    return {file: file_digest(folder / file) if alike.count(size) > 1 else file for file, size in sizes.items()}
+
+
+def file_digest(path: Path) -> str:
+    """Of its bytes, in hexadecimal."""
+    with open(path, "rb") as log:
+        return hashlib.file_digest(log, "sha256").hexdigest()

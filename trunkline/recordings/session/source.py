@@ -1,0 +1,154 @@
+"""One log, decoded: which topics hold the poses and which the tendons."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from trunkline.errors import InputError
+from trunkline.recordings.logs.cdr import short_name
+from trunkline.recordings.logs.joint_stream import JointStream, joint_stream
+from trunkline.recordings.logs.log import Log, Topic, read_log
+from trunkline.recordings.logs.messages import JOINTS, POSES, TOPIC_PER_BODY
+from trunkline.recordings.logs.pose_stream import PoseStream, pose_stream
+from trunkline.recordings.session.session import Session
+
+Stream = TypeVar("Stream")
+STATIC = "tf_static"  # how the topic's name ends
+TWIN = "tf_twin"  # the same, of poses that a model drew and nobody measured (docs/live_log.md)
+COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "position")
+
+
+@dataclass
+class Source:
+    """One log, decoded. log: without its messages, which are decoded. pose_topic: for people to read.
+
+    joint_topics: all whose schema is in `JOINTS`.
+    """
+
+    log: Log
+    pose_topic: str
+    poses: PoseStream
+    commands: JointStream | None
+    tendon_positions: JointStream | None
+    joint_topics: tuple[str, ...]
+
+
+def open_log(path: Path, session: Session) -> Source:
+    """Read and decode a log.
+
+    Raises:
+        InputError: naming the file and the topic, where the poses are missing or the topics are not clear.
+    """
+    log = read_log(path, POSES.keys() | JOINTS.keys())
+    topics = pose_topics(log, session.topics.poses)
+    if not topics:
+        found = ", ".join(f"{t.name} ({t.schema})" for t in log.topics.values()) or "no readable message"
+        wanted = session.topics.poses
+        named = "" if wanted is None else f"{wanted!r} of session.yaml with "
+        damage = f"; the log is damaged: {'; '.join(log.damage)}" if log.damage else ""
+        raise InputError(f"{path}: no pose topic, found {found}{damage}, expected {named}one of {', '.join(POSES)}")
+    name = ", ".join(topic.name for topic in topics.values())
+    where = f"{path}: {name}"
+    poses = _understood(where, pose_stream, topics, session.bodies, session.frame.name, static_topics(log))
+    if poses.unnamed is not None:
+        found = f"found {poses.unnamed} poses without names"
+        raise InputError(f"{where}: {found}, expected `bodies` in session.yaml to name them, in order")
+    if not len(poses.stamps):
+        schema = next(iter(topics.values())).schema
+        names = f" with {len(session.bodies)} `bodies`, as in session.yaml" if session.bodies else ""
+        found = f"no message fits its schema {schema}{names}"
+        if poses.twice is not None:
+            found = f"found {poses.twice!r} twice in a message, expected each body once"
+        raise InputError(f"{where}: {found}")
+    if len(poses.parents) > 1 and session.frame.name is None:
+        found = f"found poses in the frames {', '.join(poses.parents)}, which nothing connects"
+        raise InputError(f"{where}: {found}, expected one, or its name in session.yaml: frame.name")
+    commands = _joints(log, session.topics.commands, "command", COMMAND_WORDS, session)
+    tendon_positions = _joints(log, session.topics.tendon_positions, "tendon position", POSITION_WORDS, session)
+    joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
+    log.topics = {}  # decoded: the raw messages can go
+    return Source(log, name, poses, commands, tendon_positions, joint_topics)
+
+
+def _joints(log: Log, wanted: str | None, role: str, words: tuple[str, ...], session: Session) -> JointStream | None:
+    topic = choose(log, wanted, JOINTS, role, words)
+    if topic is None:
+        return None
+    where = f"{log.path}: {topic.name}"
+    stream = _understood(where, joint_stream, topic)
+    if stream.unnamed is not None and session.tendons is None:
+        found = f"found {stream.unnamed} numbers without names"
+        raise InputError(f"{where}: {found}, expected `tendons` in session.yaml to name them, in order")
+    return stream
+
+
+def pose_topics(log: Log, wanted: str | dict[str, str] | None) -> dict[str | None, Topic]:
+    """The topic of all poses under None, or each body's topic under its name; empty where the log has none."""
+    if isinstance(wanted, dict):
+        chosen = {body: choose(log, name, POSES, "pose") for body, name in wanted.items()}
+        return {body: topic for body, topic in chosen.items() if topic is not None}
+    if wanted is None:
+        single = [topic for topic in _best(log, POSES) if short_name(topic.schema) in TOPIC_PER_BODY]
+        if single:
+            return dict(zip(_names_in(single), single, strict=True))
+    topic = choose(log, wanted, POSES, "pose")
+    if topic is not None and short_name(topic.schema) in TOPIC_PER_BODY:
+        return {topic.name.strip("/"): topic}
+    return {} if topic is None else {None: topic}
+
+
+def static_topics(log: Log) -> list[Topic]:
+    """The topics of transforms that hold all the time."""
+    return [topic for topic in log.topics.values() if topic.name.endswith(STATIC) and short_name(topic.schema) in POSES]
+
+
+def choose(
+    log: Log, name: str | None, registry: dict, role: str, wanted: tuple[str, ...] = ("",)
+) -> Topic | None:
+    """The topic that the session names, or the only one whose schema fits best and whose name tells its role."""
+    if name is not None:
+        topic = log.topics.get(name)
+        if topic is not None and short_name(topic.schema) not in registry:
+            expected = ", ".join(registry)
+            raise InputError(f"{log.path}: {name}: found {topic.schema}, expected a {role} schema: {expected}")
+        return topic
+    told = _best(log, registry, wanted)
+    if len(told) > 1:
+        found = ", ".join(topic.name for topic in told)
+        raise InputError(f"{log.path}: {role} topic: found {found}, expected one, or its name in session.yaml: topics")
+    return told[0] if told else None
+
+
+def _best(log: Log, registry: dict, words: tuple[str, ...] = ("",)) -> list[Topic]:
+    """The topics with one of `words` in their names whose schema is registered first; not what never moves, nor what
+    a model drew."""
+    told = [
+        topic
+        for topic in log.topics.values()
+        if short_name(topic.schema) in registry
+        and any(word in topic.name for word in words)
+        and not topic.name.endswith((STATIC, TWIN))
+    ]
+    rank = list(registry).index
+    first = min((rank(short_name(topic.schema)) for topic in told), default=None)
+    return [topic for topic in told if rank(short_name(topic.schema)) == first]
+
+
+def _names_in(topics: list[Topic]) -> list[str]:
+    """What tells topics apart: `/mocap/base/pose` and `/mocap/tip/pose` are base and tip."""
+    paths = [topic.name.strip("/").split("/") for topic in topics]
+    if len(paths) == 1:
+        return ["/".join(paths[0])]
+    shortest = min(map(len, paths))
+    before = next((i for i in range(shortest) if len({p[i] for p in paths}) > 1), shortest)
+    behind = next((i for i in range(shortest - before) if len({p[-1 - i] for p in paths}) > 1), 0)
+    return ["/".join(path[before : len(path) - behind]) or "/".join(path) for path in paths]
+
+
+def _understood(where: str, read: Callable[..., Stream], *arguments) -> Stream:
+    """What `read` returns; that a topic cannot be read at all becomes the user's business."""
+    try:
+        return read(*arguments)
+    except ValueError as error:
+        raise InputError(f"{where}: {error}") from error

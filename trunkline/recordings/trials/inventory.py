@@ -1,0 +1,118 @@
+"""What was recorded, in words: tilts, releases, pulls and loads by split, and which directions are missing."""
+
+import numpy as np
+
+from trunkline.frames import tilt_of_gravity
+from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, SPLITS
+from trunkline.recordings.trials.trial import Trial, sessions_of
+
+UPRIGHT = np.radians(3)  # of tilt, below which gravity has no direction across the arm
+PULLED = 1e-3  # m, from which on a tendon counts as pulled
+SEVERAL = 0.25  # share of a trial's largest pull, from which on two tendons are pulled together
+WIDEST = 180.0  # deg without a direction, from which on one side of the arm is not seen
+ONE_LINE = 20.0  # deg, within which directions lie in one plane
+
+
+def recorded_lines(trials: list[Trial], splits: tuple[str, ...] = SPLITS) -> list[str]:
+    """A line a kind of experiment: trials of `splits` by split, and over which range, but for those of `test`."""
+    lines = []
+    for kind, told in EXPERIMENTS.items():
+        own = [trial for trial in trials if trial.experiment == kind]
+        if own:
+            counts = [f"{sum(t.split == split for t in own)} {split}" for split in splits]
+            lines.append(f"{told.plural}: {', '.join(counts)}{_range([t for t in own if t.split in DECIDING])}")
+    return lines
+
+
+def recorded_of_each(trials: list[Trial], splits: tuple[str, ...] = SPLITS) -> list[str]:
+    """`recorded_lines`; of several sessions those of each, behind its name."""
+    sessions = sessions_of(trials)
+    if len(sessions) == 1:
+        return recorded_lines(trials, splits)
+    return [
+        f"{session}: {line}"
+        for session in sessions
+        for line in recorded_lines([trial for trial in trials if trial.session == session], splits)
+    ]
+
+
+def _range(own: list[Trial]) -> str:
+    """Over which tilts, pulls and loads."""
+    if not own:
+        return ""
+    said = ""
+    tilts = [np.degrees(tilt_of_gravity(trial.gravity)) for trial in own if trial.gravity.any()]
+    if tilts and max(tilts) > np.degrees(UPRIGHT):
+        found = dict.fromkeys(f"{tilt:.0f}" for tilt in (min(tilts), max(tilts)))
+        said += f"; tilted by {' to '.join(found)}°"
+    pulls = [float(_drawn(trial).max(initial=0)) for trial in own]
+    if max(pulls) > PULLED:
+        said += f"; pulls of up to {1e3 * max(pulls):.0f} mm"
+    loads = sorted({trial.load for trial in own})
+    if loads != [0.0]:
+        said += f"; loads of {', '.join(f'{1e3 * load:.0f}' for load in loads)} g"
+    return said
+
+
+def missing_lines(trials: list[Trial]) -> list[str]:
+    """What the trials to identify from leave out: directions of tilts and releases, tendons, pulls of several."""
+    own = [trial for trial in trials if trial.split == IDENTIFY]
+    tilts = [t.gravity for t in own if t.gravity.any() and tilt_of_gravity(t.gravity) > UPRIGHT]
+    lines = _sides("tilts", np.array([np.arctan2(g[1], g[0]) for g in tilts]), "gravity pulls the arm")
+    releases = [trial for trial in own if EXPERIMENTS[trial.experiment].hangs]
+    lines += _sides("releases", np.array([_bent(trial) for trial in releases]), "the arm is held")
+    return lines + _pulls([trial for trial in own if EXPERIMENTS[trial.experiment].needs_motors])
+
+
+def _sides(what: str, azimuths: np.ndarray, word: str) -> list[str]:
+    """Whether directions (n,), rad, leave out a side of the arm."""
+    if not len(azimuths):
+        return []
+    degrees = np.sort(np.degrees(azimuths) % 360)
+    gaps = np.diff(np.append(degrees, degrees[0] + 360))
+    if gaps.max() < WIDEST:
+        return []
+    if gaps.max() > 360 - ONE_LINE:
+        only = round(float(np.degrees(np.angle(np.mean(np.exp(1j * azimuths))))))
+        return [f"{what}: {word} towards {only}° alone (base +x is 0°)"]
+    middle = (degrees[np.argmax(gaps)] + gaps.max() / 2 + 180) % 360 - 180
+    half = np.degrees(azimuths) % 180
+    turned = np.angle(np.mean(np.exp(2j * np.radians(half)))) / 2
+    apart = np.degrees(np.abs(np.angle(np.exp(2j * (np.radians(half) - turned))) / 2)).max()
+    plane = ", all in one plane" if apart < ONE_LINE / 2 else ""
+    return [f"{what}: {word} to no side within {gaps.max() / 2:.0f}° of {middle:.0f}° (base +x is 0°){plane}"]
+
+
+def _bent(trial: Trial) -> float:
+    """Towards which side the last tracked point is held at the start, from where it ends, rad."""
+    tip = trial.positions[:, np.argmax(np.ptp(trial.positions, axis=0).max(axis=1))]
+    start = int(np.searchsorted(trial.time, trial.start))
+    return float(np.arctan2(*(tip[min(start, len(tip) - 1)] - tip[-1])[1::-1]))
+
+
+def _drawn(trial: Trial) -> np.ndarray:
+    """How far each tendon is drawn in beyond its least, at most, m. Shape (K,)."""
+    return np.maximum(trial.commands, 0).max(axis=0, initial=0)
+
+
+def _pulls(own: list[Trial]) -> list[str]:
+    if not own:
+        return []
+    lines, most = [], np.max([_drawn(trial) for trial in own], axis=0)
+    idle = [name for name, pull in zip(own[0].tendons, most, strict=True) if pull < PULLED]
+    if len(idle) == len(most):
+        if not (pull := most.max(initial=0)):
+            return ["no tendon is pulled; if some were, their sign in session.yaml is wrong"]
+        return [f"no tendon is pulled by more than {1e3 * pull:.2g} mm: is the unit in session.yaml right?"]
+    if idle:
+        lines.append(f"never pulled: {', '.join(idle)}")
+    if max(_at_once(trial) for trial in own) == 1:
+        lines.append("only one tendon is pulled at a time: how several share the load is not seen")
+    return lines
+
+
+def _at_once(trial: Trial) -> int:
+    """How many tendons are pulled together, at most."""
+    pulls = np.maximum(trial.commands, 0)
+    return int((pulls > max(SEVERAL * pulls.max(initial=0), PULLED)).sum(axis=1).max(initial=0))

@@ -1,0 +1,143 @@
+"""A take: one trial as recorded, checked but not filtered, in the motion-capture frame, on its own clocks."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from trunkline.recordings.trials.recording import Recording
+from trunkline.recordings.trials.tables import long_table, pose_table, read_tables, stack, with_sessions
+
+BASE = "base"  # the base body's name in poses.parquet
+
+
+@dataclass(kw_only=True)
+class Take(Recording):
+    """T frames, S segments, K tendons; the motors have Tc commands and Tm measured positions.
+
+    name, experiment, split, level, load: as planned, see `Planned`. segments: S names, tendons: K names, as in the
+    model.
+    up: (3,) unit vector against gravity, 0 where there is none. time: (T,) s from the first frame.
+    positions (T, S, 3) m, quaternions (T, S, 4) wxyz or None, base_positions (T, 3), base_quaternions (T, 4):
+    in the motion-capture frame, NaN where there is no good sample.
+    command_time (Tc,), tendon_time (Tm,): s on the motors' clock, which reads time - clock_offset.
+    commands (Tc, K), tendon_positions (Tm, K): m of pull.
+    repairs: how many `ingest` made in it.
+    """
+
+    up: np.ndarray
+    base_positions: np.ndarray
+    base_quaternions: np.ndarray
+    command_time: np.ndarray
+    tendon_time: np.ndarray
+    clock_offset: float = 0.0
+    repairs: int = 0
+
+
+SCHEMA = pa.schema(
+    {
+        "trial": pa.string(),
+        "experiment": pa.string(),
+        "split": pa.string(),
+        "level": pa.float64(),
+        "load": pa.float64(),
+        "up": pa.list_(pa.float64()),
+        "clock_offset": pa.float64(),
+        "repairs": pa.int64(),
+        "frames": pa.int64(),
+        "commands": pa.int64(),
+        "tendon_positions": pa.int64(),
+        "segments": pa.list_(pa.string()),
+        "tendons": pa.list_(pa.string()),
+        "orientations": pa.bool_(),
+    }
+)
+
+
+def write_takes(folder: Path, takes: list[Take]) -> None:
+    """Write trials.parquet (a row a trial), poses.parquet (a row a frame and body, the base first) and
+    commands.parquet (a row a tendon and time; `stream` is "command" or "position")."""
+    rows, poses, commands = [], [], []
+    for take in takes:
+        rows.append(
+            {
+                "trial": take.name,
+                "experiment": take.experiment,
+                "split": take.split,
+                "level": take.level,
+                "load": take.load,
+                "session": take.session,
+                "up": take.up.tolist(),
+                "clock_offset": float(take.clock_offset),
+                "repairs": take.repairs,
+                "frames": len(take.time),
+                "commands": len(take.command_time),
+                "tendon_positions": len(take.tendon_time),
+                "segments": list(take.segments),
+                "tendons": list(take.tendons),
+                "orientations": take.quaternions is not None,
+            }
+        )
+        quaternions = take.quaternions
+        if quaternions is None:
+            quaternions = np.full((*take.positions.shape[:2], 4), np.nan)
+        positions = np.concatenate([take.base_positions[:, None], take.positions], axis=1)
+        quaternions = np.concatenate([take.base_quaternions[:, None], quaternions], axis=1)
+        poses.append(pose_table(take.name, take.time, (BASE, *take.segments), positions, quaternions))
+        for stream, time, values in (
+            ("command", take.command_time, take.commands),
+            ("position", take.tendon_time, take.tendon_positions),
+        ):
+            table = long_table(take.name, time, "tendon", take.tendons, {"pull": values})
+            commands.append(table.append_column("stream", pa.array([stream] * len(table), pa.string())))
+    folder = Path(folder)
+    schema = with_sessions(SCHEMA, [take.session for take in takes])
+    pq.write_table(pa.Table.from_pylist(rows, schema), folder / "trials.parquet")
+    pq.write_table(pa.concat_tables(poses), folder / "poses.parquet")
+    pq.write_table(pa.concat_tables(commands), folder / "commands.parquet")
+
+
+def read_takes(folder: Path, splits: tuple[str, ...]) -> list[Take]:
+    """The takes of `splits` that `write_takes` wrote into `folder`, in the same order; InputError as `read_tables`."""
+    rows, poses, pulls = read_tables(folder, "ingest")
+    takes, pose_row, pull_row = [], 0, 0
+    for row in rows:
+        shape = (row["frames"], 1 + len(row["segments"]))
+        pose = {key: column[pose_row : pose_row + shape[0] * shape[1]] for key, column in poses.items()}
+        pose_row += shape[0] * shape[1]
+        motors = {}
+        for stream, count in (("command", row["commands"]), ("tendon", row["tendon_positions"])):
+            size = (count, len(row["tendons"]))
+            span = slice(pull_row, pull_row + size[0] * size[1])
+            time = pulls["time"][span].reshape(size)[:, 0] if size[1] else np.empty(0)
+            motors[stream] = time, pulls["pull"][span].reshape(size)
+            pull_row = span.stop
+        positions = stack(pose, ("x", "y", "z"), shape)
+        quaternions = stack(pose, ("qw", "qx", "qy", "qz"), shape)
+        takes.append(
+            Take(
+                name=row["trial"],
+                experiment=row["experiment"],
+                split=row["split"],
+                level=row["level"],
+                load=row["load"],
+                session=row.get("session", ""),
+                up=np.array(row["up"]),
+                time=pose["time"].reshape(shape)[:, 0].copy(),
+                segments=tuple(row["segments"]),
+                positions=positions[:, 1:],
+                quaternions=quaternions[:, 1:] if row["orientations"] else None,
+                base_positions=positions[:, 0],
+                base_quaternions=quaternions[:, 0],
+                tendons=tuple(row["tendons"]),
+                command_time=motors["command"][0],
+                commands=motors["command"][1],
+                tendon_time=motors["tendon"][0],
+                tendon_positions=motors["tendon"][1],
+                clock_offset=row["clock_offset"],
+                repairs=row["repairs"],
+            )
+        )
+    return [take for take in takes if take.split in splits]

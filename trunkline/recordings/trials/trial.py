@@ -1,0 +1,148 @@
+"""A filtered trial: every tracked segment and tendon on one uniform clock, in the base frame.
+
+This is what the identification stages read. Positions in metres in the base frame (origin at the arm's mount,
+arm along -z when straight), quaternions (w, x, y, z), time in seconds from the trial's first frame.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from trunkline.recordings.trials.recording import Recording
+from trunkline.recordings.trials.tables import long_table, pose_table, read_tables, stack, with_sessions
+
+
+@dataclass(kw_only=True)
+class Trial(Recording):
+    """One experiment of T frames, S segments and K tendons.
+
+    name, experiment, split, level, load: as planned, see `Planned`. segments: S names, tendons: K names, as in the
+    model.
+    gravity: (3,) m/s² in the base frame, measured from the base body.
+    time: (T,) s, uniform. A static trial is averaged over time and has T = 1.
+    positions: (T, S, 3) m. quaternions: (T, S, 4) wxyz, hemisphere-continuous; None where the log has none.
+    measured: (T, S) False where a sample was bridged over a gap too long to trust.
+    commands, tendon_positions: (T, K) m of pull from the straight arm's path length, on the same clock.
+    start: s, when it begins: the detected release, or the beginning of the curl cycle; 0 for a static trial.
+    start_sigma: s, standard error of `start`; 0 for a static trial.
+    in_motion: whether the arm moves at `start` already.
+    swaying: whether a hand still moved it when it let go, so that it starts with the velocity that it had before.
+    repairs: how many `ingest` made in it.
+    """
+
+    gravity: np.ndarray
+    measured: np.ndarray
+    start: float = 0.0
+    start_sigma: float = 0.0
+    in_motion: bool = False
+    swaying: bool = False
+    repairs: int = 0
+
+
+def sessions_of(trials: list[Trial]) -> list[str]:
+    """Names of the sessions to which trials belong, in their order; [""] where there is one."""
+    return list(dict.fromkeys(trial.session for trial in trials))
+
+
+def write_trials(folder: Path, trials: list[Trial]) -> None:
+    """Write trials.parquet (a row a trial), poses.parquet (a row a frame and segment) and commands.parquet
+    (a row a frame and tendon) into `folder`, in the order of `trials`."""
+    rows = [
+        {
+            "trial": trial.name,
+            "experiment": trial.experiment,
+            "split": trial.split,
+            "level": trial.level,
+            "load": trial.load,
+            "session": trial.session,
+            "gravity": list(map(float, trial.gravity)),
+            "start": float(trial.start),
+            "start_sigma": float(trial.start_sigma),
+            "in_motion": trial.in_motion,
+            "swaying": trial.swaying,
+            "repairs": trial.repairs,
+            "frames": len(trial.time),
+            "segments": list(trial.segments),
+            "tendons": list(trial.tendons),
+            "orientations": trial.quaternions is not None,
+        }
+        for trial in trials
+    ]
+    schema = pa.schema(
+        {
+            "trial": pa.string(),
+            "experiment": pa.string(),
+            "split": pa.string(),
+            "level": pa.float64(),
+            "load": pa.float64(),
+            "gravity": pa.list_(pa.float64()),
+            "start": pa.float64(),
+            "start_sigma": pa.float64(),
+            "in_motion": pa.bool_(),
+            "swaying": pa.bool_(),
+            "repairs": pa.int64(),
+            "frames": pa.int64(),
+            "segments": pa.list_(pa.string()),
+            "tendons": pa.list_(pa.string()),
+            "orientations": pa.bool_(),
+        }
+    )
+    schema = with_sessions(schema, [trial.session for trial in trials])
+    pq.write_table(pa.Table.from_pylist(rows, schema), Path(folder) / "trials.parquet")
+    poses = [
+        pose_table(t.name, t.time, t.segments, t.positions, t.quaternions).append_column(
+            "measured", pa.array(t.measured.ravel())
+        )
+        for t in trials
+    ]
+    pq.write_table(pa.concat_tables(poses), Path(folder) / "poses.parquet")
+    commands = [
+        long_table(t.name, t.time, "tendon", t.tendons, {"command": t.commands, "position": t.tendon_positions})
+        for t in trials
+    ]
+    pq.write_table(pa.concat_tables(commands), Path(folder) / "commands.parquet")
+
+
+def read_trials(folder: Path, splits: tuple[str, ...]) -> list[Trial]:
+    """The trials of `splits` that `write_trials` wrote into `folder`, in the same order; InputError as `read_tables`.
+
+    Only the stage `score` may ask for the test split.
+    """
+    rows, poses, commands = read_tables(folder, "filter")
+    trials, pose_row, command_row = [], 0, 0
+    for row in rows:
+        shape = (row["frames"], len(row["segments"]))
+        pose = {key: column[pose_row : pose_row + shape[0] * shape[1]] for key, column in poses.items()}
+        pose_row += shape[0] * shape[1]
+        command_shape = (row["frames"], len(row["tendons"]))
+        count = command_shape[0] * command_shape[1]
+        command = {key: column[command_row : command_row + count] for key, column in commands.items()}
+        command_row += count
+        trials.append(
+            Trial(
+                name=row["trial"],
+                experiment=row["experiment"],
+                split=row["split"],
+                level=row["level"],
+                load=row["load"],
+                session=row.get("session", ""),
+                gravity=np.array(row["gravity"]),
+                time=pose["time"].reshape(shape)[:, 0].copy(),
+                segments=tuple(row["segments"]),
+                positions=stack(pose, ("x", "y", "z"), shape),
+                quaternions=stack(pose, ("qw", "qx", "qy", "qz"), shape) if row["orientations"] else None,
+                measured=pose["measured"].reshape(shape),
+                tendons=tuple(row["tendons"]),
+                commands=command["command"].reshape(command_shape),
+                tendon_positions=command["position"].reshape(command_shape),
+                start=row["start"],
+                start_sigma=row["start_sigma"],
+                in_motion=row["in_motion"],
+                swaying=row["swaying"],
+                repairs=row["repairs"],
+            )
+        )
+    return [trial for trial in trials if trial.split in splits]

@@ -1,0 +1,177 @@
+"""The uncertainty of the tip at rest, in the form of the Guide (JCGM 100, 101 and 102).
+
+The measurand is where the tip is, m, in the frame of the tracked base, after slow commands, from whichever side. Its
+estimate is the twin's tip in the middle of what friction can hold. Of every input x_i with standard uncertainty u_i the
+twin gives the sensitivity c_i = ∂tip/∂x_i, and u² = Σ c_i u_i c_j u_j r_ij. The radius within which the tip lies in
+95 of 100 cases is not taken from u but from draws of all inputs at once, through the twin (JCGM 101; a sphere is its
+region of coverage, JCGM 102, 7.6): it is the 95th percentile of the tip's distance from the estimate.
+"""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.report.certificate.arms import Arm, arm_of, arms_with
+from trunkline.report.certificate.discrepancy import Discrepancy, discrepancy
+from trunkline.report.certificate.identified import Identified
+from trunkline.report.certificate.poses import Poses
+
+COVERAGE = 0.95
+FRICTION, LACKING, NOISE = "friction", "what the model lacks", "cameras"
+LEAST = 1e-7  # m, below which an input moves no tip
+
+
+@dataclass
+class Source:
+    """A line of the budget, over N poses.
+
+    Attributes:
+        name: of the input.
+        distribution: in words.
+        uncertainty: standard, in its unit; None where it differs from pose to pose.
+        unit: of the input, and so of the sensitivity, mm over it.
+        degrees: of freedom; infinite where it is known.
+        contributions: c_i u_i, or of a vector its root mean square length, m. Shape (N,).
+    """
+
+    name: str
+    distribution: str
+    uncertainty: float | None
+    unit: str
+    degrees: float
+    contributions: np.ndarray
+
+
+@dataclass
+class Budget:
+    """Of N poses.
+
+    Attributes:
+        tips: the estimate, m. Shape (N, 3).
+        sources: the lines.
+        correlated: what the correlations of the parameters add to u², m². Shape (N,).
+        radius: expanded uncertainty, m: the tip is that near to the estimate in 95 of 100 cases. Shape (N,).
+    """
+
+    tips: np.ndarray
+    sources: list[Source]
+    correlated: np.ndarray
+    radius: np.ndarray
+
+    @property
+    def combined(self) -> np.ndarray:
+        """u, the root mean square distance of the tip from the estimate by the law of propagation, m. Shape (N,)."""
+        squares = sum((source.contributions**2 for source in self.sources), np.zeros(len(self.tips)))
+        return np.sqrt(np.maximum(squares + self.correlated, 0))
+
+
+@dataclass
+class Inputs:
+    """Of a budget.
+
+    Attributes:
+        model: of the twin.
+        parameters: what is known of them.
+        lacking: what the model lacks; None where no held-out trial tells it.
+        noise: of the cameras' tip, standard uncertainty of each coordinate, m.
+    """
+
+    model: mujoco.MjModel
+    parameters: Identified
+    lacking: Discrepancy | None
+    noise: float
+
+
+def held_out(
+    model: mujoco.MjModel, parameters: Identified, noise: float, poses: Poses, residuals: np.ndarray, arms: int,
+    rng: np.random.Generator,
+) -> Discrepancy:
+    """What the model lacks, from how far the tips of held-out poses are from the twin's, m (N,), beside what `arms`
+    draws of the parameters make of them."""
+    arm = arm_of(model)
+    shifts = parameter_shifts(model, parameters, arm, poses, arms, rng)
+    others = 3 * noise**2 + (arm.friction(poses) ** 2).sum(axis=1) / 3 + np.nanmean((shifts**2).sum(axis=2), axis=0)
+    return discrepancy(residuals, arm.ways(poses), others)
+
+
+def parameter_shifts(
+    model: mujoco.MjModel, parameters: Identified, arm: Arm, poses: Poses, draws: int, rng: np.random.Generator
+) -> np.ndarray:
+    """By how far the tip moves with `draws` draws of the parameters, m, NaN where an arm finds no rest. Shape
+    (draws, N, 3)."""
+    if not parameters.names:
+        return np.zeros((draws, len(poses), 3))
+    values, near = parameters.values(parameters.draw(draws, rng)), arm.rest(poses)
+    moved = np.array([other.tips(poses, near.qpos) for other in arms_with(model, values)])
+    return moved - arm.placed(near)
+
+
+def sensitivities(model: mujoco.MjModel, parameters: Identified, arm: Arm, poses: Poses) -> np.ndarray:
+    """By how far the tip moves with a standard uncertainty of each parameter, half the way between a step up and one
+    down, m. Shape (P, N, 3)."""
+    count = len(parameters.names)
+    if not count:
+        return np.zeros((0, len(poses), 3))
+    steps = np.concatenate([np.diag(parameters.deviation), -np.diag(parameters.deviation)])
+    values, near = parameters.values(parameters.estimate + steps), arm.rest(poses).qpos
+    moved = np.array([other.tips(poses, near) for other in arms_with(model, values)])
+    return (moved[:count] - moved[count:]) / 2
+
+
+def budget(inputs: Inputs, poses: Poses, arms: int, each: int, rng: np.random.Generator) -> Budget:
+    """Of the tip in `poses`, by so many draws of the parameters, `each` of them with so many of everything else."""
+    arm, known = arm_of(inputs.model), inputs.parameters
+    tips = arm.tips(poses)
+    friction, ways = arm.friction(poses), arm.ways(poses)
+    moves = sensitivities(inputs.model, known, arm, poses)
+    offsets = np.tile(parameter_shifts(inputs.model, known, arm, poses, arms, rng), (each, 1, 1))
+    draws = arms * each
+    offsets = offsets + rng.uniform(-1, 1, (draws, len(poses), 1)) * friction
+    offsets = offsets + inputs.noise * rng.standard_normal(offsets.shape)
+    if inputs.lacking:
+        offsets = offsets + lacking_draws(inputs.lacking, ways, tips - arm.origin, draws, rng)
+    told = [
+        Source(name, f"t, {degrees:.0f} degrees of freedom", deviation * PARAMETERS[name].scale, _axis_unit(name),
+               degrees, np.linalg.norm(move, axis=1))
+        for name, deviation, degrees, move in zip(known.names, known.deviation, known.degrees, moves, strict=True)
+    ]  # fmt: skip
+    told.append(Source(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3), "half bands", np.inf,
+                       np.linalg.norm(friction, axis=1) / np.sqrt(3)))  # fmt: skip
+    if inputs.lacking:
+        scales = inputs.lacking.rms
+        told.append(Source(LACKING, f"from {inputs.lacking.trials} held-out trials at rest", None, "mm",
+                           inputs.lacking.trials, np.sqrt(ways**2 @ scales**2)))  # fmt: skip
+    every = np.full(len(poses), np.sqrt(3) * inputs.noise)
+    told.append(Source(NOISE, "normal, of each coordinate", inputs.noise * 1e3, "mm", np.inf, every))
+    both = np.einsum("ink,jnk,ij->n", moves, moves, known.correlation - np.eye(len(known.names)))
+    return Budget(tips, told, both, radius_of(offsets))
+
+
+def lacking_draws(
+    lacking: Discrepancy, ways: np.ndarray, arms: np.ndarray, draws: int, rng: np.random.Generator
+) -> np.ndarray:
+    """Draws of what the model lacks, m, across the lines from the mount to the tips. Shape (draws, N, 3).
+
+    Args:
+        ways: g and p, m. Shape (N, 2). arms: from the mount to the tip. Shape (N, 3).
+    """
+    scales = lacking.draw(draws, rng)
+    deviation = np.sqrt(scales**2 @ (ways**2).T / 2)  # of each of both directions
+    across = np.linalg.svd(np.nan_to_num(arms)[:, None, :])[2][:, 1:]  # (N, 2, 3); a twin without rest has no arm
+    normal = rng.standard_normal((draws, len(ways), 2))
+    return deviation[..., None] * np.einsum("dnk,nkx->dnx", normal, across)
+
+
+def radius_of(offsets: np.ndarray) -> np.ndarray:
+    """Within which a tip lies in 95 of 100 draws, m; a draw without a rest counts as far away. From (D, N, 3) to (N,).
+    """
+    distances = np.nan_to_num(np.linalg.norm(offsets, axis=2), nan=np.inf)
+    return np.quantile(distances, COVERAGE, axis=0, method="higher")
+
+
+def _axis_unit(name: str) -> str:
+    """Of what is uncertain of a parameter: a share of itself, or its unit."""
+    parameter = PARAMETERS[name]
+    return parameter.unit if parameter.signed else "relative"

@@ -1,0 +1,217 @@
+"""A certificate from what the pipeline found: errors, parameters, the uncertainty of the tip, and replays."""
+
+import hashlib
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated
+
+import mujoco
+import numpy as np
+from pydantic import Field
+
+from trunkline.errors import InputError
+from trunkline.identification.evaluation.evaluation import Prediction, replay
+from trunkline.identification.results.scoring import fingerprint
+from trunkline.identification.simulate.checks import check_trials
+from trunkline.identification.simulate.experiment import prepare
+from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
+from trunkline.recordings.trials.splits import DECIDING, VALIDATE
+from trunkline.recordings.trials.trial import Trial, sessions_of
+from trunkline.report.certificate.arms import arm_of
+from trunkline.report.certificate.budget import Budget, Inputs, budget, held_out
+from trunkline.report.certificate.coverage import Bring, covered
+from trunkline.report.certificate.facts import error_rows, parameter_facts, uncertainty_facts
+from trunkline.report.certificate.held_out import at_rest, tip_residuals
+from trunkline.report.certificate.identified import identified
+from trunkline.report.certificate.poses import conditions_of, draw_poses, posed
+from trunkline.report.certificate.replays import packed
+from trunkline.report.certificate.words import Use, limits_of, verdict
+from trunkline.settings import Seed
+from trunkline.version import __version__
+
+LIBRARIES = ("mujoco", "numpy", "scipy")
+COMMAND = "dvc repro report"
+FEWEST = 3  # held-out trials at rest, below which nothing is told of what the model lacks
+
+
+@dataclass
+class Asked:
+    """See conf/report/config.yaml."""
+
+    arm: str
+    session: str
+    seed: Seed
+    poses: Annotated[int, Field(ge=1, le=10_000)]
+    arms: Annotated[int, Field(ge=2, le=10_000)]
+    each: Annotated[int, Field(ge=1, le=1000)]
+    covered: Annotated[int, Field(ge=8, le=10_000)]
+    frames: Annotated[int, Field(ge=2, le=10_000)]
+    factor: Annotated[float, Field(ge=1, le=100)]
+    uses: Annotated[list[Use], Field(min_length=1)]
+
+
+@dataclass
+class Certificate:
+    """facts: as facts.json has them. metrics: a few of them. replays: as `packed` has them. shapes: name, measured and
+    simulated points of held-out trials, for a picture."""
+
+    facts: dict
+    metrics: dict
+    replays: dict
+    shapes: list[tuple[str, np.ndarray, np.ndarray]]
+    budget: Budget
+
+
+def certify(
+    asked: Asked, model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict], metrics: dict[str, dict],
+    bring: Bring | None = None,
+) -> Certificate:  # fmt: skip
+    """Of `model`, the last that the stages identified.
+
+    Args:
+        trials: that may decide.
+        tables: parameters.json of the stages that identified, in their order. metrics: of these, and of the stages
+            `score`, `ingest` and `filter`.
+        bring: the arm that the model is of, to see how often its tip is where the certificate says; None for none.
+
+    Raises:
+        InputError: the trials are of another arm, or of another session than the model was fitted to.
+    """
+    check_trials(trials, model)
+    check_fitted(tables, trials)
+    rng = np.random.default_rng(asked.seed)
+    conditions, length = conditions_of(trials), arm_of(model).chain.length
+    inputs = inputs_of(model, trials, tables, metrics["ingest"], asked.arms, rng)
+    poses = draw_poses(arm_of(model).chain, conditions, asked.poses, rng)
+    found = budget(inputs, poses, asked.arms, asked.each, rng)
+    uncertainty = uncertainty_facts(found, conditions, length, asked.arms * asked.each)
+    uncertainty["held_out_trials"] = inputs.lacking.trials if inputs.lacking else 0
+    if inputs.lacking:
+        uncertainty["lacking_pct"] = dict(zip(("of_what_gravity_moves", "of_what_cables_move"),
+                                              100 * inputs.lacking.rms, strict=True))  # fmt: skip
+    if len(sessions := sessions_of(trials)) > 1:
+        uncertainty["mounted_as_in"] = sessions[0]
+    uncertainty["measured"] = None
+    if bring:
+        drawn = draw_poses(arm_of(model).chain, conditions, asked.covered, rng)
+        stated = budget(inputs, drawn, asked.arms, asked.each, rng)
+        uncertainty["measured"] = covered(arm_of(model).chain, drawn, stated, bring, rng).metrics()
+    rows = error_rows({stage: metrics[stage] for stage in tables}, metrics["score"])
+    limits = limits_of(conditions, [trial.load for trial in trials])
+    headline = headline_of(list(tables), metrics)
+    radius = uncertainty["radius_mm"]["median"]
+    prediction = replayed(model, trials, tables, asked.frames)
+    facts = {
+        "arm": {"name": asked.arm, "length_m": length, "segments": len(trials[0].segments), "tendons": model.nu},
+        "session": {
+            "name": asked.session,
+            "recorded": recorded_of_each(trials, DECIDING),
+            "missing": missing_lines(trials),
+        },
+        "verdict": verdict(*headline, asked.uses, asked.factor, radius, limits),
+        "errors": rows,
+        "parameters": parameter_facts(tables),
+        "uncertainty": uncertainty,
+        "data": data_facts(metrics["ingest"], metrics["filter"]),
+        "versions": {"trunkline": __version__} | {name: version(name) for name in LIBRARIES},
+        "trials": digest_of_trials(trials),
+        "command": COMMAND,
+    }
+    numbers = {"radius_mm": uncertainty["radius_mm"], "combined_mm": uncertainty["combined_mm"],
+               "held_out_trials": uncertainty["held_out_trials"], "without_rest": uncertainty["without_rest"],
+               "open": sum(len(stage["open"]) for stage in facts["parameters"].values())}  # fmt: skip
+    if uncertainty["measured"]:
+        numbers["coverage"] = uncertainty["measured"]
+    replays = packed(prediction, model, trials[0].segments)
+    return Certificate(facts, numbers, replays, held_out_shapes(prediction), found)
+
+
+def inputs_of(
+    model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict], ingested: dict, arms: int,
+    rng: np.random.Generator,
+) -> Inputs:  # fmt: skip
+    """Of the budget. ingested: metrics of the stage `ingest`."""
+    parameters, noise = identified(tables), ingested["position_noise_mm"] / 1e3
+    rested = at_rest(trials)
+    tip = replay(model, [], trials[0].segments).tip
+    residuals = tip_residuals(model, rested, tip)
+    told = np.isfinite(residuals)
+    lacking = None
+    if told.sum() >= FEWEST:
+        lacking = held_out(model, parameters, noise, posed(rested, model)[told], residuals[told], arms, rng)
+    return Inputs(model, parameters, lacking, noise)
+
+
+def check_fitted(tables: dict[str, dict], trials: list[Trial]) -> None:
+    """Refuse a model that was fitted to trials of another session."""
+    known = {trial.name: fingerprint(trial) for trial in trials}
+    for stage, table in tables.items():
+        for name, digest in table["fitted_to"].items():
+            if known.get(name) != digest:
+                found = f"trial {name} with digest {known[name]}" if name in known else f"no trial {name}"
+                raise InputError(
+                    f"artifacts/{stage}/parameters.json: fitted to trial {name} with digest {digest}, found {found} in "
+                    "data/processed/filter, expected the session that the model was fitted to: run `dvc repro`"
+                )
+
+
+def headline_of(stages: list[str], metrics: dict[str, dict]) -> tuple[str, dict, dict]:
+    """Which trials the verdict is of, in words, and of them the errors of the twin and of the mean shape at rest: those
+    of the last stage that was scored, or else of the last one's trials for choices."""
+    for stage in reversed(stages):
+        for split, errors in metrics["score"].get(stage, {}).get("identified", {}).items():
+            return f"On trials that decided nothing ({split})", errors, metrics["score"][stage]["null"][split]
+    own = metrics[stages[-1]]
+    return f"On trials that no fit has seen ({VALIDATE})", own["identified"][VALIDATE], own["null"][VALIDATE]
+
+
+def replayed(model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict], frames: int) -> Prediction:
+    """What the model says of the trials that it was compared with when it was identified."""
+    compared = list(tables.values())[-1]["compared"]
+    kinds = {kind for table in tables.values() for kind in table["compared"]["experiments"]}
+    delay = compared["command_delay"]
+    experiments = [prepare(trial, model, frames, delay) for trial in trials if trial.experiment in kinds]
+    return Prediction(replay(model, experiments, trials[0].segments), experiments)
+
+
+def held_out_shapes(prediction: Prediction) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    """Of each held-out trial the frame in which the arm is furthest from straight, the widest trials first."""
+    rows = []
+    order = np.argsort(np.linalg.norm(prediction.replay.straight, axis=1))
+    for experiment, positions in zip(prediction.experiments, prediction.replay.positions, strict=True):
+        if experiment.split == VALIDATE:
+            away = np.linalg.norm(positions[:, order[-1]] - prediction.replay.straight[order[-1]], axis=-1)
+            frame = int(np.nanargmax(away))
+            seen = np.where(experiment.measured[frame][:, None], experiment.positions[frame], np.nan)
+            whole = [np.concatenate([np.zeros((1, 3)), points[order]]) for points in (seen, positions[frame])]
+            rows.append((float(away[frame]), (experiment.name, *whole)))
+    return [row for _, row in sorted(rows, key=lambda row: -row[0])]
+
+
+def data_facts(ingested: dict, filtered: dict) -> dict:
+    """What the first two stages say of the logs."""
+    keys = ("trials", "refused", "coverage", "dropped_frames", "gaps", "longest_gap_ms", "rate_hz", "position_noise_mm",
+            "orientation_noise_deg", "clock_uncertainty_ms", "warnings")  # fmt: skip
+    found = {key: ingested[key] for key in keys if ingested.get(key) is not None}
+    found["repairs"] = ingested["repairs"]["total"]
+    return found | {key: filtered[key] for key in ("gap_share", "filled_share") if key in filtered}
+
+
+def digest_of_trials(trials: list[Trial]) -> str:
+    """Of all trials' positions to the micrometre."""
+    return hashlib.sha256("".join(fingerprint(trial) for trial in trials).encode()).hexdigest()[:16]
+
+
+def digests(files: list[Path]) -> dict[str, str]:
+    """SHA-256 of files, by their paths."""
+    return {path.as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def digest_of_code(root: Path, parts: list[str]) -> str:
+    """SHA-256 of all files of `parts`, files or folders in `root`, with their paths; not of what Python keeps there."""
+    total = hashlib.sha256()
+    inside = {file for part in parts for file in (root / part, *(root / part).rglob("*")) if file.is_file()}
+    for name in sorted(file.relative_to(root).as_posix() for file in inside if "__pycache__" not in file.parts):
+        total.update(name.encode() + b"\0" + (root / name).read_bytes() + b"\0")
+    return total.hexdigest()

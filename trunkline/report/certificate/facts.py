@@ -1,0 +1,99 @@
+"""All that a certificate says, as one plain dictionary: facts.json, and what the page shows."""
+
+import numpy as np
+
+from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.report.certificate.budget import COVERAGE, LEAST, Budget
+from trunkline.report.certificate.poses import Conditions
+from trunkline.report.certificate.words import certainty_words, open_lines, strong_pairs, telling
+
+SHOWN = ("identified", "cad", "null", "null_straight", "noise_floor")  # models of the table of errors
+ERRORS = ("e_position_mm", "e_position_pct", "e_tip_mm", "e_tip_pct")
+
+
+def error_rows(stages: dict[str, dict], scored: dict[str, dict]) -> list[dict]:
+    """The errors of every stage's model, by split and, within it, by kind: all together first.
+
+    Args:
+        stages: metrics of the identification stages by name, with the splits that they may read. scored: of the stage
+            `score`, by the same names, with the other one.
+    """
+    rows = []
+    for stage, own in stages.items():
+        for metrics in (own, scored.get(stage, {})):
+            for split in metrics.get("identified", {}):
+                whole = {name: metrics[name][split] for name in SHOWN if split in metrics.get(name, {})}
+                kinds = [None, *whole["identified"]["by_experiment"]]
+                for kind in kinds if len(kinds) > 2 else kinds[1:]:
+                    found = {name: one if kind is None else one["by_experiment"].get(kind, {})
+                             for name, one in whole.items()}  # fmt: skip
+                    errors = {LABELS[name]: {key: one[key] for key in ERRORS if key in one}
+                              for name, one in found.items() if "e_position_mm" in one}  # fmt: skip
+                    trials = found["identified"]["trials"]
+                    rows.append({"stage": stage, "split": split, "kind": kind, "trials": trials, "errors": errors})
+    return rows
+
+
+def parameter_facts(tables: dict[str, dict]) -> dict[str, dict]:
+    """By stage: values with their intervals, of several sessions also what all but the first have for themselves; what
+    trades off, what is told least, and what is open."""
+    found = {}
+    for stage, table in tables.items():
+        rows = {
+            key: {name: _told(name, row) for name, row in table[key].items()}
+            for key in ("parameters", "per_session")
+            if key in table
+        }
+        found[stage] = rows | {
+            "trials": len(table["fitted_to"]),
+            "weakest_direction": table["weakest_direction"],
+            "hardly_told_apart": strong_pairs(table),
+            "correlation": table["correlation"],
+            "open": open_lines(table),
+        }
+    return found
+
+
+def _told(name: str, row: dict) -> dict:
+    keys = ("value", "unit", "interval_95_given_model", "range", "at_bound", "undetermined")
+    return {key: row[key] for key in keys} | {"words": certainty_words(name, row), "told_by": telling(name)}
+
+
+def uncertainty_facts(found: Budget, conditions: Conditions, length: float, draws: int) -> dict:
+    """The budget over its poses: of each line the root mean square of its contributions, mm."""
+    known = np.isfinite(found.radius)
+    radius = found.radius[known] * 1e3
+    lines = []
+    still = [source.name for source in found.sources if source.contributions.max(initial=0) < LEAST]
+    for source in (source for source in found.sources if source.name not in still):
+        share = _rms(source.contributions[known]) * 1e3
+        spread = source.uncertainty
+        lines.append(
+            {
+                "source": source.name,
+                "distribution": source.distribution,
+                "standard_uncertainty": spread,
+                "unit": source.unit,
+                "sensitivity_mm": None if spread is None else share / spread,
+                "contribution_mm": share,
+            }
+        )
+    combined = _rms(found.combined[known]) * 1e3
+    correlated = float(np.mean(found.correlated[known])) * 1e6
+    return {
+        "coverage": COVERAGE,
+        "poses": len(found.radius),
+        "without_rest": int((~known).sum()),
+        "draws": draws,
+        "conditions": vars(conditions),
+        "radius_mm": {"median": np.median(radius), "p95": np.quantile(radius, 0.95), "max": radius.max()},
+        "radius_pct": {"median": np.median(radius) / length / 10},
+        "combined_mm": combined,
+        "correlations_mm2": correlated,
+        "lines": lines,
+        "move_no_tip": still,
+    }
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))

@@ -1,0 +1,32 @@
+"""How far the twin's tip is from the measured one in the held-out trials at rest."""
+
+import mujoco
+import numpy as np
+
+from trunkline.identification.evaluation.evaluation import segment_positions
+from trunkline.identification.parameters.per_session import model_in
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.splits import VALIDATE
+from trunkline.recordings.trials.trial import Trial, sessions_of
+from trunkline.report.certificate.arms import arm_of
+from trunkline.report.certificate.poses import posed
+
+
+def at_rest(trials: list[Trial]) -> list[Trial]:
+    """Of `trials` those held out, at rest, without a load, that were seen."""
+    own = [t for t in trials if t.split == VALIDATE and is_static(t.experiment) and not t.load]
+    return [t for t in own if t.measured[-1].any()]
+
+
+def tip_residuals(model: mujoco.MjModel, trials: list[Trial], tip: int) -> np.ndarray:
+    """Distances of the twin's segment of number `tip` from where `trials` at rest saw it, m, NaN where they did not.
+    Shape (N,)."""
+    lengths = np.full(len(trials), np.nan)
+    for session in sessions_of(trials):
+        own, places = model_in(session, model), [i for i, trial in enumerate(trials) if trial.session == session]
+        found = arm_of(own).rest(posed([trials[i] for i in places], own))
+        for i, qpos, rested in zip(places, found.qpos, found.converged, strict=True):
+            if rested and trials[i].measured[-1, tip]:
+                place = segment_positions(own, trials[i].segments, qpos)[tip]
+                lengths[i] = np.linalg.norm(place - trials[i].positions[-1, tip])
+    return lengths

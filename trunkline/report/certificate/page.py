@@ -1,0 +1,264 @@
+"""The certificate as one page that opens from disk and asks nothing of any network.
+
+What reads and prints stands in the page as HTML. `page/viewer.js` and `page/page.css`, which `make client` builds from
+`client/src/certificate/`, add the replay.
+"""
+
+import base64
+import json
+from html import escape
+from pathlib import Path
+
+from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.recordings.trials.experiments import EXPERIMENTS
+
+ASSETS = Path(__file__).parent / "page"
+POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+BESIDE = [LABELS[name] for name in ("identified", "cad", "null", "noise_floor")]
+SPEEDS = (0.1, 0.25, 0.5, 1, 2)
+
+
+def page(facts: dict, replays: dict, pictures: dict[str, bytes]) -> str:
+    """The page of `facts`, as `certify` gives them.
+
+    Args:
+        replays: as `packed` gives them.
+        pictures: PNGs: "uncertainty" and "poses".
+    """
+    parts = [_first(facts), _errors(facts), _replay(pictures), _parameters(facts), _uncertainty(facts, pictures)]
+    parts += [_data(facts), _versions(facts), _signature()]
+    title = escape(f"Calibration certificate: {facts['arm']['name']}, session {facts['session']['name']}")
+    told = json.dumps(replays, separators=(",", ":")).replace("<", "\\u003c")
+    script = (ASSETS / "viewer.js").read_text(encoding="utf-8").replace("</script", "<\\/script")
+    style = (ASSETS / "page.css").read_text(encoding="utf-8")
+    return (
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<title>{title}</title>\n'
+        f'<link rel="icon" href="data:,">\n<style>\n{style}</style>\n</head>\n<body>\n'
+        f"{''.join(parts)}"
+        f'<script type="application/json" id="replays">{told}</script>\n'
+        f'<script type="module">\n{script}</script>\n</body>\n</html>\n'
+    )
+
+
+def _first(facts: dict) -> str:
+    arm, session = facts["arm"], facts["session"]
+    rows = {
+        "Arm": f"{arm['name']}; {1e3 * arm['length_m']:.0f} mm, {arm['tendons']} tendons, "
+        f"{arm['segments']} segments tracked",
+        "Session": f"{session['name']}; {'; '.join(session['recorded'])}",
+    }
+    return (
+        f'<header>\n<p class="kind">Calibration certificate</p>\n<h1>{escape(arm["name"])}, session '
+        f"{escape(session['name'])}</h1>\n</header>\n<main>\n<p class=\"verdict\">{escape(facts['verdict'])}</p>\n"
+        f"{_list(rows)}"
+    )
+
+
+def _errors(facts: dict) -> str:
+    head = ["model of", "split", "trials", *BESIDE]
+    whole = [row for row in facts["errors"] if row["kind"] is None or _lone(facts, row)]
+    table = [_error_row(row, whole=False) for row in whole]
+    every = [_error_row(row, whole=row["kind"] is None) for row in facts["errors"]]
+    caption = "Position error over all segments / of the tip, mm (the former in % of length), mean over trials"
+    note = (
+        "<p class=\"quiet\">Nothing was fitted to the trials of test; choices are made on those of validate. The noise "
+        "floor is what noise and the fit of a pose leave by themselves.</p>\n"
+    )
+    return (
+        f"<h2>Errors</h2>\n{_table(caption, head, table)}{note}"
+        f"<details>\n<summary>By kind of experiment</summary>\n{_table(caption, head, every)}</details>\n"
+    )
+
+
+def _lone(facts: dict, row: dict) -> bool:
+    """Whether a kind is all that a stage has in a split."""
+    same = [one for one in facts["errors"] if (one["stage"], one["split"]) == (row["stage"], row["split"])]
+    return len(same) == 1
+
+
+def _error_row(row: dict, whole: bool) -> tuple[bool, list[str]]:
+    kind = "all kinds" if row["kind"] is None else EXPERIMENTS[row["kind"]].plural
+    cells = []
+    for label in BESIDE:
+        found = row["errors"].get(label)
+        if not found:
+            cells.append("–")
+            continue
+        tip = f" / {found['e_tip_mm']:.3g}" if "e_tip_mm" in found else ""
+        cells.append(f"{found['e_position_mm']:.3g}{tip} ({found['e_position_pct']:.2g} %)")
+    return whole, [row["stage"], row["split"], f"{row['trials']} {kind}", *cells]
+
+
+def _replay(pictures: dict[str, bytes]) -> str:
+    speeds = "".join(f'<option value="{speed}">{speed} ×</option>' for speed in SPEEDS)
+    speeds = speeds.replace('value="1"', 'value="1" selected')
+    return f"""<h2>Replay</h2>
+<p class="screen" id="replay-note">Measured (orange) and simulated arm; the simulated one is coloured by how far each
+point is from where it was measured, white where that was not seen. Trials of the split that is kept for the score are
+not shown.</p>
+<div id="player">
+<div class="bar"><label>Trial <select id="trial"></select></label>
+<fieldset><legend>Arms</legend><label><input type="radio" name="layout" value="over" checked> overlaid</label>
+<label><input type="radio" name="layout" value="beside"> side by side</label></fieldset></div>
+<div id="stage"><canvas id="view" tabindex="0" role="img" aria-label="The arm in three dimensions. Arrow keys turn it,
+plus and minus come nearer and go away, space plays."></canvas>
+<span id="left" hidden>measured</span><span id="right" hidden>simulated</span></div>
+<div class="bar"><button type="button" id="play">Play</button>
+<input type="range" id="scrubber" min="0" max="0" step="1" value="0" aria-label="Time">
+<label>Speed <select id="speed">{speeds}</select></label></div>
+<div class="bar"><output id="now"></output><span class="quiet">Error: 0 <span id="scale"></span>
+<span id="largest"></span></span><span class="quiet">Drag, or arrow keys, +, − and space on the picture</span></div>
+</div>
+<figure class="still"><img src="{_png(pictures["poses"])}" alt="Measured and simulated shapes of held-out trials at
+their widest, each seen from the side to which it bends"><figcaption>Held-out trials at their widest, measured and
+simulated.</figcaption></figure>
+"""
+
+
+def _parameters(facts: dict) -> str:
+    parts = ["<h2>Parameters</h2>\n"]
+    for stage, told in facts["parameters"].items():
+        rows = []
+        for name, row in (told["parameters"] | told.get("per_session", {})).items():
+            low, high = row["interval_95_given_model"]
+            state = "on a bound" if row["at_bound"] else "undetermined" if row["undetermined"] else ""
+            rows.append((False, [name, f"{row['value']:.4g}", f"{low:.4g} … {high:.4g}", row["unit"] or "–",
+                                 f"{row['words']}{f'; {state}' if state else ''}"]))  # fmt: skip
+        caption = f"From {told['trials']} trials; intervals of 95 %, given the model"
+        table = _table(caption, ["parameter", "value", "interval", "unit", "in words"], rows)
+        parts.append(f"<h3>{stage}</h3>\n{table}")
+        sentences = [f"What the trials tell least: {told['weakest_direction']}."]
+        sentences += [f"Hardly told apart: {pair}." for pair in told["hardly_told_apart"]]
+        sentences += [f"{line}." for line in told["open"]] or ["Nothing is on a bound or undetermined."]
+        parts.append(f"<ul>{''.join(f'<li>{escape(line)}</li>' for line in sentences)}</ul>\n")
+        names = list(told["parameters"])
+        matrix = [(False, [a, *(f"{told['correlation'][a][b]:+.2f}" for b in names)]) for a in names]
+        table = _table("Correlations of the estimates", ["", *names], matrix)
+        parts.append(f"<details>\n<summary>Correlations, {stage}</summary>\n{table}</details>\n")
+    missing = facts["session"]["missing"]
+    if missing:
+        listed = "".join(f"<li>{escape(line)}</li>" for line in missing)
+        parts.append(f"<h3>What the session's trials leave out</h3>\n<ul>{listed}</ul>\n")
+    return "".join(parts)
+
+
+def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
+    told = facts["uncertainty"]
+    radius, where = told["radius_mm"], told["conditions"]
+    rows = []
+    for line in told["lines"]:
+        spread = "–" if line["standard_uncertainty"] is None else f"{line['standard_uncertainty']:.3g}"
+        slope = "–" if line["sensitivity_mm"] is None else f"{line['sensitivity_mm']:.3g}"
+        rows.append((False, [line["source"], line["distribution"], spread, line["unit"] or "–", slope,
+                             f"{line['contribution_mm']:.2f}"]))  # fmt: skip
+    rows.append((True, ["combined, with correlations", "", "", "", "", f"{told['combined_mm']:.2f}"]))
+    head = ["source", "distribution", "standard uncertainty", "unit", "sensitivity, mm a unit", "contribution, mm"]
+    caption = f"Root mean squares over {told['poses']} poses"
+    still = ""
+    if told["move_no_tip"]:
+        still = f'<p class="quiet">No tip at rest moves with {escape(", ".join(told["move_no_tip"]))}.</p>\n'
+    lacking = "Too few held-out trials at rest tell what the model lacks: it is not in here."
+    if count := told["held_out_trials"]:
+        lacking = f"What the model lacks, which no interval holds, is taken from the {count} held-out trials at rest."
+    mounted = ""
+    if session := told.get("mounted_as_in"):
+        mounted = f" It is of the arm as it was mounted in the session {escape(session)}."
+    pulled = (
+        f"pulls of up to {1e3 * where['pull']:.0f} mm, together {1e3 * where['pulls']:.0f} mm, with the mount tilted "
+        f"by up to {where['pulled_tilt_deg']:.1f}°; no pull, with the mount tilted by up to {where['tilt_deg']:.0f}°"
+    )
+    return (
+        f"<h2>Uncertainty of the tip</h2>\n<p>At rest the tip is within <strong>{radius['median']:.3g} mm</strong> of "
+        f"the twin's in 95 of 100 cases in the median pose, within {radius['p95']:.3g} mm in 95 of 100 poses. That is "
+        f"the expanded uncertainty, from {told['draws']} draws of all sources through the model (JCGM 100, 101, 102). "
+        f"{lacking} It holds for what the session's trials at rest went up to: {pulled}.{mounted}</p>\n"
+        f"<p>{escape(_measured(told))}</p>\n"
+        f"{_table(caption, head, rows)}{still}"
+        f'<figure><img src="{_png(pictures["uncertainty"])}" alt="Tips at rest over the workspace from two sides, '
+        f'coloured by their expanded uncertainty, {radius["median"]:.3g} mm in the median, at most '
+        f'{radius["max"]:.3g} mm">'
+        "<figcaption>Expanded uncertainty of the tip over the workspace, the mount at the square.</figcaption>"
+        "</figure>\n"
+    )
+
+
+def _measured(told: dict) -> str:
+    """How often the arm's tip was within the radius, beside how often it is to be."""
+    stated, measured = f"{100 * told['coverage']:.0f} %", told["measured"]
+    if measured is None:
+        return f"Whether {stated} of tips are within it, the arm itself was not asked: not measured."
+    parts = {"poses that no trial has": measured} | (
+        {"poses with a pull": measured["pulled"]} if "pulled" in measured else {}
+    )
+    shares = [
+        f"in {100 * part['share']:.1f} % of {part['poses']} {words} (95 % interval {100 * part['low']:.0f} to "
+        f"{100 * part['high']:.0f} %)"
+        for words, part in parts.items()
+    ]
+    return f"Measured on the arm itself, beside the stated {stated}: its tip was within it {', '.join(shares)}."
+
+
+def _data(facts: dict) -> str:
+    told = facts["data"]
+    words = {
+        "trials": "trials", "refused": "trials refused", "repairs": "repairs", "warnings": "warnings",
+        "coverage": "share of frames that were seen", "dropped_frames": "frames dropped", "gaps": "gaps",
+        "longest_gap_ms": "longest gap, ms", "gap_share": "share of samples in gaps",
+        "filled_share": "share of samples filled", "rate_hz": "rate of the cameras, Hz",
+        "position_noise_mm": "noise of positions, mm", "orientation_noise_deg": "noise of orientations, °",
+        "clock_uncertainty_ms": "uncertainty of the clocks' offset, ms",
+    }  # fmt: skip
+    return f"<h2>Data quality</h2>\n{_list({words[key]: f'{told[key]:.4g}' for key in words if key in told})}"
+
+
+def _versions(facts: dict) -> str:
+    files = {f"SHA-256 of {path}": digest for path, digest in facts["files"].items()}
+    made = {"SHA-256 of the code": facts["code"], "digest of the trials": facts["trials"]}
+    told = facts["versions"] | made | files
+    rows = [(False, [name, found]) for name, found in told.items()]
+    table = _table("Versions and digests", ["what", "is"], rows, "code")
+    return f"<h2>How it was made</h2>\n<p>To make it again: <code>{escape(facts['command'])}</code></p>\n{table}"
+
+
+def _signature() -> str:
+    fields = "".join(f"<div>{name}</div>" for name in ("Laboratory", "Name", "Date", "Signature"))
+    return f'<h2>Signed for the laboratory</h2>\n<div class="signature">{fields}</div>\n</main>\n'
+
+
+def _list(rows: dict[str, str]) -> str:
+    return f"<dl>{''.join(f'<dt>{escape(name)}</dt><dd>{escape(said)}</dd>' for name, said in rows.items())}</dl>\n"
+
+
+def _table(caption: str, head: list[str], rows: list[tuple[bool, list[str]]], last: str = "") -> str:
+    """A table that scrolls by itself where it is too wide.
+
+    Args:
+        rows: whether one stands out, and its cells. last: the element that the last cell is put in.
+    """
+    heads = "".join(f'<th scope="col"{_wrapped(name)}>{escape(name)}</th>' if name else "<td></td>" for name in head)
+    lines = []
+    for whole, (first, *cells) in rows:
+        marked = ' class="whole"' if whole else ""
+        inside = [""] * (len(cells) - 1) + [last]
+        parts = [_cell(*cell) for cell in zip(cells, head[1:], inside, strict=True)]
+        lines.append(f'<tr{marked}><th scope="row">{escape(first)}</th>{"".join(parts)}</tr>')
+    label = escape(caption, quote=True)
+    return (
+        f'<div class="table" role="group" tabindex="0" aria-label="{label}"><table>'
+        f"<caption>{escape(caption)}</caption><thead><tr>{heads}</tr></thead><tbody>{''.join(lines)}</tbody></table></div>\n"
+    )
+
+
+def _cell(text: str, head: str, inside: str) -> str:
+    shown = f"<{inside}>{escape(text)}</{inside}>" if inside else escape(text)
+    return f"<td{_wrapped(head)}>{shown}</td>"
+
+
+def _wrapped(head: str) -> str:
+    return ' class="wrap"' if head in ("in words", "distribution", "is") else ""
+
+
+def _png(picture: bytes) -> str:
+    return f"data:image/png;base64,{base64.b64encode(picture).decode()}"

@@ -1,0 +1,107 @@
+"""The poses that a certificate is for: at rest, under commands and a tilt as large as the session has them."""
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from trunkline.frames import STANDARD_GRAVITY, tilt_of_gravity
+from trunkline.identification.parameters.per_session import model_in
+from trunkline.identification.simulate.experiment import SLACK, commanded_lengths
+from trunkline.kinematics.dataset.sampling import around_the_arm
+from trunkline.model.elements import actuators
+from trunkline.model.simulation.rest import base_frame
+from trunkline.model.statics.chain import Chain
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.trial import Trial
+
+PULLED = 1e-3  # m, from which on a tendon counts as pulled
+LOOSE_EVERY = 5  # poses of which one is without a pull
+
+
+@dataclass
+class Conditions:
+    """Of the session's trials at rest, none of the split test: what they went up to.
+
+    tilt_deg: of the mount. pulled_tilt_deg: of the mount while a motor pulled. pull: of one motor, m. pulls: of all
+    motors together, m.
+    """
+
+    tilt_deg: float
+    pulled_tilt_deg: float
+    pull: float
+    pulls: float
+
+
+@dataclass
+class Poses:
+    """What N poses at rest are asked for with.
+
+    gravity: m/s², base frame. Shape (N, 3). commands: path lengths to which the motors are sent, m. Shape (N, K).
+    """
+
+    gravity: np.ndarray
+    commands: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.gravity)
+
+    def __getitem__(self, rows) -> "Poses":
+        return Poses(self.gravity[rows], self.commands[rows])
+
+
+def conditions_of(trials: list[Trial]) -> Conditions:
+    """What the trials at rest without a load among `trials` went up to."""
+    rested = [trial for trial in trials if is_static(trial.experiment) and not trial.load]
+    tilts = [(float(np.degrees(tilt_of_gravity(t.gravity))) if t.gravity.any() else 0.0, _pulls(t)) for t in rested]
+    return Conditions(
+        tilt_deg=max((tilt for tilt, _ in tilts), default=0.0),
+        pulled_tilt_deg=max((tilt for tilt, pulls in tilts if pulls.max(initial=0) > PULLED), default=0.0),
+        pull=max((float(pulls.max(initial=0)) for _, pulls in tilts), default=0.0),
+        pulls=max((float(pulls.sum(axis=1).max()) for _, pulls in tilts), default=0.0),
+    )
+
+
+def _pulls(trial: Trial) -> np.ndarray:
+    """What each motor draws in, m. Shape (T, K)."""
+    return np.maximum(trial.commands, 0) if trial.commands.size else np.zeros((1, 0))
+
+
+def posed(trials: list[Trial], model: mujoco.MjModel) -> Poses:
+    """The poses of trials at rest, the last one of each, with gravity as the mount of `model` has it."""
+    order = actuators(model)
+    commands = [commanded_lengths(trial, model)[-1][order] for trial in trials]
+    gravity = np.array([_gravity(trial, model) for trial in trials]).reshape(-1, 3)
+    return Poses(gravity, np.array(commands).reshape(-1, model.nu))
+
+
+def _gravity(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
+    """What pulled at the arm in a trial, base frame of the session whose mount `model` has, m/s². Shape (3,)."""
+    own = model_in(trial.session, model)
+    if own is model:
+        return trial.gravity
+    return base_frame(model)[1] @ base_frame(own)[1].T @ trial.gravity
+
+
+def draw_poses(chain: Chain, conditions: Conditions, count: int, rng: np.random.Generator) -> Poses:
+    """Poses within `conditions`, everything drawn evenly.
+
+    In most of them one or two neighbouring motors pull, the others are slack, and the mount is tilted as far as it was
+    in trials with a pull; in the others, one in `LOOSE_EVERY`, all are slack and the mount is tilted as far as it ever
+    was. To any side.
+    """
+    pulled = (rng.random(count) >= 1 / LOOSE_EVERY) & (conditions.pull > PULLED)
+    largest = np.where(pulled, conditions.pulled_tilt_deg, conditions.tilt_deg)
+    tilt, side = np.radians(largest * rng.uniform(0, 1, count)), rng.uniform(0, 2 * np.pi, count)
+    across = np.sin(tilt)
+    gravity = STANDARD_GRAVITY * np.stack([across * np.cos(side), across * np.sin(side), -np.cos(tilt)], axis=1)
+    pulls, order = np.full((count, chain.tendons), -SLACK), around_the_arm(chain)
+    for row in (pulls[index] for index in np.flatnonzero(pulled)):
+        levels = rng.uniform(0, conditions.pull, 2)
+        while levels.sum() > conditions.pulls:
+            levels = rng.uniform(0, conditions.pull, 2)
+        first, several = int(rng.integers(chain.tendons)), chain.tendons > 1 and rng.random() < 0.5
+        row[order[first]] = levels[0]
+        if several:
+            row[order[(first + 1) % chain.tendons]] = levels[1]
+    return Poses(gravity, chain.straight_lengths - pulls)

@@ -1,0 +1,108 @@
+"""What a certificate says in sentences, each from numbers."""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from trunkline.identification.parameters.parameters import parameter_named
+from trunkline.identification.uncertainty.identifiability import Told
+from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.report.certificate.poses import Conditions
+
+FEW_TILTS = 10.0  # deg, up to which a mount counts as upright
+STRONG = 0.9  # of a correlation, from which on it is named
+NOTHING = "for nothing yet: it is not far better than knowing nothing of forces"
+
+
+@dataclass
+class Use:
+    """up_to_pct: of the arm's length, the largest mean position error with which the twin does for `words`."""
+
+    up_to_pct: Annotated[float, Field(gt=0, le=100)]
+    words: str
+
+
+def verdict(
+    where: str, identified: dict, null: dict, uses: list[Use], factor: float, radius_mm: float, limits: list[str]
+) -> str:
+    """One sentence: how far off, what that is good for, and what not.
+
+    Args:
+        where: which trials the errors are of, in words.
+        identified, null: errors as `scores` has them, of the twin and of the mean shape at rest.
+        factor: by which the twin must be nearer than that to be good for anything.
+        radius_mm: within which a tip at rest is in 95 of 100 cases, in the median pose.
+        limits: what it is not good for.
+    """
+    off, share = identified["e_position_mm"], identified["e_position_pct"]
+    fit = [use.words for use in sorted(uses, key=lambda use: use.up_to_pct) if share <= use.up_to_pct]
+    better = off * factor <= null["e_position_mm"]
+    tip = f", tips {identified['e_tip_mm']:.2g} mm" if "e_tip_mm" in identified else ""
+    good = f"good for {fit[0]}" if fit and better else f"good {NOTHING}"
+    rest = f"at rest, in the median pose, its tip is within {radius_mm:.2g} mm of the twin's in 95 of 100 cases"
+    start = f"{where}, segments are {off:.2g} mm off in the mean, {share:.2g} % of length{tip}"
+    return f"{start}; {rest}; {good}; not for {_listed(limits)}."
+
+
+def limits_of(conditions: Conditions, loads: list[float]) -> list[str]:
+    """What no trial of the session, but for those of the last score, tells anything of. loads: at their tips, kg."""
+    heaviest = max(loads, default=0.0)
+    found = [f"loads above {1e3 * heaviest:.3g} g" if heaviest else "loads at the tip"]
+    if conditions.pull:
+        found.append(f"pulls above {1e3 * conditions.pull:.0f} mm at rest")
+        if conditions.pulled_tilt_deg < FEW_TILTS:
+            found.append("pulls while the mount is tilted")
+        else:
+            found.append(f"pulls while the mount is tilted by more than {conditions.pulled_tilt_deg:.0f}°")
+    if conditions.tilt_deg < FEW_TILTS:
+        found.append("a tilted mount")
+    return [*found, "whatever touches the arm"]
+
+
+def certainty_words(name: str, row: dict) -> str:
+    """How well a parameter of `parameters.json` is told, in the words of `trunkline.tools.preflight`."""
+    axis = parameter_named(name).coordinate
+    low, high = axis(row["interval_95_given_model"])
+    searched = np.diff(axis(row["range"]))[0]
+    half = float(high - low) / 2
+    return Told(name, half, 1.0 if row["undetermined"] else min(2 * half / searched, 0.999)).words()
+
+
+def open_lines(table: dict) -> list[str]:
+    """What a stage's trials leave open, and which experiment would tell it."""
+    lines = []
+    for name, row in (table["parameters"] | table.get("per_session", {})).items():
+        if why := _open(row):
+            lines.append(f"{name} {why}; told by {_listed([EXPERIMENTS[kind].plural for kind in telling(name)])}")
+    return lines
+
+
+def _open(row: dict) -> str:
+    if row["at_bound"]:
+        return "ended on a bound of its range"
+    if row["undetermined"]:
+        return "is not determined"
+    (low, high), (least, most) = row["interval_95_given_model"], row["range"]
+    return "is told to one side alone: its interval ends with its range" if low <= least or high >= most else ""
+
+
+def telling(name: str) -> list[str]:
+    """The kinds of experiment that tell a parameter."""
+    return [kind for kind, told in EXPERIMENTS.items() if parameter_named(name).told_by(told)]
+
+
+def strong_pairs(table: dict) -> list[str]:
+    """Parameters that a stage's trials hardly tell apart, with the correlation of their estimates."""
+    names, pairs = list(table["parameters"]), []
+    for i, one in enumerate(names):
+        for other in names[i + 1 :]:
+            found = table["correlation"][one][other]
+            if abs(found) >= STRONG:
+                pairs.append(f"{one} and {other} {'rise together' if found > 0 else 'trade off'} ({found:+.2f})")
+    return pairs
+
+
+def _listed(words: list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} or {words[-1]}"

@@ -1,5 +1,0 @@
-"""What to record next, by what it is expected to tell: `python -m trunkline.suggest`."""
-
-from trunkline.arithmetic import hold_arithmetic
-
-hold_arithmetic()  # also so that the stages and this share what Numba has compiled

@@ -1,0 +1,6 @@
+"""The pipeline for many arms or sessions, and one table and picture over all of them: `python -m
+trunkline.tools.batch`."""
+
+from trunkline.compute.numerics import hold_arithmetic
+
+hold_arithmetic()  # also so that the stages and this share what Numba has compiled

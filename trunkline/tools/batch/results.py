@@ -1,0 +1,96 @@
+"""What a pipeline has found, from the files that its stages write: parameters with their intervals, and errors."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.recordings.trials.splits import TEST, VALIDATE
+
+STAGES = ("identify_stiffness", "identify_damping", "identify_control")
+BESIDE = ("identified", "cad", "null", "noise_floor")  # models, and what they stand beside
+
+
+@dataclass(frozen=True)
+class Found:
+    """A parameter. low, high: of its 95 % interval, given the model."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Results:
+    """parameters: by name, as the last stage that identified each has it. split: whose errors these are. trials: of
+    it. errors: (position, tip) in mm, by what they are of. All empty where no stage has run."""
+
+    name: str
+    parameters: dict[str, Found]
+    split: str
+    trials: int
+    errors: dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Of a parameter since another session: as a share of ln(value), or in its unit if signed, ± half_width.
+
+    Both intervals are taken as independent and symmetric where the parameter is searched.
+    """
+
+    change: float
+    half_width: float
+
+    @property
+    def beyond(self) -> bool:
+        return abs(self.change) > self.half_width
+
+
+def read_results(name: str, folder: Path) -> Results:
+    """Of the pipeline in `folder`.
+
+    Raises:
+        InputError: a file there is not what a stage writes.
+    """
+    parameters, split, trials, errors = {}, "", 0, {}
+    for stage in STAGES:
+        table = _read(folder / "artifacts" / stage / "parameters.json")
+        for key, row in table.get("parameters", {}).items():
+            low, high = row["interval_95_given_model"]
+            parameters[key] = Found(row["value"], low, high, row["unit"])
+    scored = _read(folder / "artifacts/score/metrics.json")
+    for stage in STAGES:
+        own, which = scored.get(stage, {}), TEST
+        if not own:  # not scored, or no trial to be scored on
+            own, which = _read(folder / "artifacts" / stage / "metrics.json"), VALIDATE
+        found = {model: own[model][which] for model in BESIDE if which in own.get(model, {})}
+        if "identified" in found and (which == TEST or split != TEST):
+            split, trials = which, found["identified"]["trials"]
+            errors = {model: (row["e_position_mm"], row["e_tip_mm"]) for model, row in found.items()}
+    return Results(name, parameters, split, trials, errors)
+
+
+def drift(now: Results, before: Results) -> dict[str, Drift]:
+    """Of the parameters that both have."""
+    found = {}
+    for name in now.parameters.keys() & before.parameters.keys():
+        parameter, new, old = PARAMETERS[name], now.parameters[name], before.parameters[name]
+        scale = parameter.scale if parameter.signed else 1.0
+        change = float(parameter.coordinate(new.value) - parameter.coordinate(old.value)) * scale
+        mine, theirs = (float(np.ptp(parameter.coordinate([one.low, one.high]))) / 2 * scale for one in (new, old))
+        found[name] = Drift(change, float(np.hypot(mine, theirs)))
+    return {name: found[name] for name in now.parameters if name in found}
+
+
+def _read(file: Path) -> dict:
+    if not file.is_file():
+        return {}
+    try:
+        return json.loads(file.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(f"{file}: {error}, expected what a stage writes") from error

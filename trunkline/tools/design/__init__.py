@@ -1,0 +1,5 @@
+"""What to record next, by what it is expected to tell: `python -m trunkline.tools.design`."""
+
+from trunkline.compute.numerics import hold_arithmetic
+
+hold_arithmetic()  # also so that the stages and this share what Numba has compiled

@@ -1,0 +1,173 @@
+"""What to record next, without a fit: `python -m trunkline.tools.design SESSION`
+
+Ranks trials that a lab could record (tilts, releases, pulls, curls, motions, loads at the tip) by how much each is
+expected to shrink what you care about, by the Fisher information that it has on the twin: --for intervals (of the
+parameters, the widest count most), tip (its uncertainty at rest over the workspace) or grasp (that of a wound up arm;
+it stands in for the probability to hold a thing, which is not computed). Each suggestion knows those before it. Says
+what each costs in minutes, how to record it, its entry of session.yaml, and the commands to run afterwards. Writes
+nothing. Method and limits: docs/suggest.md.
+"""
+
+import argparse
+import sys
+from pathlib import Path
+
+import mujoco
+
+from trunkline.errors import InputError, in_one_line, nearest
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.fit.setup import check_parameters
+from trunkline.identification.parameters.per_session import make_room, names_apart, other_sessions
+from trunkline.model.arm.kinds import described_arm
+from trunkline.pipeline.config import load_folder, own_or_project, settings_of
+from trunkline.pipeline.inputs import read_spec
+from trunkline.program import called
+from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.recordings.trials.splits import IDENTIFY
+from trunkline.recordings.trials.trial import Trial
+from trunkline.settings import read_yaml
+from trunkline.tools.design.candidates import Candidate, candidates
+from trunkline.tools.design.goals import GOALS, Goal, weights_for
+from trunkline.tools.design.information import FRAMES, StageInformation, stage_information
+from trunkline.tools.design.ranking import Suggestion, after_each, expected_loss, suggest
+from trunkline.tools.design.settings import Recordable
+from trunkline.tools.design.words import (
+    TITLES,
+    entry_lines,
+    kind_lines,
+    loss_words,
+    table_lines,
+    why_words,
+    widest_words,
+)
+from trunkline.tools.evaluate.model import STAGES, read_arm
+from trunkline.tools.evaluate.session import trials_of
+
+DESCRIBED = "as described in params.yaml, as no stage has identified one yet: suggestions are only as good as it is"
+Stages = list[StageInformation]
+
+
+@in_one_line
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog=called("trunkline.tools.design"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("session", type=Path, metavar="SESSION",
+                        help="folder of logs and session.yaml, or of filtered trials")  # fmt: skip
+    parser.add_argument("--model", type=Path, metavar="MODEL",
+                        help="MJCF of the twin; default: the pipeline's latest, else as described")  # fmt: skip
+    parser.add_argument("--for", dest="goal", default="intervals", metavar="GOAL", help=", ".join(GOALS))
+    parser.add_argument("--count", type=int, default=4, metavar="N", help="trials to suggest; default: 4")
+    parser.add_argument("--only", nargs="+", default=[], metavar="KIND", help="of experiment that the lab can do")
+    parser.add_argument("--per-minute", action="store_true", help="choose by gain a minute, not by gain a trial")
+    parser.add_argument("--error", type=float, default=0.5, metavar="PERCENT",
+                        help="by which the fitted model will be off, of a point's distance from the base")  # fmt: skip
+    parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
+                        help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
+    told = parser.parse_args(arguments)
+    _check(told)
+    grid = load_folder(Recordable, own_or_project(told.settings, "conf") / "suggest")
+    spec, source = twin(told.model, told.settings)
+    trials = trials_of(told.session, told.settings, "suggest")
+    model = with_room(spec, trials, told.settings)
+    print(f"twin: {source}", flush=True)
+    stages, offered = told_of(model, trials, grid, told.settings, told.only, told.error / 100)
+    weights = weights_for(told.goal, stages, model, grid)
+    found = suggest(stages, weights, offered, told.count, told.per_minute)
+    if not found:
+        raise InputError(f"{told.session}: found no trial that would tell more, expected one of {len(offered)}")
+    print("\n".join(_report(told, stages, weights, offered, found, trials)))
+    return 0
+
+
+def _check(told: argparse.Namespace) -> None:
+    """Refuse options that mean nothing, before any work."""
+    if told.goal not in GOALS:
+        expected = f"{', '.join(GOALS)}{nearest(told.goal, list(GOALS))}"
+        raise InputError(f"--for: found {told.goal!r}, expected one of {expected}")
+    kinds = list(EXPERIMENTS)
+    for kind in told.only:
+        if kind not in kinds:
+            raise InputError(f"--only: found {kind!r}, expected some of {', '.join(kinds)}{nearest(kind, kinds)}")
+    if not 1 <= told.count <= 100:
+        raise InputError(f"--count: found {told.count}, expected 1 to 100 trials")
+    if not 0 < told.error <= 100:
+        raise InputError(f"--error: found {told.error:g}, expected more than 0 and up to 100 %")
+
+
+def twin(path: Path | None, root: Path) -> tuple[mujoco.MjSpec, str]:
+    """The MJCF at `path`; without, the last that the pipeline in `root` has identified, else the CAD model; and which.
+    """
+    identified = (root / "artifacts" / stage / "arm.xml" for stage in reversed(STAGES))
+    file = path or next(filter(Path.is_file, identified), None)
+    if file is not None:
+        read_arm(file)
+        return read_spec(file), f"{file}"
+    description = settings_of("build_mjcf", root)
+    return described_arm(description, own_or_project(root, "conf")).spec, DESCRIBED
+
+
+def with_room(spec: mujoco.MjSpec, trials: list[Trial], root: Path) -> mujoco.MjModel:
+    """The arm, with a number for what each session of `trials` has for itself: one that was not identified from them
+    has none."""
+    for config in _settings(root).values():
+        make_room(spec, names_apart(list(config.parameters), config.per_session, other_sessions(trials)))
+    return spec.compile()
+
+
+def _settings(root: Path) -> dict[str, IdentificationSettings]:
+    """Of the stages in params.yaml."""
+    given = read_yaml(root / "params.yaml")
+    return {stage: settings_of(stage, root) for stage in STAGES if stage in given}
+
+
+def told_of(
+    model: mujoco.MjModel, trials: list[Trial], grid: Recordable, root: Path, only: list[str], share: float
+) -> tuple[Stages, list[Candidate]]:
+    """What every stage in params.yaml knows and would learn, and the candidates that are offered: of the kinds `only`,
+    if there are any, and none that goes as a trial of the session did."""
+    settings, stages = _settings(root), []
+    read = {kind for config in settings.values() for kind in config.experiments}
+    kinds = tuple(kind for kind in EXPERIMENTS if kind in read and (not only or kind in only))
+    every = candidates(grid, model, kinds, FRAMES)
+    if not every:
+        expected = "expected one that a stage identifies from, and this command plans"
+        raise InputError(f"--only: found {', '.join(only) or 'no kind'}, {expected}")
+    for stage, config in settings.items():
+        check_parameters(stage, config, model)
+        stages.append(stage_information(stage, config, model, trials, every, grid, share))
+    repeated = set().union(*(stage.repeated for stage in stages))
+    return stages, [one for one in every if one.name not in repeated]
+
+
+def _report(
+    told: argparse.Namespace, stages: Stages, weights: list, offered: list[Candidate], found: list[Suggestion],
+    trials: list[Trial],
+) -> list[str]:  # fmt: skip
+    goal: Goal = told.goal
+    now, own = expected_loss(stages, weights, []), sum(trial.split == IDENTIFY for trial in trials)
+    usable = [one for one in offered if any(one.name in stage.added for stage in stages)]
+    last, filtered = found[-1], not (told.session / "session.yaml").is_file()
+    session = "data/raw/<session>" if filtered else told.session
+    minutes, unit = sum(one.candidate.minutes for one in found), "minute" if told.per_minute else "trial"
+    lines = [
+        f"goal: {TITLES[goal]}",
+        f"now, with {own} trials to identify from and a fitted model that is off by {told.error:g} %: "
+        f"{loss_words(goal, now)}; widest: {widest_words(stages, [])}",
+        "", f"suggested, of {len(usable)} that could be recorded, by gain a {unit}, each knowing those before it:",
+        *(f"  {line}" for line in table_lines(goal, found)),
+        f"after all, {minutes:g} minutes: {loss_words(goal, last.after)}; widest: {widest_words(stages, last.chosen)}",
+        "", "why:", *(f"  {n}  {why_words(stages, weights, one)}" for n, one in enumerate(found, 1)),
+        "", "how:", *(f"  {n}  {one.candidate.how}" for n, one in enumerate(found, 1)),
+        "", "if only one is recorded, the best of each kind:",
+        *(f"  {line}" for line in kind_lines(goal, now, after_each(stages, weights, usable, []), usable)),
+        "", f"once their logs lie in {session}, add to `trials` in its session.yaml:",
+        *entry_lines([one.candidate for one in found], {trial.name for trial in trials}),
+        "", "then:", f"  python -m trunkline.tools.preflight {session}", "  dvc repro",
+        f"  python -m trunkline.tools.design {session}",
+    ]  # fmt: skip
+    return lines
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,147 @@
+"""The Fisher information of trials, recorded or not, for the parameters that a stage identifies.
+
+With residuals r_t(z) of a trial as the stage's loss has them (½ Σ r² is the trial's loss), J_t = ∂r_t/∂z, and a model
+that is off by a share s of each point's distance from the base, a trial tells
+
+    M_t = (NUMBERS / s²) J_tᵀ J_t,
+
+which is `trunkline.identification.uncertainty.identifiability` by the trial: over T trials Σ M_t is the inverse of its
+s² (JᵀJ)⁻¹ / (NUMBERS T). Trials are independent, so information adds. Where motors hold the arm at rest, friction holds
+it anywhere in a band, in whose middle the twin has it: there s² is more by the variance of a rectangular distribution
+over that band. All of it is of u = (z - middle) / half, z over half of its range: what `told` calls a share.
+"""
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from trunkline.identification.fit.fit import Fit
+from trunkline.identification.fit.linearisation import linearise
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.fit.setup import fit_of, set_up, with_every
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.uncertainty.identifiability import NUMBERS, TWO_SIDED, Told
+from trunkline.model.elements import actuators
+from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
+from trunkline.recordings.trials.splits import IDENTIFY
+from trunkline.recordings.trials.trial import Trial
+from trunkline.report.certificate.arms import arm_of
+from trunkline.report.certificate.poses import Poses
+from trunkline.tools.design.candidates import Candidate
+from trunkline.tools.design.settings import Recordable
+from trunkline.tools.design.simulated import simulated
+
+PRIOR = 3.0  # information of "somewhere within its range": the variance of an even distribution over ±1 is 1/3
+FRAMES = 120  # of a moving trial that are looked at, recorded or not
+SAME = 0.02  # of a point's distance from the base, within which a candidate is a trial that there is
+
+
+@dataclass
+class StageInformation:
+    """What a stage knows of its P parameters, and what candidates would add, in u.
+
+    stage: its name. kinds: of experiments that it reads. names: of the parameters. half: of each range, on the axis
+    that is searched. Shape (P,). known: information of the trials that there are and of the ranges. Shape (P, P).
+    added: by name of a candidate, its information. Each (P, P). repeated: candidates that the session holds.
+    """
+
+    stage: str
+    kinds: tuple[str, ...]
+    names: list[str]
+    half: np.ndarray
+    known: np.ndarray
+    added: dict[str, np.ndarray]
+    repeated: set[str]
+
+    def covariance(self, chosen: list[str]) -> np.ndarray:
+        """Of u, once the candidates `chosen` are recorded; those of other kinds tell this stage nothing. (P, P)."""
+        return np.linalg.inv(self.known + sum((self.added[name] for name in chosen if name in self.added), 0.0))
+
+    def told(self, chosen: list[str]) -> list[Told]:
+        """How well each parameter will be told, as `told_by` says it."""
+        shares = TWO_SIDED * np.sqrt(np.diag(self.covariance(chosen)))
+        return [Told(*row) for row in zip(self.names, shares * self.half, shares, strict=True)]
+
+
+def information(fit: Fit, model: mujoco.MjModel, experiments: list[Experiment], share: float) -> np.ndarray:
+    """M_t in u of every trial, around the parameters of `model`. Shape (T, P, P).
+
+    Of one without which the others would be told, as a step of a parameter makes the arm leave the physics in it,
+    nothing.
+    """
+    count = len(experiments)
+    if not count:
+        return np.zeros((0, len(fit.parameters), len(fit.parameters)))
+    problem = replace(fit.problem(model, experiments), trial_weights=np.full(count, float(count)))
+    found = linearise(problem, problem.start()).normals()
+    if problem.diverged and count > 1:
+        parts = experiments[: count // 2], experiments[count // 2 :]
+        return np.concatenate([information(fit, model, part, share) for part in parts])
+    low, high = problem.bounds()
+    half = 0.5 * (high - low)
+    off = shares_of(model, experiments, share)[:, None, None]
+    return (not problem.diverged) * found * np.outer(half, half) * NUMBERS / off**2
+
+
+def shares_of(model: mujoco.MjModel, experiments: list[Experiment], share: float) -> np.ndarray:
+    """By which the fitted model will be off in each trial, of a point's distance from the base: `share`, and with it
+    half the band in which friction holds the arm, where motors pull at rest. Of the tip's distance that is the more the
+    nearer a point is to the tip, so the tip's is taken over √3, the root mean square of 0 to 1. Shape (T,)."""
+    found = np.full(len(experiments), share)
+    pulled = [i for i, e in enumerate(experiments) if is_static(e.kind) and not e.slack(model)]
+    if pulled:
+        order = actuators(model)
+        commands = np.array([experiments[i].controls[-1][order] for i in pulled])
+        bands = arm_of(model).friction(Poses(np.array([experiments[i].gravity for i in pulled]), commands))
+        tips = np.array([np.linalg.norm(experiments[i].positions[-1], axis=1).max() for i in pulled])
+        found[pulled] = np.hypot(share, np.linalg.norm(bands, axis=1) / 3 / tips)
+    return found
+
+
+def stage_information(
+    stage: str, config: IdentificationSettings, model: mujoco.MjModel, trials: list[Trial], chosen: list[Candidate],
+    grid: Recordable, share: float,
+) -> StageInformation:  # fmt: skip
+    """What the trials of a session to identify from tell a stage, and what each of the candidates `chosen` would.
+
+    Args:
+        model: the twin, around whose parameters residuals are taken to first order.
+        share: by which the fitted model will be off, of a point's distance from the base.
+    """
+    config = with_every(config, model)
+    own = [trial for trial in trials if trial.experiment in config.experiments and trial.split == IDENTIFY]
+    if own:
+        model, experiments, fit = set_up(_possible(config, own), own, model)
+        experiments = [e if is_static(e.kind) else e.shortened(FRAMES) for e in experiments]
+    else:
+        experiments, fit = [], fit_of(config, trials[0].segments)
+    fitting = [one for one in chosen if one.kind in config.experiments]
+    done = simulated(fitting, model, fit, grid.frame_rate)
+    told = information(fit, model, [e for _, e in done], share)
+    low, high = fit.problem(model, [e for _, e in done] or experiments).bounds()
+    known = information(fit, model, experiments, share).sum(axis=0)
+    return StageInformation(
+        stage, tuple(config.experiments), list(fit.parameters), 0.5 * (high - low),
+        PRIOR * np.eye(len(known)) + known,
+        {one.name: matrix for (one, _), matrix in zip(done, told, strict=True)},
+        {one.name for one, e in done if any(_same(e, other) for other in experiments)},
+    )  # fmt: skip
+
+
+def _possible(config: IdentificationSettings, own: list[Trial]) -> IdentificationSettings:
+    """The stage's settings; with the shape at rest unchanged where no trial shows it yet."""
+    if config.rest_shape == "measured" and not any(EXPERIMENTS[trial.experiment].hangs for trial in own):
+        return replace(config, rest_shape="unchanged")
+    return config
+
+
+def _same(one: Experiment, other: Experiment) -> bool:
+    """Whether two trials go about the same way."""
+    if one.kind != other.kind or abs(one.load - other.load) > 1e-3:
+        return False
+    frames = min(one.frames, other.frames)
+    first, second = one.positions[:frames], other.positions[:frames]
+    off = np.linalg.norm(first - second, axis=2)[other.measured[:frames]]
+    far = np.linalg.norm(second, axis=2)[other.measured[:frames]]
+    return bool(off.sum() < SAME * far.sum())

@@ -1,0 +1,95 @@
+"""What the twin would do in a candidate: an experiment whose measurement is the twin's own."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from trunkline.identification.fit.fit import Fit
+from trunkline.identification.simulate.experiment import Experiment
+from trunkline.identification.simulate.population import Population, Simulated
+from trunkline.identification.simulate.pose_fit import PoseFit
+from trunkline.model.elements import arm_hinges
+from trunkline.recordings.trials.experiments import is_static
+from trunkline.recordings.trials.splits import IDENTIFY
+from trunkline.tools.design.candidates import Candidate
+
+MOST_OF_RANGE = 0.95  # of a joint's range, up to which a hand bends it
+
+
+def simulated(
+    chosen: list[Candidate], model: mujoco.MjModel, fit: Fit, frame_rate: float
+) -> list[tuple[Candidate, Experiment]]:
+    """The candidates in which the twin comes to rest or stays in one piece, and what it then does.
+
+    Args:
+        fit: what will be identified from them; the twin is where its search would begin.
+    """
+    planned = [_experiment(one, model, len(fit.segments), frame_rate) for one in chosen]
+    starts = _starts([e for e in planned if not is_static(e.kind)], model, fit)
+    planned = [replace(e, start=starts.get(e.name, e.start)) for e in planned]
+    done = []
+    for static in (True, False):
+        own = [(one, e) for one, e in zip(chosen, planned, strict=True) if is_static(e.kind) == static]
+        if not own:
+            continue
+        for (one, experiment), positions in zip(own, _positions([e for _, e in own], model, fit), strict=True):
+            if np.isfinite(positions).all():
+                done.append((one, replace(experiment, positions=positions)))
+    return done
+
+
+def _experiment(one: Candidate, model: mujoco.MjModel, segments: int, frame_rate: float) -> Experiment:
+    """Without what is measured."""
+    static, hinges = is_static(one.kind), arm_hinges(model)
+    start = _held(one, model) if one.turn else np.full(hinges, np.nan if static else 0.0)
+    straight = model.tendon_length0[model.actuator_trnid[:, 0]]
+    step = 0.0 if static else 1 / frame_rate
+    return Experiment(
+        name=one.name, kind=one.kind, split=IDENTIFY, gravity=one.gravity, start=start, velocity=np.zeros(hinges),
+        lead=step, controls=straight - one.pulls, positions=np.zeros((len(one.pulls), segments, 3)),
+        measured=np.ones((len(one.pulls), segments), bool), frame_step=step,
+        fit=PoseFit(start, np.zeros(segments), 0, True), load=one.load,
+    )  # fmt: skip
+
+
+def _held(one: Candidate, model: mujoco.MjModel) -> np.ndarray:
+    """Joint angles, rad, of an arm that is bent by `turn` towards `side`, every unit by the same. Shape (n,)."""
+    hinges = arm_hinges(model)
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    axis = np.array([np.sin(one.side), -np.cos(one.side), 0.0])  # about it, what hangs down swings towards the side
+    units = len(np.unique(model.jnt_bodyid[:hinges]))
+    angles = one.turn / units * (data.xaxis[:hinges] @ axis)
+    limited, span = model.jnt_limited[:hinges].astype(bool), MOST_OF_RANGE * model.jnt_range[:hinges]
+    return np.where(limited, np.clip(angles, span[:, 0], span[:, 1]), angles)
+
+
+def _starts(moving: list[Experiment], model: mujoco.MjModel, fit: Fit) -> dict[str, np.ndarray]:
+    """By name, where arms that their motors will move rest before, rad, each (n,)."""
+    driven = [e for e in moving if not e.slack(model)]
+    different = {_before(e): e for e in driven}
+    hanging = [
+        replace(e, kind="static_pull", controls=e.controls[:1], positions=e.positions[:1], measured=e.measured[:1],
+                start=np.full_like(e.start, np.nan))
+        for e in different.values()
+    ]  # fmt: skip
+    rests = dict(zip(different, _twin(hanging, model, fit).rests, strict=True)) if hanging else {}
+    found = {e.name: rests[_before(e)][0] for e in driven}
+    return {name: rest for name, rest in found.items() if np.isfinite(rest).all()}
+
+
+def _before(experiment: Experiment) -> bytes:
+    """What decides where the arm rests before its motors move it."""
+    return np.concatenate([experiment.gravity, experiment.controls[0], [experiment.load]]).tobytes()
+
+
+def _positions(experiments: list[Experiment], model: mujoco.MjModel, fit: Fit) -> list[np.ndarray]:
+    """Of the segments, m, NaN where the twin finds no rest or leaves the physics. Each (T, S, 3)."""
+    return [one[0] for one in _twin(experiments, model, fit).positions]
+
+
+def _twin(experiments: list[Experiment], model: mujoco.MjModel, fit: Fit) -> Simulated:
+    """The one candidate from which a search begins."""
+    problem = fit.problem(model, experiments)
+    return Population(model, experiments, fit.segments).simulate(problem.fields(problem.start()[None]))

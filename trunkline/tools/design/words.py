@@ -1,0 +1,124 @@
+"""Suggestions in words: a table, why each, what to do, and what goes into session.yaml."""
+
+import numpy as np
+import yaml
+
+from trunkline.identification.parameters.parameters import parameter_named
+from trunkline.identification.uncertainty.identifiability import TWO_SIDED, Told
+from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.recordings.trials.splits import IDENTIFY
+from trunkline.tools.design.candidates import Candidate
+from trunkline.tools.design.goals import Goal
+from trunkline.tools.design.information import StageInformation
+from trunkline.tools.design.ranking import Suggestion
+
+LEAST = 0.15  # of what a trial gains, from which on the parameter by which it does is named
+NAMED = 3  # parameters that are named, at most
+PERCENT = 0.2  # half-width of a logarithm, below which percent say it
+TITLES: dict[Goal, str] = {
+    "intervals": "root mean square of the 95 % intervals over their ranges",
+    "tip": "standard uncertainty of the tip at rest by the parameters, over the workspace",
+    "grasp": "standard uncertainty of the tip by the parameters where the arm is wound up, in place of a grasp's odds",
+}
+
+
+def loss_words(goal: Goal, loss: float) -> str:
+    """The root of an expected loss Φ in the goal's unit."""
+    if goal == "intervals":
+        return f"{100 * TWO_SIDED * np.sqrt(loss):.3g} %"
+    return f"{1e3 * np.sqrt(loss):.3g} mm"
+
+
+def widest_words(stages: list[StageInformation], chosen: list[str]) -> str:
+    """The widest interval over its range, as the last stage that identifies a parameter leaves it."""
+    last = {one.name: (one, stage.stage) for stage in stages for one in stage.told(chosen)}
+    told, stage = max(last.values(), key=lambda pair: pair[0].share)
+    return f"{told.words()} ({stage})"
+
+
+def table_lines(goal: Goal, found: list[Suggestion]) -> list[str]:
+    """A line a suggestion, in their order: what it leaves, by how much it shrinks that, and what it costs."""
+    rows = [["", "trial", "expected after it", "gain", "minutes", "gain a minute"]]
+    for number, one in enumerate(found, 1):
+        told = [one.candidate.name, loss_words(goal, one.after), *_numbers(one.gain, one.candidate)]
+        rows.append([f"{number}", *told])
+    return aligned(rows)
+
+
+def kind_lines(goal: Goal, before: float, after: np.ndarray, offered: list[Candidate]) -> list[str]:
+    """Of every kind of experiment, with and without a load, the one that gains most if it is recorded alone.
+
+    Args:
+        before, after: Φ now, and with each of `offered` alone. after: shape (C,).
+    """
+    rows = [["", "best by itself", "expected after it", "gain", "minutes", "gain a minute"]]
+    gains = 1 - np.sqrt(after / before)
+    groups: dict[tuple[str, bool], int] = {}
+    for index in np.argsort(-gains, kind="stable").tolist():
+        groups.setdefault((offered[index].kind, offered[index].load > 0), index)
+    for (kind, loaded), index in groups.items():
+        label = EXPERIMENTS[kind].plural + (", loaded" if loaded else "")
+        numbers = _numbers(float(gains[index]), offered[index])
+        rows.append([label, offered[index].name, loss_words(goal, after[index]), *numbers])
+    return aligned(rows)
+
+
+def why_words(stages: list[StageInformation], weights: list[np.ndarray], one: Suggestion) -> str:
+    """The parameters by which a suggestion shrinks the loss the most, once those before it are recorded."""
+    shares: list[tuple[float, Told, Told]] = []
+    for stage, weight in zip(stages, weights, strict=True):
+        old, new = stage.told(one.chosen[:-1]), stage.told(one.chosen)
+        for before, now, counts in zip(old, new, np.diag(weight), strict=True):
+            shares.append((float(counts) * (before.share**2 - now.share**2), before, now))
+    shares.sort(key=lambda row: -row[0])
+    total = sum(max(share, 0.0) for share, *_ in shares)
+    said = [_change(before, now) for share, before, now in shares[:NAMED] if share > LEAST * total]
+    return "; ".join(said) if said else "tells a little of everything"
+
+
+def _change(before: Told, now: Told) -> str:
+    return f"{before.name} {_width(before)} now, then {_width(now)}"
+
+
+def _width(told: Told) -> str:
+    """Of an interval: a number in its unit, a factor, or percent where that is as good."""
+    parameter = parameter_named(told.name)
+    if told.share >= 1:
+        return "undetermined"
+    if parameter.signed:
+        return f"± {told.half_width * parameter.scale:.2g} {parameter.unit}".rstrip()
+    if told.half_width < PERCENT:
+        return f"± {100 * told.half_width:.2g} %"
+    return f"within a factor of {np.exp(told.half_width):.2f}"
+
+
+def entry_lines(found: list[Candidate], taken: set[str]) -> list[str]:
+    """Entries of `trials` in session.yaml, a line each, with names that are not `taken` yet."""
+    lines, taken = [], set(taken)
+    for one in found:
+        name = one.name
+        while name in taken:
+            name = f"{name}_again"
+        taken.add(name)
+        entry: dict[str, str | float] = {"file": f"{name}.mcap", "experiment": one.kind}
+        if one.level is not None:
+            entry["level"] = int(one.level) if one.level == int(one.level) else one.level
+        if one.load:
+            entry["load"] = one.load
+        text = yaml.safe_dump(entry | {"split": IDENTIFY}, default_flow_style=True, sort_keys=False, width=1000)
+        lines.append(f"  - {text.strip()}")
+    return lines
+
+
+def aligned(rows: list[list[str]]) -> list[str]:
+    """Columns of equal width: the first two to the left, the others to the right."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return [
+        "  ".join(cell.ljust(width) if column < 2 else cell.rjust(width)
+                  for column, (cell, width) in enumerate(zip(row, widths, strict=True))).rstrip()
+        for row in rows
+    ]  # fmt: skip
+
+
+def _numbers(gain: float, one: Candidate) -> list[str]:
+    return [f"{100 * gain:.1f} %", f"{one.minutes:g}", f"{100 * gain / one.minutes:.1f} %"]

@@ -1,0 +1,107 @@
+"""How far a model is from a session, without a fit: `python -m trunkline.tools.evaluate MODEL SESSION`
+
+Prints the errors of every trial and their means, beside what knows nothing of forces (the mean rest shape, the straight
+arm, the start held) and beside the noise floor. All in mm; of what stands beside, position / tip error. Writes
+metrics.json, trials.csv, segments.csv and two pictures. With --reference, how the errors changed: has the arm aged?
+"""
+
+import argparse
+import hashlib
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+from threadpoolctl import threadpool_limits
+
+from trunkline.errors import InputError, in_one_line
+from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.results.scoring import evaluate
+from trunkline.identification.simulate.checks import check_trials
+from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.program import called
+from trunkline.recordings.trials.trial import sessions_of
+from trunkline.tools.evaluate.model import read_arm, written_beside
+from trunkline.tools.evaluate.report import change_lines, kind_lines, read_reference, trial_lines
+from trunkline.tools.evaluate.session import trials_of
+
+
+@in_one_line
+def main(arguments: list[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(
+        prog=called("trunkline.tools.evaluate"),
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("model", type=Path, metavar="MODEL", help="MJCF of the arm")
+    parser.add_argument(
+        "session", type=Path, metavar="SESSION",
+        help="folder of logs and session.yaml, or of several such, or of filtered trials",
+    )  # fmt: skip
+    parser.add_argument("--cad", type=Path, metavar="MODEL", help="another MJCF to stand beside, such as the CAD model")
+    parser.add_argument("--reference", type=Path, metavar="EVALUATION", help="folder or metrics.json of an earlier one")
+    parser.add_argument("--out", type=Path, metavar="FOLDER", help="where to write; default: evaluation/<session>")
+    parser.add_argument(
+        "--settings", type=Path, metavar="FOLDER", default=Path("."),
+        help="whose params.yaml says how to filter logs; default: the current folder",
+    )  # fmt: skip
+    told = parser.parse_args(arguments)
+    with threadpool_limits(1, user_api="blas"):  # as the stages: sums depend on how many cores there are
+        return _run(told)
+
+
+def _run(told: argparse.Namespace) -> int:
+    out = told.out or Path("evaluation") / told.session.resolve().name
+    if out.exists() and not (out / "metrics.json").is_file() and any(out.iterdir()):
+        raise InputError(f"--out: {out}: found other files in it, expected a new folder or an earlier evaluation")
+    reference = None if told.reference is None else read_reference(told.reference)
+    if told.reference is not None and out.resolve() in (told.reference.resolve(), told.reference.resolve().parent):
+        raise InputError(f"--out: {out}: found the reference there, expected another folder: it would be written over")
+    models = {"model": read_arm(told.model)} | ({} if told.cad is None else {"cad": read_arm(told.cad)})
+    written = written_beside(told.model, told.settings)
+    trials = trials_of(told.session, told.settings, "evaluate")
+    if len(sessions_of(trials)) == 1 and (session := written.session_of(trials)):
+        print(f"evaluate: the session {session} of those that the model was fitted to")
+        trials = [replace(trial, session=session, name=f"{session}/{trial.name}") for trial in trials]
+    for session in written.namesakes(models["model"], trials):
+        doubt = "the model has numbers for a session of that name, and was fitted to no trial of this one"
+        print(f"evaluate: warning: session {session}: {doubt}", file=sys.stderr)
+    segments = trials[0].segments
+    for model in models.values():
+        check_trials(trials, model)
+    print(f"evaluate: simulating {len(trials)} trials", flush=True)
+    metrics, predictions = evaluate(models, trials, written.frames, written.command_delay)
+    fitted = {trial.name for trial in trials if written.saw(trial)}
+    metrics["evaluated"] = {
+        "model": hashlib.sha256(told.model.read_bytes()).hexdigest()[:16],
+        "frames": written.frames,
+        "command_delay": written.command_delay,
+        "fitted_to": sorted(fitted),
+    }
+    table = trial_table(predictions)
+    print("\nErrors in mm; of what stands beside the model, position / tip error")
+    print("\n".join(["", *trial_lines(table, fitted), "", *kind_lines(metrics)]))
+    for session, own in metrics.get("by_session", {}).items():
+        print("\n".join(["", f"session {session}", *kind_lines(own)]))
+    if fitted:
+        print(f"\n* the model was fitted to these {len(fitted)} of {len(trials)} trials")
+    if reference is not None:
+        print("\n".join(["", *change_lines(reference, metrics)]))
+    _write(out, metrics, table, segment_table(predictions, segments), told.session.resolve().name)
+    print(f"\nevaluate: written to {out}")
+    return 0
+
+
+def _write(out: Path, metrics: dict, trials, segments, title: str) -> None:
+    from trunkline.report.figures.scoring import segment_figure, trial_figure  # pyplot takes long to import
+    from trunkline.report.figures.style import save_figure
+
+    with output_folder(out) as folder:
+        write_json(folder / "metrics.json", metrics)
+        trials.to_csv(folder / "trials.csv", index=False, float_format="%.6g")
+        segments.to_csv(folder / "segments.csv", index=False, float_format="%.6g")
+        save_figure(trial_figure({title: trials}), folder / "errors.png")
+        save_figure(segment_figure({title: segments}), folder / "segments.png")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

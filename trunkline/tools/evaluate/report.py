@@ -1,0 +1,110 @@
+"""An evaluation in words: a table a trial, means by kind, and what changed since another evaluation."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+
+from trunkline.errors import InputError
+from trunkline.identification.evaluation.error_tables import LABELS
+
+BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")
+ERRORS = ("e_internal_mm", "e_position_mm", "e_tip_mm")
+
+
+def trial_lines(trials: pd.DataFrame, fitted: set[str]) -> list[str]:
+    """A line a trial, `*` at those that the model was fitted to; position / tip error of what stands beside it."""
+    models = {name for name, label in LABELS.items() if label in set(trials.model)}
+    rows = [["trial", "experiment", "split", *_heads(models)]]
+    for trial in dict.fromkeys(trials.trial):
+        own = trials[trials.trial == trial].set_index("model")
+        errors = {name: own.loc[LABELS[name]].to_dict() for name in models if LABELS[name] in own.index}
+        told = errors["model"]
+        label = f"{trial} *" if trial in fitted else trial
+        rows.append([label, told["experiment"], told["split"], *_cells(errors, models)])
+    return _aligned(rows, 3)
+
+
+def kind_lines(metrics: dict) -> list[str]:
+    """A line a kind: means over its trials, and how well the arm repeats itself."""
+    models = {name for name in ("model", *BESIDE) if name in metrics}
+    repeats = metrics["repeatability_mm"]
+    rows = [["mean of", "trials", *_heads(models), "repeatability"]]
+    for kind, table in metrics["model"]["by_experiment"].items():
+        errors = {name: metrics[name]["by_experiment"].get(kind, {}) for name in models}
+        found = repeats.get(kind, {})
+        scatter = _pair(found.get("mean_mm"), found.get("tip_mm"))
+        rows.append([kind, str(table["trials"]), *_cells(errors, models), scatter])
+    return _aligned(rows, 1)
+
+
+def read_reference(path: Path) -> dict:
+    """The metrics.json of another evaluation, or that in its folder.
+
+    Raises:
+        InputError: there is none, or it is of something else.
+    """
+    file = path / "metrics.json" if path.is_dir() else path
+    try:
+        metrics = json.loads(file.read_text(encoding="utf-8"))
+        _ = metrics["model"]["by_experiment"], metrics["evaluated"]["model"]
+    except FileNotFoundError:
+        raise InputError(f"--reference: {file}: no such file, expected metrics.json of another evaluation") from None
+    except (ValueError, KeyError, TypeError) as error:
+        expected = "expected what `python -m trunkline.tools.evaluate` writes"
+        raise InputError(f"--reference: {file}: {error!r}, {expected}") from error
+    return metrics
+
+
+def change_lines(before: dict, now: dict) -> list[str]:
+    """Each kind's errors in a reference and now, and what else differs between the two."""
+    rows = [["change of", *(f"{word}: then → now" for word in ("E_internal", "position", "tip"))]]
+    old, new = (metrics["model"]["by_experiment"] for metrics in (before, now))
+    for kind in sorted(old.keys() & new.keys()):
+        rows.append([kind, *(_change(old[kind].get(error), new[kind].get(error)) for error in ERRORS)])
+    lines = _aligned(rows, 1)
+    alone = [f"{kind} in the {where} alone" for kinds, where in ((old.keys() - new.keys(), "reference"),
+             (new.keys() - old.keys(), "session")) for kind in sorted(kinds)]  # fmt: skip
+    lines += [f"not compared: {', '.join(alone)}"] if alone else []
+    for key, words in (("model", "another model"), ("frames", "other numbers of frames"), ("command_delay", "a delay")):
+        one, other = (metrics["evaluated"].get(key) for metrics in (before, now))
+        if one != other:
+            lines.append(f"the reference is of {words} ({one}, here {other}): not all of the change is the arm's")
+    return lines
+
+
+def _heads(models: set[str]) -> list[str]:
+    return ["E_internal", "position", "tip", "tip %", *(LABELS[name] for name in BESIDE if name in models)]
+
+
+def _cells(errors: dict[str, dict], models: set[str]) -> list[str]:
+    found = errors["model"]
+    pairs = [
+        _pair(row.get("e_position_mm"), row.get("e_tip_mm"))
+        for row in (errors.get(name, {}) for name in BESIDE if name in models)
+    ]
+    return [*(_number(found.get(error)) for error in (*ERRORS, "e_tip_pct")), *pairs]
+
+
+def _change(old: float | None, new: float | None) -> str:
+    if old is None or new is None:
+        return "–"
+    return f"{_number(old)} → {_number(new)} mm ({round(100 * (new / old - 1)):+d} %)"
+
+
+def _pair(position: float | None, tip: float | None) -> str:
+    return "–" if position is None else f"{_number(position)} / {_number(tip)}"
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None or pd.isna(value) else f"{value:.3g}"
+
+
+def _aligned(rows: list[list[str]], words: int) -> list[str]:
+    """Columns of equal width: the first `words` to the left, numbers to the right."""
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return [
+        "  ".join(cell.ljust(width) if column < words else cell.rjust(width)
+                  for column, (cell, width) in enumerate(zip(row, widths, strict=True))).rstrip()
+        for row in rows
+    ]  # fmt: skip

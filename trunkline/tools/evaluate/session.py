@@ -1,0 +1,83 @@
+"""The trials of a session for one look at them: from its logs, or as the stage `filter` wrote them."""
+
+import sys
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from trunkline.compute.progress import progress
+from trunkline.errors import InputError
+from trunkline.pipeline.config import settings_of
+from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.quality import by_sentence, judge
+from trunkline.recordings.cleaning.same_arm import gather_each
+from trunkline.recordings.cleaning.session_checks import Gathered, gather, together
+from trunkline.recordings.filtering.filter import filter_take
+from trunkline.recordings.session.session import Session, session_folders
+from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.splits import SPLITS
+from trunkline.recordings.trials.trial import Trial, read_trials
+
+
+def trials_of(folder: Path, root: Path, caller: str) -> list[Trial]:
+    """Every trial of a session, of all splits, filtered; what is refused, repaired or doubtful is said on stderr.
+
+    Args and errors as of `read_trials_of`.
+    """
+    return read_trials_of(folder, root, caller)[0]
+
+
+def read_trials_of(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[Take]]:
+    """`trials_of`, and the takes that they were filtered from, in the same order; none where they came filtered.
+
+    Args:
+        folder: logs and session.yaml, several such folders of one arm, or what the stage `filter` writes.
+        root: holds the params.yaml that says how to take logs in and to filter them.
+        caller: the command, which begins what is said.
+
+    Raises:
+        InputError: it is no such folder, or no trial of it can be used.
+    """
+    if not (folder / "trials.parquet").is_file():
+        return _from_logs(folder, root, caller)
+    try:
+        trials = read_trials(folder, SPLITS)
+    except KeyError as error:
+        raise InputError(f"{folder}: found trials without {error}, expected filtered ones, or a session") from error
+    if not trials:
+        raise InputError(f"{folder}: found no trial, expected at least one")
+    segments = trials[0].segments
+    other = next((trial for trial in trials if trial.segments != segments), None)
+    if other is not None:
+        found = f"found {len(other.segments)} segments, expected the {len(segments)} of {trials[0].name}"
+        raise InputError(f"{folder}: trial {other.name}: {found}")
+    return trials, []
+
+
+def _from_logs(folder: Path, root: Path, caller: str) -> tuple[list[Trial], list[Take]]:
+    ingest, settings = settings_of("ingest", root), settings_of("filter", root)
+    take = partial(_gathered, ingest=ingest, caller=caller)
+    found = gather_each(session_folders(folder), take, ingest.plausible.distance)
+    gathered = together(list(found.values()))
+    for name, reason in gathered.refused.items():
+        print(f"{caller}: left out {name}: {reason}", file=sys.stderr)
+    qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
+    for line in by_sentence(qualities, lambda found: found.repairs):
+        print(f"{caller}: repaired: {line}", file=sys.stderr)
+    for line in by_sentence(qualities, lambda found: found.warnings):
+        print(f"{caller}: warning: {line}", file=sys.stderr)
+    trials = []
+    for take, found in zip(gathered.takes, gathered.findings, strict=True):
+        take.repairs = len(found.repairs)
+        trials.append(filter_take(take, settings)[0])
+    return trials, gathered.takes
+
+
+def _gathered(folder: Path, session: Session, ingest: Any, caller: str) -> Gathered:
+    """ingest: settings of the stage."""
+    taken = []
+    with progress(len(session.trials), caller, "trials") as bar:
+        for entry in take_in(folder, session, ingest.limits):
+            taken.append(entry)
+            bar.update(1, trial=entry[0].name)
+    return gather(taken, session, ingest.plausible, "leave_out", f"{folder}")

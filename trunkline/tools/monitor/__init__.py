@@ -1,0 +1,5 @@
+"""Whether an arm has changed since its model was identified: `python -m trunkline.tools.monitor`."""
+
+from trunkline.compute.numerics import hold_arithmetic
+
+hold_arithmetic()  # also so that the stages and this share what Numba has compiled

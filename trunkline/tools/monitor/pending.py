@@ -1,0 +1,53 @@
+"""What a watch waits for, and what it has said of it: a line once, not at every look."""
+
+import json
+import time
+from pathlib import Path
+
+from trunkline.tools.monitor.inbox import PATIENCE, State
+
+
+class Patience:
+    """Kept in the file `path`, so that a command that looks once and ends waits as one that stays does."""
+
+    def __init__(self, path: Path):
+        self._path = path
+        kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        self._seen: dict[str, list] = kept.get("seen", {})  # log → mark, and when it was first seen so, s
+        self._said: dict[str, str] = kept.get("said", {})
+
+    def ready(self, log: Path, state: State) -> bool:
+        """Whether a log can be taken: it is whole, or will hardly become so. One that cannot yet is said."""
+        if state.whole:
+            return True
+        mark, since = self._seen.get(f"{log}", ["", 0.0])
+        now = time.time()
+        if mark != state.mark:
+            self._seen[f"{log}"] = [state.mark, now]
+            self._keep()
+            since = now
+        if now - since >= PATIENCE:
+            self.say(f"{log}", f"{log}: cut off, and as it is for {PATIENCE / 60:.0f} min: taken with what is left")
+            return True
+        self.say(f"{log}", f"{log}: not whole yet ({state.size} bytes, no end): waits until it changes")
+        return False
+
+    def say(self, key: str, line: str) -> bool:
+        """Print a line unless it was the last one said of `key`; whether it was printed."""
+        head = line.split(" (")[0]  # a log that grows is not said at every size
+        if self._said.get(key) == head:
+            return False
+        self._said[key] = head
+        self._keep()
+        print(f"watch: {line}", flush=True)
+        return True
+
+    def forget(self, key: str) -> None:
+        """What was said of `key` is put right: said again, it is news."""
+        if self._said.pop(key, None) is not None:
+            self._keep()
+
+    def _keep(self) -> None:
+        part = self._path.with_suffix(".part")
+        part.write_text(json.dumps({"seen": self._seen, "said": self._said}), encoding="utf-8")
+        part.replace(self._path)

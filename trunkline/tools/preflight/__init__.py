@@ -1,0 +1,5 @@
+"""What a session will and will not tell, before hours of fits: `python -m trunkline.tools.preflight`."""
+
+from trunkline.compute.numerics import hold_arithmetic
+
+hold_arithmetic()  # also so that the stages and this share what Numba has compiled

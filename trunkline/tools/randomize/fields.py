@@ -1,0 +1,59 @@
+"""Drawn parameters as fields of a MuJoCo model, for simulations that each have their own."""
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from trunkline.errors import InputError
+from trunkline.identification.parameters.parameters import PARAMETERS, Fields, candidate_fields
+from trunkline.tools.randomize.randomisation import Randomisation
+
+OWN = "numeric_data"  # numbers that MuJoCo only keeps: Trunkline's stepper reads them, others would not
+STEP = 1e-3  # of x
+NEAR = 1e-4  # of a value; an MJCF keeps fewer digits than parameters.json
+
+
+def drawn_fields(model: mujoco.MjModel, values: dict[str, np.ndarray]) -> Fields:
+    """Every field that any of the parameters writes, for n simulations: what `Batch.expand` takes.
+
+    Args:
+        model: the calibrated arm.
+        values: name to values (n,), in the parameters' units.
+
+    Returns:
+        Field to its values, shape (n, ...). To the last bit those of `model` where the values are what it has.
+    """
+    own = {name: np.append(PARAMETERS[name].read(model), given) for name, given in values.items()}
+    fields = candidate_fields(model, own)
+    # rounding: what is written and what is in the model differ by it, so only the difference is added
+    return {name: getattr(model, name) + (written[1:] - written[0]) for name, written in fields.items()}
+
+
+def changed_fields(model: mujoco.MjModel, drawn: Randomisation) -> dict[str, dict[str, int]]:
+    """By parameter, the fields of `model` that a step of it changes, and how many numbers of each."""
+    found = {}
+    for i, name in enumerate(drawn.names):
+        x = STEP * np.eye(len(drawn.names))[[i, i]] * [[0], [1]]
+        fields = drawn_fields(model, drawn.values(x))
+        changed = {field: int(np.sum(values[0] != values[1])) for field, values in fields.items()}
+        found[name] = {field: count for field, count in changed.items() if count}
+    return found
+
+
+def of_model(model: mujoco.MjModel, drawn: Randomisation, where: str) -> Randomisation:
+    """The same about what the model has, which is the centre but for the digits that its file lacks.
+
+    Raises:
+        InputError: the model at `where` has other values, or lacks a part.
+    """
+    centre = []
+    for name, told in zip(drawn.names, drawn.centre, strict=True):
+        parameter = PARAMETERS[name]
+        if not parameter.belongs_to(model):
+            raise InputError(f"{where}: {name}: found no {parameter.part}, expected the model that was identified")
+        centre.append(found := parameter.read(model))
+        if abs(found - told) > NEAR * abs(told) + NEAR**2:
+            unit = f" {parameter.unit}" if parameter.unit else ""
+            raise InputError(f"{where}: {name}: found {found:.6g}, expected the {told:.6g}{unit} of parameters.json")
+    return replace(drawn, centre=np.array(centre))

@@ -1,5 +1,0 @@
-"""Whether an arm has changed since its model was identified: `python -m trunkline.watch`."""
-
-from trunkline.arithmetic import hold_arithmetic
-
-hold_arithmetic()  # also so that the stages and this share what Numba has compiled

@@ -1,0 +1,482 @@
+"""`python -m upkeep.readme`: write the graph, all tables of results and the pictures anew.
+
+Generated blocks stand between `<!-- name -->` and `<!-- /name -->`.
+"""
+
+import json
+import re
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise, zip_longest
+from pathlib import Path
+
+import networkx
+import pandas as pd
+from dvc.repo import Repo
+
+from trunkline.errors import in_one_line
+from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.pipeline.checkout import require_checkout
+from trunkline.pipeline.config import load_config
+from trunkline.recordings.trials.experiments import EXPERIMENTS
+from trunkline.recordings.trials.splits import DECIDING, TEST
+from upkeep.baseline import baseline_file, read_baseline
+from upkeep.limits import Limit, lookup, metrics_folder, read_limits
+from upkeep.rehearsal_table import rehearsal_table, source_words
+from upkeep.results import block
+from upkeep.truth_table import KINDS, STAGES, error_table, truth_table
+
+# where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
+PICTURES = {
+    "artifacts/identify_control/distances.png": "docs/distances.png",
+    "artifacts/reachability/maps.png": "docs/maps.png",
+    "artifacts/rehearse/still.png": "docs/rehearsal.png",
+    "examples/asl_motion/artifacts/identify_stiffness/paths.png": "examples/asl_motion/paths.png",
+    "examples/asl_trunk/artifacts/identify_damping/paths.png": "examples/asl_trunk/paths.png",
+    "examples/ftdcr/artifacts/score/errors.png": "examples/ftdcr/errors.png",
+    "examples/pairs/artifacts/identify_stiffness/paths.png": "examples/pairs/paths.png",
+}
+EXAMPLES = ("asl_trunk",)  # folders of examples/ with releases, each a block of the README and of its own README
+
+# E_internal of the paper's arm before and after identification, over 437 frames: its section "Parameter Identification"
+PAPER = {"cad": "89.8 mm (17 %)", "identified": "15.8 mm (3 %)"}
+MODELS = {
+    "null": "null model: mean rest shape",
+    "cad": "CAD",
+    "coarse": "coarse: one scalar each",
+    "smooth": "identified, its cables not rubbing",
+    "prompt": "identified, its winches without rate limit and backlash",
+    "identified": "identified",
+    "noise_floor": "noise floor",
+}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A figure of a row: dotted key in metrics.json, unit, and of a count the key of how many it is of."""
+
+    key: str
+    unit: str = ""
+    of: str = ""
+
+
+def as_sent(at: str, targets: str) -> tuple[Shown, ...]:
+    """Of commands that were sent to an arm: the same statistics of whatever arm, the bad ones beside the good."""
+    error, unsaid = f"{at}.position_error_mm", f"{at}.beyond_1pct_unsaid"
+    return Shown(f"{error}.median", "mm"), Shown(f"{error}.p95", "mm"), Shown(unsaid, of=targets)
+
+
+# stage: [(what it is, its figures)]
+RESULTS = {
+    "fk_dataset": [
+        (
+            "FK against MuJoCo settled to rest, without friction: median",
+            (Shown("mujoco_deviation_mm.median", "mm"),),
+        ),
+        (
+            "Friction's band, between where the tip stops once pulled and once let go: median / 95th percentile",
+            (Shown("friction_band_mm.median", "mm"), Shown("friction_band_mm.p95", "mm")),
+        ),
+    ],
+    "train_ik": [
+        (
+            "The network's commands sent to the twin, without friction, tip error at rest: median / 95th percentile / "
+            "beyond 1 % of length and no doubt raised",
+            as_sent("as_controls.frictionless", "as_controls.targets"),
+        ),
+        (
+            "… to the twin as it is, with friction, all at once",
+            as_sent("as_controls.friction", "as_controls.friction.targets"),
+        ),
+        ("… to the lab's own arm", as_sent("on_plant", "on_plant.targets")),
+    ],
+    "reachability": [
+        (
+            "Rigid map: share of points on which inverse kinematics of the same Panda agrees",
+            (Shown("rigid.accuracy"),),
+        ),
+        ("Soft maps: smallest overlap under gravities between theirs", (Shown("soft.heldout_iou_min"),)),
+    ],
+    "identify_control": [
+        (
+            "Identified model with cables that do not rub, as the package's file has them, on `validate`: position / "
+            "tip error",
+            (Shown("smooth.validate.e_position_mm", "mm"), Shown("smooth.validate.e_tip_mm", "mm")),
+        ),
+    ],
+    "package_unity": [
+        (
+            "Packed model against the identified one with all that the importer drops, in a curl: largest deviation",
+            (Shown("dropped_max_deviation_mm", "mm"),),
+        ),
+    ],
+}
+GOAL = {"e_internal": 0.2, "e_position": 0.6, "e_tip": 2.0}  # % of the arm's length, of every kind of experiment
+
+
+BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")  # an identified model
+
+
+def pipeline_graph(root: Path) -> str:
+    """The stages of dvc.yaml as a mermaid flowchart; edges that follow from others are left out."""
+    with Repo(str(root)) as repo:
+        others = ("examples/", "rehearsal/")  # `dvc repro` alone runs neither
+        stages = {s.addressing: s for s in repo.index.stages if not s.addressing.startswith(others)}
+        edges = [(above.addressing, stage.addressing) for stage, above in repo.index.graph.edges]
+        graph = networkx.DiGraph()
+        graph.add_nodes_from(stages)
+        graph.add_edges_from(edge for edge in edges if stages.keys() >= set(edge))
+    reduced = networkx.transitive_reduction(graph)
+    order = list(networkx.lexicographical_topological_sort(reduced, key=list(stages).index))
+    names = {address: address.removesuffix(".yaml").rpartition(":")[2] for address in order}
+    lines = ["```mermaid", "flowchart LR"]
+    lines += [f"    {names[a]}" for a in order if not reduced.degree(a)]
+    while reduced.edges:
+        path = networkx.dag_longest_path(reduced, topo_order=order)
+        lines.append(f"    {' --> '.join(names[stage] for stage in path)}")
+        reduced.remove_edges_from(pairwise(path))
+    return "\n".join([*lines, "```"])
+
+
+def results_table(file: Path, results: Mapping[str, Sequence[tuple[str, Sequence[Shown]]]]) -> str:
+    """The metrics in the working tree that `file` limits as a Markdown table, beside goals and the gate's bounds."""
+    limits, baseline = read_limits(file), read_baseline(baseline_file(file))
+    lines = ["| measure | found | goal | `make gate` |", "|---|---:|---:|---:|"]
+    for stage, rows in results.items():
+        metrics = _metrics(metrics_folder(file), stage)
+        for what, figures in rows:
+            keys = [figure.key for figure in figures]
+            asked = [limits.get(stage, {}).get(key) for key in keys]
+            before = [baseline.metrics.get(stage, {}).get(key) for key in keys]
+            goals = [_goal(limit, lookup(metrics, key)) for limit, key in zip(asked, keys, strict=True)]
+            bounds = [_bound(limit, value) for limit, value in zip(asked, before, strict=True)]
+            lines.append(f"| {what} | {_figures(metrics, figures)} | {_joined(goals)} | {_joined(bounds)} |")
+    return "\n".join(lines)
+
+
+def _figures(metrics: dict | None, figures: Sequence[Shown]) -> str:
+    """Figures of a row, a unit that several have in a row behind the last of them."""
+    words = []
+    for figure, following in zip_longest(figures, figures[1:]):
+        of = f" of {_number(lookup(metrics, figure.of))}" if figure.of else ""
+        unit = "" if following is not None and following.unit == figure.unit else figure.unit
+        words.append(f"{_number(lookup(metrics, figure.key))}{of} {unit}".strip())
+    return " / ".join(words)
+
+
+def _joined(words: Sequence[str]) -> str:
+    """Words of a row's figures, a dash for one that has none where another has; empty where none has."""
+    return " / ".join(word or "–" for word in words) if any(words) else ""
+
+
+def identification_table(root: Path) -> str:
+    """Errors over all kinds on which `identify_control` is scored, of the models CAD and identified, beside null model
+    and noise floor; where joints have factors of their own, of the coarse model without them too."""
+    metrics = _metrics(root, "identify_control")
+    factors = lookup(_metrics(root, "identify_stiffness"), "per_joint_gain")
+    lines = [
+        "| model | E_internal, identify | E_internal, validate | position / tip error, mm, identify "
+        "| position / tip error, mm, validate | E_internal, paper's arm |",
+        "|---|---:|---:|---:|---:|---:|",
+    ]
+    for model, words in MODELS.items():
+        if (model == "coarse" and not factors) or lookup(metrics, model) is None:
+            continue
+        cells = []
+        for split in DECIDING:
+            millimetres, share = (lookup(metrics, f"{model}.{split}.e_internal_{unit}") for unit in ("mm", "pct"))
+            cells.append(f"{_number(millimetres)} mm ({_number(share)} %)")
+        cells += [_pair(metrics, f"{model}.{split}.", share=True) for split in DECIDING]
+        lines.append(f"| {words} | {' | '.join(cells)} | {PAPER.get(model, '')} |")
+    return "\n".join(lines)
+
+
+def parameter_table(root: Path) -> str:
+    """What each stage of identification identifies, and from what, by the settings."""
+    lines = ["| stage | experiments | parameters |", "|---|---|---|"]
+    for stage in STAGES:
+        config = load_config(IdentificationSettings, stage, root)
+        kinds = ", ".join(EXPERIMENTS[kind].plural for kind in config.experiments)
+        names = [name for name in PARAMETERS if name in config.parameters]
+        lines.append(f"| `{stage}` | {kinds} | {', '.join(f'`{name}`' for name in names)} |")
+    return "\n".join(lines)
+
+
+def experiment_table() -> str:
+    """The kinds of experiment, for whoever writes a session.yaml."""
+    lines = ["| `experiment` | what | `level` | commands or tendon positions |", "|---|---|---|---|"]
+    for name, kind in EXPERIMENTS.items():
+        level = kind.level.says if kind.level else ""
+        lines.append(f"| `{name}` | {kind.what} | {level} | {'needed' if kind.needs_motors else ''} |")
+    return "\n".join(lines)
+
+
+def score_table(root: Path) -> str:
+    """Errors on the trials of the split test, by kind of experiment, of the stage that identifies from it; last of all
+    kinds on which the last stage is scored."""
+    metrics = _metrics(root, "score")
+    rows, together = [], "identify_control"
+    for kind, (what, stage) in KINDS.items():
+        at = f"{TEST}.by_experiment.{kind}."
+        if lookup(metrics, f"{stage}.identified.{at}trials") is not None:
+            rows.append(f"| {what} | {' | '.join(_beside(lookup(metrics, stage), at))} |")
+    scored = lookup(metrics, f"{together}.identified.{TEST}.by_experiment") or {}
+    if scored:
+        *words, last = (KINDS[kind][0] for kind in KINDS if kind in scored)
+        what = f"{', '.join(words)} and {last}" if words else last
+        rows.append(f"| {what}, `{together}` | {' | '.join(_beside(lookup(metrics, together), f'{TEST}.'))} |")
+    goal = f"| goal | {GOAL['e_internal']:g} % | {GOAL['e_position']:g} / {GOAL['e_tip']:g} % |{' |' * len(BESIDE)}"
+    return "\n".join([*_head(f"trials of `{TEST}`"), goal, *rows])
+
+
+def rehearsal_block(root: Path, variants: bool) -> str:
+    """What the committed runs of the rehearsal came to, and of which code and package."""
+    metrics = _metrics(root, "rehearse")
+    if metrics is None:
+        return "(no runs are committed yet)"
+    goals = read_limits(root / "tests" / "limits.yaml")["rehearse"]
+    table = rehearsal_table(metrics, goals, source_words(root, metrics), variants)
+    stated = preview_table(metrics.get("preview"), goals)
+    return "\n\n".join([table, stated] if stated else [table])
+
+
+def preview_table(preview: dict | None, goals: dict[str, Limit]) -> str:
+    """Whether what previews state came true, beside the goals; "" where no run had a preview."""
+    coverage = lookup(preview, "coverage.at_end")
+    if not coverage:
+        return ""
+    times = {"at_end": "at the end", "after_2s": "2 s later", "after_10s": "10 s later"}
+    lines = ["| what previews state | came true | goal |", "|---|---:|---:|"]
+    radius = f"{_number(lookup(preview, 'radius_mm.median'))} mm"
+    counts = [[lookup(preview, f"coverage.{name}.{key}") for key in ("inside", "runs")] for name in times]
+    inside = [f"{count} of {runs}" for count, runs in counts]
+    off = [_number(lookup(preview, f"tip_error_radii.{name}.median")) for name in times]
+    asked = [_goal(goals.get(f"preview.coverage.{n}.share"), lookup(preview, f"coverage.{n}.share")) for n in times]
+    what = f"reach: the tip ends within a radius ({radius}, median) in 9 of 10 cases: {', '.join(times.values())}"
+    came = f"{' / '.join(inside)}; it is {' / '.join(off)} radii off, median"
+    lines.append(f"| {what} | {came} | {_joined(asked)} |")
+    likelier, previews = lookup(preview, "agreed"), lookup(preview, "previews")
+    goal = _goal(goals.get("preview.agreement"), lookup(preview, "agreement"))
+    lines.append(f"| grasp, hand-over: whether it holds | {likelier} of {previews} as the likelier | {goal} |")
+    path = lookup(preview, "path_pct_median")
+    goal = _goal(goals.get("preview.path_pct_median"), path)
+    lines.append(f"| grasp, hand-over: where the tip goes | {_number(path)} % of length off, median | {goal} |")
+    return "\n".join(lines)
+
+
+def example_table(folder: Path, all_splits: bool = True) -> str:
+    """An example's releases by split, beside what an identified model stands beside, and the arm's repeatability; then
+    its error with each trial's own mean rest offset taken out, and that of the tip's speed 1 to 2 s after release."""
+    scored = lookup(_metrics(folder, "score"), "identify_damping")
+    fitted = _metrics(folder, "identify_damping")
+    head, line = _head("releases")
+    rows = [head + " repeatability | about each one's rest | late tip speed off by |", line + "---:|" * 3]
+    fits = [(split, fitted) for split in reversed(DECIDING)] if all_splits else []
+    for split, metrics in ((TEST, scored), *fits):
+        scatter = [_number(lookup(metrics, f"repeatability_mm.release.{key}_mm")) for key in ("mean", "tip")]
+        for words, at in (("", f"{split}."), (", without repaired trials", f"{split}.without_repaired.")):
+            if not words or lookup(metrics, f"identified.{at}trials") is not None:
+                cells = [*_beside(metrics, at), " / ".join(scatter) if set(scatter) != {"–"} else "–"]
+                about = [lookup(metrics, f"identified.{at}e_{what}_about_rest_mm") for what in ("position", "tip")]
+                late = lookup(metrics, f"identified.{at}e_late_speed_pct")
+                cells += [" / ".join(map(_number, about)), _number(late) + (" %" if late is not None else "")]
+                rows.append(f"| of `{split}`{words} | {' | '.join(cells)} |")
+    return "\n".join(rows)
+
+
+PATHS = {"identified": "identified", "prompt": "identified, no backlash", "cad": "CAD",
+         "null": "null: mean shape", "null_straight": "null: straight arm"}  # fmt: skip
+
+
+def path_table(folder: Path) -> str:
+    """An example's static paths by split: root mean square of the tip's distance, raw and without its mean offset."""
+    scored = lookup(_metrics(folder, "score"), "identify_stiffness")
+    fitted = _metrics(folder, "identify_stiffness")
+    what = "poses: RMS of the tip's distance, without / with its mean offset, mm"
+    lines = [f"| {what} | {' | '.join(PATHS.values())} |"]
+    lines.append("|---" + "|---:" * len(PATHS) + "|")
+    for split, metrics in ((TEST, scored), *((split, fitted) for split in reversed(DECIDING))):
+        ways = [f"{split}.e_tip_{way}_mm" for way in ("centred_rms", "rms")]
+        cells = [" / ".join(_number(lookup(metrics, f"{model}.{way}")) for way in ways) for model in PATHS]
+        lines.append(f"| of `{split}` | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+# stage: [(what it is, dotted key in metrics.json, unit)], of an example
+NETWORK = {
+    "fk_dataset": [("FK against MuJoCo settled to rest: median", "mujoco_deviation_mm.median", "mm")],
+    "train_ik": [
+        ("IK, tip of settled MuJoCo: median", "as_controls.frictionless.position_error_mm.median", "mm"),
+        ("… 95th percentile", "as_controls.frictionless.position_error_mm.p95", "mm"),
+        ("… reachable poses that it calls doubtful", "as_controls.frictionless.doubted", ""),
+        ("… sent at once, with the winches' backlash", "as_controls.friction.position_error_mm.median", "mm"),
+        ("IK, samples held out: median", "position_error_mm.median", "mm"),
+        ("… after 3 Gauss-Newton steps: median", "polished.position_error_mm.median", "mm"),
+        ("… 95th percentile", "polished.position_error_mm.p95", "mm"),
+    ],
+    "reachability": [
+        ("Soft map: unseen tips that it calls reachable", "soft.heldout_reachable_min", ""),
+        ("… points 30 mm from every tip that it calls so", "soft.heldout_beyond_max", ""),
+        ("Hybrid map: points inside for which a pose was found", "hybrid.found_inside", ""),
+    ],
+}
+
+
+def network_table(folder: Path) -> str:
+    """What an example's samples, network and maps are worth."""
+    rows = ["| kinematics | |", "|---|---:|"]
+    for stage, entries in NETWORK.items():
+        metrics = _metrics(folder, stage)
+        rows += [f"| {what} | {_number(lookup(metrics, key))} {unit} |" for what, key, unit in entries]
+    return "\n".join(rows)
+
+
+def log_table(folder: Path) -> str:
+    """An example's trials of `test` by the log that they are pieces of: each model's mean position / tip error, mm."""
+    file = folder / "artifacts" / "score" / "trials.csv"
+    names = [LABELS[name] for name in ("identified", *BESIDE)]
+    lines = [f"| log: position / tip error, mm | trials | {' | '.join(names)} |", f"|---{'|---:' * (len(names) + 1)}|"]
+    if not file.is_file():
+        return "\n".join(lines)
+    rows = pd.read_csv(file)
+    rows["log"] = rows["trial"].str.rpartition("_")[0]
+    for log, group in rows.groupby("log", sort=False):
+        means = group.groupby("model")[["e_position_mm", "e_tip_mm"]].mean()
+        cells = [" / ".join(map(_number, means.loc[name])) if name in means.index else "–" for name in names]
+        lines.append(f"| `{log}` | {group['trial'].nunique()} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def other_arms(examples: Path) -> str:
+    """What became of the examples that are moved by motors, on trials of `test`: a line each."""
+    scored = [_metrics(examples / name, "score") for name in ("asl_motion", "ftdcr")]
+    moved, paths = (lookup(metrics, "identify_stiffness") for metrics in scored)
+    found, share = (_number(lookup(moved, f"identified.{TEST}.e_position_{unit}")) for unit in ("mm", "pct"))
+    tip = _number(lookup(paths, f"identified.{TEST}.e_tip_centred_rms_mm"))
+    nulls = lookup(moved, f"null.{TEST}.e_position_mm"), lookup(paths, f"null.{TEST}.e_tip_centred_rms_mm")
+    own, other = map(_number, nulls)
+    return (
+        f"[Moved by its motors](examples/asl_motion), without and with a load: {found} mm ({share} %) on `{TEST}` "
+        f"(mean shape {own}).\n"
+        f"The [FTDCR](examples/ftdcr), nine tendons: tip {tip} mm RMS on `{TEST}` (its authors' simulator 9.38, "
+        f"mean shape {other})."
+    )
+
+
+def _metrics(root: Path, stage: str) -> dict | None:
+    path = root / "artifacts" / stage / "metrics.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+
+
+def _head(what: str) -> list[str]:
+    """The head of a table whose rows are of `_beside`."""
+    cells = [f"{what}: position / tip error, mm", "E_internal", *(LABELS[name] for name in ("identified", *BESIDE))]
+    return [f"| {' | '.join(cells)} |", f"|---|{'---:|' * (len(cells) - 1)}"]
+
+
+def _beside(metrics: dict | None, at: str) -> list[str]:
+    """E_internal, then position / tip error of the identified model, of CAD, null models and the noise floor."""
+    internal = [_number(lookup(metrics, f"identified.{at}e_internal_{unit}")) for unit in ("mm", "pct")]
+    found = [f"{internal[0]} ({internal[1]} %)", _pair(metrics, f"identified.{at}", share=True)]
+    return found + [_pair(metrics, f"{name}.{at}") for name in BESIDE]
+
+
+def _pair(metrics: dict | None, at: str, share: bool = False) -> str:
+    """Position / tip error in mm; with `share` in % of the arm's length too."""
+    if lookup(metrics, f"{at}e_position_mm") is None:
+        return "–"
+    pairs = [
+        " / ".join(_number(lookup(metrics, f"{at}{error}_{unit}")) for error in ("e_position", "e_tip"))
+        for unit in ("mm", "pct")
+    ]
+    return f"{pairs[0]} ({pairs[1]} %)" if share else pairs[0]
+
+
+def _goal(limit: Limit | None, value: float | None) -> str:
+    """The goal of a metric whose `value` is found, with a word where that misses it."""
+    if limit is None:
+        return ""
+    words = [f"{limit.equals}"] if limit.equals is not None else []
+    if limit.asked is not None:
+        missed = " (missed)" if value is not None and limit.misses(value, limit.asked) else ""
+        words.append(f"{'≤' if limit.rises else '≥'} {_number(limit.asked)}{missed}")
+    words += [f"{limit.below.factor:g}× below {limit.below.key.partition('.')[0].upper()}"] if limit.below else []
+    return ", ".join(words)
+
+
+def _bound(limit: Limit | None, before: float | None) -> str:
+    if limit is None or before is None:
+        return f"{limit.equals}" if limit and limit.equals is not None else ""
+    return f"{'≤' if limit.rises else '≥'} {_number(limit.bound(before))}"
+
+
+def _number(value: float | None) -> str:
+    if value is None:
+        return "–"
+    return f"{int(value):,}" if value == int(value) else f"{value:.3g}"
+
+
+def with_blocks(text: str, blocks: dict[str, str]) -> str:
+    """`text` with the content of each named block replaced.
+
+    Raises:
+        ValueError: if `text` has no such block.
+    """
+    for name, content in blocks.items():
+        block = re.compile(rf"(<!-- {name} -->\n).*?(<!-- /{name} -->)", re.DOTALL)
+        if not block.search(text):
+            raise ValueError(f"expected a block `<!-- {name} -->` … `<!-- /{name} -->`")
+        text = block.sub(lambda match, content=content: f"{match[1]}{content}\n{match[2]}", text)
+    return text
+
+
+def generate(root: Path) -> dict[Path, str]:
+    """README.md, the examples' own, the reference of sessions and the pages on results, with their generated blocks as
+    they should be."""
+    examples = {name: example_table(root / "examples" / name) for name in EXAMPLES}
+    examples |= {name: log_table(root / "examples" / name) for name in ("asl_motion", "pairs")}
+    results = results_table(root / "tests" / "limits.yaml", RESULTS)
+    own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
+    own |= {"score": score_table(root), "rehearsal": rehearsal_block(root, variants=False)}
+    own |= {name: example_table(root / "examples" / name, all_splits=False) for name in EXAMPLES}
+    own["arms"] = other_arms(root / "examples")
+    blocks = {root / "README.md": own}
+    blocks[root / "data" / "raw" / "README.md"] = {"experiments": experiment_table()}
+    blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
+    ftdcr = root / "examples" / "ftdcr"
+    blocks[ftdcr / "README.md"] = {"ftdcr": path_table(ftdcr), "network": network_table(ftdcr)}
+    for page in sorted((root / "docs").rglob("*.md")):
+        names = re.findall(r"^<!-- (results/\w+) -->$", page.read_text(encoding="utf-8"), re.MULTILINE)
+        if names:
+            blocks[page] = {name: block(root / "docs" / f"{name}.json") for name in names}
+    blocks.setdefault(root / "docs" / "identification.md", {})["parameters"] = parameter_table(root)
+    blocks.setdefault(root / "docs" / "rehearsal.md", {})["rehearsal"] = rehearsal_block(root, variants=True)
+    truth = {"truth": truth_table(root), "errors": error_table(root)}
+    blocks.setdefault(root / "docs" / "results" / "intervals.md", {}).update(truth)
+    return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}
+
+
+@in_one_line
+def main(root: Path = Path(".")) -> int:
+    """Write what `generate` says, and the pictures."""
+    require_checkout(root)
+    for path, text in generate(root).items():
+        path.write_text(text, encoding="utf-8")
+    copy_pictures(root)
+    return 0
+
+
+def copy_pictures(root: Path) -> None:
+    """To where the READMEs show them."""
+    for source, target in PICTURES.items():
+        if (root / source).is_file():
+            (root / target).parent.mkdir(exist_ok=True)
+            shutil.copyfile(root / source, root / target)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
