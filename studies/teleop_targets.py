@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from trunkline.ar.preview.contents import network_of
 from trunkline.ar.teleop.alignment import least_turn, wrist_of
 from trunkline.ar.teleop.reach import MapReach
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -24,7 +25,7 @@ from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import Chain, read_chain
 from trunkline.pipeline.inputs import read_model
-from trunkline.unity.unpacked import maps_of, model_of, network_of, read_package
+from trunkline.unity.unpacked import maps_of, model_of, read_package
 from upkeep.results import recorded
 
 ARTIFACTS = Path("artifacts")

@@ -44,9 +44,9 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "rehearsal/test_held.py",
         "test_the_first_grasps_hold_what_is_lifted_does_not_slip_and_does_not_hang",
     ),
-    "trunkline.ar.hybrid.preview:Holding.holds": ("hybrid/test_preview.py", "test_what_counts_as_held"),
-    "trunkline.ar.hybrid.released:Resting.holds": ("hybrid/test_resting.py", "test_what_rests"),
-    "trunkline.ar.hybrid.trials:Tried.held": ("hybrid/test_preview.py", "test_what_counts_as_held_in_a_trial"),
+    "trunkline.ar.hybrid.preview:Holding.holds": ("ar/hybrid/test_preview.py", "test_what_counts_as_held"),
+    "trunkline.ar.hybrid.released:Resting.holds": ("ar/hybrid/test_resting.py", "test_what_rests"),
+    "trunkline.ar.hybrid.trials:Tried.held": ("ar/hybrid/test_preview.py", "test_what_counts_as_held_in_a_trial"),
     "trunkline.identification.fit.identify:_at_bound": (
         "identification/test_bounds.py",
         "test_a_parameter_is_at_a_bound_within_a_share_of_its_own_range",
@@ -71,30 +71,39 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "identification/test_converged.py",
         "test_only_a_search_whose_starts_agree_has_converged",
     ),
-    "trunkline.ar.session.preview_validation:_held": ("live/test_hindsight.py", "test_what_came_of_a_grasp"),
-    "trunkline.ar.session.preview_validation:_holds": ("live/test_hindsight.py", "test_whether_the_arm_holds_anything"),
+    "trunkline.ar.session.preview_validation:_held": ("ar/session/test_hindsight.py", "test_what_came_of_a_grasp"),
+    "trunkline.ar.session.preview_validation:_holds": (
+        "ar/session/test_hindsight.py",
+        "test_whether_the_arm_holds_anything",
+    ),
     "trunkline.ar.session.preview_validation:lines": (
-        "live/test_hindsight.py",
+        "ar/session/test_hindsight.py",
         "test_whether_the_outcome_agreed_with_what_was_foreseen",
     ),
-    "trunkline.kinematics.panda.inverse:solve": ("panda/test_labels.py", "test_a_solution_is_within_both_tolerances_and_free"),
+    "trunkline.kinematics.panda.inverse:solve": (
+        "kinematics/panda/test_labels.py",
+        "test_a_solution_is_within_both_tolerances_and_free",
+    ),
     "trunkline.kinematics.panda.labels:_reached": (
-        "panda/test_labels.py",
+        "kinematics/panda/test_labels.py",
         "test_a_worker_says_of_its_own_points_what_the_solver_does",
     ),
     "trunkline.kinematics.panda.labels:label": (
-        "panda/test_labels.py",
+        "kinematics/panda/test_labels.py",
         "test_every_point_not_reached_gets_the_same_further_starts",
     ),
     "trunkline.kinematics.reachability.reach_signal:held_out": (
-        "reachability/test_verdicts.py",
+        "kinematics/reachability/test_verdicts.py",
         "test_a_held_out_angle_counts_what_its_signal_calls_within_reach",
     ),
     "trunkline.kinematics.reachability.surface_check:check_sheets": (
-        "reachability/test_verdicts.py",
+        "kinematics/reachability/test_verdicts.py",
         "test_sheets_are_checked_with_tips_and_points_beyond",
     ),
-    "trunkline.model.statics.newton:find_equilibrium": ("statics/test_converged.py", "test_balance_alone_is_no_rest"),
+    "trunkline.model.statics.newton:find_equilibrium": (
+        "model/statics/test_converged.py",
+        "test_balance_alone_is_no_rest",
+    ),
 }
 OTHERWISE = {  # what the word stands for there: no verdict
     "trunkline.identification.simulate.experiment:start_frames": "frames in which an arm is held before its release",

@@ -22,22 +22,15 @@ from trunkline.unity.package import MANIFEST as PACKED
 from trunkline.unity.package import read_tarball
 from upkeep.provenance import MANIFEST, SHOWN, package_of
 
-ROOMS = ("trunkline", "demo", "rehearsal", "studies", "benchmarks", "stages", "tests")
+ROOMS = ("trunkline", "upkeep", "demo", "rehearsal", "studies", "benchmarks", "stages", "tests")
 
 # What surrounds every result (load, show, refuse, write) and never changes a number. Also of tests/pipeline.
 INERT = (
-    "trunkline/compute/numerics.py",
-    "trunkline/errors.py",
-    "trunkline/startup_notice.py",
-    "trunkline/compute/progress.py",
+    "trunkline/compute/",  # where it runs: the same bits
+    *("trunkline/errors.py", "trunkline/startup_notice.py", "trunkline/settings.py"),
+    *("trunkline/report/figures/", "trunkline/pipeline/", "upkeep/"),
+    *("demo/__init__.py", "rehearsal/__init__.py", "rehearsal/report.py", "studies/rows.py"),
 )
-INERT += ("trunkline/settings.py", "trunkline/compute/threads.py", "demo/__init__.py", "rehearsal/__init__.py")
-INERT += (
-    "trunkline/compute/cluster.py",
-    "trunkline/compute/environment.py",
-    "trunkline/compute/scheduler.py",
-)  # where it runs: the same bits
-INERT += ("trunkline/report/figures/", "trunkline/pipeline/", "rehearsal/report.py", "studies/rows.py")
 ACTIVE = ("trunkline/pipeline/identify.py",)
 MADE = {".pyc", ".nbi", ".nbc", ".md"}  # by Python and numba; and words
 
@@ -115,7 +108,7 @@ def code_of(root: Path, modules: Iterable[str], reads: Iterable[str] = ()) -> di
     starts += [entry for entry in reads if entry.endswith(".py")]
     folders: dict[str, list[Path]] = {}
     for file in with_neighbours(root, imported(root, starts)):
-        folders.setdefault("/".join(file.parts[:2]), []).append(file)
+        folders.setdefault(_place(root, file).as_posix(), []).append(file)
     found = {name: _digest(root, files) for name, files in folders.items()}
     others = {entry: _of_entry(root, entry) for entry in reads if not entry.endswith(".py")}
     return found | {entry: digest for entry, digest in others.items() if digest}
@@ -148,13 +141,23 @@ def imported(root: Path, starts: Iterable[str]) -> set[str]:
 def with_neighbours(root: Path, files: Iterable[str]) -> list[Path]:
     """`files`, and what is no Python in their folders; of a file that lies in a room itself, what has its stem."""
     found = {Path(file) for file in files}
-    places = {file.parts[:2] if len(file.parts) > 2 else file.parent.parts for file in found if file.parts[0] in ROOMS}
-    for place in places:
-        folder = root / Path(*place)
-        inner = folder.rglob("*") if len(place) > 1 else folder.glob("*")
+    places = {_place(root, file) for file in found if file.parts[0] in ROOMS}
+    for place in {place.parent if place.suffix else place for place in places}:
+        inside = len(place.parts) > 1
+        inner = (root / place).rglob("*") if inside else (root / place).glob("*")
         others = [file.relative_to(root) for file in inner if file.is_file() and file.suffix not in {".py", *MADE}]
-        found |= {file for file in others if len(place) > 1 or file.with_suffix(".py") in found}
+        found |= {file for file in others if inside or file.with_suffix(".py") in found}
     return sorted(found)
+
+
+def _place(root: Path, file: Path) -> Path:
+    """The innermost package that a file is of, or the file where it lies in a room itself."""
+    if len(file.parts) < 3:
+        return file
+    folder = file.parent
+    while len(folder.parts) > 2 and not (root / folder / "__init__.py").is_file():
+        folder = folder.parent
+    return folder
 
 
 def _flat(entries: str | list) -> list[str]:

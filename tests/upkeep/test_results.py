@@ -44,7 +44,8 @@ FILES_OF_A_PROJECT = {
     "studies/some.py": "from trunkline.ar.teleop.core import step\n",
     "studies/some.yaml": "runs: 20\n",
     "studies/other.yaml": "runs: 20\n",
-    "trunkline/ar/teleop/core.py": "from trunkline.model.arm import unit\n\n\ndef step():\n    import trunkline.frames\n",
+    "trunkline/ar/teleop/core.py": "from trunkline.model.arm import unit\n\n\ndef step():\n"
+    "    import trunkline.frames\n",
     "trunkline/ar/teleop/unused.py": "",
     "trunkline/ar/teleop/core.csv": "1\n",
     "trunkline/model/arm/unit.py": "LENGTH = 1\n",

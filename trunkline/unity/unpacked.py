@@ -1,6 +1,5 @@
-"""A finished package, read back: its digest, its maps in the base frames, as the stage `reachability` wrote them, its
-network, the calibrated model, and what a preview needs: the arm whole, what holds it, and how sure its parameters
-are."""
+"""A finished package, read back: its digest, its maps in the base frames, as the stage `reachability` wrote them, the
+calibrated model, the arm whole, and what holds it."""
 
 import hashlib
 import json
@@ -11,12 +10,9 @@ import mujoco
 import numpy as np
 from pydantic import TypeAdapter
 
-from trunkline.ar.hybrid import posterior
-from trunkline.ar.teleop import tendons
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import Robot
 from trunkline.unity.frame import unity_position
-from trunkline.unity.manifest import require_widths
 from trunkline.unity.package import MANIFEST, read_tarball
 from trunkline.unity.unsupported import without_unsupported
 
@@ -44,7 +40,7 @@ def package_digest(files: dict[str, bytes]) -> str:
     Raises:
         InputError: naming the file that is not the one that the manifest means.
     """
-    manifest = _manifest(files)
+    manifest = manifest_of(files)
     for path, expected in manifest["sha256"].items():
         found = hashlib.sha256(files[path]).hexdigest() if path in files else "none"
         if found != expected:
@@ -59,7 +55,7 @@ def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
     Raises:
         InputError: a file is missing or of another size, or soft maps do not share a lattice.
     """
-    manifest = _manifest(files)
+    manifest = manifest_of(files)
     arrays: dict[str, np.ndarray] = {"soft_angles": np.array(manifest["reach"]["angles"])}
     soft = manifest["reach"]["grids"]
     for name in soft:
@@ -85,22 +81,6 @@ def maps_of(files: dict[str, bytes]) -> dict[str, np.ndarray]:
     return arrays
 
 
-def network_of(files: dict[str, bytes]) -> tendons.Network:
-    """The network, to be asked.
-
-    Raises:
-        InputError: its file is no network, or one of other inputs or outputs than the manifest says.
-    """
-    block = _manifest(files)["network"]
-    try:
-        session = tendons.session_of(files[block["file"]])
-    except tendons.NO_NETWORK as error:
-        raise InputError(f"network: found {str(error).splitlines()[0]}, expected an ONNX file") from None
-    took, gave = ([one.shape[-1] for one in ends] for ends in (session.get_inputs(), session.get_outputs()))
-    require_widths(took, gave, block["input_order"], block["output_order"], "network")
-    return tendons.network_of(session)
-
-
 def model_of(files: dict[str, bytes]) -> mujoco.MjModel:
     """The calibrated model as plain MuJoCo steps it: without the motors' dead time and winches, and cables that rub.
     Its controls are commands, those of the file that Unity imports are pulls."""
@@ -111,16 +91,7 @@ def model_of(files: dict[str, bytes]) -> mujoco.MjModel:
 
 def arm_of(files: dict[str, bytes]) -> mujoco.MjSpec:
     """The calibrated arm, with the motors' dead time and winches, and cables that rub: what `hybrid.compose` takes."""
-    return mujoco.MjSpec.from_string(_file(files, "arm").decode())
-
-
-def doubts_of(files: dict[str, bytes], contact: posterior.Contact | None = None) -> posterior.Doubts:
-    """What is not known of the arm, and of what it touches.
-
-    Raises:
-        InputError: naming a parameter that is unknown or whose interval is none.
-    """
-    return posterior.doubts_of(json.loads(_file(files, "parameters"))["stages"], contact)
+    return mujoco.MjSpec.from_string(file_of(files, "arm").decode())
 
 
 def robot_of(files: dict[str, bytes]) -> Robot:
@@ -142,13 +113,13 @@ class _Block(dict):
         raise InputError(f"{self._source}: found no {name}, expected one")
 
 
-def _file(files: dict[str, bytes], name: str) -> bytes:
+def file_of(files: dict[str, bytes], name: str) -> bytes:
     """The file that the manifest's block `hybrid` calls `name`."""
     return files[_hybrid(files)[name]]
 
 
 def _hybrid(files: dict[str, bytes]) -> dict:
-    manifest = _manifest(files)
+    manifest = manifest_of(files)
     if "hybrid" not in manifest:
         raise InputError(f"{MANIFEST}: found no block hybrid, expected a package that a preview can be made of")
     return manifest["hybrid"]
@@ -163,7 +134,8 @@ def _numbers(files: dict[str, bytes], path: str, kind: str, shape: tuple[int, ..
     return np.frombuffer(files[path], dtype=kind).reshape(shape)
 
 
-def _manifest(files: dict[str, bytes]) -> _Block:
+def manifest_of(files: dict[str, bytes]) -> _Block:
+    """The package's manifest; what is missing in it is an error that names it."""
     if MANIFEST not in files:
         raise InputError(f"package: found no {MANIFEST}, expected one of the stage package_unity")
     try:

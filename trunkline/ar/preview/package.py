@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 
 from trunkline.ar.hybrid.grasp_poses import Grip, SideGrip
+from trunkline.ar.preview import contents
 from trunkline.ar.teleop.alignment import base_quaternion
 from trunkline.ar.teleop.config import Config
 from trunkline.ar.teleop.grasping import Grasping
@@ -102,7 +103,7 @@ def read_package(path: Path) -> Package:
     return Package(
         digest,
         MapReach.from_arrays(unpacked.maps_of(files)),
-        unpacked.network_of(files),
+        contents.network_of(files),
         compiled,
         read_chain(compiled).smooth,
         read_geometry(mujoco.MjSpec.from_string(files[MODEL].decode())),

@@ -13,6 +13,7 @@ from trunkline.ar.hybrid.rollouts import Twin
 from trunkline.ar.hybrid.string import hang
 from trunkline.ar.hybrid.worlds import Surface
 from trunkline.ar.hybrid.worlds import World as Room
+from trunkline.ar.preview import contents
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.teleop.messages import Box, Thing, World
 from trunkline.ar.teleop.vectors import Quaternion, unit
@@ -61,7 +62,7 @@ def believed(settings: Previewing, files: dict[str, bytes]) -> Believed:
     robot = unpacked.robot_of(files)
     if not isinstance(robot, PandaRobot):
         raise InputError(f"package: found a robot of kind {robot.kind}, expected panda: plans move that")
-    return Believed(unpacked.arm_of(files), unpacked.doubts_of(files, contact), robot)
+    return Believed(unpacked.arm_of(files), contents.doubts_of(files, contact), robot)
 
 
 def compose_twin(

@@ -1,0 +1,34 @@
+"""What teleoperation and previews ask of a package's files: its network, and how sure the arm's parameters are."""
+
+import json
+
+from trunkline.ar.hybrid import posterior
+from trunkline.ar.teleop import tendons
+from trunkline.errors import InputError
+from trunkline.unity.manifest import require_widths
+from trunkline.unity.unpacked import file_of, manifest_of
+
+
+def network_of(files: dict[str, bytes]) -> tendons.Network:
+    """The network, to be asked.
+
+    Raises:
+        InputError: its file is no network, or one of other inputs or outputs than the manifest says.
+    """
+    block = manifest_of(files)["network"]
+    try:
+        session = tendons.session_of(files[block["file"]])
+    except tendons.NO_NETWORK as error:
+        raise InputError(f"network: found {str(error).splitlines()[0]}, expected an ONNX file") from None
+    took, gave = ([one.shape[-1] for one in ends] for ends in (session.get_inputs(), session.get_outputs()))
+    require_widths(took, gave, block["input_order"], block["output_order"], "network")
+    return tendons.network_of(session)
+
+
+def doubts_of(files: dict[str, bytes], contact: posterior.Contact | None = None) -> posterior.Doubts:
+    """What is not known of the arm, and of what it touches.
+
+    Raises:
+        InputError: naming a parameter that is unknown or whose interval is none.
+    """
+    return posterior.doubts_of(json.loads(file_of(files, "parameters"))["stages"], contact)
