@@ -48,3 +48,16 @@ def test_currents_go_out_in_standard_frames():
     expected = list(command_frames({FIRST: 0.5}))
     assert [(one.arbitration_id, bytes(one.data)) for one in sent] == expected
     assert not any(one.is_extended_id for one in sent)
+
+
+def test_the_first_fault_of_a_bus_is_the_one_that_is_named():
+    causes = iter([OSError("unplugged"), OSError("gone")])
+
+    def recv(_):
+        raise next(causes)
+
+    bus = SimpleNamespace(recv=recv, send=lambda _: None, set_filters=lambda _: None)
+    driver = BusMotors(motor_settings(), bus)  # type: ignore[arg-type]
+    for _ in range(2):
+        driver.turn([0.0], [0.0])
+        assert driver.fault == "bus: unplugged"
