@@ -105,7 +105,7 @@ def test_its_version_is_the_one_written_once(python, tmp_path):
     assert Path(where).is_relative_to(python.parents[1])
 
 
-@pytest.mark.parametrize("name", ["gate", "lock", "readme", "settings", "versions"])
+@pytest.mark.parametrize("name", ["report", "settings"])
 def test_a_command_that_needs_a_checkout_says_so_in_one_line(python, tmp_path, name):
     done = run(tmp_path, python, "-m", f"trunkline.pipeline.{name}")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1), done.stderr
