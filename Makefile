@@ -11,7 +11,7 @@ PIP := .venv/bin/python -m pip --disable-pip-version-check -qq
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
 unexport PYTHONDONTWRITEBYTECODE  # where that is set, every process of a stage compiles all its libraries: 9 s each
 
-.PHONY: demo small_demo rehearse live client browser mono test types gate baseline lock release readme pull push setup stale \
+.PHONY: demo small_demo rehearse live client browser mono test types gate baseline lock release house readme pull push setup stale \
   mutants mutants_sample requirements clean
 
 demo: setup          ## run the whole pipeline, from recording the demo logs to the Unity package
@@ -61,6 +61,9 @@ lock: setup          ## check that dvc.lock belongs to the code, params.yaml, th
 
 release: setup       ## hold the split test against tests/release.yaml; nothing is chosen by it
 	python -m upkeep.release
+
+house: setup         ## measure the code: packages, imports, sizes, names; make house AGAINST=REVISION shows both
+	@python -m upkeep.house $(if $(AGAINST),--against $(AGAINST))
 
 readme: setup        ## regenerate the README's graph, table and picture
 	python -m upkeep.readme

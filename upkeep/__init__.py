@@ -1,1 +1,1 @@
-"""Upkeep of this repository: README, gate, baseline, lock, versions, kept results. No part of the library."""
+"""Tools that look after this repository. No part of the product: nothing in trunkline/ imports them."""
