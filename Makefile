@@ -68,7 +68,7 @@ house: setup         ## measure the code: packages, imports, sizes, names; make 
 readme: setup        ## regenerate the README's graph, table and picture
 	python -m upkeep.readme
 
-# All but the examples: `dvc pull` alone fails where nobody ran and pushed those (docs/remotes.md).
+# All but the examples: `dvc pull` alone fails where nobody ran and pushed those (docs/speed.md).
 SHARED := dvc.yaml $(or $(wildcard data/raw/*.dvc),demo/dvc.yaml)
 
 pull: setup          ## bring the session and all results from the DVC remote

@@ -3,7 +3,7 @@
     ROBOT_PYTHON=fr3/bin/python python -m benchmarks.franka ROBOT ADDRESS
 
 **It moves whatever is at ADDRESS**, each joint by TURN rad: a simulator such as franka-sim. ROBOT: `fr3` or `panda`.
-ROBOT_PYTHON: of the environment with the robot's library. docs/execution.md says how to start the simulator.
+ROBOT_PYTHON: of the environment with the robot's library. docs/hardware.md says how to start the simulator.
 """
 
 import os

@@ -8,7 +8,7 @@ stand-in among true objects, from the session's log, and judged as the rehearsal
 own.
 
 ROBOT_PYTHON is of an environment with pylibfranka and franka-sim; franka-sim listens to every address, so the whole
-belongs in a network of its own (docs/execution.md). A run is a row of docs/results/experiments.csv as soon as it is
+belongs in a network of its own (docs/hardware.md). A run is a row of docs/results/experiments.csv as soon as it is
 done; stopped, the command goes on from there. Runs of other code or with another package stay in that file, and count
 for nothing; with `--again` each seed is run once more, as a further row. The first attempt of each seed counts, and the
 lines under the table tell of all others.

@@ -13,7 +13,7 @@ from trunkline.recordings.session.session import FixedBase, MocapFrame, Session,
 ROOT = Path(__file__).parents[2]
 DOCS = sorted(
     path
-    for pattern in ("*.md", "docs/*.md", "docs/results/*.md", "data/*/README.md", "examples/*/README.md")
+    for pattern in ("*.md", "docs/*.md", "docs/*/*.md", "data/*/README.md", "examples/*/README.md")
     for path in ROOT.glob(pattern)
 )
 FOLDERS = "trunkline|stages|conf|docs|demo|studies|benchmarks|tests|examples"
@@ -72,6 +72,17 @@ def test_its_lines_are_short(page):
     assert [line for line in text.splitlines() if len(line) > 120 and not line.startswith("|")] == []
 
 
+CITING = ("stages", "demo", "studies", "examples", "rehearsal", "client/src")  # folders whose code names pages
+
+
+@pytest.mark.parametrize("folder", CITING)
+def test_pages_that_code_names_exist(folder):
+    files = [file for file in (ROOT / folder).rglob("*.*") if file.suffix in (".py", ".yaml", ".js")]
+    assert files
+    named = {name for file in files for name in re.findall(r"\bdocs/[\w/-]+\.md", file.read_text(encoding="utf-8"))}
+    assert [name for name in sorted(named) if not (ROOT / name).is_file()] == []
+
+
 def test_nothing_cites_a_specification_that_readers_lack():
     files = [file for folder in FOLDERS.split("|") for file in (ROOT / folder).rglob("*.*")]
     files = [file for file in files if file.suffix in (".py", ".yaml", ".md")]
@@ -80,7 +91,19 @@ def test_nothing_cites_a_specification_that_readers_lack():
 
 
 def test_the_readme_is_short():
-    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 150
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 90
+
+
+def test_the_docs_are_few_pages_and_the_readme_leads_to_each():
+    """Archives of results, docs/*/, do not count."""
+    chosen = sorted((ROOT / "docs").glob("*.md"))
+    assert len(chosen) <= 16
+    assert sum(len(page.read_text(encoding="utf-8").splitlines()) for page in chosen) <= 3500
+    targets = {target for target, _ in links(ROOT / "README.md")}
+    assert [page.name for page in chosen if f"docs/{page.name}" not in targets] == []
+    linked = {target for page in chosen for target, _ in links(page)}
+    measured = sorted((ROOT / "docs/measurements").glob("*.md"))
+    assert [page.name for page in measured if f"measurements/{page.name}" not in linked] == []
 
 
 def test_the_paper_is_cited_as_the_readme_names_it():

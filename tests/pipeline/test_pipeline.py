@@ -358,7 +358,7 @@ def store(request, tmp_path):
 
 
 def _add_remote(pipeline: StubPipeline, store: dict[str, str]) -> None:
-    """As in docs/remotes.md, all of it in `.dvc/config.local`."""
+    """As in docs/speed.md, all of it in `.dvc/config.local`."""
     pipeline.run("dvc", "remote", "add", "--local", "-q", "-d", "store", store["url"])
     for option, value in store.items():
         if option != "url":
@@ -366,7 +366,7 @@ def _add_remote(pipeline: StubPipeline, store: dict[str, str]) -> None:
 
 
 def test_what_was_pushed_is_pulled_elsewhere_and_not_run_again(pipeline, store, tmp_path):
-    """docs/remotes.md: the results, and then a session of one's own."""
+    """docs/speed.md: the results, and then a session of one's own."""
     make = ("make", "--silent", "--assume-old=setup")  # the environment is there
     _add_remote(pipeline, store)
     pipeline.run(*make, "push")

@@ -21,7 +21,7 @@ from upkeep.results import block, modules_of, not_in_history, recorded
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "docs/results").glob("*.json"))
-PAGES = sorted([*(ROOT / "docs/results").glob("*.md"), ROOT / "docs/speed.md"])
+PAGES = sorted(page for name in ("results/*", "measurements/*", "speed") for page in (ROOT / "docs").glob(f"{name}.md"))
 FIGURE = re.compile(r"\d\.\d|\d ?(?:%|mm|cm|s|ms|µs|N|°)(?!\w)|\d times|\d of \d")
 
 
@@ -361,7 +361,7 @@ def test_settings_and_outputs_that_a_module_names_are_declared(file):
     assert [path for path in paths if not any(path in entry or entry in path for entry in reads)] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}/{page.stem}")
 def test_a_page_of_results_has_no_figure_that_was_typed(page):
     """All stand in blocks that `make readme` writes; test_readme.py compares those with their files."""
     text = re.sub(r"<!-- ([\w/]+) -->.*?<!-- /\1 -->", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)

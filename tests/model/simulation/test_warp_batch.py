@@ -29,7 +29,7 @@ from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.recordings.trials.trial import write_trials
 
 SECONDS = 0.5
-BOUND = 5e-6  # m, of any site in that time, as docs/cluster.md states it
+BOUND = 5e-6  # m, of any site in that time, as docs/speed.md states it
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 
 

@@ -5,7 +5,7 @@
 
 PACKAGE: the folder or .tgz that the stage package_unity writes. It listens on this machine alone; a headset comes over
 USB: `adb reverse tcp:8443 tcp:8443`. Another address needs TLS. The address that is printed opens the session: whoever
-has it may control the robot. What happens is logged: docs/live_log.md.
+has it may control the robot. What happens is logged: docs/live-sessions.md.
 """
 
 import argparse
@@ -40,7 +40,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
     parser.add_argument("--cert", type=Path, help="a certificate of your own, PEM")
     parser.add_argument("--key", type=Path, help="its key, PEM")
     parser.add_argument("--dry-run", action="store_true", help="on the simulated robot, as without --robot, --motors")
-    parser.add_argument("--robot", choices=ROBOTS, default=ROBOTS[0], help="docs/execution.md says what was tried")
+    parser.add_argument("--robot", choices=ROBOTS, default=ROBOTS[0], help="docs/hardware.md says what was tried")
     parser.add_argument("--motors", choices=MOTORS, default=MOTORS[0], help="of the tendons")
     parser.add_argument("--bus", default="", help=f"the motors', such as can0; {SIMULATED}: simulated motors behind it")
     parser.add_argument("--interface", default="", help="python-can's, for the bus; socketcan unless it is named")

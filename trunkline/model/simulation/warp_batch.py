@@ -2,7 +2,7 @@
 
 State and fields of each simulation stay in the rows of a `mujoco.batch.Batch`. A rollout takes them to Warp as 32-bit
 floats and its end back, so constants, `forward` and `step` are as exact as ever, and positions are off from MuJoCo's as
-docs/cluster.md says. `trunkline.model.simulation.motion.batch_of` chooses: nothing else imports this.
+docs/speed.md says. `trunkline.model.simulation.motion.batch_of` chooses: nothing else imports this.
 """
 
 import copy

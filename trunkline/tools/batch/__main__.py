@@ -23,7 +23,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
         prog=called("trunkline.tools.batch"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("list", type=Path, metavar="LIST.yaml", help="the arms: docs/fleet.md")
+    parser.add_argument("list", type=Path, metavar="LIST.yaml", help="the arms: docs/lab-tools.md")
     parser.add_argument("--out", type=Path, metavar="FOLDER", default=Path("build/fleet"), help="default: build/fleet")
     parser.add_argument("--until", metavar="STAGE", default="score", help="the last stage to run; default: score")
     parser.add_argument("--only-table", action="store_true", help="run nothing, tell what is there")

@@ -5,7 +5,7 @@ expected to shrink what you care about, by the Fisher information that it has on
 parameters, the widest count most), tip (its uncertainty at rest over the workspace) or grasp (that of a wound up arm;
 it stands in for the probability to hold a thing, which is not computed). Each suggestion knows those before it. Says
 what each costs in minutes, how to record it, its entry of session.yaml, and the commands to run afterwards. Writes
-nothing. Method and limits: docs/suggest.md.
+nothing. Method and limits: docs/lab-tools.md.
 """
 
 import argparse

@@ -83,7 +83,7 @@ def reference_lines(baseline: Baseline, chart: Chart, names: tuple[str, ...]) ->
     lines = ["reference: " + ", ".join(f"{trials[kind]} {kind} under {conditions[kind]} conditions" for kind in kinds)]
     if repeated := [kind for kind in kinds if trials[kind] >= REPEATED * conditions[kind]]:
         lines.append(f"  few conditions of {', '.join(repeated)}, as where a session is planned for identification: "
-                     "trials under others may raise more false alarms (docs/watch.md)")  # fmt: skip
+                     "trials under others may raise more false alarms (docs/lab-tools.md)")  # fmt: skip
     for kind in kinds:
         told = []
         for p in chart.lines:
