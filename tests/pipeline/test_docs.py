@@ -72,7 +72,7 @@ def test_its_lines_are_short(page):
     assert [line for line in text.splitlines() if len(line) > 120 and not line.startswith("|")] == []
 
 
-CITING = ("stages", "demo", "studies", "examples", "rehearsal", "client/src")  # folders whose code names pages
+CITING = ("trunkline", "conf", "stages", "demo", "benchmarks", "studies", "examples", "rehearsal", "client/src")  # folders whose code names pages
 
 
 @pytest.mark.parametrize("folder", CITING)
