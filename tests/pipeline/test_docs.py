@@ -72,7 +72,8 @@ def test_its_lines_are_short(page):
     assert [line for line in text.splitlines() if len(line) > 120 and not line.startswith("|")] == []
 
 
-CITING = ("trunkline", "conf", "stages", "demo", "benchmarks", "studies", "examples", "rehearsal", "client/src")  # folders whose code names pages
+# folders whose code names pages
+CITING = ("trunkline", "conf", "stages", "demo", "benchmarks", "studies", "examples", "rehearsal", "client/src")
 
 
 @pytest.mark.parametrize("folder", CITING)
