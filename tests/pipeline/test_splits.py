@@ -26,7 +26,7 @@ from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, SPLITS, TEST,
 from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 
 ROOT = Path(__file__).parents[2]
-FOLDERS = ("trunkline", "stages", "studies", "benchmarks", "examples", "demo")
+FOLDERS = ("trunkline", "stages", "studies", "benchmarks", "qualification", "examples", "demo")
 READERS = {"filter", "identify_stiffness", "identify_damping", "identify_control", "score", "report"}  # of trials
 # who may name the split test, or all splits, and for what
 MAY_NAME = {
@@ -48,13 +48,7 @@ MAY_NAME = {
     "upkeep/truth_table.py": {"TEST"},  # shows it
 }
 # who says the same words of something else: the network's samples are split too; `identify` is also a function
-OTHERWISE = (
-    "trunkline/kinematics/dataset/",
-    "trunkline/kinematics/ik/",
-    "trunkline/report/figures/network.py",
-    "studies/training.py",
-)
-OTHERWISE += ("benchmarks/identification/sysid.py",)
+OTHERWISE = ("trunkline/kinematics/dataset/", "trunkline/kinematics/ik/", "trunkline/report/figures/network.py")
 
 
 def files() -> dict[str, ast.Module]:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from onnx import TensorProto, helper
 
-from studies.reaching import EXAMPLES, reach, reach_by_ros
 from tests.support.folders import package
+from tests.support.reaching import EXAMPLES, reach, reach_by_ros
 from tests.support.small_arm import small_spec
 from tests.unity.test_twin import LABEL, ROBOT, TRAJECTORY, sources_in
 from trunkline.errors import InputError

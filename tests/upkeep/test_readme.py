@@ -339,7 +339,7 @@ def test_no_stage_reads_the_truth():
     on holds it, nor does the session."""
     naming = [
         path.relative_to(ROOT).as_posix()
-        for folder in ("trunkline", "stages", "demo", "studies", "benchmarks", "conf")
+        for folder in ("trunkline", "stages", "demo", "studies", "benchmarks", "qualification", "conf")
         for path in (ROOT / folder).rglob("*.*")
         if path.suffix in (".py", ".yaml") and "truth.json" in path.read_text(encoding="utf-8")
     ]

@@ -1,4 +1,4 @@
-"""Results of studies and benchmarks: what they printed, of what commit, as the pages show it."""
+"""Results of studies, benchmarks and qualification: what they printed, of what commit, as the pages show it."""
 
 import ast
 import csv
@@ -13,15 +13,26 @@ from pathlib import Path
 import pytest
 import yaml
 
-from benchmarks.identification.__main__ import PARTS
 from trunkline.errors import InputError
 from trunkline.unity.package import write_tarball
 from upkeep.origin import READS, code_of, reads_of
-from upkeep.results import block, modules_of, not_in_history, recorded
+from upkeep.results import (
+    ARCHIVES,
+    COMMANDS,
+    KeptResult,
+    block,
+    kept_results,
+    modules_of,
+    names_recorded,
+    not_in_history,
+    recorded,
+    results_index,
+)
 
 ROOT = Path(__file__).parents[2]
 FILES = sorted((ROOT / "docs/results").glob("*.json"))
 PAGES = sorted(page for name in ("results/*", "measurements/*", "speed") for page in (ROOT / "docs").glob(f"{name}.md"))
+CURRENT = [file for file in FILES if not KeptResult.read(file).archived]
 FIGURE = re.compile(r"\d\.\d|\d ?(?:%|mm|cm|s|ms|µs|N|°)(?!\w)|\d times|\d of \d")
 
 
@@ -278,17 +289,85 @@ def test_a_file_that_is_none_is_one_line(project, text):
     assert block(project / "docs/results/another.json") == "(no run is kept yet)"
 
 
-def test_every_study_and_benchmark_keeps_its_results_and_every_kept_one_is_shown():
-    code = "".join(file.read_text(encoding="utf-8") for name in ("studies", "benchmarks") for file in modules(name))
-    named = set(re.findall(r'recorded\("(\w+)"', code))
-    named |= {f"identification_{part}" for part in PARTS}
+def archived(project, **fields):
+    """The kept result of `project`, archived."""
+    path = project / "docs/results/study.json"
+    path.write_text(json.dumps(stored(project) | {"archived": "results-1"} | fields))
+    return KeptResult.read(path)
+
+
+def test_an_archived_result_names_its_tag_and_commit_and_is_never_stale(project):
+    record(project)
+    (project / "studies/some.py").unlink()
+    (project / "trunkline/frames.py").write_text("UP = 2\n")
+    assert KeptResult.read(project / "docs/results/study.json").state(project) == "STALE"
+    assert archived(project).state(project) == "archived (results-1)"
+    of = stored(project)["commit"]
+    words = " ".join(shown(project).split())
+    assert f"(commit {of} of " in words
+    assert words.endswith("; archived (results-1): its code stands last in commit f922469a)")
+    archived(project, stale="its rows name no commit")
+    assert " ".join(shown(project).split()).endswith("in commit f922469a; its rows name no commit)")
+
+
+def test_an_archived_result_whose_code_is_there_and_one_of_no_code_are_wrong(project):
+    record(project)
+    (project / "studies/some.py").write_text('@recorded("study")\ndef main():\n    pass\n')
+    result = KeptResult.read(project / "docs/results/study.json")
+    assert result.problem(project) == ""
+    assert archived(project).problem(project).startswith("study: archived, and the tree has its code")
+    (project / "studies/some.py").write_text('if __name__ == "__main__":\n    qualify("study", __doc__, main)\n')
+    assert archived(project).problem(project).startswith("study: archived, and the tree has its code")
+    (project / "studies/some.py").write_text("")
+    assert archived(project).problem(project) == ""
+    assert result.problem(project) == "study: the tree has no code of it, expected it archived"
+    assert archived(project, archived="results-0").problem(project).startswith("study: archived by results-0, expected")
+
+
+def test_a_command_that_has_another_name_today_is_shown_with_both(project):
+    record(project)
+    content = stored(project) | {"ran_as": "benchmarks.some"}
+    (project / "docs/results/study.json").write_text(json.dumps(content))
+    assert "`python -m studies.some --only 'a b'`\n(as `benchmarks.some`, commit " in shown(project)
+
+
+def test_the_index_has_every_result_and_the_archive_by_itself(project):
+    record(project)
+    (project / "docs/page.md").write_text("<!-- results/study -->\n<!-- /results/study -->\n")
+    of = stored(project)["commit"]
+    rows = results_index(project).partition("\n\n")
+    assert f"| `study` | [page.md](../page.md) | `studies.some` | {of} |" in rows[0]
+    assert rows[0].endswith("| of this code |")
+    archived(project)
+    rows = results_index(project).partition("\n\n")
+    assert "study" not in rows[0]
+    assert rows[2].endswith("| archived (results-1) |")
+
+
+def test_every_kept_result_has_the_right_state():
+    assert [problem for result in kept_results(ROOT) if (problem := result.problem(ROOT))] == []
+
+
+def test_the_archive_s_commits_have_the_code_of_what_is_archived():
+    try:
+        not_in_history(ROOT)
+    except InputError as error:
+        pytest.skip(f"commits of results cannot be checked: {error}")
+    for result in kept_results(ROOT):
+        for module in modules_of(result.command) if result.archived else ():
+            at, place = ARCHIVES[result.archived], module.replace(".", "/")
+            assert git(ROOT, "ls-tree", "--name-only", at, f"{place}.py", f"{place}/__main__.py"), result.name
+
+
+def test_every_command_keeps_its_results_and_every_kept_one_is_shown():
+    named = names_recorded(ROOT) | {result.name for result in kept_results(ROOT) if result.archived}
     pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md"))
     shown = re.findall(r"^<!-- results/(\w+) -->$", pages, re.MULTILINE)
     assert sorted(shown) == sorted(named)
     assert {file.stem for file in FILES} <= named
-    runs = [file for name in ("studies", "benchmarks") for file in modules(name) if "__main__" in file.read_text()]
+    runs = [file for name in COMMANDS for file in modules(name) if '"__main__"' in file.read_text()]
     assert len(runs) >= 15
-    assert [file for file in runs if "recorded(" not in file.read_text()] == []
+    assert [file for file in runs if not re.search(r"\b(recorded|qualify)\(", file.read_text())] == []
 
 
 def modules(name):
@@ -298,16 +377,17 @@ def modules(name):
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_a_result_is_of_a_command_and_of_code(file):
     found = json.loads(file.read_text(encoding="utf-8"))
-    modules = re.findall(r"python -m ((?:studies|benchmarks)\.[\w.]+)", found["command"])
+    modules = re.findall(r"python -m ((?:studies|benchmarks|qualification)\.[\w.]+)", found["command"])
     assert modules
-    for module in modules:
+    for module in modules if file in CURRENT else ():
         place = ROOT / module.replace(".", "/")
         assert place.with_suffix(".py").is_file() or (place / "__main__.py").is_file()
     assert re.fullmatch(r"[0-9a-f]{7}", found["commit"])
     if file.stem in UNPROVEN:
         assert UNPROVEN[file.stem] in found["stale"]
         assert "code" not in found
-        assert f"**STALE**: {found['stale']}" in " ".join(block(file).split())
+        words = "**STALE**: " if file in CURRENT else f"in commit {ARCHIVES[found['archived']]}; "
+        assert words + found["stale"] in " ".join(block(file).split())
     else:
         assert "stale" not in found
         assert found["code"]
@@ -334,9 +414,15 @@ def test_rows_that_were_made_with_changes_or_name_no_commit_are_in_the_list():
         assert is_proven or table.stem in UNPROVEN, table
 
 
+def test_the_code_of_a_qualification_is_that_of_server_robot_and_its_own():
+    code = code_of(ROOT, ["qualification.faults"], reads_of(ROOT, "faults"))
+    own = {"qualification/faults.py", "qualification/scene.py", "qualification/witness.py", "qualification/guests.py"}
+    assert own | {"trunkline/ar/session", "trunkline/ar/drivers", "conf/live", "package"} <= set(code)
+
+
 def test_what_results_read_is_named_and_is_there():
     named = yaml.safe_load((ROOT / READS).read_text())
-    assert {file.stem for file in FILES} <= set(named)
+    assert {file.stem for file in CURRENT} == set(named)
     entries = {entry for name in named for entry in reads_of(ROOT, name)}
     modules = {entry for entry in entries if entry.endswith(".py")}
     assert set(code_of(ROOT, [], entries - modules)) == entries - modules
@@ -346,7 +432,7 @@ def test_what_results_read_is_named_and_is_there():
 SETTINGS = re.compile(r"(?:conf|artifacts|data/processed)/[\w/.]+")
 
 
-@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", CURRENT, ids=lambda file: file.stem)
 def test_settings_and_outputs_that_a_module_names_are_declared(file):
     """Paths and the package, in the module of the command or its folder."""
     (module,) = modules_of(json.loads(file.read_text())["command"])
@@ -355,7 +441,7 @@ def test_settings_and_outputs_that_a_module_names_are_declared(file):
     trees = [ast.parse(one.read_text(encoding="utf-8")) for one in own]
     texts = {node.value for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Constant)}
     paths = {text for text in texts if isinstance(text, str) and SETTINGS.fullmatch(text)}
-    paths |= {"package"} if any("only_package" in one.read_text() for one in own) else set()
+    paths |= {"package"} if any("qualify(" in one.read_text() for one in own) else set()
     paths = {"package" if path.startswith("artifacts/package_unity") else path for path in paths}
     reads = reads_of(ROOT, file.stem)
     assert [path for path in paths if not any(path in entry or entry in path for entry in reads)] == []

@@ -21,7 +21,7 @@ from typing import get_args
 
 from PIL import Image
 
-from benchmarks.browser import Page, browsing
+from qualification.browser import Page, browsing
 from trunkline.ar.preview.package import only_package
 from trunkline.ar.session import lease, preview_process, robot
 from trunkline.ar.session.controller import Planning
