@@ -13,6 +13,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, zip_longest
 from pathlib import Path
+from textwrap import fill
 
 import networkx
 import pandas as pd
@@ -387,7 +388,7 @@ def headline(root: Path) -> str:
     lines = ["| | calibrated twin | for comparison |", "|---|---|---|", *_held_out_rows(root), _command_row(root)]
     lines += _rehearsal_rows(rehearsed, read_limits(root / "tests" / "limits.yaml").get("rehearse", {}))
     if rehearsed:
-        lines += ["", f"The last two rows: rehearsal {source_words(root, rehearsed)}."]
+        lines += ["", fill(f"The last two rows: rehearsal {source_words(root, rehearsed)}.", 120)]
     return "\n".join(lines)
 
 

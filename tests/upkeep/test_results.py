@@ -58,6 +58,8 @@ FILES_OF_A_PROJECT = {
     "trunkline/ar/teleop/core.py": "from trunkline.model.arm import unit\n\n\ndef step():\n"
     "    import trunkline.frames\n",
     "trunkline/ar/teleop/unused.py": "",
+    **dict.fromkeys(("trunkline/ar/teleop/__init__.py", "trunkline/model/arm/__init__.py"), ""),
+    "trunkline/ar/hybrid/__init__.py": "",
     "trunkline/ar/teleop/core.csv": "1\n",
     "trunkline/model/arm/unit.py": "LENGTH = 1\n",
     "trunkline/frames.py": "UP = 1\n",
@@ -120,7 +122,7 @@ def test_what_is_printed_is_kept_with_its_command_and_its_origin(project, capsys
     assert (found["command"], found["commit"], found["date"]) == ("python -m studies.some --only 'a b'", of, day)
     code = ["artifacts/arm.xml", "conf/teleop", "package", "params.yaml:filter", "stages/filter.py", "studies/some.py"]
     code.append("studies/some.yaml")
-    assert list(found["code"]) == [*code, "trunkline/model/arm", "trunkline/frames.py", "trunkline/ar/teleop"]
+    assert list(found["code"]) == [*code, "trunkline/ar/teleop", "trunkline/frames.py", "trunkline/model/arm"]
     assert all(re.fullmatch("[0-9a-f]{12}", digest) for digest in found["code"].values())
     table = "```\ntwo threads\n```\n\n| a | b |\n|---|---|\n| 1 | 2 |\n\n`python -m studies.some --only 'a b'`\n"
     assert shown(project) == f"{table}(commit {of} of {day}; nothing that it goes through has changed since)"
@@ -138,7 +140,7 @@ def test_what_is_printed_is_kept_with_its_command_and_its_origin(project, capsys
         ),
         ("trunkline/ar/teleop/core.csv", "2\n", "trunkline/ar/teleop"),
         ("trunkline/model/arm/unit.py", "LENGTH = 2\n", "trunkline/model/arm"),
-        ("trunkline/frames.py", "import trunkline.ar.hybrid.trials\n", "trunkline/frames.py, trunkline/ar/hybrid"),
+        ("trunkline/frames.py", "import trunkline.ar.hybrid.trials\n", "trunkline/ar/hybrid, trunkline/frames.py"),
         ("stages/filter.py", "RATE = 2\n", "stages/filter.py"),
         ("conf/teleop/config.yaml", "speed: 2\n", "conf/teleop"),
         ("conf/teleop/added.yaml", "speed: 2\n", "conf/teleop"),
