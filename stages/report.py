@@ -5,7 +5,7 @@ from pathlib import Path
 
 from trunkline.errors import existing
 from trunkline.pipeline.inputs import load_rig, read_model
-from trunkline.pipeline.stage import output_folder, run_stage, write_json
+from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
 from trunkline.recordings.trials.splits import DECIDING
 from trunkline.recordings.trials.trial import read_trials
 from trunkline.report.certificate.certificate import Asked, certify, digest_of_code, digests
@@ -45,7 +45,7 @@ def main(config: Config) -> None:
         pictures = {name: (folder / f"{name}.png").read_bytes() for name in ("uncertainty", "poses")}
         (folder / "certificate.html").write_text(page(facts, found.replays, pictures), encoding="utf-8")
         write_json(folder / "facts.json", facts)
-        write_json(folder / "metrics.json", found.metrics)
+        write_metrics(folder, found.metrics)
 
 
 def code() -> list[str]:

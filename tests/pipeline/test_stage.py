@@ -12,7 +12,7 @@ import pytest
 from trunkline.compute.progress import progress
 from trunkline.compute.threads import thread_count
 from trunkline.errors import InputError
-from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.report.figures.style import save_figure
 
 ROOT = Path(__file__).parents[2]
@@ -95,6 +95,12 @@ def test_json_is_sorted_rounded_and_free_of_numpy(tmp_path):
     write_json(tmp_path / "a.json", {"b": np.float64(0.1) + 0.2, "a": np.arange(2), "c": np.bool_(True), "d": None})
     assert (tmp_path / "a.json").read_text().index('"a"') < (tmp_path / "a.json").read_text().index('"b"')
     assert json.loads((tmp_path / "a.json").read_text()) == {"a": [0, 1], "b": 0.3, "c": True, "d": None}
+
+
+def test_metrics_have_four_significant_digits_and_counts_have_all(tmp_path):
+    write_metrics(tmp_path, {"e_tip_mm": 13.14159, "small": 1.23456e-7, "frames": 123456, "by": {"kind": [0.99994]}})
+    written = {"e_tip_mm": 13.14, "small": 1.235e-7, "frames": 123456, "by": {"kind": [0.9999]}}
+    assert json.loads((tmp_path / "metrics.json").read_text()) == written
 
 
 @pytest.mark.parametrize("bad", [float("nan"), np.inf, np.array([1.0, np.nan])])

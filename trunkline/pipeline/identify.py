@@ -31,7 +31,7 @@ from trunkline.identification.uncertainty.cross_validation import cross_validate
 from trunkline.identification.uncertainty.trial_diagnostics import suspicions
 from trunkline.model.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, numeric, switch_off
 from trunkline.pipeline.inputs import read_spec
-from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.pipeline.stage import output_folder, write_json, write_metrics
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import DECIDING, VALIDATE
 from trunkline.recordings.trials.trial import Trial, read_trials
@@ -131,7 +131,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         table = parameter_table(result, fit.parameters) | {"compared": vars(Compared.of(config))}
         table["fitted_to"] = fingerprints([t for t in reported if t.experiment in config.experiments])
         write_json(folder / "parameters.json", table)
-        write_json(folder / "metrics.json", metrics)
+        write_metrics(folder, metrics)
         write_tables(folder, predictions, segments)
         write_plots(folder, result, fit.parameters, segments, predictions, shapes=model_path == CAD_MODEL and rests)
 

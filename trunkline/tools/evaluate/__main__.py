@@ -17,7 +17,7 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.identification.evaluation.error_tables import segment_table, trial_table
 from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
-from trunkline.pipeline.stage import output_folder, write_json
+from trunkline.pipeline.stage import output_folder, write_metrics
 from trunkline.program import called
 from trunkline.recordings.trials.trial import sessions_of
 from trunkline.tools.evaluate.model import read_arm, written_beside
@@ -96,7 +96,7 @@ def _write(out: Path, metrics: dict, trials, segments, title: str) -> None:
     from trunkline.report.figures.style import save_figure
 
     with output_folder(out) as folder:
-        write_json(folder / "metrics.json", metrics)
+        write_metrics(folder, metrics)
         trials.to_csv(folder / "trials.csv", index=False, float_format="%.6g")
         segments.to_csv(folder / "segments.csv", index=False, float_format="%.6g")
         save_figure(trial_figure({title: trials}), folder / "errors.png")
