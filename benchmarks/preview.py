@@ -18,13 +18,14 @@ import numpy as np
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.grasps import CABLES, Grasp, object_in_base
 from trunkline.ar.hybrid.objects import Thing
-from trunkline.ar.hybrid.payload import HOOK_ABOVE, LEVEL
 from trunkline.ar.hybrid.posterior import read_doubts
 from trunkline.ar.hybrid.preview import Holding, nominal, preview
 from trunkline.ar.hybrid.rollouts import Twin, Way
 from trunkline.ar.hybrid.settings import HybridSettings
 from trunkline.ar.hybrid.worlds import World
+from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.compute.threads import thread_count
+from trunkline.identification.fit.settings import STAGES
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.model.arm.contact_geometry import read_geometry
@@ -32,10 +33,11 @@ from trunkline.pipeline.config import PROJECT, load_folder
 from trunkline.pipeline.inputs import read_spec
 from upkeep.results import recorded
 
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 STEPS = (1 / 480, 1 / 240, 1 / 200)  # s; joint limits and contacts, of 0.01 s, allow no longer one than 5 ms
 CLOSE, LET_GO, LENGTH, PULL, LIFT = 1.0, 1.75, 4.0, 0.2, 0.3  # s, s, s, m of cable, rad of the Panda's second joint
 PAID_OUT, PAY_TIME = 0.2, 0.3  # m and s, of cables that do not pull
+HOOK_ABOVE = 0.15  # m, of the cylinder's upper side: the length of what it hangs by
+LEVEL = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)  # turns an object's z to base y
 
 
 @dataclass(frozen=True)
@@ -105,7 +107,7 @@ def grasp(path: Path, placing: Placing | None = None) -> tuple[Twin, Way]:
     drawn = np.where(pulls > 0, -PULL * np.minimum(times / CLOSE, 1), PAID_OUT * np.minimum(times / PAY_TIME, 1))
     share = np.clip((times - LET_GO) / 1.5, 0, 1)
     joints = np.tile(ready, (len(times), 1))
-    joints[:, 1:2] -= LIFT * share**3 * (10 - 15 * share + 6 * share**2)
+    joints[:, 1:2] -= minimum_jerk(share, LIFT)
     return Twin(model, arm), Way(time_step, joints, straight + drawn, LET_GO)
 
 

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 from trunkline.errors import existing
+from trunkline.identification.fit.settings import STAGES
 from trunkline.pipeline.inputs import load_rig, read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
 from trunkline.recordings.trials.splits import DECIDING
@@ -16,7 +17,6 @@ from trunkline.settings import read_yaml, settings
 
 ARTIFACTS, TRIALS = Path("artifacts"), Path("data/processed/filter")
 MODEL = ARTIFACTS / "identify_control/arm.xml"
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 CHECKOUT = Path(__file__).resolve().parent.parent
 
 

@@ -46,7 +46,6 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
     ),
     "trunkline.ar.hybrid.preview:Holding.holds": ("ar/hybrid/test_preview.py", "test_what_counts_as_held"),
     "trunkline.ar.hybrid.released:Resting.holds": ("ar/hybrid/test_resting.py", "test_what_rests"),
-    "trunkline.ar.hybrid.trials:Tried.held": ("ar/hybrid/test_preview.py", "test_what_counts_as_held_in_a_trial"),
     "trunkline.identification.fit.identify:_at_bound": (
         "identification/test_bounds.py",
         "test_a_parameter_is_at_a_bound_within_a_share_of_its_own_range",

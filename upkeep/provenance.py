@@ -10,6 +10,8 @@ from pathlib import Path
 
 from dvc.repo import Repo
 
+from trunkline.files import file_digest
+
 SHOWN = 12  # digits of a digest
 REHEARSAL = ("rehearsal/dvc.yaml", "rehearse")
 METRICS, MANIFEST = Path("artifacts/rehearse/metrics.json"), Path("artifacts/package_unity/manifest.json")
@@ -33,7 +35,7 @@ def changed_since(root: Path, file: str, name: str) -> list[str]:
 def package_of(root: Path) -> str:
     """Digest of the tree's package, as `unpacked.package_digest`, from the manifest that Git has; "none" without."""
     path = root / MANIFEST
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:SHOWN] if path.is_file() else "none"
+    return file_digest(path)[:SHOWN] if path.is_file() else "none"
 
 
 def stale(root: Path) -> list[str]:

@@ -3,14 +3,16 @@
 import json
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
+from trunkline.identification.evaluation.error_tables import number
+from trunkline.identification.fit.settings import STAGES
 from trunkline.recordings.trials.experiments import EXPERIMENTS, Kind
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 TRUTH = Path("data/raw/demo.truth.json")
 
 
@@ -21,6 +23,7 @@ def judge(kind: Kind) -> str:
     return "identify_stiffness" if kind.static else "identify_damping"
 
 
+_number = partial(number, digits=4)
 # kind of experiment: what its trials are called, and the stage whose model is scored on them
 KINDS = {name: (kind.plural, judge(kind)) for name, kind in EXPERIMENTS.items()}
 # whose errors: of the identified model, and of what it stands beside
@@ -214,7 +217,3 @@ def _at(table: dict, *keys: str) -> dict:
 
 def _json(path: Path) -> dict:
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.4g}"

@@ -220,6 +220,23 @@ def test_a_stage_has_metrics_and_plots(stages, name):
     assert any(out.plot for out in outs.values())
 
 
+@pytest.mark.parametrize("file", ["dvc.yaml", *sorted({e.partition(":")[0] for e in EXAMPLES})])
+def test_every_curve_has_a_title_of_what_it_draws(file):
+    curves = {
+        path: plot
+        for stage in yaml.safe_load((ROOT / file).read_text())["stages"].values()
+        for plots in stage.get("plots", [])
+        for path, plot in (plots.items() if isinstance(plots, dict) else {plots: {}}.items())
+        if path.endswith(".csv")
+    }
+    assert [path for path, plot in curves.items() if "title" not in plot] == []
+    density = curves.get("artifacts/fk_dataset/density.csv")
+    if density is not None:  # it draws how unevenly the tips lie, before and after thinning, not their density
+        assert density["template"] == "lines_by_thinning"
+        assert "unevenness" in density["title"]
+        assert density["y_label"] == "tips in a cell: standard deviation over mean"
+
+
 @pytest.fixture(scope="module")
 def pipeline(tmp_path_factory):
     pipeline = StubPipeline(tmp_path_factory.mktemp("stub") / "project")

@@ -19,12 +19,12 @@ from trunkline.ar.hybrid.rollouts import Twin, Way, futures
 from trunkline.ar.hybrid.worlds import World
 from trunkline.ar.preview.contents import doubts_of
 from trunkline.errors import InputError
+from trunkline.identification.fit.settings import STAGES
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.arm.spiral import spiral_chain
 from trunkline.model.elements import capstan_friction
 from trunkline.unity.package import CALIBRATED, MANIFEST, MODEL, write_tarball
-from trunkline.unity.sources import IDENTIFIED
 from trunkline.unity.twin import Trajectory, assemble
 from trunkline.unity.unpacked import arm_of, package_digest, read_package, robot_of
 
@@ -104,7 +104,7 @@ def test_doubts_of_the_package_are_those_of_the_stages(files, tmp_path):
     contact = Contact(friction=0.1)
     for stage, found in PARAMETERS.items():
         (tmp_path / f"{stage}.json").write_text(json.dumps(found))
-    expected = read_doubts([tmp_path / f"{stage}.json" for stage in IDENTIFIED], contact)
+    expected = read_doubts([tmp_path / f"{stage}.json" for stage in STAGES], contact)
     doubts = doubts_of(files, contact)
     assert (doubts.names, doubts.contact) == (expected.names, contact)
     np.testing.assert_array_equal(doubts.deviation, expected.deviation)

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError, existing
-from trunkline.identification.evaluation.error_tables import segment_table, trial_table
+from trunkline.identification.evaluation.error_tables import TABLED, segment_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, halved_step, replay
 from trunkline.identification.evaluation.null_model import references
 from trunkline.identification.evaluation.repeatability import repeatability
@@ -38,7 +38,6 @@ from trunkline.recordings.trials.trial import Trial, read_trials
 
 CAD_MODEL = Path("artifacts/build_mjcf/arm.xml")
 TRIALS = Path("data/processed/filter")
-TABLED = ("identified", "cad", "null", "noise_floor")  # in trials.csv; metrics.json has all
 CSV = {"index": False, "float_format": "%.6g"}
 
 

@@ -39,15 +39,6 @@ def step_errors(
     Args:
         duration: s, pull: m, of the curl. tilts: gravity angles, rad.
     """
-    before = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)  # else it tells of those that diverge, which are meant to
-    try:
-        return _step_errors(calibrated, packed, duration, pull, tilts)
-    finally:
-        mujoco.set_mju_user_warning(before)
-
-
-def _step_errors(calibrated, packed, duration, pull, tilts) -> list[StepError]:
     start = curl(calibrated, duration, pull)
     expected = [simulate(calibrated, start, tilt).tip for tilt in tilts]
     known = calibrated.opt.timestep * np.arange(len(start))

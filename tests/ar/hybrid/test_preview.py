@@ -8,7 +8,6 @@ from trunkline.ar.hybrid.posterior import nominal_draw
 from trunkline.ar.hybrid.preview import Holding, Preview, asked, joined
 from trunkline.ar.hybrid.rates import wilson
 from trunkline.ar.hybrid.rollouts import Piece
-from trunkline.ar.hybrid.trials import Tried
 
 FRAMES, SINCE = 11, 0.5
 TIME = np.linspace(0.0, 1.0, FRAMES)
@@ -98,30 +97,6 @@ def test_what_hung_need_not_have_been_lifted():
     assert Holding(SINCE).holds(motion).tolist() == [True]
     assert Holding(SINCE, lifted=-0.01).holds(motion).tolist() == [True]
     assert Holding(SINCE, lifted=0.0).holds(motion).tolist() == [False]
-
-
-def tried(dropped=0.0, further=0.0) -> Tried:
-    """A grasp of which the thing came `dropped` m down and `further` m from the arm since it was let go in row 2."""
-    path, distance = np.zeros((1, 5, 3)), np.full((1, 5), 0.03)
-    path[0, -1, 2], distance[0, -1] = -dropped, 0.03 + further
-    path[0, :2], distance[0, :2] = 1.0, 1.0  # before it was let go: nobody asks
-    return Tried(path, distance, 2, np.zeros((1, 3)), np.zeros((1, 1)))
-
-
-@pytest.mark.parametrize(
-    ("dropped", "further", "held"),
-    [(0.0, 0.0, True), (0.08 - NEAR, 0.0, True), (0.08 + NEAR, 0.0, False), (0.0, 0.02 - NEAR, True),
-     (0.0, 0.02 + NEAR, False), (-0.08 - NEAR, 0.0, False), (0.0, -0.02, True), (np.nan, 0.0, False),
-     (0.0, np.nan, False)],
-)  # fmt: skip
-def test_what_counts_as_held_in_a_trial(dropped, further, held):
-    assert tried(dropped, further).held(sag=0.08, slip=0.02).tolist() == [held]
-
-
-def test_at_a_border_itself_nothing_is_held_in_a_trial_either():
-    path, distance = np.zeros((2, 5, 3)), np.zeros((2, 5))
-    path[0, -1, 2], distance[1, -1] = -0.5, 0.25
-    assert Tried(path, distance, 2, np.zeros((2, 3)), np.zeros((2, 1))).held(0.5, 0.25).tolist() == [False, False]
 
 
 def of_futures(tips, sound, held=None) -> Preview:

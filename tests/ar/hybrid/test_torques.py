@@ -6,7 +6,7 @@ import pytest
 
 from tests.ar.hybrid.conftest import hybrid_settings
 from trunkline.ar.hybrid.compose import compose
-from trunkline.ar.hybrid.torques import joint_torques, require_torques, servo_commands
+from trunkline.ar.hybrid.torques import joint_torques, servo_commands
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import TORQUE
 from trunkline.kinematics.panda.mounts import FixedMount
@@ -68,15 +68,6 @@ def test_moving_torques_do_the_work_that_energy_gains(model):
     friction = model.dof_damping[:7] @ v**2
     gained = (energy(time + step) - energy(time - step)) / (2 * step)
     assert torques @ v == pytest.approx(gained + friction, rel=1e-5)
-
-
-def test_too_much_is_refused_by_the_joints_name(model):
-    stretched = pose(model, [0, np.pi / 2, 0, -0.1, 0, 1.6, 0])
-    require_torques(joint_torques(model, stretched[None], load=0.1))
-    with pytest.raises(InputError, match=r"^joint_2: found .* N m at row 1, expected at most 87 N m"):
-        require_torques(joint_torques(model, np.stack([pose(model, Q), stretched]), load=8.0))
-    with pytest.raises(InputError, match="joint_5"):
-        require_torques(np.array([[0, 0, 0, 0, np.nan, 0, 0]]))
 
 
 def test_servos_stand_where_they_are_sent(model):

@@ -12,6 +12,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.support.operator import Operator, config
+from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 
 PRESSES, HZ, LENGTH = 100, 72.0, 1.0  # Hz of inputs; m from the hand to the target
@@ -60,7 +61,7 @@ def _hand(rng: np.random.Generator, times: np.ndarray, moving: bool) -> list[Rot
     off = TREMOR * np.sin(2 * np.pi * rates * times[:, None] + phases) + rng.normal(scale=NOISE, size=(len(times), 2))
     off[:, 0] += rng.normal(*KICK) * np.clip(1 + times / rng.uniform(*KICKS), 0, 1)
     share = np.clip((times + rng.uniform(*RESTS) + TAKES) / TAKES, 0, 1)
-    along = TURN * share**3 * (10 - 15 * share + 6 * share**2) if moving else np.zeros(len(times))
+    along = minimum_jerk(share, TURN) if moving else np.zeros(len(times))
     return [
         Rotation.from_euler("y", angle, degrees=True) * Rotation.from_rotvec([*degrees, 0.0], degrees=True)
         for angle, degrees in zip(along, off, strict=True)

@@ -5,8 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-PHASES = ("approach", "curl", "lift", "transfer", "release")
-
 
 @dataclass(frozen=True)
 class Plan:

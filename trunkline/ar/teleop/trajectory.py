@@ -12,6 +12,7 @@ import numpy as np
 import ruckig
 from pydantic import Field
 
+from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.limits import ACCELERATION, JERK, VELOCITY
 
@@ -78,12 +79,11 @@ def gentle(start: np.ndarray, end: np.ndarray, limits: Limits, step: float, seco
 
         x(τ) = x_0 + (x_1 - x_0) (10 τ³ - 15 τ⁴ + 6 τ⁵),    τ = t / T,
 
-    whose largest velocity, acceleration and jerk are 15/8 Δ/T, 10/√3 Δ/T² and 60 Δ/T³ (T. Flash, N. Hogan, J. Neurosci.
-    5 (1985) 1688-1703).
+    whose largest velocity, acceleration and jerk are 15/8 Δ/T, 10/√3 Δ/T² and 60 Δ/T³ (as `minimum_jerk`).
     """
     away = np.abs(end - start)
     least = [15 / 8 * away / limits.velocity, np.sqrt(10 / np.sqrt(3) * away / limits.acceleration),
              np.cbrt(60 * away / limits.jerk)]  # fmt: skip
     duration = max(seconds, float(np.max(least)))
     share = np.minimum(step * np.arange(int(np.ceil(duration / step)) + 1) / max(duration, step), 1.0)[:, None]
-    return start + (end - start) * share**3 * (10 - 15 * share + 6 * share**2)
+    return start + minimum_jerk(share, end - start)

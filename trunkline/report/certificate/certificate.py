@@ -11,6 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.errors import InputError
+from trunkline.files import file_digest
 from trunkline.identification.evaluation.evaluation import Prediction, replay
 from trunkline.identification.results.scoring import fingerprint
 from trunkline.identification.simulate.checks import check_trials
@@ -205,7 +206,7 @@ def digest_of_trials(trials: list[Trial]) -> str:
 
 def digests(files: list[Path]) -> dict[str, str]:
     """SHA-256 of files, by their paths."""
-    return {path.as_posix(): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    return {path.as_posix(): file_digest(path) for path in files}
 
 
 def digest_of_code(root: Path, parts: list[str]) -> str:

@@ -9,12 +9,12 @@ import json
 from html import escape
 from pathlib import Path
 
-from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.identification.evaluation.error_tables import LABELS, TABLED, number
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 
 ASSETS = Path(__file__).parent / "page"
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
-BESIDE = [LABELS[name] for name in ("identified", "cad", "null", "noise_floor")]
+BESIDE = [LABELS[name] for name in TABLED]
 SPEEDS = (0.1, 0.25, 0.5, 1, 2)
 
 
@@ -149,8 +149,8 @@ def _uncertainty(facts: dict, pictures: dict[str, bytes]) -> str:
     radius, where = told["radius_mm"], told["conditions"]
     rows = []
     for line in told["lines"]:
-        spread = "–" if line["standard_uncertainty"] is None else f"{line['standard_uncertainty']:.3g}"
-        slope = "–" if line["sensitivity_mm"] is None else f"{line['sensitivity_mm']:.3g}"
+        spread = number(line["standard_uncertainty"])
+        slope = number(line["sensitivity_mm"])
         rows.append((False, [line["source"], line["distribution"], spread, line["unit"] or "–", slope,
                              f"{line['contribution_mm']:.2f}"]))  # fmt: skip
     rows.append((True, ["combined, with correlations", "", "", "", "", f"{told['combined_mm']:.2f}"]))

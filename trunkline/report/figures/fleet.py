@@ -5,6 +5,7 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
+from trunkline.identification.evaluation.error_tables import LABELS
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.report.figures.style import DOUBTFUL, IDENTIFIED, INITIAL, MEASURED
 
@@ -12,7 +13,6 @@ ACROSS = 4  # panels
 MODELS = {  # colour, dot
     "identified": (IDENTIFIED, "o"), "cad": (INITIAL, "o"), "null": (DOUBTFUL, "s"), "noise_floor": (MEASURED, "x"),
 }  # fmt: skip
-WORDS = {"cad": "CAD", "null": "null: mean rest shape", "noise_floor": "noise floor"}
 
 
 def fleet_figure(table: pd.DataFrame) -> Figure:
@@ -41,7 +41,7 @@ def _errors(axis, errors: pd.DataFrame, arms: list[str]) -> None:
             x = own.arm.map(places) + offset
             face = color if filled or dot == "x" else "none"
             size = 6 if filled else 5
-            label = f"{WORDS.get(model, model)}" if filled else None
+            label = LABELS[model] if filled else None
             axis.semilogy(x, own.value, dot, color=color, mfc=face, ms=size, label=label)
     axis.set_xticks(range(len(arms)), arms, rotation=20 if len(arms) > 6 else 0)
     axis.set_xlim(-0.6, len(arms) - 0.4)

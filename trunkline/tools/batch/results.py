@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.identification.evaluation.error_tables import TABLED
+from trunkline.identification.fit.settings import STAGES
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.recordings.trials.splits import TEST, VALIDATE
-
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
-BESIDE = ("identified", "cad", "null", "noise_floor")  # models, and what they stand beside
 
 
 @dataclass(frozen=True)
@@ -68,7 +67,7 @@ def read_results(name: str, folder: Path) -> Results:
         own, which = scored.get(stage, {}), TEST
         if not own:  # not scored, or no trial to be scored on
             own, which = _read(folder / "artifacts" / stage / "metrics.json"), VALIDATE
-        found = {model: own[model][which] for model in BESIDE if which in own.get(model, {})}
+        found = {model: own[model][which] for model in TABLED if which in own.get(model, {})}
         if "identified" in found and (which == TEST or split != TEST):
             split, trials = which, found["identified"]["trials"]
             errors = {model: (row["e_position_mm"], row["e_tip_mm"]) for model, row in found.items()}

@@ -14,6 +14,7 @@ import yaml
 from omegaconf import DictConfig, OmegaConf
 
 from trunkline.errors import InputError, nearest
+from trunkline.files import written_whole
 from trunkline.pipeline.config import PROJECT
 from trunkline.settings import read_yaml
 from trunkline.tools.batch.listing import Arm
@@ -134,6 +135,5 @@ def _write(path: Path, content: dict) -> None:
     """YAML, left alone where it is the same: what has not changed runs nothing again."""
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=1000)
     if not path.is_file() or path.read_text(encoding="utf-8") != text:
-        part = path.with_suffix(".part")
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
+        with written_whole(path) as part:
+            part.write_text(text, encoding="utf-8")

@@ -3,18 +3,17 @@
 import numpy as np
 import pandas as pd
 
+from trunkline.identification.evaluation.error_tables import LABELS, TABLED, pair
 from trunkline.identification.parameters.parameters import PARAMETERS
-from trunkline.tools.batch.results import BESIDE, Drift, Results
-
-HEADS = {"identified": "identified", "cad": "CAD", "null": "null: mean rest shape", "noise_floor": "noise floor"}
+from trunkline.tools.batch.results import Drift, Results
 
 
 def error_table(fleet: list[Results]) -> list[str]:
     """A row an arm."""
-    lines = [f"| position / tip error, mm | trials | {' | '.join(HEADS.values())} |"]
-    lines.append("|---|---|" + "---:|" * len(HEADS))
+    lines = [f"| position / tip error, mm | trials | {' | '.join(LABELS[model] for model in TABLED)} |"]
+    lines.append("|---|---|" + "---:|" * len(TABLED))
     for one in fleet:
-        cells = [_pair(one.errors.get(model)) for model in BESIDE]
+        cells = [pair(*one.errors.get(model, (None, None))) for model in TABLED]
         count = f"{one.trials} of `{one.split}`" if one.split else "–"
         lines.append(f"| {one.name} | {count} | {' | '.join(cells)} |")
     return lines
@@ -64,8 +63,8 @@ def long_table(fleet: list[Results], drifts: dict[str, dict[str, Drift]], since:
             }  # fmt: skip
             row = {"arm": one.name, "kind": "parameter", "name": name, "value": found.value, "low": found.low}
             rows.append(row | {"high": found.high, "unit": found.unit} | drifted)
-        for model, pair in one.errors.items():
-            for error, value in zip(("position", "tip"), pair, strict=True):
+        for model, errors in one.errors.items():
+            for error, value in zip(("position", "tip"), errors, strict=True):
                 name = f"{model}_{error}_{one.split}"
                 rows.append({"arm": one.name, "kind": "error", "name": name, "value": value, "unit": "mm"})
     columns = ["arm", "kind", "name", "value", "low", "high", "unit", "drift", "drift_half_width", "since"]
@@ -75,7 +74,3 @@ def long_table(fleet: list[Results], drifts: dict[str, dict[str, Drift]], since:
 def _number(value: float) -> str:
     """Three digits that count, without a power of ten where that is as short."""
     return f"{value:.0f}" if 1e3 <= abs(value) < 1e6 else f"{value:.3g}"
-
-
-def _pair(errors: tuple[float, float] | None) -> str:
-    return "–" if errors is None else f"{errors[0]:.3g} / {errors[1]:.3g}"

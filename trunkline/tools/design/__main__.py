@@ -15,7 +15,7 @@ from pathlib import Path
 import mujoco
 
 from trunkline.errors import InputError, in_one_line, nearest
-from trunkline.identification.fit.settings import IdentificationSettings
+from trunkline.identification.fit.settings import STAGES, IdentificationSettings
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, names_apart, other_sessions
 from trunkline.model.arm.kinds import described_arm
@@ -40,7 +40,7 @@ from trunkline.tools.design.words import (
     why_words,
     widest_words,
 )
-from trunkline.tools.evaluate.model import STAGES, read_arm
+from trunkline.tools.evaluate.model import read_arm
 from trunkline.tools.evaluate.session import trials_of
 
 DESCRIBED = "as described in params.yaml, as no stage has identified one yet: suggestions are only as good as it is"

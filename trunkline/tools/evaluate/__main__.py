@@ -6,7 +6,6 @@ metrics.json, trials.csv, segments.csv and two pictures. With --reference, how t
 """
 
 import argparse
-import hashlib
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +13,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from trunkline.errors import InputError, in_one_line
+from trunkline.files import file_digest
 from trunkline.identification.evaluation.error_tables import segment_table, trial_table
 from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
@@ -72,7 +72,7 @@ def _run(told: argparse.Namespace) -> int:
     metrics, predictions = evaluate(models, trials, written.frames, written.command_delay)
     fitted = {trial.name for trial in trials if written.saw(trial)}
     metrics["evaluated"] = {
-        "model": hashlib.sha256(told.model.read_bytes()).hexdigest()[:16],
+        "model": file_digest(told.model)[:16],
         "frames": written.frames,
         "command_delay": written.command_delay,
         "fitted_to": sorted(fitted),

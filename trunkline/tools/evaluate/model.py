@@ -9,6 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
+from trunkline.identification.fit.settings import STAGES
 from trunkline.identification.parameters.parameters import APART, PARAMETERS
 from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.results.scoring import fingerprint
@@ -17,7 +18,6 @@ from trunkline.pipeline.inputs import read_spec
 from trunkline.recordings.trials.trial import Trial, sessions_of
 
 TABLE = "parameters.json"
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")  # in their order: each goes on from the last
 MOST_TURN = np.radians(30)  # of the mount in the tracked base, as it may be identified; more is another frame
 
 

@@ -6,9 +6,8 @@ from pathlib import Path
 import pandas as pd
 
 from trunkline.errors import InputError
-from trunkline.identification.evaluation.error_tables import LABELS
+from trunkline.identification.evaluation.error_tables import LABELS, REFERENCES, number, pair
 
-BESIDE = ("cad", "null", "null_straight", "null_held", "noise_floor")
 ERRORS = ("e_internal_mm", "e_position_mm", "e_tip_mm")
 
 
@@ -27,13 +26,13 @@ def trial_lines(trials: pd.DataFrame, fitted: set[str]) -> list[str]:
 
 def kind_lines(metrics: dict) -> list[str]:
     """A line a kind: means over its trials, and how well the arm repeats itself."""
-    models = {name for name in ("model", *BESIDE) if name in metrics}
+    models = {name for name in ("model", *REFERENCES) if name in metrics}
     repeats = metrics["repeatability_mm"]
     rows = [["mean of", "trials", *_heads(models), "repeatability"]]
     for kind, table in metrics["model"]["by_experiment"].items():
         errors = {name: metrics[name]["by_experiment"].get(kind, {}) for name in models}
         found = repeats.get(kind, {})
-        scatter = _pair(found.get("mean_mm"), found.get("tip_mm"))
+        scatter = pair(found.get("mean_mm"), found.get("tip_mm"))
         rows.append([kind, str(table["trials"]), *_cells(errors, models), scatter])
     return _aligned(rows, 1)
 
@@ -74,30 +73,22 @@ def change_lines(before: dict, now: dict) -> list[str]:
 
 
 def _heads(models: set[str]) -> list[str]:
-    return ["E_internal", "position", "tip", "tip %", *(LABELS[name] for name in BESIDE if name in models)]
+    return ["E_internal", "position", "tip", "tip %", *(LABELS[name] for name in REFERENCES if name in models)]
 
 
 def _cells(errors: dict[str, dict], models: set[str]) -> list[str]:
     found = errors["model"]
     pairs = [
-        _pair(row.get("e_position_mm"), row.get("e_tip_mm"))
-        for row in (errors.get(name, {}) for name in BESIDE if name in models)
+        pair(row.get("e_position_mm"), row.get("e_tip_mm"))
+        for row in (errors.get(name, {}) for name in REFERENCES if name in models)
     ]
-    return [*(_number(found.get(error)) for error in (*ERRORS, "e_tip_pct")), *pairs]
+    return [*(number(found.get(error)) for error in (*ERRORS, "e_tip_pct")), *pairs]
 
 
 def _change(old: float | None, new: float | None) -> str:
     if old is None or new is None:
         return "–"
-    return f"{_number(old)} → {_number(new)} mm ({round(100 * (new / old - 1)):+d} %)"
-
-
-def _pair(position: float | None, tip: float | None) -> str:
-    return "–" if position is None else f"{_number(position)} / {_number(tip)}"
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None or pd.isna(value) else f"{value:.3g}"
+    return f"{number(old)} → {number(new)} mm ({round(100 * (new / old - 1)):+d} %)"
 
 
 def _aligned(rows: list[list[str]], words: int) -> list[str]:

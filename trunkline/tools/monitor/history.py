@@ -5,7 +5,6 @@ model and parameters it is; another model is refused, as its scores are about an
 """
 
 import fcntl
-import hashlib
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.errors import InputError
+from trunkline.files import file_digest, written_whole
 from trunkline.tools.monitor.scores import Score
 
 
@@ -51,9 +51,8 @@ class Ledger:
         key = (row["session"], row["trial"])
         self.rows = [one for one in self.rows if (one["session"], one["trial"]) != key] + [row]
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        part = self.path.with_suffix(".part")
-        part.write_text("".join(json.dumps(one) + "\n" for one in (self.made_of, *self.rows)), encoding="utf-8")
-        part.replace(self.path)
+        with written_whole(self.path) as part:
+            part.write_text("".join(json.dumps(one) + "\n" for one in (self.made_of, *self.rows)), encoding="utf-8")
 
     def of(self, session: str, trial: str) -> dict | None:
         """The row of a trial."""
@@ -77,8 +76,7 @@ def read_score(row: dict) -> Score:
 
 def digest(path: Path) -> str:
     """Of a file's bytes."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()[:16]
+    return file_digest(path)[:16]
 
 
 @contextmanager

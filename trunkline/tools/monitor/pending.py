@@ -4,6 +4,7 @@ import json
 import time
 from pathlib import Path
 
+from trunkline.files import written_whole
 from trunkline.tools.monitor.inbox import PATIENCE, State
 
 
@@ -48,6 +49,5 @@ class Patience:
             self._keep()
 
     def _keep(self) -> None:
-        part = self._path.with_suffix(".part")
-        part.write_text(json.dumps({"seen": self._seen, "said": self._said}), encoding="utf-8")
-        part.replace(self._path)
+        with written_whole(self._path) as part:
+            part.write_text(json.dumps({"seen": self._seen, "said": self._said}), encoding="utf-8")

@@ -10,6 +10,7 @@ import sys
 from pathlib import Path
 
 from trunkline.errors import in_one_line
+from trunkline.identification.fit.settings import STAGES
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, names_apart, other_sessions, untold_apart
 from trunkline.identification.simulate.checks import check_trials
@@ -22,8 +23,6 @@ from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.settings import read_yaml
 from trunkline.tools.evaluate.session import read_trials_of
 from trunkline.tools.preflight.up_axis import other_ups, up_lines
-
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 
 
 @in_one_line

@@ -7,10 +7,8 @@ beside it has the fields of so many drawn models, for programs that know nothing
 """
 
 import argparse
-import hashlib
 import io
 import json
-import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -19,10 +17,12 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError, in_one_line
+from trunkline.files import file_digest, written_whole
+from trunkline.identification.fit.settings import STAGES
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.program import called
 from trunkline.report.certificate.identified import identified
-from trunkline.tools.evaluate.model import STAGES, read_arm
+from trunkline.tools.evaluate.model import read_arm
 from trunkline.tools.randomize.fields import changed_fields, drawn_fields, of_model
 from trunkline.tools.randomize.file import to_table
 from trunkline.tools.randomize.randomisation import Randomisation, of_arm, of_population
@@ -48,7 +48,7 @@ def main(arguments: list[str] | None = None) -> int:
     path, model = _model_in(told.artifacts[0])
     arms[0] = of_model(model, arms[0], str(path))
     drawn = (of_population(arms) if len(arms) > 1 else arms[0]).widened(told.widen)
-    which = {"file": path.name, "sha256": hashlib.sha256(path.read_bytes()).hexdigest(), "mujoco": mujoco.__version__}
+    which = {"file": path.name, "sha256": file_digest(path), "mujoco": mujoco.__version__}
     table = to_table(drawn, changed_fields(model, drawn), which)
     if told.draws:
         x = drawn.draw(told.draws, np.random.default_rng(told.seed))
@@ -103,11 +103,9 @@ def _lines(table: dict) -> list[str]:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Whole or not at all."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.part")
-    part.write_bytes(content)
-    os.replace(part, path)
+    with written_whole(path) as part:
+        part.write_bytes(content)
 
 
 if __name__ == "__main__":

@@ -17,10 +17,10 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
+from studies.payload.trials import Schedule, Tried, Tries, try_grasps
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.grasps import Grasp, Pull, object_in_base, pulls_of
 from trunkline.ar.hybrid.objects import Shape, Thing
-from trunkline.ar.hybrid.trials import Schedule, Tried, Tries, try_grasps
 from trunkline.ar.hybrid.worlds import Surface, World
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import FixedMount

@@ -1,7 +1,7 @@
 """The heaviest mass that the arm holds: `python -m studies.payload`
 
-Goes over the cells of `studies/payload.yaml` and adds a row for each to docs/results/payload.csv as soon as it is done;
-stopped, it goes on from there. Rows of other code, other settings or another arm stay, and count for nothing.
+Goes over the cells of `payload.yaml` beside it and adds a row for each to docs/results/payload.csv as soon as it is
+done; stopped, it goes on from there. Rows of other code, other settings or another arm stay, and count for nothing.
 `--quick` is a small chart that is not kept: hanging objects of two diameters, 1 placement, a coarser ladder.
 `--cells N` stops after N more. Prints the rows and their cost; docs/results/payload.png shows them.
 """
@@ -15,20 +15,20 @@ from pathlib import Path
 import pandas as pd
 from omegaconf import OmegaConf
 
+from studies.payload.chart import Cell, Outcome, PayloadSettings, cells, chart_rows
+from studies.payload.figure import payload_figure
 from studies.rows import Rows, digest
 from trunkline.ar.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
-from trunkline.ar.hybrid.payload import Cell, Outcome, PayloadSettings, cells, chart_rows
 from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
 from trunkline.pipeline.config import validated
 from trunkline.pipeline.inputs import read_spec
-from trunkline.report.figures.payload import payload_figure
 from trunkline.report.figures.style import save_figure
 from trunkline.settings import read_yaml
 from upkeep.results import recorded
 
 MODEL = Path("artifacts/identify_control/arm.xml")
-SETTINGS = Path("studies/payload.yaml")
+SETTINGS = Path("studies/payload/payload.yaml")
 FIGURE = Path("docs/results/payload.png")
 QUICK = {
     "grids": [{"supports": ["hanging"], "shapes": ["cylinder", "box", "sphere", "toy"], "diameters": [0.03, 0.06],

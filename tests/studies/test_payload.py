@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from studies.payload.trials import PAID_OUT, Schedule, Tried, Tries, try_grasps
+from tests.ar.hybrid.conftest import SIZE, rubbing_arm
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import Thing
-from trunkline.ar.hybrid.trials import PAID_OUT, Schedule, Tries, try_grasps
 from trunkline.ar.hybrid.worlds import Surface, World
 from trunkline.frames import wxyz_from_rotation
 from trunkline.kinematics.panda.mounts import FixedMount
+from trunkline.model.arm.spiral import spiral_chain
 from trunkline.model.elements import arm_hinges
 from trunkline.model.simulation.rest import settle
 
@@ -20,10 +22,12 @@ LEVEL = Rotation.from_euler("x", 90, degrees=True)  # turns the bar's z to base 
 BESIDE = np.array([0.07, 0.0, -0.34])  # m, of the bar in the base frame
 SHORT = Schedule(close=0.4, settle=0.05, lift=0.1, shakes=0, hold=0.05)
 PULL = np.array([0.15, 0.0, 0.0])
+NEAR = 1e-6  # m, to either side of a border
 
 
 @pytest.fixture(scope="module")
-def models(arm):
+def models():
+    arm = rubbing_arm(spiral_chain(**SIZE), 8)
     hook = [float(value) for value in BESIDE + [0, 0, 0.17]]
     table = {"table": Surface([0.0, 0.0, -0.7], [1.0, 1.0, 0.03], "wood")}
     placed = Placed(BAR, BESIDE, tuple(wxyz_from_rotation(LEVEL)), True)
@@ -82,3 +86,27 @@ def test_a_table_sinks_along_gravity(models):
     slow = Schedule(close=0.2, settle=0.05, lift=0.5, sink=0.1, shakes=0, hold=0.05)
     tried = try_grasps(whole, alone, tries, slow, ("table",))
     assert tried.path[0, -1, 2] - tried.path[0, tried.let_go, 2] == pytest.approx(-0.1 * 0.55, abs=0.006)
+
+
+def tried(dropped=0.0, further=0.0) -> Tried:
+    """A grasp of which the thing came `dropped` m down and `further` m from the arm since it was let go in row 2."""
+    path, distance = np.zeros((1, 5, 3)), np.full((1, 5), 0.03)
+    path[0, -1, 2], distance[0, -1] = -dropped, 0.03 + further
+    path[0, :2], distance[0, :2] = 1.0, 1.0  # before it was let go: nobody asks
+    return Tried(path, distance, 2, np.zeros((1, 3)), np.zeros((1, 1)))
+
+
+@pytest.mark.parametrize(
+    ("dropped", "further", "held"),
+    [(0.0, 0.0, True), (0.08 - NEAR, 0.0, True), (0.08 + NEAR, 0.0, False), (0.0, 0.02 - NEAR, True),
+     (0.0, 0.02 + NEAR, False), (-0.08 - NEAR, 0.0, False), (0.0, -0.02, True), (np.nan, 0.0, False),
+     (0.0, np.nan, False)],
+)  # fmt: skip
+def test_what_counts_as_held_in_a_trial(dropped, further, held):
+    assert tried(dropped, further).held(sag=0.08, slip=0.02).tolist() == [held]
+
+
+def test_at_a_border_itself_nothing_is_held_in_a_trial_either():
+    path, distance = np.zeros((2, 5, 3)), np.zeros((2, 5))
+    path[0, -1, 2], distance[1, -1] = -0.5, 0.25
+    assert Tried(path, distance, 2, np.zeros((2, 3)), np.zeros((2, 1))).held(0.5, 0.25).tolist() == [False, False]
