@@ -25,7 +25,7 @@ from trunkline.ar.hybrid.settings import HybridSettings
 from trunkline.ar.hybrid.worlds import World
 from trunkline.ar.teleop.minimum_jerk import minimum_jerk
 from trunkline.compute.threads import thread_count
-from trunkline.identification.fit.settings import STAGES
+from trunkline.identification.stages import STAGES
 from trunkline.kinematics.panda.kinematics import mount_pose
 from trunkline.kinematics.panda.mounts import PandaRobot
 from trunkline.model.arm.contact_geometry import read_geometry

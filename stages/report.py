@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from trunkline.errors import existing
-from trunkline.identification.fit.settings import STAGES
+from trunkline.identification.stages import STAGES
 from trunkline.pipeline.inputs import load_rig, read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
 from trunkline.recordings.trials.splits import DECIDING

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.identification.evaluation.error_tables import number
-from trunkline.identification.fit.settings import STAGES
+from trunkline.identification.stages import STAGES
 from trunkline.recordings.trials.experiments import EXPERIMENTS, Kind
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 

@@ -19,7 +19,7 @@ from trunkline.ar.hybrid.rollouts import Twin, Way, futures
 from trunkline.ar.hybrid.worlds import World
 from trunkline.ar.preview.contents import doubts_of
 from trunkline.errors import InputError
-from trunkline.identification.fit.settings import STAGES
+from trunkline.identification.stages import STAGES
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.model.arm.spiral import spiral_chain

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 
 from trunkline.errors import InputError, existing
-from trunkline.identification.fit.settings import STAGES as IDENTIFYING
+from trunkline.identification.stages import STAGES as IDENTIFYING
 from trunkline.unity.twin import Sources
 from trunkline.version import __version__
 

@@ -11,7 +11,6 @@ from trunkline.identification.simulate.loss import Loss
 from trunkline.recordings.trials.experiments import EXPERIMENTS, ExperimentName
 from trunkline.settings import settings
 
-STAGES = ("identify_stiffness", "identify_damping", "identify_control")  # in their order: each goes on from the last
 MOUNT = ("mount_tilt_x", "mount_tilt_y", "mount_twist")
 Experiments = Annotated[list[ExperimentName], Field(min_length=1)]
 

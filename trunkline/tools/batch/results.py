@@ -8,8 +8,8 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.identification.evaluation.error_tables import TABLED
-from trunkline.identification.fit.settings import STAGES
 from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.stages import STAGES
 from trunkline.recordings.trials.splits import TEST, VALIDATE
 
 

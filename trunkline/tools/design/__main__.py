@@ -15,9 +15,10 @@ from pathlib import Path
 import mujoco
 
 from trunkline.errors import InputError, in_one_line, nearest
-from trunkline.identification.fit.settings import STAGES, IdentificationSettings
+from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, names_apart, other_sessions
+from trunkline.identification.stages import STAGES
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
 from trunkline.pipeline.inputs import read_spec

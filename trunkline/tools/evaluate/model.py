@@ -9,10 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
-from trunkline.identification.fit.settings import STAGES
 from trunkline.identification.parameters.parameters import APART, PARAMETERS
 from trunkline.identification.parameters.per_session import names_in
 from trunkline.identification.results.scoring import fingerprint
+from trunkline.identification.stages import STAGES
 from trunkline.pipeline.config import settings_of
 from trunkline.pipeline.inputs import read_spec
 from trunkline.recordings.trials.trial import Trial, sessions_of

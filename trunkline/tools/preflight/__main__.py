@@ -10,10 +10,10 @@ import sys
 from pathlib import Path
 
 from trunkline.errors import in_one_line
-from trunkline.identification.fit.settings import STAGES
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, names_apart, other_sessions, untold_apart
 from trunkline.identification.simulate.checks import check_trials
+from trunkline.identification.stages import STAGES
 from trunkline.identification.uncertainty.identifiability import described_lines, to_identify_from, told_by, untold
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import own_or_project, settings_of

@@ -18,8 +18,8 @@ import numpy as np
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.files import file_digest, written_whole
-from trunkline.identification.fit.settings import STAGES
 from trunkline.identification.parameters.parameters import PARAMETERS
+from trunkline.identification.stages import STAGES
 from trunkline.program import called
 from trunkline.report.certificate.identified import identified
 from trunkline.tools.evaluate.model import read_arm
