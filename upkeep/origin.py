@@ -27,7 +27,7 @@ ROOMS = ("trunkline", "upkeep", "demo", "rehearsal", "studies", "benchmarks", "q
 # What surrounds every result (load, show, refuse, write) and never changes a number. Also of tests/pipeline.
 INERT = (
     "trunkline/compute/",  # where it runs: the same bits
-    *("trunkline/errors.py", "trunkline/startup_notice.py", "trunkline/settings.py"),
+    *("trunkline/errors.py", "trunkline/files.py", "trunkline/startup_notice.py", "trunkline/settings.py"),
     *("trunkline/report/figures/", "trunkline/pipeline/", "upkeep/"),
     *("demo/__init__.py", "rehearsal/__init__.py", "rehearsal/report.py", "studies/rows.py"),
 )
