@@ -355,13 +355,13 @@ def other_arms(examples: Path) -> str:
     """What became of the examples that are moved by motors, on trials of `test`: a line each."""
     scored = [_metrics(examples / name, "score") for name in ("asl_motion", "ftdcr")]
     moved, paths = (lookup(metrics, "identify_stiffness") for metrics in scored)
-    found, share = (_number(lookup(moved, f"identified.{TEST}.e_position_{unit}")) for unit in ("mm", "pct"))
+    position, share = (_number(lookup(moved, f"identified.{TEST}.e_position_{unit}")) for unit in ("mm", "pct"))
     tip = _number(lookup(paths, f"identified.{TEST}.e_tip_centred_rms_mm"))
     nulls = lookup(moved, f"null.{TEST}.e_position_mm"), lookup(paths, f"null.{TEST}.e_tip_centred_rms_mm")
-    own, other = map(_number, nulls)
+    shape, other = map(_number, nulls)
     return (
-        f"[Moved by its motors](examples/asl_motion), without and with a load: {found} mm ({share} %) on `{TEST}` "
-        f"(mean shape {own}).\n"
+        f"[Moved by its motors](examples/asl_motion), without and with a load: {position} mm ({share} %) on `{TEST}` "
+        f"(mean shape {shape}).\n"
         f"The [FTDCR](examples/ftdcr), nine tendons: tip {tip} mm RMS on `{TEST}` (its authors' simulator 9.38, "
         f"mean shape {other})."
     )
@@ -381,8 +381,8 @@ def _head(what: str) -> list[str]:
 def _beside(metrics: dict | None, at: str) -> list[str]:
     """E_internal, then position / tip error of the identified model, of CAD, null models and the noise floor."""
     internal = [_number(lookup(metrics, f"identified.{at}e_internal_{unit}")) for unit in ("mm", "pct")]
-    found = [f"{internal[0]} ({internal[1]} %)", _pair(metrics, f"identified.{at}", share=True)]
-    return found + [_pair(metrics, f"{name}.{at}") for name in BESIDE]
+    cells = [f"{internal[0]} ({internal[1]} %)", _pair(metrics, f"identified.{at}", share=True)]
+    return cells + [_pair(metrics, f"{name}.{at}") for name in BESIDE]
 
 
 def _pair(metrics: dict | None, at: str, share: bool = False) -> str:
@@ -440,11 +440,11 @@ def generate(root: Path) -> dict[Path, str]:
     examples = {name: example_table(root / "examples" / name) for name in EXAMPLES}
     examples |= {name: log_table(root / "examples" / name) for name in ("asl_motion", "pairs")}
     results = results_table(root / "tests" / "limits.yaml", RESULTS)
-    own = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
-    own |= {"score": score_table(root), "rehearsal": rehearsal_block(root, variants=False)}
-    own |= {name: example_table(root / "examples" / name, all_splits=False) for name in EXAMPLES}
-    own["arms"] = other_arms(root / "examples")
-    blocks = {root / "README.md": own}
+    readme = {"pipeline": pipeline_graph(root), "identification": identification_table(root), "results": results}
+    readme |= {"score": score_table(root), "rehearsal": rehearsal_block(root, variants=False)}
+    readme |= {name: example_table(root / "examples" / name, all_splits=False) for name in EXAMPLES}
+    readme["arms"] = other_arms(root / "examples")
+    blocks = {root / "README.md": readme}
     blocks[root / "data" / "raw" / "README.md"] = {"experiments": experiment_table()}
     blocks |= {root / "examples" / name / "README.md": {name: table} for name, table in examples.items()}
     ftdcr = root / "examples" / "ftdcr"

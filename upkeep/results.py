@@ -77,9 +77,9 @@ def modules_of(command: str) -> list[str]:
     Raises:
         InputError: there is none; what made a result is then unknown.
     """
-    if not (found := re.findall(r"(?<=-m )[\w.]+", command)):
+    if not (modules := re.findall(r"(?<=-m )[\w.]+", command)):
         raise InputError(f"{command}: found no module, expected `python -m studies.…` or `python -m benchmarks.…`")
-    return found
+    return modules
 
 
 def block(path: Path) -> str:
@@ -99,8 +99,8 @@ def block(path: Path) -> str:
     for is_table, group in groupby(lines, key=lambda line: line.startswith("|")):
         text = "\n".join(group)
         parts.append(re.sub(r"\n(.+\n\|-)", r"\n\n\1", text) if is_table else f"```\n{text}\n```")  # a second header
-    told = textwrap.fill(f"({words})", 118, break_long_words=False, break_on_hyphens=False)
-    return "\n\n".join([*parts, f"`{command}`\n{told}"])
+    caption = textwrap.fill(f"({words})", 118, break_long_words=False, break_on_hyphens=False)
+    return "\n\n".join([*parts, f"`{command}`\n{caption}"])
 
 
 def origin_words(root: Path, name: str, content: dict) -> str:
@@ -130,12 +130,12 @@ def not_in_history(root: Path) -> list[str]:
         history = git(root, "rev-list", "HEAD").split()
     except (FileNotFoundError, subprocess.CalledProcessError):
         raise InputError(f"{root.resolve()}: found no Git repository, expected the whole history") from None
-    known, lines = {commit[:7] for commit in history}, []
+    commits_there, lines = {commit[:7] for commit in history}, []
     for file in sorted((root / FOLDER).glob("*.json")):
         commits = {json.loads(file.read_text(encoding="utf-8"))["commit"]}
         if file.with_suffix(".csv").is_file():
             with file.with_suffix(".csv").open(newline="", encoding="utf-8") as table:
                 commits |= {row["commit"] for row in csv.DictReader(table) if row.get("commit")}
         clean = sorted(commit.removesuffix(" with changes") for commit in commits)
-        lines += [f"{file.stem}: commit {commit}" for commit in clean if commit[:7] not in known]
+        lines += [f"{file.stem}: commit {commit}" for commit in clean if commit[:7] not in commits_there]
     return lines

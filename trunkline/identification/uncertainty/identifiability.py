@@ -69,14 +69,14 @@ def told_by(
     half = TWO_SIDED * share / np.sqrt(NUMBERS * len(experiments)) * np.where(scale > 0, spread * scale, np.inf)
     low, high = problem.bounds()
     names = list(fit.parameters)
-    told = [Told(name, *row) for name, *row in zip(names, half, half / (0.5 * (high - low)), strict=True)]
+    parameters = [Told(name, *row) for name, *row in zip(names, half, half / (0.5 * (high - low)), strict=True)]
     alike = inverse / np.maximum(np.outer(spread, spread), 1e-300)
     pairs = [
         f"{names[i]} and {names[j]} {'rise together' if alike[i, j] > 0 else 'trade off'}"
         for i, j in zip(*np.triu_indices(len(names), 1), strict=True)
         if abs(alike[i, j]) > ALIKE
     ]
-    return told, pairs
+    return parameters, pairs
 
 
 def described_lines(model: mujoco.MjModel, experiments: list[Experiment], fit: Fit) -> list[str]:
@@ -86,14 +86,14 @@ def described_lines(model: mujoco.MjModel, experiments: list[Experiment], fit: F
     A released arm swings about its straight shape, and the described one with a guess of damping: that a straight arm
     is nearer to a release does not mean that anything is described wrongly.
     """
-    found = replay(model, experiments, fit.segments)
-    described, plain = (Prediction(one, experiments) for one in (found, straight(experiments, found)))
+    replayed = replay(model, experiments, fit.segments)
+    described, plain = (Prediction(simulated, experiments) for simulated in (replayed, straight(experiments, replayed)))
     off, still = described.overall(), plain.overall()
-    told = f"as described, it is {off['e_position_mm']:.3g} mm off ({off['e_position_pct']:.2g} % of length)"
-    lines = [f"{told}, a straight arm {still['e_position_mm']:.3g} mm"]
+    description = f"as described, it is {off['e_position_mm']:.3g} mm off ({off['e_position_pct']:.2g} % of length)"
+    lines = [f"{description}, a straight arm {still['e_position_mm']:.3g} mm"]
     bent = [e for e in experiments if _stays_bent(e)]
     if bent:
-        mine, its = (one.of(_stays_bent) for one in (described, plain))
+        mine, its = (prediction.of(_stays_bent) for prediction in (described, plain))
         if mine.overall()["e_position_mm"] >= its.overall()["e_position_mm"]:
             lines.append(f"no nearer than a straight arm: look at {_doubtful(model, bent)}")
     return lines
@@ -117,17 +117,17 @@ def to_identify_from(
 ) -> tuple[mujoco.MjModel, list[Experiment], Fit]:
     """As `set_up`, of the trials to identify from alone, which must be there; moving ones by their beginning."""
     config = with_every(config, model)
-    own = [trial for trial in trials if trial.experiment in config.experiments and trial.split == IDENTIFY]
-    model, experiments, fit = set_up(config, own, model)
+    used = [trial for trial in trials if trial.experiment in config.experiments and trial.split == IDENTIFY]
+    model, experiments, fit = set_up(config, used, model)
     return model, [e if is_static(e.kind) else e.shortened(FRAMES) for e in experiments], fit
 
 
 def untold(config: IdentificationSettings, trials: list[Trial]) -> list[str]:
     """Why a stage has nothing to identify from, a sentence each."""
-    found = {trial.experiment for trial in trials if trial.split == IDENTIFY}
+    kinds = {trial.experiment for trial in trials if trial.split == IDENTIFY}
     lines = []
     for kind in config.experiments:
-        if kind not in found:
+        if kind not in kinds:
             way_out = EXPERIMENTS[kind].without
             lines.append(f"no {kind} of the split identify" + (f": {way_out}" if way_out else ""))
     return lines

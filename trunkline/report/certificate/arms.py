@@ -44,18 +44,18 @@ class Arm:
         """Its tip at rest, in the frame of the tracked base, m, NaN where none is found. Shape (N, 3)."""
         return self.placed(self.rest(poses, near))
 
-    def placed(self, found: Equilibrium) -> np.ndarray:
-        tips = np.where(found.converged[:, None], found.position, np.nan)
+    def placed(self, equilibrium: Equilibrium) -> np.ndarray:
+        tips = np.where(equilibrium.converged[:, None], equilibrium.position, np.nan)
         return self.origin + tips @ self.turn.T
 
     def friction(self, poses: Poses) -> np.ndarray:
         """From the tip at rest to one end of the band in which friction can hold it, m, half of it where the ends lie
         unevenly; 0 where none is found. Shape (N, 3)."""
-        found = self.rest(poses)
+        equilibrium = self.rest(poses)
         dry, mu = model_friction(self.model), self.whole.capstan
         if mu == 0 and not any(part.any() for part in dry):
             return np.zeros((len(poses), 3))
-        band = friction_band(self.chain, found.tensions, poses.gravity @ self.turn, *dry, capstan=mu)
+        band = friction_band(self.chain, equilibrium.tensions, poses.gravity @ self.turn, *dry, capstan=mu)
         return np.nan_to_num((band.loaded - band.unloaded) / 2) @ self.turn.T
 
     @property
@@ -82,9 +82,9 @@ def arms_with(model: mujoco.MjModel, values: dict[str, np.ndarray]) -> Iterator[
     Args:
         values: by name. Each of shape (D,).
     """
-    own, data = copy.copy(model), mujoco.MjData(model)
+    variant, data = copy.copy(model), mujoco.MjData(model)
     fields = candidate_fields(model, values)
     for candidate in range(len(next(iter(values.values())))):
-        set_fields(own, fields, candidate)
-        mujoco.mj_setConst(own, data)  # what softens joint limits follows from where hinges are
-        yield arm_of(own)
+        set_fields(variant, fields, candidate)
+        mujoco.mj_setConst(variant, data)  # what softens joint limits follows from where hinges are
+        yield arm_of(variant)

@@ -122,31 +122,32 @@ def sensitivities(model: mujoco.MjModel, parameters: Identified, arm: Arm, poses
 
 def budget(inputs: Inputs, poses: Poses, arms: int, each: int, rng: np.random.Generator) -> Budget:
     """Of the tip in `poses`, by so many draws of the parameters, `each` of them with so many of everything else."""
-    arm, known = arm_of(inputs.model), inputs.parameters
+    arm, parameters = arm_of(inputs.model), inputs.parameters
     tips = arm.tips(poses)
     friction, ways = arm.friction(poses), arm.ways(poses)
-    moves = sensitivities(inputs.model, known, arm, poses)
-    offsets = np.tile(parameter_shifts(inputs.model, known, arm, poses, arms, rng), (each, 1, 1))
+    moves = sensitivities(inputs.model, parameters, arm, poses)
+    offsets = np.tile(parameter_shifts(inputs.model, parameters, arm, poses, arms, rng), (each, 1, 1))
     draws = arms * each
     offsets = offsets + rng.uniform(-1, 1, (draws, len(poses), 1)) * friction
     offsets = offsets + inputs.noise * rng.standard_normal(offsets.shape)
     if inputs.lacking:
         offsets = offsets + lacking_draws(inputs.lacking, ways, tips - arm.origin, draws, rng)
-    told = [
+    sources = [
         Source(name, f"t, {degrees:.0f} degrees of freedom", deviation * PARAMETERS[name].scale, _axis_unit(name),
                degrees, np.linalg.norm(move, axis=1))
-        for name, deviation, degrees, move in zip(known.names, known.deviation, known.degrees, moves, strict=True)
+        for name, deviation, degrees, move
+        in zip(parameters.names, parameters.deviation, parameters.degrees, moves, strict=True)
     ]  # fmt: skip
-    told.append(Source(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3), "half bands", np.inf,
+    sources.append(Source(FRICTION, "rectangular, between both ends of its band", 1 / np.sqrt(3), "half bands", np.inf,
                        np.linalg.norm(friction, axis=1) / np.sqrt(3)))  # fmt: skip
     if inputs.lacking:
         scales = inputs.lacking.rms
-        told.append(Source(LACKING, f"from {inputs.lacking.trials} held-out trials at rest", None, "mm",
+        sources.append(Source(LACKING, f"from {inputs.lacking.trials} held-out trials at rest", None, "mm",
                            inputs.lacking.trials, np.sqrt(ways**2 @ scales**2)))  # fmt: skip
     every = np.full(len(poses), np.sqrt(3) * inputs.noise)
-    told.append(Source(NOISE, "normal, of each coordinate", inputs.noise * 1e3, "mm", np.inf, every))
-    both = np.einsum("ink,jnk,ij->n", moves, moves, known.correlation - np.eye(len(known.names)))
-    return Budget(tips, told, both, radius_of(offsets))
+    sources.append(Source(NOISE, "normal, of each coordinate", inputs.noise * 1e3, "mm", np.inf, every))
+    both = np.einsum("ink,jnk,ij->n", moves, moves, parameters.correlation - np.eye(len(parameters.names)))
+    return Budget(tips, sources, both, radius_of(offsets))
 
 
 def lacking_draws(

@@ -34,8 +34,8 @@ class Coverage:
 
 def share_of(inside: np.ndarray) -> dict:
     """The share of `inside` (N,), N at least 1, that is true, and Wilson's interval of 95 %."""
-    found = binomtest(int(inside.sum()), len(inside)).proportion_ci(0.95, "wilson")
-    return {"share": float(np.mean(inside)), "low": found.low, "high": found.high, "poses": len(inside)}
+    interval = binomtest(int(inside.sum()), len(inside)).proportion_ci(0.95, "wilson")
+    return {"share": float(np.mean(inside)), "low": interval.low, "high": interval.high, "poses": len(inside)}
 
 
 def from_beyond(pulled: np.ndarray, rng: np.random.Generator) -> np.ndarray:

@@ -77,10 +77,10 @@ def posed(trials: list[Trial], model: mujoco.MjModel) -> Poses:
 
 def _gravity(trial: Trial, model: mujoco.MjModel) -> np.ndarray:
     """What pulled at the arm in a trial, base frame of the session whose mount `model` has, m/s². Shape (3,)."""
-    own = model_in(trial.session, model)
-    if own is model:
+    session_model = model_in(trial.session, model)
+    if session_model is model:
         return trial.gravity
-    return base_frame(model)[1] @ base_frame(own)[1].T @ trial.gravity
+    return base_frame(model)[1] @ base_frame(session_model)[1].T @ trial.gravity
 
 
 def draw_poses(chain: Chain, conditions: Conditions, count: int, rng: np.random.Generator) -> Poses:

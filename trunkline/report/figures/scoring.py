@@ -61,8 +61,8 @@ def segment_figure(tables: dict[str, pd.DataFrame]) -> Figure:
     figure, axes = plt.subplots(down, across, figsize=size, squeeze=False, sharey=True)
     for axis, (title, kind, rows) in zip(axes.flat, panels, strict=False):
         for model, (color, line, dot, width) in _shown(rows).items():
-            own, dots = rows[rows.model == model], {"marker": dot, "ms": 0.7 * _dot_size(dot, width)}
-            axis.semilogy(own.from_base_mm, own.e_position_mm, line, lw=width, color=color, label=model, **dots)
+            curve, dots = rows[rows.model == model], {"marker": dot, "ms": 0.7 * _dot_size(dot, width)}
+            axis.semilogy(curve.from_base_mm, curve.e_position_mm, line, lw=width, color=color, label=model, **dots)
         axis.set(title=f"{kind}, {title}", xlabel="distance from the base, straight arm (mm)")
         axis.set_xlim(0, 1.04 * rows.from_base_mm.max())
     if not panels:
@@ -82,8 +82,8 @@ def _dot_size(dot: str, width: float) -> float:
 
 
 def _shown(table: pd.DataFrame) -> dict[str, tuple[str, str, str, float]]:
-    found = set(table.model)
-    return {model: style for model, style in MODELS.items() if model in found}
+    present = set(table.model)
+    return {model: style for model, style in MODELS.items() if model in present}
 
 
 def _legend(figure: Figure, axes: np.ndarray) -> None:

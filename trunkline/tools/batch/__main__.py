@@ -27,18 +27,18 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, metavar="FOLDER", default=Path("build/fleet"), help="default: build/fleet")
     parser.add_argument("--until", metavar="STAGE", default="score", help="the last stage to run; default: score")
     parser.add_argument("--only-table", action="store_true", help="run nothing, tell what is there")
-    told = parser.parse_args(arguments)
-    listing = read_listing(told.list)
-    failed = {} if told.only_table else run_all(listing, told.out, told.until)
+    args = parser.parse_args(arguments)
+    listing = read_listing(args.list)
+    failed = {} if args.only_table else run_all(listing, args.out, args.until)
     fleet = [
-        read_results(arm.name, Path(arm.folder) if arm.folder else told.out / arm.name) for arm in listing.arms
+        read_results(arm.name, Path(arm.folder) if arm.folder else args.out / arm.name) for arm in listing.arms
     ]
-    found = [one for one in fleet if one.parameters or one.errors]
-    if told.only_table and not found:
-        raise InputError(f"{told.list}: found no results of any arm, expected those of at least one")
-    if found:
-        _tell(listing, found, told.out)
-    for name in [one.name for one in fleet if one not in found and one.name not in failed]:
+    identified = [results for results in fleet if results.parameters or results.errors]
+    if args.only_table and not identified:
+        raise InputError(f"{args.list}: found no results of any arm, expected those of at least one")
+    if identified:
+        _tell(listing, identified, args.out)
+    for name in [results.name for results in fleet if results not in identified and results.name not in failed]:
         print(f"fleet: {name}: nothing is identified yet", file=sys.stderr)
     _say_failed(failed)
     return 1 if failed else 0
@@ -54,12 +54,12 @@ def run_all(listing: Listing, out: Path, until: str) -> dict[str, str]:
         print(f"fleet: {arm.name}: up to {until}", flush=True)
         try:
             prepare(arm, out / arm.name, until)
-            said = run(out / arm.name)
+            reason = run(out / arm.name)
         except InputError as error:
-            said = str(error)
-        if said is not None:
-            failed[arm.name] = said
-        print(f"fleet: {arm.name}: {'failed' if said else 'done'} after {time.monotonic() - begun:.0f} s", flush=True)
+            reason = str(error)
+        if reason is not None:
+            failed[arm.name] = reason
+        print(f"fleet: {arm.name}: {'failed' if reason else 'done'} after {time.monotonic() - begun:.0f} s", flush=True)
     return failed
 
 
@@ -67,10 +67,10 @@ def _tell(listing: Listing, fleet: list[Results], out: Path) -> None:
     from trunkline.report.figures.fleet import fleet_figure  # pyplot takes long to import
     from trunkline.report.figures.style import save_figure
 
-    by_name = {one.name: one for one in fleet}
+    by_name = {results.name: results for results in fleet}
     earlier = {arm.name: listing.earlier(arm) for arm in listing.arms if arm.name in by_name}
-    since = {name: one for name, one in earlier.items() if one is not None and one in by_name}
-    drifts = {name: drift(by_name[name], by_name[one]) for name, one in since.items()}
+    since = {name: reference for name, reference in earlier.items() if reference is not None and reference in by_name}
+    drifts = {name: drift(by_name[name], by_name[reference]) for name, reference in since.items()}
     words = ["95 % intervals, given the model"]
     if since:
         words.append(f"then the drift since {', '.join(sorted(set(since.values())))}, bold where beyond both intervals")
@@ -88,8 +88,8 @@ def _tell(listing: Listing, fleet: list[Results], out: Path) -> None:
 
 
 def _say_failed(failed: dict[str, str]) -> None:
-    for name, said in failed.items():
-        print(f"fleet: {name}: failed: {said}", file=sys.stderr)
+    for name, reason in failed.items():
+        print(f"fleet: {name}: failed: {reason}", file=sys.stderr)
 
 
 if __name__ == "__main__":

@@ -30,8 +30,8 @@ class Arm:
 
     def __post_init__(self):
         if (self.session is None) == (self.folder is None):
-            found = "both" if self.session else "neither"
-            raise ValueError(f"session: found {found} of session and folder, expected one of the two for {self.name!r}")
+            which = "both" if self.session else "neither"
+            raise ValueError(f"session: found {which} of session and folder, expected one of the two for {self.name!r}")
 
 
 @settings
@@ -48,8 +48,8 @@ class Listing:
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
             raise ValueError(f"arms: found {twice!r} twice, expected each name once")
-        told = [("reference", self.reference), *((f"arms: {arm.name}: since", arm.since) for arm in self.arms)]
-        for key, name in told:
+        references = [("reference", self.reference), *((f"arms: {arm.name}: since", arm.since) for arm in self.arms)]
+        for key, name in references:
             if name not in (None, NONE, *names):
                 raise ValueError(f"{key}: found {name!r}, expected one of {', '.join(names)}{nearest(name, names)}")
 

@@ -31,16 +31,16 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--session", type=Path, metavar="FOLDER", help="of logs and session.yaml")
     parser.add_argument("--out", type=Path, metavar="PNG",
                         help=f"the drawing; default: {DRAWINGS}/<ARM's name>.png")  # fmt: skip
-    told = parser.parse_args(arguments)
-    model = read_drawing(told.arm, Path("."))
+    args = parser.parse_args(arguments)
+    model = read_drawing(args.arm, Path("."))
     if model.nu:
         read_chain(model)  # what the statics cannot solve is told here
-    session = None if told.session is None else read_session(told.session)
+    session = None if args.session is None else read_session(args.session)
     for lines in (unit_lines(model), tendon_lines(model), marker_lines(model)):
         print("\n".join(lines))
     print("\n".join(f"note: {line}" for line in doubt_lines(model, session)))
-    out = told.out or DRAWINGS / f"{told.arm.stem}.png"
-    if told.out is None:
+    out = args.out or DRAWINGS / f"{args.arm.stem}.png"
+    if args.out is None:
         DRAWINGS.mkdir(parents=True, exist_ok=True)
     save_figure(arm_figure(model), out)
     print(f"drawn in {out}")

@@ -28,14 +28,14 @@ def weights_for(
 ) -> list[np.ndarray]:
     """W of each stage, 0 for a parameter that a later stage finds anew. Each (P, P)."""
     last = {name: stage.stage for stage in stages for name in stage.names}
-    own = [np.array([last[name] == stage.stage for name in stage.names], float) for stage in stages]
+    latest = [np.array([last[name] == stage.stage for name in stage.names], float) for stage in stages]
     if goal == "intervals":
-        return [np.diag(counts) / len(last) for counts in own]
+        return [np.diag(counts) / len(last) for counts in latest]
     poses = workspace(model, grid)
     if goal == "grasp":
         poses = poses[_most_wound(model, poses)]
     weights = []
-    for stage, counts in zip(stages, own, strict=True):
+    for stage, counts in zip(stages, latest, strict=True):
         moves = tip_moves(model, stage.names, poses) * (stage.half * counts)[:, None, None]
         weights.append(np.einsum("ink,jnk->ij", moves, moves) / len(poses))
     return weights
@@ -64,9 +64,9 @@ def tip_moves(model: mujoco.MjModel, names: list[str], poses: Poses) -> np.ndarr
         return np.zeros((count, len(poses), 3))
     near = arm_of(model).rest(poses).qpos
     tips = np.array([arm.tips(poses, near) for arm in arms_with(model, values)])
-    found = np.nan_to_num((tips[:count] - tips[count:]) / (2 * STEP))
-    found[missing] = 0  # what the arm lacks moves nothing
-    return found
+    slopes = np.nan_to_num((tips[:count] - tips[count:]) / (2 * STEP))
+    slopes[missing] = 0  # what the arm lacks moves nothing
+    return slopes
 
 
 def _most_wound(model: mujoco.MjModel, poses: Poses) -> np.ndarray:

@@ -37,23 +37,23 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, metavar="FOLDER", help="where to write; default: watch/<folder>")
     parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
                         help="whose params.yaml says how to filter logs; default: the current folder")  # fmt: skip
-    told = parser.parse_args(arguments)
-    ended = _run(told)
+    args = parser.parse_args(arguments)
+    ended = _run(args)
     return ended - ENDED if ended >= ENDED else UNUSABLE
 
 
 @in_one_line
-def _run(told: argparse.Namespace) -> int:
-    out = told.out or Path("watch") / told.folder.resolve().name
-    with threadpool_limits(1, user_api="blas"), Watch.begun(told.model, told.folder, told.reference, out,
-                                                            told.settings) as watch:  # fmt: skip
+def _run(args: argparse.Namespace) -> int:
+    out = args.out or Path("watch") / args.folder.resolve().name
+    with threadpool_limits(1, user_api="blas"), Watch.begun(args.model, args.folder, args.reference, out,
+                                                            args.settings) as watch:  # fmt: skip
         try:
             while True:
                 unusable = watch.look()
-                if told.once:
+                if args.once:
                     print(f"watch: {watch.summary()}")
                     break
-                time.sleep(told.every)
+                time.sleep(args.every)
         except KeyboardInterrupt:
             unusable = 0
             print("watch: interrupted; what was scored is kept")

@@ -75,11 +75,11 @@ class Chart:
     trials: list[Charted] = field(default_factory=list)
 
     def add(self, score: Score) -> Charted:
-        found = {p: one for p, one in self.baseline.departures(score).items() if p in self.lines}
-        for p, departure in found.items():
+        departures = {p: departure for p, departure in self.baseline.departures(score).items() if p in self.lines}
+        for p, departure in departures.items():
             self.lines[p].add(departure)
-        alarms = [p for p in found if self.lines[p].beyond]
-        charted = Charted(score, found, {p: self.lines[p].level for p in found}, alarms)
+        alarms = [p for p in departures if self.lines[p].beyond]
+        charted = Charted(score, departures, {p: self.lines[p].level for p in departures}, alarms)
         self.trials.append(charted)
         if alarms and self.restart:
             self.lines = {p: Line(line.limit, line.best) for p, line in self.lines.items()}
@@ -87,7 +87,7 @@ class Chart:
 
     def changed(self) -> int | None:
         """The number of the first trial with an alarm."""
-        return next((i for i, one in enumerate(self.trials) if one.alarms), None)
+        return next((i for i, trial in enumerate(self.trials) if trial.alarms), None)
 
     def suspects(self) -> list[Charted]:
         """The trials up to the first alarm since the chart that is furthest beyond was last near its middle."""
@@ -103,10 +103,10 @@ class Chart:
 
 def chart_of(baseline: Baseline, parameters: int, rate: float = FALSE_ALARMS, restart: bool = False) -> Chart:
     """Empty charts of those of P `parameters` that the reference tells. rate: of false alarms, a trial."""
-    typical = {p: found for p in range(parameters) if (found := baseline.typical(p))}
+    typical = {p: pairs for p in range(parameters) if (pairs := baseline.typical(p))}
     lines = {}
-    for p, found in typical.items():
-        best = min(one.deviation for one, _ in found)
+    for p, pairs in typical.items():
+        best = min(departure.deviation for departure, _ in pairs)
         lines[p] = Line(limit_of(baseline, p, rate / len(typical)), best)
     return Chart(baseline, lines, restart)
 
@@ -114,14 +114,14 @@ def chart_of(baseline: Baseline, parameters: int, rate: float = FALSE_ALARMS, re
 def limit_of(baseline: Baseline, p: int, rate: float) -> float:
     """The limit of |Q| that trials of an unchanged arm, of the reference's mixture, pass at this rate."""
     rng, typical = np.random.default_rng([SEED, p]), baseline.typical(p)
-    deviations = np.array([one.deviation for one, _ in typical])
+    deviations = np.array([departure.deviation for departure, _ in typical])
     weights = deviations.min() / deviations
-    groups = list({one.group.key: one.group for one, _ in typical}.values())
+    groups = list({departure.group.key: departure.group for departure, _ in typical}.values())
     place = {group.key: i for i, group in enumerate(groups)}
-    of = np.array([place[one.group.key] for one, _ in typical])
+    of = np.array([place[departure.group.key] for departure, _ in typical])
     degrees = np.array([group.degrees for group in groups])
     # what a reference of these sizes gets wrong, in each run: the mean, and the spread over the true one
-    shared = np.array([one.group.shared(score.level) / one.deviation for one, score in typical])
+    shared = np.array([departure.group.shared(score.level) / departure.deviation for departure, score in typical])
     # the spread is pooled over the conditions of a kind, so its error is theirs together
     pools = {(key[0], len(key) > 1): i for i, key in enumerate(place)}
     pooled = np.array([pools[key[0], len(key) > 1] for key in place])
@@ -129,8 +129,8 @@ def limit_of(baseline: Baseline, p: int, rate: float) -> float:
     spreads = np.sqrt(spreads[:, pooled])
     drawn = rng.integers(len(typical), size=(LENGTH, RUNS))
     row = np.arange(RUNS)
-    own = rng.normal(size=(LENGTH, RUNS)) * np.sqrt(1 - np.square(shared).sum(axis=1))[drawn]
-    x = (own - np.einsum("trp,trp->tr", shared[drawn], means[row, of[drawn]])) / spreads[row, of[drawn]]
+    noise = rng.normal(size=(LENGTH, RUNS)) * np.sqrt(1 - np.square(shared).sum(axis=1))[drawn]
+    x = (noise - np.einsum("trp,trp->tr", shared[drawn], means[row, of[drawn]])) / spreads[row, of[drawn]]
     z = -np.sign(x) * ndtri(stdtr(degrees[of[drawn]], -np.abs(x)))
     low, high = 1.0, WIDEST
     while high - low > 0.01:

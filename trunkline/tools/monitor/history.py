@@ -27,7 +27,7 @@ class Ledger:
     rows: list[dict] = field(default_factory=list)
 
     @classmethod
-    def opened(cls, path: Path, made_of: dict, kept: bool = False) -> "Ledger":
+    def opened(cls, path: Path, made_of: dict, replace: bool = False) -> "Ledger":
         """What `path` holds, or an empty one. kept: whether one of something else is replaced instead of refused.
 
         Raises:
@@ -40,7 +40,7 @@ class Ledger:
         except ValueError as error:
             raise InputError(f"{path}: {error}, expected lines of JSON that this command wrote") from error
         if head != made_of:
-            if kept:
+            if replace:
                 return cls(path, made_of)
             differs = ", ".join(key for key in made_of if head.get(key) != made_of[key])
             raise InputError(f"{path}: found scores of other {differs}, expected the same; begin anew with --out")
@@ -49,15 +49,15 @@ class Ledger:
     def add(self, **row) -> None:
         """Keep a row, in place of an earlier one of the same trial."""
         key = (row["session"], row["trial"])
-        self.rows = [one for one in self.rows if (one["session"], one["trial"]) != key] + [row]
+        self.rows = [other for other in self.rows if (other["session"], other["trial"]) != key] + [row]
         self.path.parent.mkdir(parents=True, exist_ok=True)
         part = self.path.with_suffix(".part")
-        part.write_text("".join(json.dumps(one) + "\n" for one in (self.made_of, *self.rows)), encoding="utf-8")
+        part.write_text("".join(json.dumps(line) + "\n" for line in (self.made_of, *self.rows)), encoding="utf-8")
         part.replace(self.path)
 
     def of(self, session: str, trial: str) -> dict | None:
         """The row of a trial."""
-        return next((one for one in self.rows if (one["session"], one["trial"]) == (session, trial)), None)
+        return next((row for row in self.rows if (row["session"], row["trial"]) == (session, trial)), None)
 
     def scores(self) -> list[tuple[dict, Score]]:
         """Rows of trials that were scored, with their scores, in the order in which they came."""

@@ -60,10 +60,10 @@ class Watch:
         made_of = {"model": digest(model), "parameters": list(scorer.parameters)}
         with alone(out):
             ledger = Ledger.opened(out / "scores.jsonl", made_of)
-            known, is_new = [], False
+            scores, is_new = [], False
             if reference is not None:
-                known, is_new = reference_scores(reference, scorer, out, made_of, settings)
-            watch = cls(folder, out, settings, scorer, ledger, known, Patience(out / "awaited.json"))
+                scores, is_new = reference_scores(reference, scorer, out, made_of, settings)
+            watch = cls(folder, out, settings, scorer, ledger, scores, Patience(out / "awaited.json"))
             if is_new:
                 print("\n".join(f"watch: {line}" for line in reference_lines(
                     watch.chart.baseline, watch.chart, scorer.parameters)), flush=True)  # fmt: skip
@@ -81,8 +81,8 @@ class Watch:
             try:
                 new = self._new(session)
                 if new:
-                    found, refused = self._score(session, new)
-                    scored, unusable = scored or found, unusable + refused
+                    any_scored, refused = self._score(session, new)
+                    scored, unusable = scored or any_scored, unusable + refused
                 self.patience.forget(f"{session}")
             except InputError as error:
                 unusable += self.patience.say(f"{session}", str(error))
@@ -92,7 +92,7 @@ class Watch:
 
     def _new(self, session: Path) -> dict[str, str]:
         """Trials that have not been scored and whose log is there and whole, with the mark of its state."""
-        found, described = {}, state_of(session / "session.yaml")
+        marks, described = {}, state_of(session / "session.yaml")
         for trial in planned(session):
             name, log = name_of(trial), session / str(trial["file"])
             row, state = self.ledger.of(session.name, name), state_of(log)
@@ -105,13 +105,13 @@ class Watch:
             if row is not None and scored:
                 self._say_changed(log, row)
             elif self.patience.ready(log, state):
-                found[name] = f"{state.mark} {described.mark}"
-        return found
+                marks[name] = f"{state.mark} {described.mark}"
+        return marks
 
     def _say_changed(self, log: Path, row: dict) -> None:
         if digest(log) != row["log"]:  # not merely copied anew
-            said = "changed after it was scored, which stands; give it another name to have it scored again"
-            self.patience.say(f"{log}", f"{log}: {said}")
+            message = "changed after it was scored, which stands; give it another name to have it scored again"
+            self.patience.say(f"{log}", f"{log}: {message}")
 
     def _score(self, session: Path, new: dict[str, str]) -> tuple[bool, int]:
         """Whether any of the `new` trials was scored, and how many were refused."""
@@ -120,7 +120,7 @@ class Watch:
                  and self.patience.ready(session / file, state)}  # fmt: skip
         taken, scored, unusable = take(session, there, self.settings), False, 0
         for name, mark in new.items():
-            kept = {"session": session.name, "trial": name, "mark": mark, "log": digest(session / entries[name])}
+            row = {"session": session.name, "trial": name, "mark": mark, "log": digest(session / entries[name])}
             where = f"{session.name}/{name}"
             try:
                 if name not in taken.trials:
@@ -130,10 +130,10 @@ class Watch:
                 score = self.scorer.score(trial)
             except InputError as error:
                 print(f"watch: {where}: refused: {error}", flush=True)
-                self.ledger.add(**kept, refused=str(error))
+                self.ledger.add(**row, refused=str(error))
                 unusable += 1
                 continue
-            self.ledger.add(**kept, repairs=trial.repairs, **told(score))
+            self.ledger.add(**row, repairs=trial.repairs, **told(score))
             scored = True
             self._chart_one(where, score)
         return scored, unusable
@@ -155,10 +155,10 @@ class Watch:
 
     def _learn(self) -> None:
         """A kind has all its reference trials: the chart is another one."""
-        said = odd_lines(self.chart.baseline, self.scorer.parameters)
+        before = odd_lines(self.chart.baseline, self.scorer.parameters)
         self.chart, self.wheres = self._chart()
         for line in odd_lines(self.chart.baseline, self.scorer.parameters):
-            if line not in said:
+            if line not in before:
                 print(f"watch: reference: {line}", flush=True)
 
     def _kinds(self) -> Counter[str]:
@@ -170,25 +170,26 @@ class Watch:
         kinds = self._kinds()
         learning = [f"{count} of {LEARN} {kind}" for kind, count in kinds.items() if count < LEARN]
         judged = f"{len(self.chart.trials)} of {kinds.total()} trials judged"
-        found = "the arm has changed" if self.chart.changed() is not None else "no change is seen"
+        state = "the arm has changed" if self.chart.changed() is not None else "no change is seen"
         return "; ".join([
-            f"{judged}: {found}" if self.chart.trials else judged,
+            f"{judged}: {state}" if self.chart.trials else judged,
             *([f"learning: {', '.join(learning)}"] if learning and not self.reference else []),
         ])  # fmt: skip
 
     def _chart(self) -> tuple[Chart, list[str]]:
         """The chart of all trials so far, and what they are called."""
-        known, rest = list(self.reference), self.ledger.scores()
-        if not known:
-            seen: Counter[str] = Counter()
+        reference, rest = list(self.reference), self.ledger.scores()
+        if not reference:
+            counts: Counter[str] = Counter()
             for _, score in rest:
-                seen[score.kind] += 1
-                if seen[score.kind] <= LEARN:
-                    known.append(score)
-            learned = {id(score) for score in known}
-            whole = {kind for kind, count in seen.items() if count >= LEARN}
-            known, rest = [s for s in known if s.kind in whole], [(r, s) for r, s in rest if id(s) not in learned]
-        chart = chart_of(Baseline(known), len(self.scorer.parameters))
+                counts[score.kind] += 1
+                if counts[score.kind] <= LEARN:
+                    reference.append(score)
+            learned = {id(score) for score in reference}
+            whole = {kind for kind, count in counts.items() if count >= LEARN}
+            reference = [score for score in reference if score.kind in whole]
+            rest = [(row, score) for row, score in rest if id(score) not in learned]
+        chart = chart_of(Baseline(reference), len(self.scorer.parameters))
         for _, score in rest:
             chart.add(score)
         return chart, [f"{row['session']}/{row['trial']}" for row, _ in rest]
@@ -197,8 +198,8 @@ class Watch:
         """What is said where the arm has changed; nothing where it has not."""
         if self.chart.changed() is None:
             return []
-        found = explain(self.chart.suspects(), self.chart.baseline, list(self.chart.lines))
-        return change_lines(self.chart, found, self.scorer.parameters, self.wheres)
+        attribution = explain(self.chart.suspects(), self.chart.baseline, list(self.chart.lines))
+        return change_lines(self.chart, attribution, self.scorer.parameters, self.wheres)
 
     def _write(self) -> None:
         from trunkline.report.figures.style import save_figure  # pyplot takes long to import
@@ -217,8 +218,8 @@ class Watch:
 def scorer_of(model: Path, settings: Path) -> Scorer:
     """What scores trials against the MJCF at `model`, as the stage that wrote it compared them."""
     arm, written = read_arm(model), written_beside(model, settings)
-    given = read_yaml(settings / "params.yaml")
-    stage = next((stage for stage in STAGES if stage in given), None)
+    params = read_yaml(settings / "params.yaml")
+    stage = next((stage for stage in STAGES if stage in params), None)
     if stage is None:
         raise InputError(f"{settings / 'params.yaml'}: found no stage of identification, expected one of {STAGES}")
     loss = settings_of(stage, settings).loss
@@ -235,7 +236,7 @@ def reference_scores(
     """
     files = sorted(file for file in reference.glob("*") if file.is_file())
     marks = [f"{file.name} {state.mark}" for file in files if (state := state_of(file)) is not None]
-    ledger = Ledger.opened(out / "reference.jsonl", made_of | {"reference": marks}, kept=True)
+    ledger = Ledger.opened(out / "reference.jsonl", made_of | {"reference": marks}, replace=True)
     if ledger.rows and ledger.rows[-1].get("last"):
         return [read_score(row) for row in ledger.rows], False
     trials = [trial for trial in trials_of(reference, settings, "watch") if trial.split in DECIDING]

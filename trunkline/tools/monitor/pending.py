@@ -12,9 +12,9 @@ class Patience:
 
     def __init__(self, path: Path):
         self._path = path
-        kept = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-        self._seen: dict[str, list] = kept.get("seen", {})  # log → mark, and when it was first seen so, s
-        self._said: dict[str, str] = kept.get("said", {})
+        content = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        self._seen: dict[str, list] = content.get("seen", {})  # log → mark, and when it was first seen so, s
+        self._said: dict[str, str] = content.get("said", {})
 
     def ready(self, log: Path, state: State) -> bool:
         """Whether a log can be taken: it is whole, or will hardly become so. One that cannot yet is said."""

@@ -72,18 +72,18 @@ class Scorer:
     def score(self, trial: Trial) -> Score:
         """Raises InputError where the trial is not of this arm, or the model does not survive it."""
         kind = EXPERIMENTS[trial.experiment]
-        told = [i for i, name in enumerate(self.parameters) if PARAMETERS[name].told_by(kind)]
+        determined = [i for i, name in enumerate(self.parameters) if PARAMETERS[name].told_by(kind)]
         experiment = prepare(trial, self.model, self.frames, self.command_delay)
         slope, curvature = np.zeros(len(self.parameters)), np.zeros((len(self.parameters),) * 2)
-        if told:
-            bounds = {self.parameters[i]: _around(self.parameters[i], self.model) for i in told}
+        if determined:
+            bounds = {self.parameters[i]: _around(self.parameters[i], self.model) for i in determined}
             problem = Problem(self.model, [experiment], trial.segments, bounds, self.loss.kind, self.loss)
             linear = linearise(problem, problem.start())
             if problem.diverged:
                 raise InputError(f"trial {trial.name}: the model does not survive it, expected one that stays together")
             jacobian = linear.jacobians[0]
-            slope[told] = jacobian.T @ linear.residuals[0]
-            curvature[np.ix_(told, told)] = jacobian.T @ jacobian
+            slope[determined] = jacobian.T @ linear.residuals[0]
+            curvature[np.ix_(determined, determined)] = jacobian.T @ jacobian
         return Score(trial.name, trial.experiment, trial.level, trial.load, slope, curvature)
 
 

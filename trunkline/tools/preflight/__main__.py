@@ -39,15 +39,15 @@ def main(arguments: list[str] | None = None) -> int:
                         help="by which the fitted model will be off, of a point's distance from the base")  # fmt: skip
     parser.add_argument("--settings", type=Path, metavar="FOLDER", default=Path("."),
                         help="whose params.yaml describes arm and stages; default: the current folder")  # fmt: skip
-    told = parser.parse_args(arguments)
-    description = settings_of("build_mjcf", told.settings)
-    spec = described_arm(description, own_or_project(told.settings, "conf")).spec
+    args = parser.parse_args(arguments)
+    description = settings_of("build_mjcf", args.settings)
+    spec = described_arm(description, own_or_project(args.settings, "conf")).spec
     model = spec.compile()
-    given = read_yaml(told.settings / "params.yaml")
-    configs = {stage: settings_of(stage, told.settings) for stage in STAGES if stage in given}
-    if arm := (given.get("build_mjcf") or {}).get("arm"):
-        print(f"arm: {arm}, as {told.settings / 'params.yaml'} has it", flush=True)
-    trials, takes = read_trials_of(told.session, told.settings, "check")
+    params = read_yaml(args.settings / "params.yaml")
+    configs = {stage: settings_of(stage, args.settings) for stage in STAGES if stage in params}
+    if arm := (params.get("build_mjcf") or {}).get("arm"):
+        print(f"arm: {arm}, as {args.settings / 'params.yaml'} has it", flush=True)
+    trials, takes = read_trials_of(args.session, args.settings, "check")
     check_trials([trial for trial in trials if trial.split in DECIDING], model)
     print("\n".join(["recorded:", *(f"  {line}" for line in recorded_of_each(trials))]))
     if missing := missing_lines(trials):
@@ -68,9 +68,9 @@ def main(arguments: list[str] | None = None) -> int:
         arm, experiments, fit = to_identify_from(config, model, trials)
         lines = described_lines(arm, experiments, fit) + up_lines(arm, experiments, fit.segments, ups)
         print("\n".join(f"  {line}" for line in lines), flush=True)
-        found, pairs = told_by(arm, experiments, fit, told.error / 100)
-        for one in sorted(found, key=lambda one: -one.share):
-            print(f"  {one.words()}")
+        parameters, pairs = told_by(arm, experiments, fit, args.error / 100)
+        for parameter in sorted(parameters, key=lambda parameter: -parameter.share):
+            print(f"  {parameter.words()}")
         for pair in pairs:
             print(f"  hardly told apart: {pair}")
     print("All of it is of the arm as described: where a fit ends elsewhere, some of it changes several-fold.")

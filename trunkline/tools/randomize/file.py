@@ -31,9 +31,9 @@ def to_table(drawn: Randomisation, fields: dict[str, dict[str, int]], model: dic
         }
     groups = {}
     for group in dict.fromkeys(drawn.groups):
-        own = [i for i, other in enumerate(drawn.groups) if other == group]
-        covariance = drawn.covariance[np.ix_(own, own)].tolist()
-        groups[group] = {"parameters": [drawn.names[i] for i in own], "covariance": covariance}
+        members = [i for i, other in enumerate(drawn.groups) if other == group]
+        covariance = drawn.covariance[np.ix_(members, members)].tolist()
+        groups[group] = {"parameters": [drawn.names[i] for i in members], "covariance": covariance}
     meaning = {
         "sd": "of ln(value) where lognormal, of the value where normal; unit: the value's",
         "covariance": "of the same, before limits cut; groups are independent of each other",
@@ -53,15 +53,15 @@ def read_randomisation(path: Path) -> tuple[Randomisation, dict[str, str]]:
         table = json.loads(path.read_text(encoding="utf-8"))
         if table["format"] != FORMAT:
             raise InputError(f"{path}: format: found {table['format']!r}, expected {FORMAT!r}")
-        given = table["parameters"]
+        rows = table["parameters"]
         names = [name for group in table["groups"].values() for name in group["parameters"]]
-        centre = np.array([float(given[name]["centre"]) for name in names])
-        limits = np.array([given[name]["limits"] for name in names], float).reshape(-1, 2)
+        centre = np.array([float(rows[name]["centre"]) for name in names])
+        limits = np.array([rows[name]["limits"] for name in names], float).reshape(-1, 2)
         covariance, first = np.zeros((len(names), len(names))), 0
         for group in table["groups"].values():
-            own = slice(first, first + len(group["parameters"]))
-            covariance[own, own], first = group["covariance"], own.stop
-        groups = [given[name]["group"] for name in names]
+            block = slice(first, first + len(group["parameters"]))
+            covariance[block, block], first = group["covariance"], block.stop
+        groups = [rows[name]["group"] for name in names]
         if unknown := [name for name in names if name not in PARAMETERS]:
             raise InputError(f"{path}: parameters: found {unknown[0]!r}, expected one that can be identified")
         return Randomisation(names, groups, centre, covariance, limits[:, 0], limits[:, 1], table["arms"]), table[
