@@ -30,17 +30,17 @@ class Both(io.TextIOBase):
     """Writes to a stream, and keeps it."""
 
     def __init__(self, stream: TextIO):
-        self._stream, self._kept = stream, io.StringIO()
+        self._stream, self._copy = stream, io.StringIO()
 
     def write(self, text: str) -> int:
-        self._kept.write(text)
+        self._copy.write(text)
         return self._stream.write(text)
 
     def flush(self) -> None:
         self._stream.flush()
 
     def lines(self) -> list[str]:
-        return [line.rstrip() for line in self._kept.getvalue().splitlines() if line.strip()]
+        return [line.rstrip() for line in self._copy.getvalue().splitlines() if line.strip()]
 
 
 @contextlib.contextmanager
@@ -130,12 +130,12 @@ def not_in_history(root: Path) -> list[str]:
         history = git(root, "rev-list", "HEAD").split()
     except (FileNotFoundError, subprocess.CalledProcessError):
         raise InputError(f"{root.resolve()}: found no Git repository, expected the whole history") from None
-    commits_there, lines = {commit[:7] for commit in history}, []
+    in_history, lines = {commit[:7] for commit in history}, []
     for file in sorted((root / FOLDER).glob("*.json")):
         commits = {json.loads(file.read_text(encoding="utf-8"))["commit"]}
         if file.with_suffix(".csv").is_file():
             with file.with_suffix(".csv").open(newline="", encoding="utf-8") as table:
                 commits |= {row["commit"] for row in csv.DictReader(table) if row.get("commit")}
         clean = sorted(commit.removesuffix(" with changes") for commit in commits)
-        lines += [f"{file.stem}: commit {commit}" for commit in clean if commit[:7] not in commits_there]
+        lines += [f"{file.stem}: commit {commit}" for commit in clean if commit[:7] not in in_history]
     return lines

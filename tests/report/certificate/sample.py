@@ -14,13 +14,13 @@ from trunkline.identification.simulate.experiment import prepare
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY, TEST
 from trunkline.recordings.trials.trial import Trial
-from trunkline.report.certificate.certificate import Asked, Certificate, certify
+from trunkline.report.certificate.certificate import Certificate, CertificateSettings, certify
 from trunkline.report.certificate.page import page
 from trunkline.report.certificate.words import Use
 from trunkline.report.figures.certificate import pose_figure, uncertainty_figure
 from trunkline.report.figures.style import save_figure
 
-ASKED = Asked(
+ASKED = CertificateSettings(
     arm="small arm <of tests>", session="sample", seed=1, poses=12, arms=6, each=20, covered=12, frames=40, factor=3.0,
     uses=[Use(1.0, "previewing reaches"), Use(3.0, "showing how it moves")],
 )  # fmt: skip

@@ -12,7 +12,7 @@ from trunkline.report.certificate.arms import arm_of
 from trunkline.report.certificate.budget import FRICTION, NOISE, Inputs, budget, lacking_draws
 from trunkline.report.certificate.discrepancy import Discrepancy, discrepancy
 from trunkline.report.certificate.identified import Identified, identified
-from trunkline.report.certificate.poses import Conditions, Poses, draw_poses
+from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
 
 SMALL = 1e-3  # rad, of a mount: tips move along straight lines
 
@@ -24,10 +24,10 @@ def model():
     return model
 
 
-def straight(model, count=1) -> Poses:
+def straight(model, count=1) -> StaticPoses:
     """Without weight and pull."""
     chain = arm_of(model).chain
-    return Poses(np.zeros((count, 3)), np.tile(chain.straight_lengths + SLACK, (count, 1)))
+    return StaticPoses(np.zeros((count, 3)), np.tile(chain.straight_lengths + SLACK, (count, 1)))
 
 
 def mounts(correlation: float, degrees: float = 1e6) -> Identified:
@@ -103,7 +103,7 @@ def test_friction_is_rectangular_between_the_ends_of_its_band(model):
     rubbing.tendon_frictionloss[:] = 0.3
     arm = arm_of(rubbing)
     pulls = np.array([[0.015, -SLACK, -SLACK]])
-    poses = Poses(np.array([[0.0, 0.0, -9.81]]), arm.chain.straight_lengths - pulls)
+    poses = StaticPoses(np.array([[0.0, 0.0, -9.81]]), arm.chain.straight_lengths - pulls)
     half = np.linalg.norm(arm.friction(poses)[0])
     assert half > 5e-4
     found = budget(Inputs(rubbing, nothing_known(), None, 0.0), poses, 20_000, 1, np.random.default_rng(5))

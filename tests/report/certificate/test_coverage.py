@@ -13,7 +13,7 @@ from trunkline.report.certificate.certificate import certify
 from trunkline.report.certificate.coverage import Coverage, covered, from_beyond, is_inside, share_of
 from trunkline.report.certificate.discrepancy import discrepancy
 from trunkline.report.certificate.page import _measured
-from trunkline.report.certificate.poses import Conditions, Poses, draw_poses
+from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
 
 CONDITIONS = Conditions(60.0, 0.0, 0.02, 0.03)
 
@@ -101,7 +101,7 @@ def certified(truth):
     arm, trials = arm_of(truth), sample_trials(truth)
 
     def bring(pulls, gravity, back):
-        return arm.tips(Poses(gravity, arm.chain.straight_lengths - pulls))
+        return arm.tips(StaticPoses(gravity, arm.chain.straight_lengths - pulls))
 
     asked, tables = replace(ASKED, covered=12, poses=4, arms=3), {"identify_stiffness": table(trials)}
     of = metrics(truth, trials)

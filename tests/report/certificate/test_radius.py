@@ -11,12 +11,12 @@ from trunkline.identification.simulate.experiment import SLACK
 from trunkline.recordings.trials.splits import IDENTIFY, TEST, VALIDATE
 from trunkline.report.certificate import budget as budgets
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.budget import Inputs, Source, budget, held_out, parameter_shifts, radius_of
+from trunkline.report.certificate.budget import Inputs, UncertaintySource, budget, held_out, parameter_shifts, radius_of
 from trunkline.report.certificate.certificate import FEWEST, inputs_of
 from trunkline.report.certificate.facts import uncertainty_facts
 from trunkline.report.certificate.held_out import at_rest, tip_residuals
 from trunkline.report.certificate.identified import Identified
-from trunkline.report.certificate.poses import Conditions, Poses
+from trunkline.report.certificate.poses import Conditions, StaticPoses
 from trunkline.report.certificate.words import open_lines
 
 NOISE = 1e-3  # m
@@ -53,7 +53,7 @@ def test_a_radius_holds_95_of_100_draws_and_no_more_than_it_needs():
 
 
 def test_a_pose_whose_draws_find_no_rest_is_counted_and_not_averaged(model):
-    lines = [Source("cameras", "normal", 1.0, "mm", np.inf, np.full(3, NOISE))]
+    lines = [UncertaintySource("cameras", "normal", 1.0, "mm", np.inf, np.full(3, NOISE))]
     found = budgets.Budget(np.zeros((3, 3)), lines, np.zeros(3), np.array([0.004, np.inf, 0.008]))
     told = uncertainty_facts(found, Conditions(0.0, 0.0, 0.0, 0.0), 0.5, 100)
     assert (told["poses"], told["without_rest"]) == (3, 1)
@@ -61,14 +61,14 @@ def test_a_pose_whose_draws_find_no_rest_is_counted_and_not_averaged(model):
     assert np.isfinite(told["combined_mm"])
 
 
-def hanging(model, count=1) -> Poses:
+def hanging(model, count=1) -> StaticPoses:
     chain = arm_of(model).chain
-    return Poses(np.tile([0.0, 0.0, -9.81], (count, 1)), np.tile(chain.straight_lengths + SLACK, (count, 1)))
+    return StaticPoses(np.tile([0.0, 0.0, -9.81], (count, 1)), np.tile(chain.straight_lengths + SLACK, (count, 1)))
 
 
-def pulled(model) -> Poses:
+def pulled(model) -> StaticPoses:
     chain = arm_of(model).chain
-    return Poses(np.array([[0.0, 0.0, -9.81]]), chain.straight_lengths - np.array([[0.015, -SLACK, -SLACK]]))
+    return StaticPoses(np.array([[0.0, 0.0, -9.81]]), chain.straight_lengths - np.array([[0.015, -SLACK, -SLACK]]))
 
 
 def rubbing(model):
@@ -132,7 +132,7 @@ def test_shifts_are_nan_where_a_drawn_arm_does_not_come_to_rest(model):
     far = np.full(1, 1e9)
     known = Identified(["stiffness"], ["a"], np.log([1e-9]), np.array([1e-3]), far, np.eye(1), -far, far)
     arm = arm_of(model)
-    up = Poses(np.array([[3.0, 0.0, 9.0]]), arm.chain.straight_lengths[None] + SLACK)
+    up = StaticPoses(np.array([[3.0, 0.0, 9.0]]), arm.chain.straight_lengths[None] + SLACK)
     found = parameter_shifts(model, known, arm, up, 2, np.random.default_rng(0))
     assert found.shape == (2, 1, 3)
     assert not np.isfinite(found).any() or np.abs(found).max() > 0.05

@@ -76,10 +76,10 @@ def test_pipelines_run_in_folders_of_their_own_go_on_and_one_that_fails_stops_no
     words = [str(listing(tmp_path, arms)), "--out", str(tmp_path / "out"), "--until", "ingest"]
     assert main(words) == 1
     told = capsys.readouterr()
-    assert "fleet: good: done after" in told.out
+    assert "batch: good: done after" in told.out
     failed = [line for line in told.err.splitlines() if "failed" in line]
     assert len(failed) == 1
-    assert "fleet: bad: failed: data/raw/bad/session.yaml: " in failed[0]
+    assert "batch: bad: failed: data/raw/bad/session.yaml: " in failed[0]
     log = tmp_path / "out/good/fleet.log"
     assert json.loads((tmp_path / "out/good/artifacts/ingest/metrics.json").read_text())["trials"] == 4
     assert json.loads((tmp_path / "out/both/artifacts/ingest/metrics.json").read_text())["trials"] == 8

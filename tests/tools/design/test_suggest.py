@@ -15,7 +15,7 @@ from tests.support.workbench import workbench
 from trunkline.identification.fit.identify import with_parameters
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.parameters.per_session import make_room
-from trunkline.identification.uncertainty.identifiability import to_identify_from, told_by
+from trunkline.identification.uncertainty.identifiability import expected_identifiability, to_identify_from
 from trunkline.model.arm.joints import Joints, add_elements
 from trunkline.pipeline.config import load_folder
 from trunkline.recordings.session.session import read_session
@@ -69,11 +69,11 @@ def test_a_side_to_which_nothing_tilted_the_arm_comes_first(model, grid):
     ranges = {"stiffness": (0.1, 20.0), "mount_tilt_x": (-0.3, 0.3), "mount_tilt_y": (-0.3, 0.3)}
     trials = [tilt(model, angle) for angle in (20, 50, 80)]  # about y: gravity towards +x
     stage, every = stage_of(model, grid, ["static_tilt"], ranges, trials, 2e-4, loss=paper_loss())
-    told = {one.name: one.share for one in stage.told([])}
+    told = {one.name: one.share for one in stage.identifiability([])}
     assert told["mount_tilt_x"] > 1 > 2 * told["mount_tilt_y"], "undetermined, and determined"
     (first,) = best(stage, every, model, grid)
     assert abs(first.gravity[1]) > abs(first.gravity[0]), first.name
-    after = {one.name: one.share for one in stage.told([first.name])}
+    after = {one.name: one.share for one in stage.identifiability([first.name])}
     assert after["mount_tilt_x"] < 0.5
     weights = weights_for("intervals", [stage], model, grid)
     why = why_words([stage], weights, suggest([stage], weights, every, 1)[0])
@@ -115,8 +115,8 @@ def test_information_adds_and_never_takes_away(model, grid):
     ("static_pull", "pull_1_061", lambda model: static_pull(model, (61, -300, -300))),
 ])  # fmt: skip
 def test_the_expected_interval_is_that_with_the_trial_really_added(grid, kind, name, made):
-    """By `told_by`, the arithmetic of `check`, on a trial that plain steps of MuJoCo simulate; within 3 %. Of an arm
-    whose tendons have no friction, which `check` leaves out."""
+    """By `expected_identifiability`, the arithmetic of `check`, on a trial that plain steps of MuJoCo simulate; within
+    3 %. The arm's tendons have no friction, which `check` leaves out."""
     model = small_model(4, kp=100)
     model.tendon_frictionloss[:] = 0
     kinds = ["static_tilt", "static_pull"]
@@ -125,8 +125,9 @@ def test_the_expected_interval_is_that_with_the_trial_really_added(grid, kind, n
               static_pull(model, (-300, 45, -300))]  # fmt: skip
     stage, every = stage_of(model, grid, kinds, ranges, trials, 0.002)
     assert name in {one.name for one in every if one.kind == kind}
-    now, expected = stage.told([]), stage.told([name])
-    really, _ = told_by(*to_identify_from(settings(kinds, kinds, ranges), model, [*trials, made(model)]), 0.002)
+    now, expected = stage.identifiability([]), stage.identifiability([name])
+    prepared = to_identify_from(settings(kinds, kinds, ranges), model, [*trials, made(model)])
+    really, _ = expected_identifiability(*prepared, 0.002)
     for before, one, other in zip(now, expected, really, strict=True):
         assert one.half_width == pytest.approx(other.half_width, rel=0.03), one.name
         assert one.half_width < before.half_width
@@ -173,9 +174,9 @@ def test_what_the_session_holds_is_not_suggested_again(model, grid):
 
 def test_a_stage_without_any_of_its_trials_knows_the_ranges_alone(model, grid):
     stage, _ = stage_of(model, grid, ["static_pull"], {"kp": (10.0, 1e4)}, [tilt(model, 30)])
-    (told,) = stage.told([])
+    (told,) = stage.identifiability([])
     assert told.words() == "kp stays undetermined within its range"
-    assert min(stage.told([name])[0].share for name in stage.added) < 1
+    assert min(stage.identifiability([name])[0].share for name in stage.added) < 1
 
 
 def test_the_tip_answers_a_parameter_as_another_arm_does(model, grid):

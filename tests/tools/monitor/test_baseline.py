@@ -73,11 +73,11 @@ def test_a_reference_trial_unlike_the_others_is_left_out():
     own = [drawn("release", rng) for _ in range(11)]
     touched = drawn("release", rng, (-0.5, 0))
     baseline, without = Baseline([*own[:5], touched, *own[5:]]), Baseline(own)
-    assert list(baseline.odd) == [5]
-    assert 0 in baseline.odd[5]
+    assert list(baseline.outliers) == [5]
+    assert 0 in baseline.outliers[5]
     score = drawn("release", rng, (-0.05, 0))
     assert baseline.departure(score, 0).z == pytest.approx(without.departure(score, 0).z)
-    assert without.odd == {}
+    assert without.outliers == {}
 
 
 def test_what_is_done_alike_is_odd_among_its_like_alone():
@@ -85,17 +85,17 @@ def test_what_is_done_alike_is_odd_among_its_like_alone():
     rng = np.random.default_rng(9)
     bare = [drawn("static_tilt", rng, level=60.0) for _ in range(12)]
     loaded = [replace(drawn("static_tilt", rng, (0.3, 0), 60.0), load=0.05) for _ in range(3)]
-    assert Baseline([*bare, *loaded]).odd == {}
+    assert Baseline([*bare, *loaded]).outliers == {}
     levels = {20.0: 0.0, 40.0: 0.0, 60.0: 0.4, 80.0: 0.0, 100.0: 0.0}
     apart = [drawn("static_tilt", rng, (off, 0), level) for level, off in levels.items() for _ in range(3)]
-    assert Baseline(apart).odd == {}
+    assert Baseline(apart).outliers == {}
     assert abs(Baseline(apart).departure(drawn("static_tilt", rng, (0.4, 0), 60.0), 0).z) < 3.5
 
 
 def test_few_reference_trials_are_all_kept():
     rng = np.random.default_rng(8)
     own = [*(drawn("release", rng) for _ in range(LEAST)), drawn("release", rng, (-0.5, 0))]
-    assert Baseline(own).odd == {}
+    assert Baseline(own).outliers == {}
 
 
 def test_too_few_reference_trials_and_other_kinds_chart_nothing():

@@ -5,7 +5,7 @@ import pytest
 
 from tests.tools.monitor.scores import drawn
 from trunkline.tools.monitor.baseline import Baseline
-from trunkline.tools.monitor.chart import Chart, Line, chart_of, limit_of
+from trunkline.tools.monitor.chart import Chart, ParameterChart, chart_of, limit_of
 
 KINDS = ("static_tilt", "release", "curl")
 
@@ -23,7 +23,7 @@ def test_false_alarms_are_as_rare_as_asked_for():
     for _ in range(150):
         found = baseline(rng)
         best = min(one.deviation for one, _ in found.typical(0))
-        chart = Chart(found, {0: Line(limit, best)}, restart=True)
+        chart = Chart(found, {0: ParameterChart(limit, best)}, restart=True)
         for _ in range(60):
             count += bool(chart.add(drawn(KINDS[rng.integers(3)], rng)).alarms)
             trials += 1

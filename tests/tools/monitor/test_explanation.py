@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.tools.monitor.scores import drawn
-from trunkline.tools.monitor.attribution import explain
+from trunkline.tools.monitor.attribution import attribute_change
 from trunkline.tools.monitor.baseline import Baseline
 from trunkline.tools.monitor.chart import chart_of
 
@@ -24,7 +24,7 @@ def explained(change, seed: int, alias: bool = False):
     chart = chart_of(Baseline([one() for _ in range(15)]), 2)
     while chart.changed() is None:
         chart.add(one(change))
-    return explain(chart.suspects(), chart.baseline, list(chart.lines))
+    return attribute_change(chart.suspects(), chart.baseline, list(chart.lines))
 
 
 @pytest.mark.parametrize("parameter", [0, 1])
@@ -46,7 +46,7 @@ def test_a_trial_of_a_kind_without_reference_between_those_that_tell_is_left_asi
         chart.add(drawn("release", rng, (-0.2, 0.0)))
         if chart.changed() is None:
             chart.add(drawn("motion", rng))
-    found = explain(chart.suspects(), chart.baseline, list(chart.lines))
+    found = attribute_change(chart.suspects(), chart.baseline, list(chart.lines))
     assert found.best.parameter == 0
 
 

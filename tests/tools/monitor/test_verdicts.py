@@ -8,9 +8,9 @@ import pytest
 from scipy.special import stdtrit
 from scipy.stats import chi2
 
-from trunkline.tools.monitor.attribution import APART, explain
+from trunkline.tools.monitor.attribution import APART, attribute_change
 from trunkline.tools.monitor.baseline import POWERS, Departure, Group
-from trunkline.tools.monitor.chart import ALONE, FORGETTING, LONG_RUN, Chart, Charted, Line
+from trunkline.tools.monitor.chart import ALONE, FORGETTING, LONG_RUN, Chart, Charted, ParameterChart
 from trunkline.tools.monitor.scores import Score
 
 LIMIT = 4.0
@@ -28,7 +28,7 @@ def departure(z: float, deviation: float = 1.0) -> Departure:
 @pytest.mark.parametrize("deviation", [1.0, 0.5, 3.0])
 def test_one_trial_moves_a_chart_by_a_share_of_the_limit_at_most(z, deviation):
     """However far off it is, and however well it tells the parameter; two of them are beyond the limit."""
-    line = Line(LIMIT, best=1.0)
+    line = ParameterChart(LIMIT, best=1.0)
     line.add(departure(z, deviation))
     assert abs(line.level) <= ALONE * LIMIT + 1e-12
     assert np.sign(line.level) == np.sign(z)
@@ -42,7 +42,7 @@ def test_one_trial_moves_a_chart_by_a_share_of_the_limit_at_most(z, deviation):
 def test_a_usual_trial_moves_it_by_its_weight():
     """A ← (1 - λ) A + λ w z, with w the best deviation over its own, 1 at most."""
     for deviation, weight in ((1.0, 1.0), (4.0, 0.25), (0.25, 1.0)):
-        line = Line(LIMIT, best=1.0, mean=0.4)
+        line = ParameterChart(LIMIT, best=1.0, mean=0.4)
         line.add(departure(1.0, deviation))
         assert line.mean == pytest.approx((1 - FORGETTING) * 0.4 + FORGETTING * weight)
         assert line.variance == pytest.approx((1 - FORGETTING) ** 2 * LONG_RUN + (FORGETTING * weight) ** 2)
@@ -53,7 +53,7 @@ def test_a_usual_trial_moves_it_by_its_weight():
     [(0.0, False), (3.999, False), (LIMIT, False), (4.001, True), (-LIMIT, False), (-4.001, True), (np.nan, False)],
 )
 def test_beyond_the_limit_is_more_than_it_to_either_side(level, beyond):
-    line = Line(LIMIT, best=1.0, mean=level, variance=1.0)
+    line = ParameterChart(LIMIT, best=1.0, mean=level, variance=1.0)
     assert line.beyond is beyond
 
 
@@ -73,7 +73,7 @@ class Told:
 
 
 def charted(*rows: dict[int, float], limits=(LIMIT, LIMIT), restart: bool = False) -> Chart:
-    lines = {p: Line(limit, 1.0) for p, limit in enumerate(limits)}
+    lines = {p: ParameterChart(limit, 1.0) for p, limit in enumerate(limits)}
     chart = Chart(Told(*rows), lines, restart)  # type: ignore[arg-type]
     for _ in rows:
         chart.add(score())
@@ -110,7 +110,7 @@ def test_a_chart_that_begins_anew_after_an_alarm_takes_two_again(restart, alarms
 
 def standing(levels: list[dict[int, float]], limits=(LIMIT, LIMIT)) -> Chart:
     """A chart that stood at these levels after its trials; alarms where they are beyond the limits."""
-    lines = {p: Line(limit, 1.0) for p, limit in enumerate(limits)}
+    lines = {p: ParameterChart(limit, 1.0) for p, limit in enumerate(limits)}
     trials = [Charted(score(), {}, row, [p for p, level in row.items() if abs(level) > limits[p]]) for row in levels]
     return Chart(None, lines, trials=trials)  # type: ignore[arg-type]
 
@@ -143,7 +143,7 @@ def test_how_far_beyond_is_told_against_each_chart_s_own_limit():
     assert chart.suspects() == chart.trials
 
 
-PLAIN = SimpleNamespace(reference=[score(curvature=np.eye(2))], odd={}, departures=lambda _: {})
+PLAIN = SimpleNamespace(reference=[score(curvature=np.eye(2))], outliers={}, departures=lambda _: {})
 
 
 def of_changes(*rows: dict[int, float], curvature=((1.0, 0.0), (0.0, 1.0)), own: Group | None = None):
@@ -151,7 +151,7 @@ def of_changes(*rows: dict[int, float], curvature=((1.0, 0.0), (0.0, 1.0)), own:
     own = own or group()
     trials = [Charted(score(curvature=curvature), {p: Departure(change, 1.0, change, own) for p, change in row.items()},
                       {}, []) for row in rows]  # fmt: skip
-    return explain(trials, PLAIN, sorted({p for row in rows for p in row}))  # type: ignore[arg-type]
+    return attribute_change(trials, PLAIN, sorted({p for row in rows for p in row}))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("scatter", [0.0, 0.5, 1.0, 2.0, 6.0])
@@ -185,7 +185,7 @@ def test_parameters_are_told_apart_by_more_than_chance_leaves(other, wider, shar
 def test_few_degrees_of_freedom_widen_an_interval_and_those_of_the_worst_trial_count():
     few, many = group(degrees=4), group(degrees=60)
     trials = [Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, own)}, {}, []) for own in (many, few)]
-    found = explain(trials, PLAIN, [0])  # type: ignore[arg-type]
+    found = attribute_change(trials, PLAIN, [0])  # type: ignore[arg-type]
     assert found.best.half_width == pytest.approx(stdtrit(4, 0.975) / np.sqrt(2))
 
 
@@ -213,7 +213,7 @@ def test_the_best_explanation_need_not_be_asked_first():
 
 def test_a_parameter_that_no_trial_tells_of_explains_nothing():
     trial = Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, group())}, {}, [])
-    found = explain([trial], PLAIN, [1, 0])  # type: ignore[arg-type]
+    found = attribute_change([trial], PLAIN, [1, 0])  # type: ignore[arg-type]
     assert (found.best.parameter, found.alike) == (0, [])
 
 
@@ -233,5 +233,5 @@ def test_groups_of_another_condition_share_no_error():
     """Beside two means, each uncertain by 1/2, two trials have a variance of (1 + 1/4) / 2."""
     groups = [replace(group(error=0.5), key=("release", level)) for level in (1, 2)]
     trials = [Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, own)}, {}, []) for own in groups]
-    found = explain(trials, PLAIN, [0])  # type: ignore[arg-type]
+    found = attribute_change(trials, PLAIN, [0])  # type: ignore[arg-type]
     assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * np.sqrt(1.25 / 2))

@@ -87,7 +87,7 @@ def test_nothing_is_scored_twice(lab, capsys):
     before = (lab / "out/scores.jsonl").read_bytes()
     capsys.readouterr()
     assert watch(lab) == 0
-    assert capsys.readouterr().out == f"watch: {len(TILTS)} of {len(TILTS)} trials judged: no change is seen\n"
+    assert capsys.readouterr().out == f"monitor: {len(TILTS)} of {len(TILTS)} trials judged: no change is seen\n"
     assert (lab / "out/scores.jsonl").read_bytes() == before
 
 
@@ -98,13 +98,13 @@ def test_a_half_written_log_is_said_in_one_line_and_scored_once_it_is_whole(lab,
     log.write_bytes(whole[: len(whole) // 2])
     assert watch(lab) == 0
     assert [line for line in capsys.readouterr().out.splitlines() if "not whole yet" in line] == [
-        f"watch: {log}: not whole yet ({len(whole) // 2} bytes, no end): waits until it changes"
+        f"monitor: {log}: not whole yet ({len(whole) // 2} bytes, no end): waits until it changes"
     ]
     assert len(scored(lab)) == len(TILTS) - 1
     log.write_bytes(whole[: 2 * len(whole) // 3])
     watch(lab)
     (line,) = capsys.readouterr().out.splitlines()  # it grows: said before
-    assert line == f"watch: {len(TILTS) - 1} of {len(TILTS) - 1} trials judged: no change is seen"
+    assert line == f"monitor: {len(TILTS) - 1} of {len(TILTS) - 1} trials judged: no change is seen"
     log.write_bytes(whole)
     watch(lab)
     assert "tilt_50_0: within limits" in capsys.readouterr().out
@@ -156,7 +156,7 @@ def test_a_trial_of_another_arm_is_refused_in_one_line(lab, capsys):
     (session / "session.yaml").write_text(text.replace("trials:", f"{named}trials:"))
     assert watch(lab) == 2
     *lines, last = capsys.readouterr().out.splitlines()
-    assert last == "watch: 0 of 0 trials judged"
+    assert last == "monitor: 0 of 0 trials judged"
     assert len(lines) == len(TILTS)
     assert all("refused: session.yaml: segments: " in line and "found 'joint_02'" in line for line in lines)
 

@@ -16,7 +16,12 @@ from tests.support.workbench import ROOT, workbench
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.identification.fit.search import search
 from trunkline.identification.fit.setup import set_up
-from trunkline.identification.uncertainty.identifiability import described_lines, to_identify_from, told_by, untold
+from trunkline.identification.uncertainty.identifiability import (
+    described_lines,
+    expected_identifiability,
+    to_identify_from,
+    unidentifiable,
+)
 from trunkline.recordings.trials.inventory import missing_lines, recorded_lines
 from trunkline.recordings.trials.raw_trial import Take
 from trunkline.recordings.trials.trial import Trial, write_trials
@@ -76,15 +81,15 @@ def test_what_shows_in_no_trial_and_what_shows_as_one_is_told(model):
     ranges = {"stiffness": (0.1, 10.0), "kp": (10.0, 1e4), "force_range": (5.0, 1e4)}
     pulls = [static_pull(model, (level, 0, 0)) for level in (10, 20)]
     prepared = to_identify_from(settings(["static_pull"], ["static_pull"], ranges), model, pulls)
-    told, pairs = told_by(*prepared, 0.005)
+    told, pairs = expected_identifiability(*prepared, 0.005)
     by_name = {one.name: one for one in told}
     assert by_name["force_range"].words() == "force_range shows in no trial"
     assert np.isfinite(by_name["kp"].half_width)
-    sure, _ = told_by(*prepared, 0.0025)
+    sure, _ = expected_identifiability(*prepared, 0.0025)
     np.testing.assert_allclose(2 * sure[0].half_width, told[0].half_width)
     moving = settings(["motion"], ["motion"], {"dead_time": (1e-3, 0.1), "time_constant": (1e-3, 0.1)})
     slow = small_model(4, dead_time=0.02)
-    _, pairs = told_by(*to_identify_from(moving, slow, [motion(slow, reach_mm=10)]), 0.005)
+    _, pairs = expected_identifiability(*to_identify_from(moving, slow, [motion(slow, reach_mm=10)]), 0.005)
     assert pairs == ["dead_time and time_constant trade off"]
 
 
@@ -167,7 +172,7 @@ def test_the_expected_width_is_that_of_fits_to_trials_that_are_off_so(model):
     share, rng = 0.01, np.random.default_rng(0)
     config = settings(["static_tilt"], ["static_tilt"], {"stiffness": (0.3 * model.jnt_stiffness[0], 30.0)})
     clean = [tilt(model, angle) for angle in (20, 40, 60, 80)]
-    (told,), _ = told_by(*to_identify_from(config, model, clean), share)
+    (told,), _ = expected_identifiability(*to_identify_from(config, model, clean), share)
     found = []
     for _ in range(40):
         off = [rng.normal(size=3) * share / np.sqrt(3) for _ in clean]
@@ -187,7 +192,7 @@ def fitted(config, model, trials) -> float:
 
 def test_a_stage_without_its_trials_says_what_to_set(model):
     config = settings(["static_tilt", "static_pull"], ["static_tilt", "static_pull"], {"stiffness": (0.1, 10.0)})
-    (line,) = untold(config, [tilt(model, 30)])
+    (line,) = unidentifiable(config, [tilt(model, 30)])
     assert line.startswith("no static_pull of the split identify: `source: tilts` under identify_stiffness")
 
 

@@ -17,8 +17,8 @@ from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.report.certificate.identified import identified
 from trunkline.tools.randomize.__main__ import main
 from trunkline.tools.randomize.fields import drawn_fields
-from trunkline.tools.randomize.file import read_randomisation
-from trunkline.tools.randomize.randomisation import Randomisation, of_arm, of_population
+from trunkline.tools.randomize.file import read_randomization
+from trunkline.tools.randomize.randomization import Randomization, of_arm, of_population
 
 ROOT = Path(__file__).parents[3]
 TOLD = {"identify_stiffness": ("stiffness", "mount_tilt_x"), "identify_control": ("kp", "damping", "force_range")}
@@ -64,7 +64,7 @@ def model(written) -> mujoco.MjModel:
 
 
 def test_draws_have_the_covariance_that_the_file_states(written):
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     stated = json.loads(written.read_text())
     values = drawn.values(drawn.draw(40_000, np.random.default_rng(1)))
     for group in stated["groups"].values():
@@ -93,7 +93,7 @@ def test_its_intervals_are_narrower_than_student_s_by_the_degrees_of_freedom(wri
 
 
 def test_the_centre_is_the_calibrated_arm_to_the_last_bit(written, model):
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     fields = drawn_fields(model, drawn.values(np.zeros((2, len(drawn.names)))))
     assert {"jnt_stiffness", "body_quat", "actuator_gainprm", "dof_damping"} <= set(fields)
     for name, values in fields.items():
@@ -102,7 +102,7 @@ def test_the_centre_is_the_calibrated_arm_to_the_last_bit(written, model):
 
 def test_what_is_written_is_read_again(written, model):
     """So the difference that is added to the model is the parameter's whole effect."""
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     values = drawn.values(drawn.draw(3, np.random.default_rng(4)))
     fields = drawn_fields(model, values)
     for number in range(3):
@@ -123,7 +123,7 @@ def test_the_file_names_the_fields_that_a_parameter_writes_and_no_others(written
 
 
 def test_every_drawn_arm_compiles_steps_and_is_another(written, model):
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     fields = drawn_fields(model, drawn.values(drawn.draw(16, np.random.default_rng(2))))
     batch = batch_of(model, 16)
     for name, values in fields.items():
@@ -137,7 +137,7 @@ def test_every_drawn_arm_compiles_steps_and_is_another(written, model):
 
 
 def test_packed_draws_are_those_fields(written, model):
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     expected = drawn_fields(model, drawn.values(drawn.draw(5, np.random.default_rng(0))))
     with np.load(written.with_suffix(".npz")) as packed:
         assert set(packed) == set(expected)
@@ -163,10 +163,10 @@ def test_the_example_s_first_arm_is_the_calibrated_one_and_the_others_spread_abo
 # --- populations
 
 
-def arm(centre: float, deviation: float) -> Randomisation:
+def arm(centre: float, deviation: float) -> Randomization:
     """Of one parameter whose logarithm is `centre`."""
     low, high = np.array([1e-9]), np.array([1e9])
-    return Randomisation(["stiffness"], ["a"], np.exp([centre]), np.array([[deviation**2]]), low, high)
+    return Randomization(["stiffness"], ["a"], np.exp([centre]), np.array([[deviation**2]]), low, high)
 
 
 def test_arms_that_differ_by_no_more_than_they_are_uncertain_are_one_kind_of_arm():
@@ -246,4 +246,4 @@ def test_another_file_is_refused_by_name(tmp_path):
     for text in ("{}", "no json", '{"format": "other"}'):
         (tmp_path / "x.json").write_text(text)
         with pytest.raises(InputError, match="x.json"):
-            read_randomisation(tmp_path / "x.json")
+            read_randomization(tmp_path / "x.json")

@@ -36,7 +36,7 @@ FEWEST = 3  # held-out trials at rest, below which nothing is told of what the m
 
 
 @dataclass
-class Asked:
+class CertificateSettings:
     """See conf/report/config.yaml."""
 
     arm: str
@@ -64,8 +64,8 @@ class Certificate:
 
 
 def certify(
-    config: Asked, model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict], metrics: dict[str, dict],
-    bring: Bring | None = None,
+    config: CertificateSettings, model: mujoco.MjModel, trials: list[Trial], tables: dict[str, dict],
+    metrics: dict[str, dict], bring: Bring | None = None,
 ) -> Certificate:  # fmt: skip
     """Of `model`, the last that the stages identified.
 
@@ -152,8 +152,8 @@ def check_fitted(tables: dict[str, dict], trials: list[Trial]) -> None:
                 here = digest_of.get(name)
                 actual = f"no trial {name}" if here is None else f"trial {name} with digest {here}"
                 raise InputError(
-                    f"artifacts/{stage}/parameters.json: fitted to trial {name} with digest {digest}, found {actual} in "
-                    "data/processed/filter, expected the session that the model was fitted to: run `dvc repro`"
+                    f"artifacts/{stage}/parameters.json: fitted to trial {name} with digest {digest}, found {actual} "
+                    "in data/processed/filter, expected the session that the model was fitted to: run `dvc repro`"
                 )
 
 

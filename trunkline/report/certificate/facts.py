@@ -40,7 +40,7 @@ def parameter_facts(tables: dict[str, dict]) -> dict[str, dict]:
     facts = {}
     for stage, table in tables.items():
         rows = {
-            key: {name: _told(name, row) for name, row in table[key].items()}
+            key: {name: _parameter_fact(name, row) for name, row in table[key].items()}
             for key in ("parameters", "per_session")
             if key in table
         }
@@ -54,7 +54,7 @@ def parameter_facts(tables: dict[str, dict]) -> dict[str, dict]:
     return facts
 
 
-def _told(name: str, row: dict) -> dict:
+def _parameter_fact(name: str, row: dict) -> dict:
     keys = ("value", "unit", "interval_95_given_model", "range", "at_bound", "undetermined")
     return {key: row[key] for key in keys} | {"words": certainty_words(name, row), "told_by": telling(name)}
 

@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.identification.uncertainty.identifiability import Told
+from trunkline.identification.uncertainty.identifiability import Identifiability
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.report.certificate.poses import Conditions
 
@@ -67,7 +67,7 @@ def certainty_words(name: str, row: dict) -> str:
     low, high = axis(row["interval_95_given_model"])
     searched = np.diff(axis(row["range"]))[0]
     half = float(high - low) / 2
-    return Told(name, half, 1.0 if row["undetermined"] else min(2 * half / searched, 0.999)).words()
+    return Identifiability(name, half, 1.0 if row["undetermined"] else min(2 * half / searched, 0.999)).words()
 
 
 def open_lines(table: dict) -> list[str]:

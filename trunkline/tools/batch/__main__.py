@@ -39,7 +39,7 @@ def main(arguments: list[str] | None = None) -> int:
     if identified:
         _tell(listing, identified, args.out)
     for name in [results.name for results in fleet if results not in identified and results.name not in failed]:
-        print(f"fleet: {name}: nothing is identified yet", file=sys.stderr)
+        print(f"batch: {name}: nothing is identified yet", file=sys.stderr)
     _say_failed(failed)
     return 1 if failed else 0
 
@@ -51,7 +51,7 @@ def run_all(listing: Listing, out: Path, until: str) -> dict[str, str]:
         if arm.folder:
             continue
         begun = time.monotonic()
-        print(f"fleet: {arm.name}: up to {until}", flush=True)
+        print(f"batch: {arm.name}: up to {until}", flush=True)
         try:
             prepare(arm, out / arm.name, until)
             reason = run(out / arm.name)
@@ -59,12 +59,12 @@ def run_all(listing: Listing, out: Path, until: str) -> dict[str, str]:
             reason = str(error)
         if reason is not None:
             failed[arm.name] = reason
-        print(f"fleet: {arm.name}: {'failed' if reason else 'done'} after {time.monotonic() - begun:.0f} s", flush=True)
+        print(f"batch: {arm.name}: {'failed' if reason else 'done'} after {time.monotonic() - begun:.0f} s", flush=True)
     return failed
 
 
 def _tell(listing: Listing, fleet: list[Results], out: Path) -> None:
-    from trunkline.report.figures.fleet import fleet_figure  # pyplot takes long to import
+    from trunkline.report.figures.batch import batch_figure  # pyplot takes long to import
     from trunkline.report.figures.style import save_figure
 
     by_name = {results.name: results for results in fleet}
@@ -81,15 +81,15 @@ def _tell(listing: Listing, fleet: list[Results], out: Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
     (out / ".fleet.md").write_text(text + "\n", encoding="utf-8")
     table.to_csv(out / ".fleet.csv", index=False, float_format="%.6g")
-    save_figure(fleet_figure(table), out / ".fleet.png")
+    save_figure(batch_figure(table), out / ".fleet.png")
     for name in ("fleet.md", "fleet.csv", "fleet.png"):
         (out / f".{name}").replace(out / name)
-    print(f"fleet: written to {out}")
+    print(f"batch: written to {out}")
 
 
 def _say_failed(failed: dict[str, str]) -> None:
     for name, reason in failed.items():
-        print(f"fleet: {name}: failed: {reason}", file=sys.stderr)
+        print(f"batch: {name}: failed: {reason}", file=sys.stderr)
 
 
 if __name__ == "__main__":

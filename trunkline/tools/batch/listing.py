@@ -15,7 +15,7 @@ NONE = "none"  # as the reference: no drift is told
 
 
 @settings
-class Arm:
+class ListedArm:
     """name: of its folder and row. session: folder of its logs and session.yaml, or of several such. like: folder whose
     dvc.yaml and params.yaml it takes, by default the project's. params: what differs from those, by stage. folder: in
     place of all of these, where a pipeline has run already; it is read and not run. since: which arm its drift is from.
@@ -38,7 +38,7 @@ class Arm:
 class Listing:
     """reference: the arm that drift is from, unless an arm says another; by default the first. "none" for none."""
 
-    arms: list[Arm]
+    arms: list[ListedArm]
     reference: str | None = None
 
     def __post_init__(self):
@@ -53,7 +53,7 @@ class Listing:
             if name not in (None, NONE, *names):
                 raise ValueError(f"{key}: found {name!r}, expected one of {', '.join(names)}{nearest(name, names)}")
 
-    def earlier(self, arm: Arm) -> str | None:
+    def earlier(self, arm: ListedArm) -> str | None:
         """The arm that the drift of another is from, if there is one."""
         name = arm.since or self.reference or self.arms[0].name
         return None if name in (NONE, arm.name) else name

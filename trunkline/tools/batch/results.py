@@ -15,7 +15,7 @@ BESIDE = ("identified", "cad", "null", "noise_floor")  # models, and what they s
 
 
 @dataclass(frozen=True)
-class Found:
+class ParameterEstimate:
     """A parameter. low, high: of its 95 % interval, given the model."""
 
     value: float
@@ -30,7 +30,7 @@ class Results:
     it. errors: (position, tip) in mm, by what they are of. All empty where no stage has run."""
 
     name: str
-    parameters: dict[str, Found]
+    parameters: dict[str, ParameterEstimate]
     split: str
     trials: int
     errors: dict[str, tuple[float, float]]
@@ -62,7 +62,7 @@ def read_results(name: str, folder: Path) -> Results:
         table = _read(folder / "artifacts" / stage / "parameters.json")
         for key, row in table.get("parameters", {}).items():
             low, high = row["interval_95_given_model"]
-            parameters[key] = Found(row["value"], low, high, row["unit"])
+            parameters[key] = ParameterEstimate(row["value"], low, high, row["unit"])
     scored = _read(folder / "artifacts/score/metrics.json")
     for stage in STAGES:
         scores, which = scored.get(stage, {}), TEST

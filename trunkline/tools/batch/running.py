@@ -16,13 +16,13 @@ from omegaconf import DictConfig, OmegaConf
 from trunkline.errors import InputError, nearest
 from trunkline.pipeline.config import PROJECT
 from trunkline.settings import read_yaml
-from trunkline.tools.batch.listing import Arm
+from trunkline.tools.batch.listing import ListedArm
 
 OWN = ("data/", "artifacts/")  # what a pipeline has for itself; all else is read where it is
 LOG = "fleet.log"
 
 
-def prepare(arm: Arm, folder: Path, until: str) -> None:
+def prepare(arm: ListedArm, folder: Path, until: str) -> None:
     """Write what the pipeline of an arm takes into `folder`, up to the stage `until`.
 
     Raises:

@@ -71,7 +71,7 @@ def main(arguments: list[str] | None = None) -> int:
     trials = trials_of(args.session, args.settings, "suggest")
     model = with_room(spec, trials, args.settings)
     print(f"twin: {source}", flush=True)
-    stages, offered = told_of(model, trials, grid, args.settings, args.only, args.error / 100)
+    stages, offered = information_of_stages(model, trials, grid, args.settings, args.only, args.error / 100)
     weights = weights_for(args.goal, stages, model, grid)
     suggestions = suggest(stages, weights, offered, args.count, args.per_minute)
     if not suggestions:
@@ -121,7 +121,7 @@ def _settings(root: Path) -> dict[str, IdentificationSettings]:
     return {stage: settings_of(stage, root) for stage in STAGES if stage in params}
 
 
-def told_of(
+def information_of_stages(
     model: mujoco.MjModel, trials: list[Trial], grid: Recordable, root: Path, only: list[str], share: float
 ) -> tuple[Stages, list[Candidate]]:
     """What every stage in params.yaml knows and would learn, and the candidates that are offered: of the kinds `only`,

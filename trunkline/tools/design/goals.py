@@ -12,7 +12,7 @@ import numpy as np
 
 from trunkline.identification.parameters.parameters import parameter_named
 from trunkline.report.certificate.arms import arm_of, arms_with
-from trunkline.report.certificate.poses import Conditions, Poses, draw_poses
+from trunkline.report.certificate.poses import Conditions, StaticPoses, draw_poses
 from trunkline.tools.design.information import StageInformation
 from trunkline.tools.design.settings import Recordable
 
@@ -41,7 +41,7 @@ def weights_for(
     return weights
 
 
-def workspace(model: mujoco.MjModel, grid: Recordable) -> Poses:
+def workspace(model: mujoco.MjModel, grid: Recordable) -> StaticPoses:
     """Poses at rest over all that the candidates go up to."""
     arm = arm_of(model)
     length = float(np.linalg.norm(arm.chain.offset, axis=1).sum() + np.linalg.norm(arm.chain.tip))
@@ -51,7 +51,7 @@ def workspace(model: mujoco.MjModel, grid: Recordable) -> Poses:
     return draw_poses(arm.chain, conditions, POSES, np.random.default_rng(SEED))
 
 
-def tip_moves(model: mujoco.MjModel, names: list[str], poses: Poses) -> np.ndarray:
+def tip_moves(model: mujoco.MjModel, names: list[str], poses: StaticPoses) -> np.ndarray:
     """∂tip/∂z by differences to both sides, m, 0 where an arm finds no rest. Shape (P, N, 3)."""
     count = len(names)
     axes = [parameter_named(name) for name in names]
@@ -69,7 +69,7 @@ def tip_moves(model: mujoco.MjModel, names: list[str], poses: Poses) -> np.ndarr
     return slopes
 
 
-def _most_wound(model: mujoco.MjModel, poses: Poses) -> np.ndarray:
+def _most_wound(model: mujoco.MjModel, poses: StaticPoses) -> np.ndarray:
     """Numbers of the poses whose joints are bent the most in all."""
     arm = arm_of(model)
     angles = np.abs(arm.rest(poses).qpos).sum(axis=1)

@@ -21,13 +21,13 @@ from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import fit_of, set_up, with_every
 from trunkline.identification.simulate.experiment import Experiment
-from trunkline.identification.uncertainty.identifiability import NUMBERS, TWO_SIDED, Told
+from trunkline.identification.uncertainty.identifiability import NUMBERS, TWO_SIDED, Identifiability
 from trunkline.model.elements import actuators
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_static
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.poses import Poses
+from trunkline.report.certificate.poses import StaticPoses
 from trunkline.tools.design.candidates import Candidate
 from trunkline.tools.design.settings import Recordable
 from trunkline.tools.design.simulated import simulated
@@ -42,7 +42,7 @@ class StageInformation:
     """What a stage knows of its P parameters, and what candidates would add, in u.
 
     stage: its name. kinds: of experiments that it reads. names: of the parameters. half: of each range, on the axis
-    that is searched. Shape (P,). known: information of the trials that there are and of the ranges. Shape (P, P).
+    that is searched. Shape (P,). recorded: information of the trials that there are and of the ranges. Shape (P, P).
     added: by name of a candidate, its information. Each (P, P). repeated: candidates that the session holds.
     """
 
@@ -56,12 +56,12 @@ class StageInformation:
 
     def covariance(self, chosen: list[str]) -> np.ndarray:
         """Of u, once the candidates `chosen` are recorded; those of other kinds tell this stage nothing. (P, P)."""
-        return np.linalg.inv(self.known + sum((self.added[name] for name in chosen if name in self.added), 0.0))
+        return np.linalg.inv(self.recorded + sum((self.added[name] for name in chosen if name in self.added), 0.0))
 
-    def told(self, chosen: list[str]) -> list[Told]:
-        """How well each parameter will be told, as `told_by` says it."""
+    def identifiability(self, chosen: list[str]) -> list[Identifiability]:
+        """How well each parameter will be told, as `expected_identifiability` says it."""
         shares = TWO_SIDED * np.sqrt(np.diag(self.covariance(chosen)))
-        return [Told(*row) for row in zip(self.names, shares * self.half, shares, strict=True)]
+        return [Identifiability(*row) for row in zip(self.names, shares * self.half, shares, strict=True)]
 
 
 def information(fit: Fit, model: mujoco.MjModel, experiments: list[Experiment], share: float) -> np.ndarray:
@@ -93,7 +93,7 @@ def shares_of(model: mujoco.MjModel, experiments: list[Experiment], share: float
     if pulled:
         order = actuators(model)
         commands = np.array([experiments[i].controls[-1][order] for i in pulled])
-        bands = arm_of(model).friction(Poses(np.array([experiments[i].gravity for i in pulled]), commands))
+        bands = arm_of(model).friction(StaticPoses(np.array([experiments[i].gravity for i in pulled]), commands))
         tips = np.array([np.linalg.norm(experiments[i].positions[-1], axis=1).max() for i in pulled])
         shares[pulled] = np.hypot(share, np.linalg.norm(bands, axis=1) / 3 / tips)
     return shares

@@ -4,7 +4,7 @@ import numpy as np
 import yaml
 
 from trunkline.identification.parameters.parameters import parameter_named
-from trunkline.identification.uncertainty.identifiability import TWO_SIDED, Told
+from trunkline.identification.uncertainty.identifiability import TWO_SIDED, Identifiability
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.tools.design.candidates import Candidate
@@ -31,7 +31,7 @@ def loss_words(goal: Goal, loss: float) -> str:
 
 def widest_words(stages: list[StageInformation], chosen: list[str]) -> str:
     """The widest interval over its range, as the last stage that identifies a parameter leaves it."""
-    last = {estimate.name: (estimate, stage.stage) for stage in stages for estimate in stage.told(chosen)}
+    last = {estimate.name: (estimate, stage.stage) for stage in stages for estimate in stage.identifiability(chosen)}
     widest, stage = max(last.values(), key=lambda pair: pair[0].share)
     return f"{widest.words()} ({stage})"
 
@@ -65,9 +65,9 @@ def kind_lines(goal: Goal, before: float, after: np.ndarray, offered: list[Candi
 
 def why_words(stages: list[StageInformation], weights: list[np.ndarray], suggestion: Suggestion) -> str:
     """The parameters by which a suggestion shrinks the loss the most, once those before it are recorded."""
-    shares: list[tuple[float, Told, Told]] = []
+    shares: list[tuple[float, Identifiability, Identifiability]] = []
     for stage, weight in zip(stages, weights, strict=True):
-        old, new = stage.told(suggestion.chosen[:-1]), stage.told(suggestion.chosen)
+        old, new = stage.identifiability(suggestion.chosen[:-1]), stage.identifiability(suggestion.chosen)
         for before, now, counts in zip(old, new, np.diag(weight), strict=True):
             shares.append((float(counts) * (before.share**2 - now.share**2), before, now))
     shares.sort(key=lambda row: -row[0])
@@ -76,11 +76,11 @@ def why_words(stages: list[StageInformation], weights: list[np.ndarray], suggest
     return "; ".join(changes) if changes else "tells a little of everything"
 
 
-def _change(before: Told, now: Told) -> str:
+def _change(before: Identifiability, now: Identifiability) -> str:
     return f"{before.name} {_width(before)} now, then {_width(now)}"
 
 
-def _width(estimate: Told) -> str:
+def _width(estimate: Identifiability) -> str:
     """Of an interval: a number in its unit, a factor, or percent where that is as good."""
     parameter = parameter_named(estimate.name)
     if estimate.share >= 1:

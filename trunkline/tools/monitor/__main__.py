@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 
 from trunkline.errors import in_one_line
 from trunkline.program import called
-from trunkline.tools.monitor.monitor import LEARN, Watch
+from trunkline.tools.monitor.monitor import LEARN, DriftMonitor
 
 UNCHANGED, CHANGED, UNUSABLE = 0, 1, 2
 ENDED = 10  # so that it is told from what `in_one_line` returns after a mistake
@@ -45,18 +45,18 @@ def main(arguments: list[str] | None = None) -> int:
 @in_one_line
 def _run(args: argparse.Namespace) -> int:
     out = args.out or Path("watch") / args.folder.resolve().name
-    with threadpool_limits(1, user_api="blas"), Watch.begun(args.model, args.folder, args.reference, out,
+    with threadpool_limits(1, user_api="blas"), DriftMonitor.begun(args.model, args.folder, args.reference, out,
                                                             args.settings) as watch:  # fmt: skip
         try:
             while True:
                 unusable = watch.look()
                 if args.once:
-                    print(f"watch: {watch.summary()}")
+                    print(f"monitor: {watch.summary()}")
                     break
                 time.sleep(args.every)
         except KeyboardInterrupt:
             unusable = 0
-            print("watch: interrupted; what was scored is kept")
+            print("monitor: interrupted; what was scored is kept")
         changed = watch.chart.changed() is not None
         return ENDED + (CHANGED if changed else UNUSABLE if unusable else UNCHANGED)
 

@@ -34,7 +34,7 @@ class Change:
 
 
 @dataclass(frozen=True)
-class Explanation:
+class Attribution:
     """best: the change that explains most. alike: others that cannot be told apart from it, best first.
 
     whole: whether what is left is chance.
@@ -45,7 +45,7 @@ class Explanation:
     whole: bool
 
 
-def explain(trials: list[Charted], baseline: Baseline, parameters: list[int]) -> Explanation:
+def attribute_change(trials: list[Charted], baseline: Baseline, parameters: list[int]) -> Attribution:
     """What explains `trials` best, of a change in one of `parameters`."""
     kinds = {trial.score.kind for trial in trials if trial.departures}
     correlation = {kind: _correlation(kind, baseline) for kind in kinds}
@@ -71,7 +71,7 @@ def explain(trials: list[Charted], baseline: Baseline, parameters: list[int]) ->
     wider = np.sqrt(max(left / free, 1.0))
     best, *others = (replace(change, half_width=float(wider * change.half_width)) for change in changes)
     alike = [change for change in others if best.gain - change.gain < APART * wider**2]
-    return Explanation(best, alike, left <= float(chdtri(free, CHANCE)))
+    return Attribution(best, alike, left <= float(chdtri(free, CHANCE)))
 
 
 def _shared(trial: Charted, p: int, other: Charted, q: int, same: bool) -> float:
@@ -93,7 +93,7 @@ def _response(trial: Charted, q: int, p: int) -> float:
 def _correlation(kind: str, baseline: Baseline) -> np.ndarray:
     """Of the estimates of an unchanged arm's trials of a kind, shrunk towards none. Shape (P, P)."""
     numbered = enumerate(baseline.reference)
-    scores = [score for number, score in numbered if score.kind == kind and number not in baseline.odd]
+    scores = [score for number, score in numbered if score.kind == kind and number not in baseline.outliers]
     count = len(baseline.reference[0].slope)
     values = np.full((len(scores), count), np.nan)
     for i, score in enumerate(scores):

@@ -7,9 +7,9 @@ to three powers, each further one where an F test has it needed (`CHANCE`), and 
 powers. A new trial is then off by (d - m) / (s √(1/I + xᵀCx)), with s² C the
 covariance of β, which has Student's distribution with ν degrees of freedom (the variance of a prediction).
 
-Reference trials that are unlike the others of their kind (`odd.py`) are left out. Where two or more were done as the
-new one was (kind, level, load), m is their mean, and s is pooled within such conditions. Fewer than `LEAST` degrees of
-freedom chart nothing.
+Reference trials that are unlike the others of their kind (`outliers.py`) are left out. Where two or more were done
+as the new one was (kind, level, load), m is their mean, and s is pooled within such conditions. Fewer than `LEAST`
+degrees of freedom chart nothing.
 """
 
 from collections import Counter, defaultdict
@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import fdtrc, ndtri, stdtr
 
-from trunkline.tools.monitor.outliers import odd
+from trunkline.tools.monitor.outliers import find_outliers
 from trunkline.tools.monitor.scores import Score
 
 LEAST = 4  # degrees of freedom of a spread
@@ -79,11 +79,11 @@ class Departure:
 class Baseline:
     """Of `reference` scores, all of the same P parameters.
 
-    odd: numbers of those that were left out as unlike the others, with the numbers of those parameters.
+    outliers: numbers of those that were left out as unlike the others, with the numbers of those parameters.
     """
 
     reference: list[Score]
-    odd: dict[int, list[int]] = field(default_factory=lambda: defaultdict(list))
+    outliers: dict[int, list[int]] = field(default_factory=lambda: defaultdict(list))
     _kinds: dict[tuple[str, int], tuple[float, Group | None, dict[tuple, Group]]] = field(default_factory=dict)
 
     def __post_init__(self):
@@ -96,7 +96,7 @@ class Baseline:
                 least, telling, left_out = _telling(scores, p)
                 self._kinds[kind, p] = _groups(kind, telling, p, least)
                 for score in left_out:
-                    self.odd[place[id(score)]].append(p)
+                    self.outliers[place[id(score)]].append(p)
 
     def departure(self, score: Score, p: int) -> Departure | None:
         """Of parameter `p`; None where the trial does not tell it, or too few reference trials do."""
@@ -115,7 +115,7 @@ class Baseline:
 
     def typical(self, p: int) -> list[tuple[Departure, Score]]:
         """Of each reference trial that tells parameter `p`: how one like it is judged."""
-        regular = [score for number, score in enumerate(self.reference) if p not in self.odd.get(number, ())]
+        regular = [score for number, score in enumerate(self.reference) if p not in self.outliers.get(number, ())]
         pairs = [(self.departure(score, p), score) for score in regular]
         return [(departure, score) for departure, score in pairs if departure is not None]
 
@@ -132,7 +132,8 @@ def _telling(scores: list[Score], p: int) -> tuple[float, list[Score], list[Scor
         alike = [score for score in telling if score.load == load]
         weights, values = _columns(alike, p)
         design = np.concatenate([_designs(alike)[-1], _repeated(alike)], axis=1)
-        left_out += [score for score, is_odd in zip(alike, odd(values, weights, design, LEAST), strict=True) if is_odd]
+        outliers = find_outliers(values, weights, design, LEAST)
+        left_out += [score for score, is_outlier in zip(alike, outliers, strict=True) if is_outlier]
     return least, [score for score in telling if score not in left_out], left_out
 
 

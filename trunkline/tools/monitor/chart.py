@@ -31,7 +31,7 @@ LONG_RUN = FORGETTING / (2 - FORGETTING)  # Var(A) after a long run of trials wi
 
 
 @dataclass
-class Line:
+class ParameterChart:
     """The chart of one parameter. best: the deviation of those reference trials that tell it best. beyond: whether
     the last trial took it beyond the limit."""
 
@@ -70,7 +70,7 @@ class Chart:
     """Charts of all parameters that the reference tells. restart: whether they begin anew after an alarm."""
 
     baseline: Baseline
-    lines: dict[int, Line]
+    lines: dict[int, ParameterChart]
     restart: bool = False
     trials: list[Charted] = field(default_factory=list)
 
@@ -82,7 +82,7 @@ class Chart:
         charted = Charted(score, departures, {p: self.lines[p].level for p in departures}, alarms)
         self.trials.append(charted)
         if alarms and self.restart:
-            self.lines = {p: Line(line.limit, line.best) for p, line in self.lines.items()}
+            self.lines = {p: ParameterChart(line.limit, line.best) for p, line in self.lines.items()}
         return charted
 
     def changed(self) -> int | None:
@@ -107,7 +107,7 @@ def chart_of(baseline: Baseline, parameters: int, rate: float = FALSE_ALARMS, re
     lines = {}
     for p, pairs in typical.items():
         best = min(departure.deviation for departure, _ in pairs)
-        lines[p] = Line(limit_of(baseline, p, rate / len(typical)), best)
+        lines[p] = ParameterChart(limit_of(baseline, p, rate / len(typical)), best)
     return Chart(baseline, lines, restart)
 
 

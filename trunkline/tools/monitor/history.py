@@ -19,7 +19,7 @@ from trunkline.tools.monitor.scores import Score
 
 
 @dataclass
-class Ledger:
+class History:
     """made_of: what all scores are of. rows: a row a trial that was scored, refused or is awaited, in their order."""
 
     path: Path
@@ -27,7 +27,7 @@ class Ledger:
     rows: list[dict] = field(default_factory=list)
 
     @classmethod
-    def opened(cls, path: Path, made_of: dict, replace: bool = False) -> "Ledger":
+    def opened(cls, path: Path, made_of: dict, replace: bool = False) -> "History":
         """What `path` holds, or an empty one. kept: whether one of something else is replaced instead of refused.
 
         Raises:
@@ -64,7 +64,7 @@ class Ledger:
         return [(row, read_score(row)) for row in self.rows if "slope" in row]
 
 
-def told(score: Score) -> dict:
+def score_row(score: Score) -> dict:
     """A score as JSON has it."""
     row = {"kind": score.kind, "level": score.level, "load": score.load}
     return row | {"slope": score.slope.tolist(), "curvature": score.curvature.tolist()}

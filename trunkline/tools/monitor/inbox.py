@@ -21,7 +21,7 @@ PATIENCE = 600.0  # s
 
 
 @dataclass(frozen=True)
-class State:
+class LogState:
     """Of a file: what changes when it does. whole: whether it ends as a log should."""
 
     size: int
@@ -33,7 +33,7 @@ class State:
         return f"{self.size}-{self.modified}"
 
 
-def state_of(log: Path) -> State | None:
+def state_of(log: Path) -> LogState | None:
     """None where there is no such file."""
     try:
         status = log.stat()
@@ -42,7 +42,7 @@ def state_of(log: Path) -> State | None:
             end = file.read()
     except OSError:  # gone, or not yet to be read
         return None
-    return State(status.st_size, status.st_mtime_ns, status.st_size > 2 * len(MAGIC) and end == MAGIC)
+    return LogState(status.st_size, status.st_mtime_ns, status.st_size > 2 * len(MAGIC) and end == MAGIC)
 
 
 def sessions_of(folder: Path) -> list[Path]:

@@ -20,14 +20,14 @@ from trunkline.settings import read_yaml
 
 
 @dataclass
-class Intake:
+class LoadedTrials:
     """trials: by name. refused: why a trial cannot be used, by name."""
 
     trials: dict[str, Trial] = field(default_factory=dict)
     refused: dict[str, str] = field(default_factory=dict)
 
 
-def take(session: Path, files: set[str], root: Path) -> Intake:
+def load_logs(session: Path, files: set[str], root: Path) -> LoadedTrials:
     """The trials of those of a session's logs that are there; what a motors' clock or a vertical is, all of them say.
 
     Args:
@@ -40,7 +40,7 @@ def take(session: Path, files: set[str], root: Path) -> Intake:
         ingest, settings = settings_of("ingest", root), settings_of("filter", root)
         taken = list(take_in(folder, read, ingest.limits))
         unreadable = {trial.name: str(result) for trial, result, _ in taken if isinstance(result, InputError)}
-        loaded = Intake(refused=unreadable)
+        loaded = LoadedTrials(refused=unreadable)
         if len(loaded.refused) < len(taken):
             gathered = gather(taken, read, ingest.plausible, "leave_out", f"{session}")
             loaded.refused |= gathered.refused

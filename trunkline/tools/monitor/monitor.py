@@ -15,22 +15,22 @@ from trunkline.recordings.trials.splits import DECIDING
 from trunkline.settings import read_yaml
 from trunkline.tools.evaluate.model import read_arm, written_beside
 from trunkline.tools.evaluate.session import trials_of
-from trunkline.tools.monitor.attribution import explain
+from trunkline.tools.monitor.attribution import attribute_change
 from trunkline.tools.monitor.baseline import Baseline
 from trunkline.tools.monitor.chart import Chart, chart_of
-from trunkline.tools.monitor.history import Ledger, alone, digest, read_score, told
+from trunkline.tools.monitor.history import History, alone, digest, read_score, score_row
 from trunkline.tools.monitor.inbox import name_of, planned, sessions_of, state_of, without_session
-from trunkline.tools.monitor.loading import take
-from trunkline.tools.monitor.pending import Patience
+from trunkline.tools.monitor.loading import load_logs
+from trunkline.tools.monitor.pending import PendingFiles
 from trunkline.tools.monitor.scores import Score, Scorer, watched_in
-from trunkline.tools.monitor.words import change_lines, chart_table, odd_lines, reference_lines, trial_line
+from trunkline.tools.monitor.words import change_lines, chart_table, outlier_lines, reference_lines, trial_line
 
 LEARN = 15  # trials of each kind that stand for the unchanged arm, where no reference is given
 STAGES = ("identify_damping", "identify_control", "identify_stiffness")  # whose loss weighs the residuals
 
 
 @dataclass
-class Watch:
+class DriftMonitor:
     """folder: that is looked at. out: what is written to. reference: scores of the unchanged arm, or none to learn
     them. chart: of all trials so far."""
 
@@ -38,9 +38,9 @@ class Watch:
     out: Path
     settings: Path
     scorer: Scorer
-    ledger: Ledger
+    history: History
     reference: list[Score]
-    patience: Patience
+    pending: PendingFiles
 
     def __post_init__(self):
         self.chart, self.wheres = self._chart()
@@ -49,7 +49,7 @@ class Watch:
     @contextmanager
     def begun(
         cls, model: Path, folder: Path, reference: Path | None, out: Path, settings: Path
-    ) -> Iterator["Watch"]:
+    ) -> Iterator["DriftMonitor"]:
         """From the arguments of the command, going on from what `out` holds.
 
         Raises:
@@ -59,16 +59,16 @@ class Watch:
         sessions_of(folder)  # is there
         made_of = {"model": digest(model), "parameters": list(scorer.parameters)}
         with alone(out):
-            ledger = Ledger.opened(out / "scores.jsonl", made_of)
+            history = History.opened(out / "scores.jsonl", made_of)
             scores, is_new = [], False
             if reference is not None:
                 scores, is_new = reference_scores(reference, scorer, out, made_of, settings)
-            watch = cls(folder, out, settings, scorer, ledger, scores, Patience(out / "awaited.json"))
+            watch = cls(folder, out, settings, scorer, history, scores, PendingFiles(out / "awaited.json"))
             if is_new:
-                print("\n".join(f"watch: {line}" for line in reference_lines(
+                print("\n".join(f"monitor: {line}" for line in reference_lines(
                     watch.chart.baseline, watch.chart, scorer.parameters)), flush=True)  # fmt: skip
             for line in watch._alarm():
-                print(f"watch: {line}", flush=True)
+                print(f"monitor: {line}", flush=True)
             yield watch
 
     def look(self) -> int:
@@ -76,16 +76,16 @@ class Watch:
         there before left aside."""
         unusable, scored = 0, False
         for folder in without_session(self.folder):
-            self.patience.say(f"{folder}", f"{folder}: found logs and no session.yaml, which says what they are: waits")
+            self.pending.say(f"{folder}", f"{folder}: found logs and no session.yaml, which says what they are: waits")
         for session in sessions_of(self.folder):
             try:
                 new = self._new(session)
                 if new:
                     any_scored, refused = self._score(session, new)
                     scored, unusable = scored or any_scored, unusable + refused
-                self.patience.forget(f"{session}")
+                self.pending.forget(f"{session}")
             except InputError as error:
-                unusable += self.patience.say(f"{session}", str(error))
+                unusable += self.pending.say(f"{session}", str(error))
         if scored or not (self.out / "chart.png").is_file():
             self._write()
         return unusable
@@ -95,7 +95,7 @@ class Watch:
         marks, described = {}, state_of(session / "session.yaml")
         for trial in planned(session):
             name, log = name_of(trial), session / str(trial["file"])
-            row, state = self.ledger.of(session.name, name), state_of(log)
+            row, state = self.history.of(session.name, name), state_of(log)
             if state is None or described is None:
                 continue
             scored = row is not None and "slope" in row
@@ -104,21 +104,21 @@ class Watch:
                 continue
             if row is not None and scored:
                 self._say_changed(log, row)
-            elif self.patience.ready(log, state):
+            elif self.pending.ready(log, state):
                 marks[name] = f"{state.mark} {described.mark}"
         return marks
 
     def _say_changed(self, log: Path, row: dict) -> None:
         if digest(log) != row["log"]:  # not merely copied anew
             message = "changed after it was scored, which stands; give it another name to have it scored again"
-            self.patience.say(f"{log}", f"{log}: {message}")
+            self.pending.say(f"{log}", f"{log}: {message}")
 
     def _score(self, session: Path, new: dict[str, str]) -> tuple[bool, int]:
         """Whether any of the `new` trials was scored, and how many were refused."""
         entries = {name_of(trial): str(trial["file"]) for trial in planned(session)}
         there = {file for file in entries.values() if (state := state_of(session / file)) is not None
-                 and self.patience.ready(session / file, state)}  # fmt: skip
-        taken, scored, unusable = take(session, there, self.settings), False, 0
+                 and self.pending.ready(session / file, state)}  # fmt: skip
+        taken, scored, unusable = load_logs(session, there, self.settings), False, 0
         for name, mark in new.items():
             row = {"session": session.name, "trial": name, "mark": mark, "log": digest(session / entries[name])}
             where = f"{session.name}/{name}"
@@ -129,11 +129,11 @@ class Watch:
                 check_trials([trial], self.scorer.model)
                 score = self.scorer.score(trial)
             except InputError as error:
-                print(f"watch: {where}: refused: {error}", flush=True)
-                self.ledger.add(**row, refused=str(error))
+                print(f"monitor: {where}: refused: {error}", flush=True)
+                self.history.add(**row, refused=str(error))
                 unusable += 1
                 continue
-            self.ledger.add(**row, repairs=trial.repairs, **told(score))
+            self.history.add(**row, repairs=trial.repairs, **score_row(score))
             scored = True
             self._chart_one(where, score)
         return scored, unusable
@@ -141,29 +141,29 @@ class Watch:
     def _chart_one(self, where: str, score: Score) -> None:
         count = self._kinds()[score.kind]
         if not self.reference and count <= LEARN:
-            print(f"watch: {where}: kept to learn from", flush=True)
+            print(f"monitor: {where}: kept to learn from", flush=True)
             if count == LEARN:
                 self._learn()
             return
         before = self.chart.changed()
         self.chart.add(score)
         self.wheres.append(where)
-        print(f"watch: {trial_line(where, self.chart.trials[-1], self.chart, self.scorer.parameters)}", flush=True)
+        print(f"monitor: {trial_line(where, self.chart.trials[-1], self.chart, self.scorer.parameters)}", flush=True)
         if before is None:
             for line in self._alarm():
-                print(f"watch: {line}", flush=True)
+                print(f"monitor: {line}", flush=True)
 
     def _learn(self) -> None:
         """A kind has all its reference trials: the chart is another one."""
-        before = odd_lines(self.chart.baseline, self.scorer.parameters)
+        before = outlier_lines(self.chart.baseline, self.scorer.parameters)
         self.chart, self.wheres = self._chart()
-        for line in odd_lines(self.chart.baseline, self.scorer.parameters):
+        for line in outlier_lines(self.chart.baseline, self.scorer.parameters):
             if line not in before:
-                print(f"watch: reference: {line}", flush=True)
+                print(f"monitor: reference: {line}", flush=True)
 
     def _kinds(self) -> Counter[str]:
         """How many trials of each kind were scored."""
-        return Counter(row["kind"] for row in self.ledger.rows if "slope" in row)
+        return Counter(row["kind"] for row in self.history.rows if "slope" in row)
 
     def summary(self) -> str:
         """How many trials were judged and what came of it, and what is still learned, in one line."""
@@ -178,7 +178,7 @@ class Watch:
 
     def _chart(self) -> tuple[Chart, list[str]]:
         """The chart of all trials so far, and what they are called."""
-        reference, rest = list(self.reference), self.ledger.scores()
+        reference, rest = list(self.reference), self.history.scores()
         if not reference:
             counts: Counter[str] = Counter()
             for _, score in rest:
@@ -198,18 +198,18 @@ class Watch:
         """What is said where the arm has changed; nothing where it has not."""
         if self.chart.changed() is None:
             return []
-        attribution = explain(self.chart.suspects(), self.chart.baseline, list(self.chart.lines))
+        attribution = attribute_change(self.chart.suspects(), self.chart.baseline, list(self.chart.lines))
         return change_lines(self.chart, attribution, self.scorer.parameters, self.wheres)
 
     def _write(self) -> None:
+        from trunkline.report.figures.monitor import monitor_figure
         from trunkline.report.figures.style import save_figure  # pyplot takes long to import
-        from trunkline.report.figures.watch import watch_figure
 
         table = chart_table(self.chart, self.scorer.parameters, self.wheres)
         title = f"{self.folder.resolve().name}: {'the arm has changed' if self._alarm() else 'within limits'}"
         with output_folder(self.out / "new") as folder:
             table.to_csv(folder / "chart.csv", index=False, float_format="%.6g")
-            save_figure(watch_figure(table, title), folder / "chart.png")
+            save_figure(monitor_figure(table, title), folder / "chart.png")
         for name in ("chart.csv", "chart.png"):
             (self.out / "new" / name).replace(self.out / name)
         (self.out / "new").rmdir()
@@ -236,14 +236,14 @@ def reference_scores(
     """
     files = sorted(file for file in reference.glob("*") if file.is_file())
     marks = [f"{file.name} {state.mark}" for file in files if (state := state_of(file)) is not None]
-    ledger = Ledger.opened(out / "reference.jsonl", made_of | {"reference": marks}, replace=True)
-    if ledger.rows and ledger.rows[-1].get("last"):
-        return [read_score(row) for row in ledger.rows], False
-    trials = [trial for trial in trials_of(reference, settings, "watch") if trial.split in DECIDING]
+    history = History.opened(out / "reference.jsonl", made_of | {"reference": marks}, replace=True)
+    if history.rows and history.rows[-1].get("last"):
+        return [read_score(row) for row in history.rows], False
+    trials = [trial for trial in trials_of(reference, settings, "monitor") if trial.split in DECIDING]
     check_trials(trials, scorer.model)
-    with progress(len(trials), "watch: reference", "trials") as bar:
+    with progress(len(trials), "monitor: reference", "trials") as bar:
         for number, trial in enumerate(trials, 1):
             score = scorer.score(trial)
-            ledger.add(session=reference.name, trial=trial.name, last=number == len(trials), **told(score))
+            history.add(session=reference.name, trial=trial.name, last=number == len(trials), **score_row(score))
             bar.update(1, trial=trial.name)
-    return [read_score(row) for row in ledger.rows], True
+    return [read_score(row) for row in history.rows], True

@@ -14,7 +14,7 @@ RANK = 1e-9  # of the largest singular value, below which a column is one of the
 MOST = 0.25  # share of n that may be
 
 
-def odd(values: np.ndarray, information: np.ndarray, design: np.ndarray, least: int) -> np.ndarray:
+def find_outliers(values: np.ndarray, information: np.ndarray, design: np.ndarray, least: int) -> np.ndarray:
     """Which of the estimates `values` (n,), of variance s² / `information` (n,) around what is linear in the columns of
     `design` (n, k), are odd; shape (n,), bool. The others keep so many degrees of freedom, at `least`."""
     count, root = len(values), np.sqrt(information)

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from trunkline.identification.parameters.parameters import PARAMETERS
-from trunkline.tools.monitor.attribution import Change, Explanation
+from trunkline.tools.monitor.attribution import Attribution, Change
 from trunkline.tools.monitor.baseline import LEAST, Baseline
 from trunkline.tools.monitor.chart import Chart, Charted
 
@@ -54,23 +54,23 @@ def trial_line(where: str, charted: Charted, chart: Chart, names: tuple[str, ...
     return f"{where}: {state} {level}, this trial alone {alone}"
 
 
-def change_lines(chart: Chart, attribution: Explanation, names: tuple[str, ...], wheres: list[str]) -> list[str]:
+def change_lines(chart: Chart, attribution: Attribution, names: tuple[str, ...], wheres: list[str]) -> list[str]:
     """That the arm has changed, and which parameter would explain it. wheres: of the chart's trials."""
     at, since = chart.changed(), chart.suspects()
     assert at is not None, "asked for where there was an alarm"
     first = wheres[at - len(since) + 1]
     trials = f"{len(since)} trial{'s' if len(since) > 1 else ''}"
     lines = [f"the arm has changed: seen at {wheres[at]}, by {trials} since {first}"]
-    lines.append(f"explained best by {_told(attribution.best, names)}")
+    lines.append(f"explained best by {_amount_of(attribution.best, names)}")
     if attribution.alike:
-        others = "; ".join(_told(change, names) for change in attribution.alike)
+        others = "; ".join(_amount_of(change, names) for change in attribution.alike)
         lines.append(f"these trials cannot tell it apart from {others}")
     if not attribution.whole:
         lines.append("no single parameter explains all of it: what is left is more than chance")
     return lines
 
 
-def _told(change: Change, names: tuple[str, ...]) -> str:
+def _amount_of(change: Change, names: tuple[str, ...]) -> str:
     return amount(names[change.parameter], change.size, change.half_width)
 
 
@@ -95,15 +95,15 @@ def reference_lines(baseline: Baseline, chart: Chart, names: tuple[str, ...]) ->
                 if unit != "%" or width < HARDLY:
                     widths.append(f"{names[p]} {_short(width)} {unit}".rstrip())
         lines.append(f"  one {kind} tells to ±: {', '.join(widths) or f'nothing, it takes {LEAST + 1} or more'}")
-    lines += [f"  {line}" for line in odd_lines(baseline, names)]
+    lines += [f"  {line}" for line in outlier_lines(baseline, names)]
     idle = [name for p, name in enumerate(names) if p not in chart.lines]
     return lines + ([f"  not charted, as the reference does not tell them: {', '.join(idle)}"] if idle else [])
 
 
-def odd_lines(baseline: Baseline, names: tuple[str, ...]) -> list[str]:
+def outlier_lines(baseline: Baseline, names: tuple[str, ...]) -> list[str]:
     """Which reference trials were left out, and of what."""
     lines = []
-    for number, unlike in baseline.odd.items():
+    for number, unlike in baseline.outliers.items():
         trial, charts = baseline.reference[number].name, ", ".join(names[p] for p in unlike)
         lines.append(f"{trial} is unlike the others of its kind, and left out of the charts of {charts}")
     return lines

@@ -13,7 +13,12 @@ from trunkline.errors import in_one_line
 from trunkline.identification.fit.setup import check_parameters
 from trunkline.identification.parameters.per_session import make_room, names_apart, other_sessions, untold_apart
 from trunkline.identification.simulate.checks import check_trials
-from trunkline.identification.uncertainty.identifiability import described_lines, to_identify_from, told_by, untold
+from trunkline.identification.uncertainty.identifiability import (
+    described_lines,
+    expected_identifiability,
+    to_identify_from,
+    unidentifiable,
+)
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import own_or_project, settings_of
 from trunkline.program import called
@@ -58,7 +63,7 @@ def main(arguments: list[str] | None = None) -> int:
         names = names_apart(list(config.parameters), config.per_session, other_sessions(trials))
         make_room(spec, names)
         model = spec.compile()
-        lacking = untold(config, trials) or untold_apart(names, trials, config.experiments)
+        lacking = unidentifiable(config, trials) or untold_apart(names, trials, config.experiments)
         chosen = [t for t in trials if t.experiment in config.experiments and t.split == IDENTIFY]
         print(f"{stage}, from {len(chosen)} trials:", flush=True)
         for line in lacking:
@@ -68,7 +73,7 @@ def main(arguments: list[str] | None = None) -> int:
         arm, experiments, fit = to_identify_from(config, model, trials)
         lines = described_lines(arm, experiments, fit) + up_lines(arm, experiments, fit.segments, ups)
         print("\n".join(f"  {line}" for line in lines), flush=True)
-        parameters, pairs = told_by(arm, experiments, fit, args.error / 100)
+        parameters, pairs = expected_identifiability(arm, experiments, fit, args.error / 100)
         for parameter in sorted(parameters, key=lambda parameter: -parameter.share):
             print(f"  {parameter.words()}")
         for pair in pairs:

@@ -25,7 +25,7 @@ from trunkline.report.certificate.identified import identified
 from trunkline.tools.evaluate.model import STAGES, read_arm
 from trunkline.tools.randomize.fields import changed_fields, drawn_fields, of_model
 from trunkline.tools.randomize.file import to_table
-from trunkline.tools.randomize.randomisation import Randomisation, of_arm, of_population
+from trunkline.tools.randomize.randomization import Randomization, of_arm, of_population
 
 
 @in_one_line
@@ -58,7 +58,7 @@ def main(arguments: list[str] | None = None) -> int:
         _write(args.out.with_suffix(".npz"), packed.getvalue())
     _write(args.out, (json.dumps(table, indent=1) + "\n").encode())
     print("\n".join(_lines(table)))
-    print(f"randomise: written to {args.out}" + (f" and {args.out.with_suffix('.npz')}" if args.draws else ""))
+    print(f"randomize: written to {args.out}" + (f" and {args.out.with_suffix('.npz')}" if args.draws else ""))
     return 0
 
 
@@ -74,7 +74,7 @@ def _stages_in(folder: Path) -> list[str]:
     return stages
 
 
-def _arm_in(folder: Path) -> Randomisation:
+def _arm_in(folder: Path) -> Randomization:
     tables = {}
     for stage in _stages_in(folder):
         path = folder / stage / "parameters.json"

@@ -7,7 +7,7 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import PARAMETERS, Fields, candidate_fields
-from trunkline.tools.randomize.randomisation import Randomisation
+from trunkline.tools.randomize.randomization import Randomization
 
 OWN = "numeric_data"  # numbers that MuJoCo only keeps: Trunkline's stepper reads them, others would not
 STEP = 1e-3  # of x
@@ -30,7 +30,7 @@ def drawn_fields(model: mujoco.MjModel, values: dict[str, np.ndarray]) -> Fields
     return {name: getattr(model, name) + (written[1:] - written[0]) for name, written in fields.items()}
 
 
-def changed_fields(model: mujoco.MjModel, drawn: Randomisation) -> dict[str, dict[str, int]]:
+def changed_fields(model: mujoco.MjModel, drawn: Randomization) -> dict[str, dict[str, int]]:
     """By parameter, the fields of `model` that a step of it changes, and how many numbers of each."""
     by_parameter = {}
     for i, name in enumerate(drawn.names):
@@ -41,7 +41,7 @@ def changed_fields(model: mujoco.MjModel, drawn: Randomisation) -> dict[str, dic
     return by_parameter
 
 
-def of_model(model: mujoco.MjModel, drawn: Randomisation, where: str) -> Randomisation:
+def of_model(model: mujoco.MjModel, drawn: Randomization, where: str) -> Randomization:
     """The same about what the model has, which is the centre but for the digits that its file lacks.
 
     Raises:

@@ -8,13 +8,13 @@ import numpy as np
 from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.tools.randomize.fields import OWN
-from trunkline.tools.randomize.randomisation import MOST, Randomisation
+from trunkline.tools.randomize.randomization import MOST, Randomization
 
 FORMAT = "trunkline randomisation 1"
 LOGNORMAL, NORMAL = "lognormal", "normal"
 
 
-def to_table(drawn: Randomisation, fields: dict[str, dict[str, int]], model: dict[str, str]) -> dict:
+def to_table(drawn: Randomization, fields: dict[str, dict[str, int]], model: dict[str, str]) -> dict:
     """Args: fields: as `changed_fields` gives them. model: what says which model it is for."""
     parameters, (low, high) = {}, drawn.interval
     for i, name in enumerate(drawn.names):
@@ -43,7 +43,7 @@ def to_table(drawn: Randomisation, fields: dict[str, dict[str, int]], model: dic
             "groups": groups}  # fmt: skip
 
 
-def read_randomisation(path: Path) -> tuple[Randomisation, dict[str, str]]:
+def read_randomization(path: Path) -> tuple[Randomization, dict[str, str]]:
     """The distribution, and what says which model it is for.
 
     Raises:
@@ -64,7 +64,7 @@ def read_randomisation(path: Path) -> tuple[Randomisation, dict[str, str]]:
         groups = [rows[name]["group"] for name in names]
         if unknown := [name for name in names if name not in PARAMETERS]:
             raise InputError(f"{path}: parameters: found {unknown[0]!r}, expected one that can be identified")
-        return Randomisation(names, groups, centre, covariance, limits[:, 0], limits[:, 1], table["arms"]), table[
+        return Randomization(names, groups, centre, covariance, limits[:, 0], limits[:, 1], table["arms"]), table[
             "model"
         ]
     except OSError as error:

@@ -14,7 +14,7 @@ MOST = 95  # of 100, within `interval`
 
 
 @dataclass(frozen=True)
-class Randomisation:
+class Randomization:
     """P parameters. Of those that are never 0 or less, lognormal, x = ln(value / centre); of the others, normal,
     x = value - centre.
 
@@ -80,12 +80,12 @@ class Randomisation:
         out = self.names[int(np.argmin(inside))]
         raise InputError(f"{out}: found {len(accepted)} of {count * TRIES} draws within its range, expected {count}")
 
-    def widened(self, factor: float) -> "Randomisation":
+    def widened(self, factor: float) -> "Randomization":
         """All standard deviations times `factor`; the limits stay."""
         return replace(self, covariance=self.covariance * factor**2)
 
 
-def of_arm(estimates: Identified) -> Randomisation:
+def of_arm(estimates: Identified) -> Randomization:
     """Of one arm: the estimates with their standard uncertainties, and correlations within a stage."""
     parameters = [PARAMETERS[name] for name in estimates.names]
     scales = np.array([parameter.scale if parameter.signed else 1.0 for parameter in parameters])
@@ -95,10 +95,10 @@ def of_arm(estimates: Identified) -> Randomisation:
         for row in (estimates.estimate, estimates.low, estimates.high)
     )
     covariance = estimates.correlation * np.outer(deviation, deviation)
-    return Randomisation(estimates.names, estimates.stages, centre, covariance, low, high)
+    return Randomization(estimates.names, estimates.stages, centre, covariance, low, high)
 
 
-def of_population(arms: list[Randomisation]) -> Randomisation:
+def of_population(arms: list[Randomization]) -> Randomization:
     """Of an arm that is not among these n: about their mean, by what differs between them besides what is uncertain.
 
     x = b + e: b between arms, independent from parameter to parameter, as a few arms tell no correlations; e within
@@ -123,7 +123,7 @@ def of_population(arms: list[Randomisation]) -> Randomisation:
     axis = np.where(first.normal, centres, np.log(np.where(first.normal, 1.0, centres)))
     middle = axis.mean(axis=0)
     between = np.maximum(axis.var(axis=0, ddof=1) - np.diag(within), 0)
-    return Randomisation(
+    return Randomization(
         first.names, first.groups, np.where(first.normal, middle, np.exp(np.where(first.normal, 0.0, middle))),
         (within + np.diag(between)) * (1 + 1 / count), low.min(axis=0), high.max(axis=0), count,
     )  # fmt: skip

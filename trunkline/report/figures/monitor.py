@@ -11,7 +11,7 @@ NAMED = 40  # trials whose names have room below the chart
 FURTHEST = 2.5  # limits, beyond which a dot is drawn at the edge
 
 
-def watch_figure(table: pd.DataFrame, title: str) -> Figure:
+def monitor_figure(table: pd.DataFrame, title: str) -> Figure:
     """From a row a trial and parameter: number, trial, parameter, z, chart, limit, beyond."""
     parameters = list(dict.fromkeys(table.parameter)) or ["no trial yet"]
     trials = table.drop_duplicates("number")

@@ -15,7 +15,7 @@ MODELS = {  # colour, dot
 WORDS = {"cad": "CAD", "null": "null: mean rest shape", "noise_floor": "noise floor"}
 
 
-def fleet_figure(table: pd.DataFrame) -> Figure:
+def batch_figure(table: pd.DataFrame) -> Figure:
     """From a row an arm and number: arm, kind (parameter or error), name, value, low, high, unit, drift,
     drift_half_width. Parameters that drifted beyond their intervals are marked."""
     arms = list(dict.fromkeys(table.arm))
