@@ -39,8 +39,8 @@ def test_help_imports_nothing_heavy():
     code = (
         f"from trunkline.__main__ import main; main(['-h']); import sys; print(sorted(set({HEAVY}) & set(sys.modules)))"
     )
-    said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    assert said.splitlines()[-1] == "[]"
+    output = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert output.splitlines()[-1] == "[]"
 
 
 @pytest.mark.parametrize("name", VERBS)
@@ -56,10 +56,10 @@ def test_called_as_a_module_a_verb_s_help_names_the_module():
     assert called("trunkline.tools.preflight") == "python -m trunkline.tools.preflight"
 
 
-@pytest.mark.parametrize(("typed", "meant"), [("chek", "check"), ("sugest", "suggest"), ("randomize", "randomise")])
-def test_a_mistyped_verb_names_the_nearest(typed, meant, capsys):
+@pytest.mark.parametrize(("typed", "nearest"), [("chek", "check"), ("sugest", "suggest"), ("randomize", "randomise")])
+def test_a_mistyped_verb_names_the_nearest(typed, nearest, capsys):
     assert main([typed]) == 1
-    assert capsys.readouterr().err == f"error: trunkline: found {typed!r}, no such verb, did you mean {meant!r}?\n"
+    assert capsys.readouterr().err == f"error: trunkline: found {typed!r}, no such verb, did you mean {nearest!r}?\n"
 
 
 def test_a_verb_that_is_like_none_names_all(capsys):

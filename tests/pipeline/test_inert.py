@@ -21,5 +21,5 @@ def test_of_what_is_imported_all_counts_but_what_changes_no_number(tmp_path, nam
     for file, text in files.items():
         (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / file).write_text(text)
-    found = imported(tmp_path, ["studies/some.py"])
-    assert found == {"studies/some.py"} | ({name, "trunkline/statics.py"} if counts else set())
+    files = imported(tmp_path, ["studies/some.py"])
+    assert files == {"studies/some.py"} | ({name, "trunkline/statics.py"} if counts else set())

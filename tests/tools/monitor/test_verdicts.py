@@ -62,19 +62,19 @@ def score(kind: str = "release", curvature=((1.0,),)) -> Score:
     return Score("trial", kind, None, 0.0, np.zeros(len(curvature)), curvature)
 
 
-class Told:
-    """A baseline that says of each trial in turn how far it is off, z by the number of the parameter."""
+class FixedBaseline:
+    """A baseline with a given departure for each trial in turn, z by the number of the parameter."""
 
     def __init__(self, *rows: dict[int, float]) -> None:
         self.rows = iter(rows)
 
-    def departures(self, one: Score) -> dict[int, Departure]:
+    def departures(self, score: Score) -> dict[int, Departure]:
         return {p: departure(z) for p, z in next(self.rows).items()}
 
 
 def charted(*rows: dict[int, float], limits=(LIMIT, LIMIT), restart: bool = False) -> Chart:
     lines = {p: ParameterChart(limit, 1.0) for p, limit in enumerate(limits)}
-    chart = Chart(Told(*rows), lines, restart)  # type: ignore[arg-type]
+    chart = Chart(FixedBaseline(*rows), lines, restart)  # type: ignore[arg-type]
     for _ in rows:
         chart.add(score())
     return chart
@@ -98,14 +98,14 @@ FAR = 1e6
 )
 def test_alarms_are_of_the_parameters_that_a_trial_tells(rows, alarms, changed):
     chart = charted(*rows)
-    assert [one.alarms for one in chart.trials] == alarms
+    assert [trial.alarms for trial in chart.trials] == alarms
     assert chart.changed() == changed
 
 
 @pytest.mark.parametrize(("restart", "alarms"), [(True, [[], [0], [], [0]]), (False, [[], [0], [0], [0]])])
 def test_a_chart_that_begins_anew_after_an_alarm_takes_two_again(restart, alarms):
     chart = charted(*[{0: FAR}] * 4, restart=restart)
-    assert [one.alarms for one in chart.trials] == alarms
+    assert [trial.alarms for trial in chart.trials] == alarms
 
 
 def standing(levels: list[dict[int, float]], limits=(LIMIT, LIMIT)) -> Chart:
@@ -146,11 +146,16 @@ def test_how_far_beyond_is_told_against_each_chart_s_own_limit():
 PLAIN = SimpleNamespace(reference=[score(curvature=np.eye(2))], outliers={}, departures=lambda _: {})
 
 
-def of_changes(*rows: dict[int, float], curvature=((1.0, 0.0), (0.0, 1.0)), own: Group | None = None):
+def five_off(reference: Group) -> Charted:
+    """A trial whose first parameter is off by five standard deviations from `reference`."""
+    return Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, reference)}, {}, [])
+
+
+def of_changes(*rows: dict[int, float], curvature=((1.0, 0.0), (0.0, 1.0)), reference: Group | None = None):
     """What explains trials with such changes, by the number of the parameter, each of variance 1."""
-    own = own or group()
-    trials = [Charted(score(curvature=curvature), {p: Departure(change, 1.0, change, own) for p, change in row.items()},
-                      {}, []) for row in rows]  # fmt: skip
+    reference = reference or group()
+    departures = [{p: Departure(change, 1.0, change, reference) for p, change in row.items()} for row in rows]
+    trials = [Charted(score(curvature=curvature), row, {}, []) for row in departures]
     return attribute_change(trials, PLAIN, sorted({p for row in rows for p in row}))  # type: ignore[arg-type]
 
 
@@ -159,9 +164,9 @@ def test_an_interval_is_widened_where_trials_disagree_by_more_than_chance(scatte
     """By the ratio of Birge: of n trials that scatter by s about their mean, ± t s / √n, and never less than t / √n."""
     signs = np.array([1, -1, 1, -1, 0])
     spread = signs * scatter / np.std(signs, ddof=1)
-    found = of_changes(*({0: 7.0 + off} for off in spread))
-    assert found.best.size == pytest.approx(7.0)
-    assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * max(scatter, 1.0) / np.sqrt(5))
+    result = of_changes(*({0: 7.0 + off} for off in spread))
+    assert result.best.size == pytest.approx(7.0)
+    assert result.best.half_width == pytest.approx(stdtrit(10, 0.975) * max(scatter, 1.0) / np.sqrt(5))
 
 
 @pytest.mark.parametrize(("excess", "whole"), [(0.99, True), (1.01, False)])
@@ -177,61 +182,61 @@ def test_what_is_left_is_chance_up_to_its_quantile(excess, whole):
 def test_parameters_are_told_apart_by_more_than_chance_leaves(other, wider, share, alike):
     """Two that are independent: what one explains of χ² more than the other must be above 3.84 times the ratio."""
     best = np.sqrt(other**2 + share * APART * wider)
-    found = of_changes({0: best, 1: other})
-    assert found.best.parameter == 0
-    assert [one.parameter for one in found.alike] == ([1] if alike else [])
+    result = of_changes({0: best, 1: other})
+    assert result.best.parameter == 0
+    assert [change.parameter for change in result.alike] == ([1] if alike else [])
 
 
 def test_few_degrees_of_freedom_widen_an_interval_and_those_of_the_worst_trial_count():
     few, many = group(degrees=4), group(degrees=60)
-    trials = [Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, own)}, {}, []) for own in (many, few)]
-    found = attribute_change(trials, PLAIN, [0])  # type: ignore[arg-type]
-    assert found.best.half_width == pytest.approx(stdtrit(4, 0.975) / np.sqrt(2))
+    trials = [five_off(reference) for reference in (many, few)]
+    result = attribute_change(trials, PLAIN, [0])  # type: ignore[arg-type]
+    assert result.best.half_width == pytest.approx(stdtrit(4, 0.975) / np.sqrt(2))
 
 
 def test_what_the_reference_itself_gets_wrong_is_shared_by_its_trials():
     """Of n trials beside one mean that is uncertain by e: variance 1 / n + e², which more trials do not lower."""
-    own = group(error=0.5)
-    assert own.shared(None).tolist() == [0.5] + [0.0] * (POWERS - 1)
+    reference = group(error=0.5)
+    assert reference.shared(None).tolist() == [0.5] + [0.0] * (POWERS - 1)
     for count in (1, 4, 100):
-        found = of_changes(*[{0: 5.0}] * count, own=own)
-        assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * np.sqrt(1 / count + 0.25))
+        result = of_changes(*[{0: 5.0}] * count, reference=reference)
+        assert result.best.half_width == pytest.approx(stdtrit(10, 0.975) * np.sqrt(1 / count + 0.25))
 
 
 def test_a_change_of_one_shows_in_the_estimate_of_another_that_moves_the_arm_alike():
-    found = of_changes({0: 6.0, 1: 3.0}, curvature=((1.0, 0.5), (0.5, 1.0)))
-    assert found.best.parameter == 0
-    assert found.best.size == pytest.approx(6.0)
-    assert found.whole
+    result = of_changes({0: 6.0, 1: 3.0}, curvature=((1.0, 0.5), (0.5, 1.0)))
+    assert result.best.parameter == 0
+    assert result.best.size == pytest.approx(6.0)
+    assert result.whole
 
 
 def test_the_best_explanation_need_not_be_asked_first():
-    found = of_changes({0: 1.0, 1: 6.0})
-    assert (found.best.parameter, found.best.size) == (1, pytest.approx(6.0))
-    assert [one.parameter for one in found.alike] == []
+    result = of_changes({0: 1.0, 1: 6.0})
+    assert (result.best.parameter, result.best.size) == (1, pytest.approx(6.0))
+    assert [change.parameter for change in result.alike] == []
 
 
 def test_a_parameter_that_no_trial_tells_of_explains_nothing():
-    trial = Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, group())}, {}, [])
-    found = attribute_change([trial], PLAIN, [1, 0])  # type: ignore[arg-type]
-    assert (found.best.parameter, found.alike) == (0, [])
+    trial = five_off(group())
+    result = attribute_change([trial], PLAIN, [1, 0])  # type: ignore[arg-type]
+    assert (result.best.parameter, result.alike) == (0, [])
 
 
 @pytest.mark.parametrize(("spread", "information", "deviation"), [(3.0, 1.0, 3.0), (1.0, 4.0, 0.5), (3.0, 4.0, 1.5)])
 def test_chance_is_the_reference_s_spread_over_the_root_of_what_a_trial_tells(spread, information, deviation):
-    found = of_changes({0: 5.0}, curvature=np.eye(2) * information, own=group(spread=spread))
-    assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * deviation)
+    result = of_changes({0: 5.0}, curvature=np.eye(2) * information, reference=group(spread=spread))
+    assert result.best.half_width == pytest.approx(stdtrit(10, 0.975) * deviation)
 
 
 @pytest.mark.parametrize(("more", "alike"), [(3.7, [1]), (4.0, [])])
 def test_two_are_told_apart_at_the_95th_percentile_of_one_degree_of_freedom(more, alike):
-    found = of_changes({0: np.sqrt(1 + more), 1: 1.0})
-    assert [one.parameter for one in found.alike] == alike
+    result = of_changes({0: np.sqrt(1 + more), 1: 1.0})
+    assert [change.parameter for change in result.alike] == alike
 
 
 def test_groups_of_another_condition_share_no_error():
     """Beside two means, each uncertain by 1/2, two trials have a variance of (1 + 1/4) / 2."""
     groups = [replace(group(error=0.5), key=("release", level)) for level in (1, 2)]
-    trials = [Charted(score(curvature=np.eye(2)), {0: Departure(5.0, 1.0, 5.0, own)}, {}, []) for own in groups]
-    found = attribute_change(trials, PLAIN, [0])  # type: ignore[arg-type]
-    assert found.best.half_width == pytest.approx(stdtrit(10, 0.975) * np.sqrt(1.25 / 2))
+    trials = [five_off(reference) for reference in groups]
+    result = attribute_change(trials, PLAIN, [0])  # type: ignore[arg-type]
+    assert result.best.half_width == pytest.approx(stdtrit(10, 0.975) * np.sqrt(1.25 / 2))
