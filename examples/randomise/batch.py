@@ -1,6 +1,6 @@
 """A batch of arms for learning, each drawn from what identification left open: how far apart are their tips?
 
-    python -m trunkline.tools.randomize artifacts --out randomisation.json
+    trunkline randomize artifacts --out randomisation.json
     python batch.py artifacts/identify_control/arm.xml randomisation.json [ARMS] [SECONDS]
 
 The first arm of the batch is the calibrated one. All are pulled by the same commands from the straight arm on.

@@ -35,7 +35,7 @@ def test_it_has_ten_steps_and_commands_in_each():
 def test_its_verbs_and_options_are_the_command_s(monkeypatch, tmp_path):
     """Parsed by the verbs' own parsers, which end there."""
     commands = [words for words in words_of("trunkline") if words[0] not in (*HELP, "VERB")]
-    assert {words[0] for words in commands} >= {"inspect", "motive", "describe", "check", "report", "evaluate"}
+    assert {words[0] for words in commands} >= {"inspect", "import-motive", "describe", "check", "report", "evaluate"}
     parse = argparse.ArgumentParser.parse_args
 
     class Parsed(Exception):

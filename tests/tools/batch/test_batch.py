@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.batch`: a table and a picture over arms, and pipelines that run in folders of their
+"""`trunkline batch`: a table and a picture over arms, and pipelines that run in folders of their
 own."""
 
 import json

@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.describe`: an arm in words, before anything is recorded."""
+"""`trunkline describe`: an arm in words, before anything is recorded."""
 
 import subprocess
 from dataclasses import replace

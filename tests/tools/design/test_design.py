@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.design`: what to record next, and what it is expected to tell."""
+"""`trunkline suggest`: what to record next, and what it is expected to tell."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -243,7 +243,7 @@ def test_the_command_says_all_and_writes_nothing(project, monkeypatch, capsys):
     assert "suggested, of " in output
     assert "  - {file: tilt_0" in output
     assert "experiment: static_tilt, level: " in output
-    assert "python -m trunkline.tools.preflight data/raw/demo" in output
+    assert "trunkline check data/raw/demo" in output
     assert sorted(path for path in project.rglob("*") if path.is_file()) == files
 
 

@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.evaluate`: any model against any session, and what it refuses in one line."""
+"""`trunkline evaluate`: any model against any session, and what it refuses in one line."""
 
 import json
 import shutil

@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.monitor`: what it finds in a folder, what it says, and that nothing is lost or scored
+"""`trunkline monitor`: what it finds in a folder, what it says, and that nothing is lost or scored
 twice."""
 
 import json

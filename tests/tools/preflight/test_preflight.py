@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.preflight`: what a session will tell, before any fit."""
+"""`trunkline check`: what a session will tell, before any fit."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""The pipeline for many arms or sessions, and one table over all of them: `python -m trunkline.tools.batch LIST.yaml`
+"""The pipeline for many arms or sessions, and one table over all of them: `trunkline batch LIST.yaml`
 
 Runs the stages up to `score` for each arm of the list, each in a folder of its own under --out; what has run is not run
 again, and an arm that fails does not stop the others. Then prints errors and parameters of all, with intervals and
@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.tools.batch.listing import Listing, read_listing
 from trunkline.tools.batch.results import Results, drift, read_results
 from trunkline.tools.batch.running import prepare, run
@@ -21,7 +21,7 @@ from trunkline.tools.batch.words import error_table, long_table, parameter_table
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.batch"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=program_name("batch"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("list", type=Path, metavar="LIST.yaml", help="the arms: docs/fleet.md")
     parser.add_argument("--out", type=Path, metavar="FOLDER", default=Path("build/fleet"), help="default: build/fleet")

@@ -1,4 +1,4 @@
-"""What to record next, without a fit: `python -m trunkline.tools.design SESSION`
+"""What to record next, without a fit: `trunkline suggest SESSION`
 
 Ranks trials that a lab could record (tilts, releases, pulls, curls, motions, loads at the tip) by how much each is
 expected to shrink what you care about, by the Fisher information that it has on the twin: --for intervals (of the
@@ -21,7 +21,7 @@ from trunkline.identification.parameters.per_session import make_room, names_apa
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
 from trunkline.pipeline.inputs import read_spec
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
@@ -50,7 +50,7 @@ Stages = list[StageInformation]
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.design"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=program_name("suggest"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("session", type=Path, metavar="SESSION",
                         help="folder of logs and session.yaml, or of filtered trials")  # fmt: skip
@@ -164,8 +164,8 @@ def _report(
         *(f"  {line}" for line in kind_lines(goal, now, after_each(stages, weights, usable, []), usable)),
         "", f"once their logs lie in {session}, add to `trials` in its session.yaml:",
         *entry_lines([suggestion.candidate for suggestion in suggestions], {trial.name for trial in trials}),
-        "", "then:", f"  python -m trunkline.tools.preflight {session}", "  dvc repro",
-        f"  python -m trunkline.tools.design {session}",
+        "", "then:", f"  trunkline check {session}", "  dvc repro",
+        f"  trunkline suggest {session}",
     ]  # fmt: skip
     return lines
 

@@ -51,7 +51,7 @@ def read_reference(path: Path) -> dict:
     except FileNotFoundError:
         raise InputError(f"--reference: {file}: no such file, expected metrics.json of another evaluation") from None
     except (ValueError, KeyError, TypeError) as error:
-        expected = "expected what `python -m trunkline.tools.evaluate` writes"
+        expected = "expected what `trunkline evaluate` writes"
         raise InputError(f"--reference: {file}: {error!r}, {expected}") from error
     return metrics
 

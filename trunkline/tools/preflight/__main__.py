@@ -1,4 +1,4 @@
-"""What a session will and will not tell, in seconds: `python -m trunkline.tools.preflight SESSION`
+"""What a session will and will not tell, in seconds: `trunkline check SESSION`
 
 Reads the logs as the stages do, says what was recorded and what is missing, and how well each parameter in params.yaml
 will be told if the fitted model is off by half a percent of each point's distance from the base. Fits and writes
@@ -21,7 +21,7 @@ from trunkline.identification.uncertainty.identifiability import (
 )
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import own_or_project, settings_of
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.settings import read_yaml
@@ -34,7 +34,7 @@ STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.preflight"),
+        prog=program_name("check"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -70,4 +70,4 @@ def read_randomization(path: Path) -> tuple[Randomization, dict[str, str]]:
     except OSError as error:
         raise InputError(f"{path}: {(error.strerror or str(error)).lower()}, expected a randomisation.json") from error
     except (ValueError, KeyError, TypeError) as error:
-        raise InputError(f"{path}: {error!r}, expected what `python -m trunkline.tools.randomize` writes") from error
+        raise InputError(f"{path}: {error!r}, expected what `trunkline randomize` writes") from error
