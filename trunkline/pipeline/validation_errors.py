@@ -1,4 +1,4 @@
-"""What pydantic found wrong, as one line that names the key."""
+"""Errors of pydantic as one line that names the key."""
 
 import re
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from pydantic import TypeAdapter
 from trunkline.errors import nearest
 
 UNKNOWN_KEY = "unexpected_keyword_argument"  # what pydantic calls it in a dataclass
-MANY = 12  # names, of which the one that was meant is told alone
+MANY = 12  # valid names, from which on the nearest alone is printed
 # pydantic's names for a number out of its range, and JSON schema's for the end that it passed
 BEYOND = {
     "greater_than": "exclusiveMinimum",

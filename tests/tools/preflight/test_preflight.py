@@ -1,4 +1,4 @@
-"""`trunkline check`: what a session will tell, before any fit."""
+"""`trunkline check`: what a session can identify, before any fit."""
 
 from dataclasses import replace
 from types import SimpleNamespace

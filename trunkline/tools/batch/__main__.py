@@ -26,7 +26,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("list", type=Path, metavar="LIST.yaml", help="the arms: docs/fleet.md")
     parser.add_argument("--out", type=Path, metavar="FOLDER", default=Path("build/fleet"), help="default: build/fleet")
     parser.add_argument("--until", metavar="STAGE", default="score", help="the last stage to run; default: score")
-    parser.add_argument("--only-table", action="store_true", help="run nothing, tell what is there")
+    parser.add_argument("--only-table", action="store_true", help="run nothing, print the results there are")
     args = parser.parse_args(arguments)
     listing = read_listing(args.list)
     failed = {} if args.only_table else run_all(listing, args.out, args.until)

@@ -11,7 +11,7 @@ from trunkline.pipeline.config import validated
 from trunkline.recordings.session.session import SessionName, sessions_in
 from trunkline.settings import read_yaml, settings
 
-NONE = "none"  # as the reference: no drift is told
+NONE = "none"  # as the reference: no drift is computed
 
 
 @settings

@@ -1,7 +1,8 @@
-"""What an arm's description gives: `trunkline describe ARM`
+"""An arm as described: `trunkline describe ARM`
 
 ARM is a description, a YAML of `conf/build_mjcf/arm/`, or a model in MJCF. Prints its units, its tendons with their
-moment arms, its tracked points, and what no log will tell of it; with --session, of that session's logs. Draws it.
+moment arms, its tracked points, and what no log can identify; with --session, what that session's logs cannot. Draws
+the arm.
 """
 
 import argparse

@@ -1,11 +1,11 @@
 """What to record next, without a fit: `trunkline suggest SESSION`
 
 Ranks trials that a lab could record (tilts, releases, pulls, curls, motions, loads at the tip) by how much each is
-expected to shrink what you care about, by the Fisher information that it has on the twin: --for intervals (of the
+expected to shrink what you care about, by its Fisher information on the twin: --for intervals (of the
 parameters, the widest count most), tip (its uncertainty at rest over the workspace) or grasp (that of a wound up arm;
-it stands in for the probability to hold a thing, which is not computed). Each suggestion knows those before it. Says
-what each costs in minutes, how to record it, its entry of session.yaml, and the commands to run afterwards. Writes
-nothing. Method and limits: docs/suggest.md.
+it stands in for the probability to hold an object, which is not computed). Each suggestion takes those before it as
+recorded. Prints what each costs in minutes, how to record it, its entry of session.yaml, and the commands to run
+afterwards. Writes nothing. Method and limits: docs/suggest.md.
 """
 
 import argparse
@@ -124,8 +124,8 @@ def _settings(root: Path) -> dict[str, IdentificationSettings]:
 def information_of_stages(
     model: mujoco.MjModel, trials: list[Trial], grid: Recordable, root: Path, only: list[str], share: float
 ) -> tuple[Stages, list[Candidate]]:
-    """What every stage in params.yaml knows and would learn, and the candidates that are offered: of the kinds `only`,
-    if there are any, and none that goes as a trial of the session did."""
+    """The information that every stage in params.yaml has and would gain, and the candidates on offer: of the kinds
+    `only`, if there are any, and none that repeats a trial of the session."""
     settings, stages = _settings(root), []
     read = {kind for config in settings.values() for kind in config.experiments}
     kinds = tuple(kind for kind in EXPERIMENTS if kind in read and (not only or kind in only))

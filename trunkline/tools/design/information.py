@@ -1,14 +1,14 @@
 """The Fisher information of trials, recorded or not, for the parameters that a stage identifies.
 
 With residuals r_t(z) of a trial as the stage's loss has them (½ Σ r² is the trial's loss), J_t = ∂r_t/∂z, and a model
-that is off by a share s of each point's distance from the base, a trial tells
+that is off by a share s of each point's distance from the base, the information of a trial is
 
     M_t = (NUMBERS / s²) J_tᵀ J_t,
 
 which is `trunkline.identification.uncertainty.identifiability` by the trial: over T trials Σ M_t is the inverse of its
 s² (JᵀJ)⁻¹ / (NUMBERS T). Trials are independent, so information adds. Where motors hold the arm at rest, friction holds
 it anywhere in a band, in whose middle the twin has it: there s² is more by the variance of a rectangular distribution
-over that band. All of it is of u = (z - middle) / half, z over half of its range: what `told` calls a share.
+over that band. All of it is of u = (z - middle) / half, z over half of its range: the `share` of `Identifiability`.
 """
 
 from dataclasses import dataclass, replace
@@ -39,7 +39,7 @@ SAME = 0.02  # of a point's distance from the base, within which a candidate is 
 
 @dataclass
 class StageInformation:
-    """What a stage knows of its P parameters, and what candidates would add, in u.
+    """The information that a stage has on its P parameters, and that candidates would add, in u.
 
     stage: its name. kinds: of experiments that it reads. names: of the parameters. half: of each range, on the axis
     that is searched. Shape (P,). recorded: information of the trials that there are and of the ranges. Shape (P, P).
@@ -55,11 +55,11 @@ class StageInformation:
     repeated: set[str]
 
     def covariance(self, chosen: list[str]) -> np.ndarray:
-        """Of u, once the candidates `chosen` are recorded; those of other kinds tell this stage nothing. (P, P)."""
+        """Of u, once the candidates `chosen` are recorded; those of other kinds add nothing. (P, P)."""
         return np.linalg.inv(self.recorded + sum((self.added[name] for name in chosen if name in self.added), 0.0))
 
     def identifiability(self, chosen: list[str]) -> list[Identifiability]:
-        """How well each parameter will be told, as `expected_identifiability` says it."""
+        """How well each parameter will be identified, as `expected_identifiability` has it."""
         shares = TWO_SIDED * np.sqrt(np.diag(self.covariance(chosen)))
         return [Identifiability(*row) for row in zip(self.names, shares * self.half, shares, strict=True)]
 
@@ -103,7 +103,7 @@ def stage_information(
     stage: str, config: IdentificationSettings, model: mujoco.MjModel, trials: list[Trial], chosen: list[Candidate],
     grid: Recordable, share: float,
 ) -> StageInformation:  # fmt: skip
-    """What the trials of a session to identify from tell a stage, and what each of the candidates `chosen` would.
+    """The information of a session's trials to identify from for a stage, and of each of the candidates `chosen`.
 
     Args:
         model: the twin, around whose parameters residuals are taken to first order.

@@ -18,7 +18,7 @@ from trunkline.program import program_name
 from trunkline.tools.monitor.monitor import LEARN, DriftMonitor
 
 UNCHANGED, CHANGED, UNUSABLE = 0, 1, 2
-ENDED = 10  # so that it is told from what `in_one_line` returns after a mistake
+ENDED = 10  # apart from what `in_one_line` returns after a mistake
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -46,18 +46,18 @@ def main(arguments: list[str] | None = None) -> int:
 def _run(args: argparse.Namespace) -> int:
     out = args.out or Path("watch") / args.folder.resolve().name
     with threadpool_limits(1, user_api="blas"), DriftMonitor.begun(args.model, args.folder, args.reference, out,
-                                                            args.settings) as watch:  # fmt: skip
+                                                            args.settings) as monitor:  # fmt: skip
         try:
             while True:
-                unusable = watch.look()
+                unusable = monitor.look()
                 if args.once:
-                    print(f"monitor: {watch.summary()}")
+                    print(f"monitor: {monitor.summary()}")
                     break
                 time.sleep(args.every)
         except KeyboardInterrupt:
             unusable = 0
             print("monitor: interrupted; what was scored is kept")
-        changed = watch.chart.changed() is not None
+        changed = monitor.chart.changed() is not None
         return ENDED + (CHANGED if changed else UNUSABLE if unusable else UNCHANGED)
 
 

@@ -1,4 +1,4 @@
-"""Which parameter's change explains best what the trials of an alarm show, by how much, and what cannot be told apart.
+"""Attribute an alarm to the change of one parameter: which explains it best, by how much, and which cannot be excluded.
 
 A change Δ of parameter p alone moves the estimate d_q of every parameter q by (JᵀJ)_qp / (JᵀJ)_qq Δ: what is charted
 for one parameter shows on the charts of those that move the arm alike. So Δ is fitted to all estimates of all trials
@@ -16,7 +16,7 @@ from scipy.special import chdtri, stdtrit
 from trunkline.tools.monitor.baseline import Baseline
 from trunkline.tools.monitor.chart import Charted
 
-APART = 3.84  # of χ², the 95th percentile for one degree of freedom: less does not tell two parameters apart
+APART = 3.84  # of χ², the 95th percentile for one degree of freedom: less does not separate two parameters
 CHANCE = 1e-3  # of more than what is left, below which one parameter does not explain it all
 
 
@@ -35,7 +35,7 @@ class Change:
 
 @dataclass(frozen=True)
 class Attribution:
-    """best: the change that explains most. alike: others that cannot be told apart from it, best first.
+    """best: the change that explains most. alike: others that the trials cannot separate from it, best first.
 
     whole: whether what is left is chance.
     """
@@ -46,7 +46,7 @@ class Attribution:
 
 
 def attribute_change(trials: list[Charted], baseline: Baseline, parameters: list[int]) -> Attribution:
-    """What explains `trials` best, of a change in one of `parameters`."""
+    """The change of one of `parameters` that explains `trials` best."""
     kinds = {trial.score.kind for trial in trials if trial.departures}
     correlation = {kind: _correlation(kind, baseline) for kind in kinds}
     rows = [(i, p) for i, trial in enumerate(trials) for p in sorted(trial.departures)]

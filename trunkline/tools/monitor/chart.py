@@ -1,12 +1,12 @@
-"""The control chart: an exponentially weighted mean of what each trial says of a parameter, and when it is too far off.
+"""The control chart: an exponentially weighted mean of each trial's estimate of a parameter, and its alarm limit.
 
 EWMA of standardised values (Roberts 1959; Lucas, Saccucci, Technometrics 32, 1990), A ← (1 - λ) A + λ w z. A trial
-that tells the parameter less well than the best kind of reference trials does weighs less, w = its best deviation over
-its own, so that pulls do not drown a telling release. The chart shows Q = A / √Var(A), Var ← (1 - λ)² Var + λ² w². It
-begins as after a long run of unchanged trials.
+that determines the parameter less well than the best kind of reference trials weighs less, w = the best deviation over
+its own, so that pulls do not drown an informative release. The chart shows Q = A / √Var(A),
+Var ← (1 - λ)² Var + λ² w². It begins as after a long run of unchanged trials.
 
-One odd trial, such as one in which somebody touched the arm, moves Q by `ALONE` of the limit at most (as the robust
-CUSUM of Lucas, Crosier 1982 limits one value): two of them, one after the other, raise the alarm.
+A single outlier, such as a trial in which somebody touched the arm, moves Q by `ALONE` of the limit at most (as the
+robust CUSUM of Lucas, Crosier 1982 limits one value): two of them, one after the other, raise the alarm.
 
 The limit is not typed. In simulated charts of an unchanged arm, with as many reference trials, drawn anew each time, it
 gives one false alarm in `1 / rate` trials over all parameters (each has the same share). What few reference trials

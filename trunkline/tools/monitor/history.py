@@ -1,7 +1,7 @@
-"""What a watch has seen, kept beside its chart as lines of JSON, so that it goes on where it was stopped.
+"""The history of a drift monitor: lines of JSON beside its chart, so that it goes on where it was stopped.
 
-The file is replaced whole after every trial: one that is killed leaves no half a line. The first line says of which
-model and parameters it is; another model is refused, as its scores are about another arm.
+The file is replaced whole after every trial, so a killed process leaves no half a line. The first line names the model
+and the parameters; another model is refused, as its scores are about another arm.
 """
 
 import fcntl
@@ -28,7 +28,7 @@ class History:
 
     @classmethod
     def opened(cls, path: Path, made_of: dict, replace: bool = False) -> "History":
-        """What `path` holds, or an empty one. kept: whether one of something else is replaced instead of refused.
+        """The history at `path`, or an empty one. replace: whether that of another model is replaced, not refused.
 
         Raises:
             InputError: it is of another model, or of something else.
@@ -47,7 +47,7 @@ class History:
         return cls(path, made_of, rows)
 
     def add(self, **row) -> None:
-        """Keep a row, in place of an earlier one of the same trial."""
+        """Add a row, in place of an earlier one of the same trial."""
         key = (row["session"], row["trial"])
         self.rows = [other for other in self.rows if (other["session"], other["trial"]) != key] + [row]
         self.path.parent.mkdir(parents=True, exist_ok=True)
@@ -65,7 +65,7 @@ class History:
 
 
 def score_row(score: Score) -> dict:
-    """A score as JSON has it."""
+    """A score as a row of JSON."""
     row = {"kind": score.kind, "level": score.level, "load": score.load}
     return row | {"slope": score.slope.tolist(), "curvature": score.curvature.tolist()}
 
@@ -83,7 +83,7 @@ def digest(path: Path) -> str:
 
 @contextmanager
 def alone(folder: Path) -> Iterator[None]:
-    """Refuse a second watch of the same state, such as of a cron job that comes before the last one is done.
+    """Refuse a second monitor of the same state, such as of a cron job that comes before the last one is done.
 
     Raises:
         InputError: there is one.
@@ -93,5 +93,5 @@ def alone(folder: Path) -> Iterator[None]:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
-            raise InputError(f"{folder}: found another watch at work there, expected one at a time") from error
+            raise InputError(f"{folder}: found another monitor at work there, expected one at a time") from error
         yield

@@ -1,4 +1,4 @@
-"""What a watched folder holds: sessions, and which of their logs are whole.
+"""The sessions in a monitored folder, and which of their logs are complete.
 
 A folder is looked at again and again, not subscribed to: the kernel's notices (inotify, and the libraries over it) do
 not tell of what another machine writes to a network drive, where labs keep their logs, and a look costs a few stats.

@@ -1,4 +1,4 @@
-"""One watch: a model, a reference, a folder that is looked at, and what has come of it so far."""
+"""A drift monitor: a model, a reference, a folder of sessions, and the results so far."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -63,17 +63,17 @@ class DriftMonitor:
             scores, is_new = [], False
             if reference is not None:
                 scores, is_new = reference_scores(reference, scorer, out, made_of, settings)
-            watch = cls(folder, out, settings, scorer, history, scores, PendingFiles(out / "awaited.json"))
+            monitor = cls(folder, out, settings, scorer, history, scores, PendingFiles(out / "awaited.json"))
             if is_new:
                 print("\n".join(f"monitor: {line}" for line in reference_lines(
-                    watch.chart.baseline, watch.chart, scorer.parameters)), flush=True)  # fmt: skip
-            for line in watch._alarm():
+                    monitor.chart.baseline, monitor.chart, scorer.parameters)), flush=True)  # fmt: skip
+            for line in monitor._alarm():
                 print(f"monitor: {line}", flush=True)
-            yield watch
+            yield monitor
 
     def look(self) -> int:
-        """Score what is new, say a line of each, and write the chart. How many inputs cannot be used, all that were
-        there before left aside."""
+        """Score new trials, print a line for each, and write the chart. Returns how many inputs cannot be used, those
+        of earlier looks left aside."""
         unusable, scored = 0, False
         for folder in without_session(self.folder):
             self.pending.say(f"{folder}", f"{folder}: found logs and no session.yaml, which says what they are: waits")
@@ -177,7 +177,7 @@ class DriftMonitor:
         ])  # fmt: skip
 
     def _chart(self) -> tuple[Chart, list[str]]:
-        """The chart of all trials so far, and what they are called."""
+        """The chart of all trials so far, and their names."""
         reference, rest = list(self.reference), self.history.scores()
         if not reference:
             counts: Counter[str] = Counter()
@@ -195,7 +195,7 @@ class DriftMonitor:
         return chart, [f"{row['session']}/{row['trial']}" for row, _ in rest]
 
     def _alarm(self) -> list[str]:
-        """What is said where the arm has changed; nothing where it has not."""
+        """Lines about the change where the arm has changed; none where it has not."""
         if self.chart.changed() is None:
             return []
         attribution = attribute_change(self.chart.suspects(), self.chart.baseline, list(self.chart.lines))

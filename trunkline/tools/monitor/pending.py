@@ -1,4 +1,4 @@
-"""What a watch waits for, and what it has said of it: a line once, not at every look."""
+"""Logs that a monitor waits for, and the lines printed about them: once, not at every look."""
 
 import json
 import time
@@ -8,7 +8,7 @@ from trunkline.tools.monitor.inbox import PATIENCE, LogState
 
 
 class PendingFiles:
-    """Kept in the file `path`, so that a command that looks once and ends waits as one that stays does."""
+    """Stored in the file `path`, so that a command that looks once and ends waits as one that stays does."""
 
     def __init__(self, path: Path):
         self._path = path
@@ -17,7 +17,7 @@ class PendingFiles:
         self._printed: dict[str, str] = content.get("said", {})
 
     def ready(self, log: Path, state: LogState) -> bool:
-        """Whether a log can be taken: it is whole, or will hardly become so. One that cannot yet is said."""
+        """Whether a log can be loaded: it is complete, or has not changed for long. Prints a line where it cannot yet."""
         if state.whole:
             return True
         mark, since = self._marks.get(f"{log}", ["", 0.0])
@@ -33,8 +33,8 @@ class PendingFiles:
         return False
 
     def say(self, key: str, line: str) -> bool:
-        """Print a line unless it was the last one said of `key`; whether it was printed."""
-        head = line.split(" (")[0]  # a log that grows is not said at every size
+        """Print a line unless it was the last one about `key`; whether it was printed."""
+        head = line.split(" (")[0]  # a log that grows is not printed at every size
         if self._printed.get(key) == head:
             return False
         self._printed[key] = head
@@ -43,7 +43,7 @@ class PendingFiles:
         return True
 
     def forget(self, key: str) -> None:
-        """What was said of `key` is put right: said again, it is news."""
+        """The line about `key` is out of date: the next one is printed."""
         if self._printed.pop(key, None) is not None:
             self._keep()
 

@@ -1,4 +1,4 @@
-"""A watch in words: a line a trial, what has changed, and the chart as a table."""
+"""The monitor in words: a line a trial, what has changed, and the chart as a table."""
 
 from collections import Counter
 
@@ -32,7 +32,7 @@ def _short(value: float) -> str:
 
 
 def shown_in(name: str) -> tuple[str, float]:
-    """The unit in which changes of a parameter are said, and how many of it a step of 1 is where it is searched (for
+    """The unit in which changes of a parameter are printed, and how many of it a step of 1 is where it is searched (for
     ln(value), in which a step is a share, to first order)."""
     parameter = PARAMETERS[name]
     if not parameter.signed:
@@ -41,7 +41,7 @@ def shown_in(name: str) -> tuple[str, float]:
 
 
 def trial_line(where: str, charted: Charted, chart: Chart, names: tuple[str, ...]) -> str:
-    """What a new trial says: the parameter whose chart is nearest to its limit, or beyond."""
+    """A line for a new trial: the parameter whose chart is nearest to its limit, or beyond."""
     if not charted.levels:
         kind = charted.score.kind
         count = sum(score.kind == kind for score in chart.baseline.reference)

@@ -1,8 +1,8 @@
-"""What a session will and will not tell, in seconds: `trunkline check SESSION`
+"""What a session can identify, in seconds: `trunkline check SESSION`
 
-Reads the logs as the stages do, says what was recorded and what is missing, and how well each parameter in params.yaml
-will be told if the fitted model is off by half a percent of each point's distance from the base. Fits and writes
-nothing.
+Loads the logs as the stages do, lists what was recorded and what is missing, and predicts how well each parameter in
+params.yaml can be identified if the fitted model is off by half a percent of each point's distance from the base. Fits
+and writes nothing.
 """
 
 import argparse

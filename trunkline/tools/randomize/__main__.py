@@ -1,4 +1,4 @@
-"""What was identified, as domain randomisation for learning: `trunkline randomize [ARTIFACTS ...]`
+"""Domain randomization for learning, from the identified parameters: `trunkline randomize [ARTIFACTS ...]`
 
 ARTIFACTS is a folder with identify_*/parameters.json and arm.xml, by default `artifacts`. Writes a JSON with each
 parameter's distribution, the covariances, and the fields of the MuJoCo model that each writes. Of several folders,
