@@ -17,7 +17,7 @@ class PendingFiles:
         self._printed: dict[str, str] = content.get("said", {})
 
     def ready(self, log: Path, state: LogState) -> bool:
-        """Whether a log can be loaded: it is complete, or has not changed for long. Prints a line where it cannot yet."""
+        """Whether a log can be loaded: complete, or unchanged for long. Prints a line where it cannot yet."""
         if state.whole:
             return True
         mark, since = self._marks.get(f"{log}", ["", 0.0])
