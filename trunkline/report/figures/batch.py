@@ -1,4 +1,4 @@
-"""A fleet at a glance: errors of every arm, and a panel a parameter with the intervals of all of them."""
+"""A batch of arms at a glance: errors of every arm, and a panel a parameter with the intervals of all of them."""
 
 import matplotlib.pyplot as plt
 import numpy as np

@@ -1,4 +1,4 @@
-"""The list of a fleet: arms or sessions, each with what differs from the pipeline that it is like."""
+"""The list of a batch: arms or sessions, each with what differs from the pipeline that it is like."""
 
 from dataclasses import field
 from pathlib import Path

@@ -62,8 +62,8 @@ def run(folder: Path) -> str | None:
     if code == 0:
         return None
     lines = (folder / LOG).read_text(encoding="utf-8").splitlines()
-    mistakes = [line for line in lines if line.lower().startswith("error:")]
-    reason = mistakes[0].partition(":")[2].strip() if mistakes else f"dvc ended with {code}"
+    errors = [line for line in lines if line.lower().startswith("error:")]
+    reason = errors[0].partition(":")[2].strip() if errors else f"dvc ended with {code}"
     return f"{reason} ({folder / LOG})"
 
 

@@ -1,4 +1,4 @@
-"""A fleet as tables: errors and parameters of every arm, and by how much they have drifted."""
+"""A batch of arms as tables: errors and parameters of every arm, and by how much they have drifted."""
 
 import numpy as np
 import pandas as pd
