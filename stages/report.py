@@ -9,7 +9,7 @@ from trunkline.pipeline.inputs import load_rig, read_model
 from trunkline.pipeline.stage import output_folder, run_stage, write_json, write_metrics
 from trunkline.recordings.trials.splits import DECIDING
 from trunkline.recordings.trials.trial import read_trials
-from trunkline.report.certificate.certificate import Asked, certify, digest_of_code, digests
+from trunkline.report.certificate.certificate import CertificateSettings, certify, digest_of_code, digests
 from trunkline.report.certificate.page import page
 from trunkline.report.figures.certificate import pose_figure, uncertainty_figure
 from trunkline.report.figures.style import save_figure
@@ -21,7 +21,7 @@ CHECKOUT = Path(__file__).resolve().parent.parent
 
 
 @settings
-class Config(Asked):
+class Config(CertificateSettings):
     """See conf/report/config.yaml."""
 
     rig: str | None

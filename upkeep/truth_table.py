@@ -107,20 +107,20 @@ def truth_table(root: Path) -> str:
         cells = [f"`{name}`{unit}", _number(truth.get("parameters", {}).get(name)), _number(expected)]
         low, high = row.get("interval_95_given_model", (None, None))
         interval = "undetermined" if row["undetermined"] else f"{_number(low)} … {_number(high)}"
-        held = {True: "yes", False: "**no**", None: ""}[holds(row, expected)]
+        verdict = {True: "yes", False: "**no**", None: ""}[holds(row, expected)]
         effects = [effect for effect in LACKING.get(truth.get("plant", ""), ()) if name in effect.on]
         lacking = [words for effect in effects if (words := effect.lacking(truth, rows))]
-        cells += [_number(row["value"]), interval, held, ", ".join(lacking)]
+        cells += [_number(row["value"]), interval, verdict, ", ".join(lacking)]
         lines.append(f"| {' | '.join(cells)} |")
     return "\n".join([*lines, "", _factors(root, truth), *_unanswered(truth)])
 
 
 def identified(root: Path) -> dict[str, dict]:
     """The rows of all stages' parameters.json, by name; of a parameter that two stages identify, the later one."""
-    found = {}
+    rows = {}
     for stage in STAGES:
-        found |= _json(root / "artifacts" / stage / "parameters.json").get("parameters", {})
-    return found
+        rows |= _json(root / "artifacts" / stage / "parameters.json").get("parameters", {})
+    return rows
 
 
 def expectation(truth: dict, name: str) -> float | None:
@@ -143,10 +143,10 @@ def _factors(root: Path, truth: dict) -> str:
     real = truth.get("stiffness_factors")
     if not table or not real or "half_width_95_given_model" not in table:
         return "Factors of single joints: –"
-    found, real = np.array(table["factor"]), np.array(real)
+    factors, real = np.array(table["factor"]), np.array(real)
     halves = np.array([np.inf if half is None else half for half in table["half_width_95_given_model"]])
-    inside = int(np.sum(np.abs(found - real) <= halves))
-    correlation = np.corrcoef(found, real)[0, 1]
+    inside = int(np.sum(np.abs(factors - real) <= halves))
+    correlation = np.corrcoef(factors, real)[0, 1]
     return (
         f"Factors of single joints' stiffness: correlation with the lab's own scatter {correlation:.2f}; "
         f"{inside} of {len(real)}\nof their intervals hold it."
@@ -157,8 +157,8 @@ def _unanswered(truth: dict) -> list[str]:
     """What the lab has that no single parameter answers to, in a sentence."""
     if "branches" not in truth:
         return []
-    branches = ", ".join(f"{_number(one['ratio'])} for {_number(one['time_s'])} s" for one in truth["branches"])
-    sliders = ", ".join(f"{_number(one['ratio'])} up to {_number(one['bend_rad'])} rad" for one in truth["sliders"])
+    branches = ", ".join(f"{_number(row['ratio'])} for {_number(row['time_s'])} s" for row in truth["branches"])
+    sliders = ", ".join(f"{_number(row['ratio'])} up to {_number(row['bend_rad'])} rad" for row in truth["sliders"])
     return [
         f"The lab's Maxwell branches, over its springs: {branches}.\nIts sliders: {sliders}.\n"
         f"Its motors wind at most {_number(truth['rate_limit_m_s'])} m/s, with "
@@ -197,8 +197,8 @@ def _start_rows(root: Path, filtered: dict) -> list[str]:
         if late:
             cells = f"{np.mean(late):+.2f} ms | {max(late, key=abs):+.2f} ms | {len(late)} trials, all splits"
             rows.append(f"| detected start of a {kind}, late | {cells} |")
-    found = _json(root / "artifacts/ingest/metrics.json").get("clock_offset_ms")
-    error = None if found is None or "clock_offset_s" not in truth else abs(found + 1e3 * truth["clock_offset_s"])
+    offset = _json(root / "artifacts/ingest/metrics.json").get("clock_offset_ms")
+    error = None if offset is None or "clock_offset_s" not in truth else abs(offset + 1e3 * truth["clock_offset_s"])
     return [*rows, f"| clock of the motors against the cameras' | | {_number(error)} ms | the session |"]
 
 

@@ -128,8 +128,8 @@ def test_the_reference_of_sessions_has_every_key_and_schema():
 
 def paths(page: Path) -> list[str]:
     """What looks like a file or folder of the project, seen from its top."""
-    found = re.findall(rf"(?<![\w/.<-])((?:{FOLDERS})/[\w./-]+)", without_archive(page))
-    return [name.rstrip(".") for name in found if "/artifacts/" not in name]
+    names = re.findall(rf"(?<![\w/.<-])((?:{FOLDERS})/[\w./-]+)", without_archive(page))
+    return [name.rstrip(".") for name in names if "/artifacts/" not in name]
 
 
 def without_archive(page: Path) -> str:
@@ -141,8 +141,8 @@ def without_archive(page: Path) -> str:
 
 def links(page: Path) -> list[tuple[str, str]]:
     """(file, anchor) of each link that stays within the project."""
-    found = re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", page.read_text(encoding="utf-8"))
-    return [(target, anchor) for target, anchor in found if "://" not in target]
+    targets = re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)\)", page.read_text(encoding="utf-8"))
+    return [(target, anchor) for target, anchor in targets if "://" not in target]
 
 
 def anchors(page: Path) -> set[str]:

@@ -232,19 +232,19 @@ def test_commands_are_told_by_the_same_statistics_of_whatever_arm():
 def test_each_figure_of_the_readme_has_a_row_of_the_gate():
     """Those of `test` by their twin of `validate`. A figure may have its row in another unit."""
     rows = {file: read_limits(file) for file in limit_files(ROOT)}
-    own = rows[ROOT / "tests/limits.yaml"]
-    shown = [(stage, figure.key) for stage, lines in RESULTS.items() for _, figures in lines for figure in figures]
+    project_rows = rows[ROOT / "tests/limits.yaml"]
+    entries = [(stage, figure.key) for stage, lines in RESULTS.items() for _, figures in lines for figure in figures]
     errors = ("e_internal", "e_position", "e_tip")
-    shown += [("identify_control", f"identified.{split}.{error}") for split in DECIDING for error in errors]
+    entries += [("identify_control", f"identified.{split}.{error}") for split in DECIDING for error in errors]
     scored = json.loads((ROOT / "artifacts/score/metrics.json").read_text())
     for kind, (_, stage) in KINDS.items():
         if lookup(scored, f"{stage}.identified.{TEST}.by_experiment.{kind}") is not None:
-            shown += [(stage, f"identified.{VALIDATE}.by_experiment.{kind}.{error}") for error in errors]
-    shown += [("rehearse", f"preview.coverage.{name}.share") for name in COVERAGE_TIMES]
+            entries += [(stage, f"identified.{VALIDATE}.by_experiment.{kind}.{error}") for error in errors]
+    entries += [("rehearse", f"preview.coverage.{name}.share") for name in COVERAGE_TIMES]
     for experiment, distance in DISTANCES.items():
-        shown.append(("rehearse", f"{experiment}.rate"))
-        shown += [("rehearse", f"{experiment}.{distance}.{at}") for at in ("median", "p95") if distance]
-    assert [key for stage, key in shown if not _has(own[stage], key)] == []
+        entries.append(("rehearse", f"{experiment}.rate"))
+        entries += [("rehearse", f"{experiment}.{distance}.{at}") for at in ("median", "p95") if distance]
+    assert [key for stage, key in entries if not _has(project_rows[stage], key)] == []
     errors += ("e_position_about_rest", "e_tip_about_rest", "e_late_speed")
     for name in EXAMPLES:
         damping = rows[ROOT / "examples" / name / "limits.yaml"]["identify_damping"]
@@ -266,10 +266,10 @@ def test_the_rehearsal_s_block_says_of_what_it_is_and_which_goals_are_missed_or_
     """Whether it is stale: test_provenance.py."""
     assert rehearsal_block(tmp_path) == "(no runs are committed yet)"
     monkeypatch.setattr("upkeep.readme.source_words", lambda root, metrics: f"of `{metrics['package']}`")
-    told = {"runs": 200, "rate": 0.975, "low": 0.943, "high": 0.989, "causes": {"aim": 5}}
-    told |= {"nearest_mm": {"median": 12.0, "p95": 21.0}, "variants": {"no preview": {**told, "runs": 40}}}
+    row = {"runs": 200, "rate": 0.975, "low": 0.943, "high": 0.989, "causes": {"aim": 5}}
+    row |= {"nearest_mm": {"median": 12.0, "p95": 21.0}, "variants": {"no preview": {**row, "runs": 40}}}
     goals = "rehearse:\n  reach.rate: {min: 0.97}\n  follow.rate: {better: higher, goal: 0.98}\n"
-    metrics = {"package": "abc", "reach": told, "follow": told, "grasp": told}
+    metrics = {"package": "abc", "reach": row, "follow": row, "grasp": row}
     for name, text in {"tests/limits.yaml": goals, "artifacts/rehearse/metrics.json": json.dumps(metrics)}.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
@@ -309,8 +309,8 @@ def test_errors_of_starts_and_of_the_clock_are_against_the_truth(judged):
 def test_which_intervals_of_the_demo_session_hold_the_truth():
     """A change is to be seen: one that moves a parameter to the other side belongs into docs/results/intervals.md."""
     truth = json.loads((ROOT / TRUTH).read_text())
-    found = {name: holds(row, expectation(truth, name)) for name, row in identified(ROOT).items()}
-    assert found == {
+    verdicts = {name: holds(row, expectation(truth, name)) for name, row in identified(ROOT).items()}
+    assert verdicts == {
         "stiffness": False,
         "hardening": True,
         "joint_place": False,

@@ -103,7 +103,7 @@ def stored(project, name="study"):
     return json.loads((project / "docs/results" / f"{name}.json").read_text())
 
 
-def shown(project):
+def page_block(project):
     return block(project / "docs/results/study.json")
 
 
@@ -117,15 +117,15 @@ def test_what_is_printed_is_kept_with_its_command_and_its_origin(project, capsys
         print("two threads\n\n| a | b |\n|---|---|\n| 1 | 2 |  ")
         print("progress", file=sys.stderr)
     assert capsys.readouterr().out.startswith("two threads\n")
-    found, of, day = stored(project), *git(project, "log", "-1", "--format=%h %cs", "--abbrev=7").split()
-    assert found["lines"] == ["two threads", "| a | b |", "|---|---|", "| 1 | 2 |"]
-    assert (found["command"], found["commit"], found["date"]) == ("python -m studies.some --only 'a b'", of, day)
+    result, of, day = stored(project), *git(project, "log", "-1", "--format=%h %cs", "--abbrev=7").split()
+    assert result["lines"] == ["two threads", "| a | b |", "|---|---|", "| 1 | 2 |"]
+    assert (result["command"], result["commit"], result["date"]) == ("python -m studies.some --only 'a b'", of, day)
     code = ["artifacts/arm.xml", "conf/teleop", "package", "params.yaml:filter", "stages/filter.py", "studies/some.py"]
     code.append("studies/some.yaml")
-    assert list(found["code"]) == [*code, "trunkline/ar/teleop", "trunkline/frames.py", "trunkline/model/arm"]
-    assert all(re.fullmatch("[0-9a-f]{12}", digest) for digest in found["code"].values())
+    assert list(result["code"]) == [*code, "trunkline/ar/teleop", "trunkline/frames.py", "trunkline/model/arm"]
+    assert all(re.fullmatch("[0-9a-f]{12}", digest) for digest in result["code"].values())
     table = "```\ntwo threads\n```\n\n| a | b |\n|---|---|\n| 1 | 2 |\n\n`python -m studies.some --only 'a b'`\n"
-    assert shown(project) == f"{table}(commit {of} of {day}; nothing that it goes through has changed since)"
+    assert page_block(project) == f"{table}(commit {of} of {day}; nothing that it goes through has changed since)"
 
 
 @pytest.mark.parametrize(
@@ -154,9 +154,9 @@ def test_an_edit_of_what_a_result_goes_through_makes_it_stale_and_is_named(proje
     record(project)
     (project / name).parent.mkdir(exist_ok=True)
     (project / name).write_text(text)
-    assert shown(project).endswith(f"; **STALE**, changed since: {since})")
+    assert page_block(project).endswith(f"; **STALE**, changed since: {since})")
     commit(project)
-    assert shown(project).endswith(f"; **STALE**, changed since: {since})"), "committed or not"
+    assert page_block(project).endswith(f"; **STALE**, changed since: {since})"), "committed or not"
 
 
 @pytest.mark.parametrize(
@@ -174,18 +174,18 @@ def test_an_edit_of_what_a_result_goes_through_makes_it_stale_and_is_named(proje
 )
 def test_an_edit_of_anything_else_leaves_a_result_as_it_is(project, name, text):
     record(project)
-    before = shown(project)
+    before = page_block(project)
     (project / name).write_text(text)
-    assert shown(project) == before
+    assert page_block(project) == before
     commit(project)
-    assert shown(project) == before, "and however many commits later"
+    assert page_block(project) == before, "and however many commits later"
 
 
 def test_a_module_that_is_gone_makes_its_result_stale(project):
     record(project)
     (project / "studies/some.py").unlink()
     (project / "studies/some.yaml").unlink()
-    words = " ".join(shown(project).split())
+    words = " ".join(page_block(project).split())
     assert "**STALE**, changed since: 5 that it no longer goes through)" in words
 
 
@@ -235,7 +235,7 @@ def test_a_package_that_the_command_names_is_the_result_s(project, tmp_path, mon
     monkeypatch.setattr(sys, "orig_argv", [*sys.orig_argv, str(tmp_path / "another.tgz")])
     record(project)
     assert stored(project)["code"]["package"] == hashlib.sha256(b"{2}").hexdigest()[:12]
-    assert shown(project).endswith("; **STALE**, changed since: package)")
+    assert page_block(project).endswith("; **STALE**, changed since: package)")
 
 
 def test_a_commit_that_is_not_in_the_history_is_named(project):
@@ -264,7 +264,7 @@ def test_a_shallow_clone_says_that_it_cannot_check(project, tmp_path):
 def test_two_tables_one_after_the_other_stay_two(project):
     with recorded("study", root=project):
         print("| a |\n|---|\n| 1 |\n\n| b |\n|---|\n| 2 |")
-    assert shown(project).startswith("| a |\n|---|\n| 1 |\n\n| b |\n|---|\n| 2 |\n\n`python")
+    assert page_block(project).startswith("| a |\n|---|\n| 1 |\n\n| b |\n|---|\n| 2 |\n\n`python")
 
 
 def test_a_run_that_fails_or_is_not_to_be_kept_leaves_the_file_alone(project):
@@ -287,7 +287,7 @@ def fail(project):
 def test_a_file_that_is_none_is_one_line(project, text):
     (project / "docs/results/study.json").write_text(text)
     with pytest.raises(InputError, match="study.json: .*expected JSON with command, commit and lines"):
-        shown(project)
+        page_block(project)
     assert block(project / "docs/results/another.json") == "(no run is kept yet)"
 
 
@@ -305,11 +305,11 @@ def test_an_archived_result_names_its_tag_and_commit_and_is_never_stale(project)
     assert KeptResult.read(project / "docs/results/study.json").state(project) == "STALE"
     assert archived(project).state(project) == "archived (results-1)"
     of = stored(project)["commit"]
-    words = " ".join(shown(project).split())
+    words = " ".join(page_block(project).split())
     assert f"(commit {of} of " in words
     assert words.endswith("; archived (results-1): its code stands last in commit f922469a)")
     archived(project, stale="its rows name no commit")
-    assert " ".join(shown(project).split()).endswith("in commit f922469a; its rows name no commit)")
+    assert " ".join(page_block(project).split()).endswith("in commit f922469a; its rows name no commit)")
 
 
 def test_an_archived_result_whose_code_is_there_and_one_of_no_code_are_wrong(project):
@@ -330,7 +330,7 @@ def test_a_command_that_has_another_name_today_is_shown_with_both(project):
     record(project)
     content = stored(project) | {"ran_as": "benchmarks.some"}
     (project / "docs/results/study.json").write_text(json.dumps(content))
-    assert "`python -m studies.some --only 'a b'`\n(as `benchmarks.some`, commit " in shown(project)
+    assert "`python -m studies.some --only 'a b'`\n(as `benchmarks.some`, commit " in page_block(project)
 
 
 def test_the_index_has_every_result_and_the_archive_by_itself(project):
@@ -364,8 +364,8 @@ def test_the_archive_s_commits_have_the_code_of_what_is_archived():
 def test_every_command_keeps_its_results_and_every_kept_one_is_shown():
     named = names_recorded(ROOT) | {result.name for result in kept_results(ROOT) if result.archived}
     pages = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs").rglob("*.md"))
-    shown = re.findall(r"^<!-- results/(\w+) -->$", pages, re.MULTILINE)
-    assert sorted(shown) == sorted(named)
+    blocks = re.findall(r"^<!-- results/(\w+) -->$", pages, re.MULTILINE)
+    assert sorted(blocks) == sorted(named)
     assert {file.stem for file in FILES} <= named
     runs = [file for name in COMMANDS for file in modules(name) if '"__main__"' in file.read_text()]
     assert len(runs) >= 15
@@ -378,22 +378,22 @@ def modules(name):
 
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_a_result_is_of_a_command_and_of_code(file):
-    found = json.loads(file.read_text(encoding="utf-8"))
-    modules = re.findall(r"python -m ((?:studies|benchmarks|qualification)\.[\w.]+)", found["command"])
+    content = json.loads(file.read_text(encoding="utf-8"))
+    modules = re.findall(r"python -m ((?:studies|benchmarks|qualification)\.[\w.]+)", content["command"])
     assert modules
     for module in modules if file in CURRENT else ():
         place = ROOT / module.replace(".", "/")
         assert place.with_suffix(".py").is_file() or (place / "__main__.py").is_file()
-    assert re.fullmatch(r"[0-9a-f]{7}", found["commit"])
+    assert re.fullmatch(r"[0-9a-f]{7}", content["commit"])
     if file.stem in UNPROVEN:
-        assert UNPROVEN[file.stem] in found["stale"]
-        assert "code" not in found
-        words = "**STALE**: " if file in CURRENT else f"in commit {ARCHIVES[found['archived']]}; "
-        assert words + found["stale"] in " ".join(block(file).split())
+        assert UNPROVEN[file.stem] in content["stale"]
+        assert "code" not in content
+        words = "**STALE**: " if file in CURRENT else f"in commit {ARCHIVES[content['archived']]}; "
+        assert words + content["stale"] in " ".join(block(file).split())
     else:
-        assert "stale" not in found
-        assert found["code"]
-        assert re.fullmatch(r"\d{4}-\d\d-\d\d", found["date"])
+        assert "stale" not in content
+        assert content["code"]
+        assert re.fullmatch(r"\d{4}-\d\d-\d\d", content["date"])
 
 
 def test_the_list_of_results_without_code_holds_no_other_name():
@@ -439,11 +439,11 @@ def test_settings_and_outputs_that_a_module_names_are_declared(file):
     """Paths and the package, in the module of the command or its folder."""
     (module,) = modules_of(json.loads(file.read_text())["command"])
     place = ROOT / module.replace(".", "/")
-    own = sorted(place.glob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
-    trees = [ast.parse(one.read_text(encoding="utf-8")) for one in own]
+    files = sorted(place.glob("*.py")) if place.is_dir() else [place.with_suffix(".py")]
+    trees = [ast.parse(file.read_text(encoding="utf-8")) for file in files]
     texts = {node.value for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Constant)}
     paths = {text for text in texts if isinstance(text, str) and SETTINGS.fullmatch(text)}
-    paths |= {"package"} if any("qualify(" in one.read_text() for one in own) else set()
+    paths |= {"package"} if any("qualify(" in file.read_text() for file in files) else set()
     paths = {"package" if path.startswith("artifacts/package_unity") else path for path in paths}
     reads = reads_of(ROOT, file.stem)
     assert [path for path in paths if not any(path in entry or entry in path for entry in reads)] == []

@@ -1,4 +1,4 @@
-"""What operators did, as a dataset for LeRobot: `python -m trunkline.ar.dataset LOG... --out FOLDER`
+"""What operators did, as a dataset for LeRobot: `trunkline export-dataset LOG... --out FOLDER`
 
 LOG is the log of a live session. An episode goes from when the robot was let move until it was done: a plan that was
 executed, or a stretch of following. Each frame has the joints and pulls as measured and the tip, what was aimed at, the
@@ -14,7 +14,7 @@ from trunkline.ar.dataset.episodes import Episode, episodes
 from trunkline.ar.dataset.recording import read_recording
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.stage import output_folder
-from trunkline.program import called
+from trunkline.program import program_name
 
 ROBOT = "panda_with_soft_arm"
 
@@ -22,7 +22,7 @@ ROBOT = "panda_with_soft_arm"
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.ar.dataset"), description=__doc__,
+        prog=program_name("export-dataset"), description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("logs", type=Path, nargs="+", metavar="LOG")

@@ -1,4 +1,4 @@
-"""OptiTrack Motive's CSV export as MCAP logs: `python -m trunkline.recordings.preparation.motive --session
+"""OptiTrack Motive's CSV export as MCAP logs: `trunkline import-motive --session
 data/raw/NAME CSV…`
 
 Up is +y. Rigid bodies become `mocap4r2_msgs/msg/RigidBodies`, and where an export has none, its markers become
@@ -14,7 +14,7 @@ from mcap_ros2.writer import Writer
 
 from trunkline.errors import in_one_line
 from trunkline.files import written_whole
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.logs.definitions import MARKERS, RIGID_BODIES
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.preparation.export import read_export
@@ -53,7 +53,7 @@ def _body(poses: PoseStream, frame: int, body: int) -> dict:
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.recordings.preparation.motive"),
+        prog=program_name("import-motive"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -1,4 +1,4 @@
-"""A fleet at a glance: errors of every arm, and a panel a parameter with the intervals of all of them."""
+"""A batch of arms at a glance: errors of every arm, and a panel a parameter with the intervals of all of them."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -15,19 +15,19 @@ MODELS = {  # colour, dot
 }  # fmt: skip
 
 
-def fleet_figure(table: pd.DataFrame) -> Figure:
+def batch_figure(table: pd.DataFrame) -> Figure:
     """From a row an arm and number: arm, kind (parameter or error), name, value, low, high, unit, drift,
     drift_half_width. Parameters that drifted beyond their intervals are marked."""
     arms = list(dict.fromkeys(table.arm))
     parameters = table[table.kind == "parameter"]
     counts = parameters.groupby("name", sort=False).arm.nunique()
-    shown = list(counts.index[counts >= min(2, len(arms))])
-    rows = 1 + -(-len(shown) // ACROSS)
+    drawn = list(counts.index[counts >= min(2, len(arms))])
+    rows = 1 + -(-len(drawn) // ACROSS)
     width, height = max(9.0, 1.2 + 0.55 * len(arms) * ACROSS), 3.4 + (rows - 1) * (1.6 + 0.09 * _longest(arms))
     figure = plt.figure(figsize=(min(width, 22.0), height))
     grid = figure.add_gridspec(rows, ACROSS, height_ratios=[1.6] + [1] * (rows - 1))
     _errors(figure.add_subplot(grid[0, :]), table[table.kind == "error"], arms)
-    for number, name in enumerate(shown):
+    for number, name in enumerate(drawn):
         axis = figure.add_subplot(grid[1 + number // ACROSS, number % ACROSS])
         _parameter(axis, parameters[parameters.name == name], arms, name)
     return figure
@@ -37,12 +37,12 @@ def _errors(axis, errors: pd.DataFrame, arms: list[str]) -> None:
     places = {arm: i for i, arm in enumerate(arms)}
     for offset, (model, (color, dot)) in zip(np.linspace(-0.2, 0.2, len(MODELS)), MODELS.items(), strict=True):
         for error, filled in (("position", False), ("tip", True)):
-            own = errors[errors.name.str.startswith(f"{model}_{error}_")]
-            x = own.arm.map(places) + offset
+            rows = errors[errors.name.str.startswith(f"{model}_{error}_")]
+            x = rows.arm.map(places) + offset
             face = color if filled or dot == "x" else "none"
             size = 6 if filled else 5
             label = LABELS[model] if filled else None
-            axis.semilogy(x, own.value, dot, color=color, mfc=face, ms=size, label=label)
+            axis.semilogy(x, rows.value, dot, color=color, mfc=face, ms=size, label=label)
     axis.set_xticks(range(len(arms)), arms, rotation=20 if len(arms) > 6 else 0)
     axis.set_xlim(-0.6, len(arms) - 0.4)
     axis.set_ylabel("error (mm)")

@@ -14,7 +14,7 @@ MOST = 95  # of 100, within `interval`
 
 
 @dataclass(frozen=True)
-class Randomisation:
+class Randomization:
     """P parameters. Of those that are never 0 or less, lognormal, x = ln(value / centre); of the others, normal,
     x = value - centre.
 
@@ -68,36 +68,37 @@ class Randomisation:
         """
         values, vectors = np.linalg.eigh(self.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0))
-        found = np.empty((0, len(self.names)))
+        accepted = np.empty((0, len(self.names)))
         inside = np.zeros(len(self.names))
         for _ in range(TRIES):
             x = rng.standard_normal((count, len(self.names))) @ root.T
             within = (self.at(x) >= self.low) & (self.at(x) <= self.high)
             inside += within.sum(axis=0)
-            found = np.concatenate([found, x[within.all(axis=1)]])
-            if len(found) >= count:
-                return found[:count]
+            accepted = np.concatenate([accepted, x[within.all(axis=1)]])
+            if len(accepted) >= count:
+                return accepted[:count]
         out = self.names[int(np.argmin(inside))]
-        raise InputError(f"{out}: found {len(found)} of {count * TRIES} draws within its range, expected {count}")
+        raise InputError(f"{out}: found {len(accepted)} of {count * TRIES} draws within its range, expected {count}")
 
-    def widened(self, factor: float) -> "Randomisation":
+    def widened(self, factor: float) -> "Randomization":
         """All standard deviations times `factor`; the limits stay."""
         return replace(self, covariance=self.covariance * factor**2)
 
 
-def of_arm(known: Identified) -> Randomisation:
+def of_arm(estimates: Identified) -> Randomization:
     """Of one arm: the estimates with their standard uncertainties, and correlations within a stage."""
-    parameters = [PARAMETERS[name] for name in known.names]
-    deviation = known.deviation * np.array([one.scale if one.signed else 1.0 for one in parameters])
+    parameters = [PARAMETERS[name] for name in estimates.names]
+    scales = np.array([parameter.scale if parameter.signed else 1.0 for parameter in parameters])
+    deviation = estimates.deviation * scales
     centre, low, high = (
-        np.array([float(one.value(z)) for one, z in zip(parameters, row, strict=True)])
-        for row in (known.estimate, known.low, known.high)
+        np.array([float(parameter.value(z)) for parameter, z in zip(parameters, row, strict=True)])
+        for row in (estimates.estimate, estimates.low, estimates.high)
     )
-    covariance = known.correlation * np.outer(deviation, deviation)
-    return Randomisation(known.names, known.stages, centre, covariance, low, high)
+    covariance = estimates.correlation * np.outer(deviation, deviation)
+    return Randomization(estimates.names, estimates.stages, centre, covariance, low, high)
 
 
-def of_population(arms: list[Randomisation]) -> Randomisation:
+def of_population(arms: list[Randomization]) -> Randomization:
     """Of an arm that is not among these n: about their mean, by what differs between them besides what is uncertain.
 
     x = b + e: b between arms, independent from parameter to parameter, as a few arms tell no correlations; e within
@@ -111,8 +112,8 @@ def of_population(arms: list[Randomisation]) -> Randomisation:
     first, count = arms[0], len(arms)
     for number, arm in enumerate(arms):
         if odd := sorted(set(first.names) ^ set(arm.names)):
-            found = f"found in one of arms 1 and {number + 1} alone, expected the same parameters"
-            raise InputError(f"{', '.join(odd)}: {found}")
+            mismatch = f"found in one of arms 1 and {number + 1} alone, expected the same parameters"
+            raise InputError(f"{', '.join(odd)}: {mismatch}")
     order = [[arm.names.index(name) for name in first.names] for arm in arms]
     within = np.mean([arm.covariance[np.ix_(o, o)] for arm, o in zip(arms, order, strict=True)], axis=0)
     centres, low, high = (
@@ -122,7 +123,7 @@ def of_population(arms: list[Randomisation]) -> Randomisation:
     axis = np.where(first.normal, centres, np.log(np.where(first.normal, 1.0, centres)))
     middle = axis.mean(axis=0)
     between = np.maximum(axis.var(axis=0, ddof=1) - np.diag(within), 0)
-    return Randomisation(
+    return Randomization(
         first.names, first.groups, np.where(first.normal, middle, np.exp(np.where(first.normal, 0.0, middle))),
         (within + np.diag(between)) * (1 + 1 / count), low.min(axis=0), high.max(axis=0), count,
     )  # fmt: skip

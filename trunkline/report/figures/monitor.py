@@ -11,7 +11,7 @@ NAMED = 40  # trials whose names have room below the chart
 FURTHEST = 2.5  # limits, beyond which a dot is drawn at the edge
 
 
-def watch_figure(table: pd.DataFrame, title: str) -> Figure:
+def monitor_figure(table: pd.DataFrame, title: str) -> Figure:
     """From a row a trial and parameter: number, trial, parameter, z, chart, limit, beyond."""
     parameters = list(dict.fromkeys(table.parameter)) or ["no trial yet"]
     trials = table.drop_duplicates("number")
@@ -20,18 +20,18 @@ def watch_figure(table: pd.DataFrame, title: str) -> Figure:
         len(parameters), 1, figsize=(width, 1.5 + 1.15 * len(parameters)), squeeze=False, sharex=True
     )
     for axis, parameter in zip(axes[:, 0], parameters, strict=True):
-        own = table[table.parameter == parameter]
-        if not len(own):
+        rows = table[table.parameter == parameter]
+        if not len(rows):
             axis.text(0.5, 0.5, parameter, ha="center", transform=axis.transAxes)
             continue
-        limit = own.limit.iloc[0]
+        limit = rows.limit.iloc[0]
         edge = FURTHEST * limit
         axis.axhspan(-limit, limit, color=IDENTIFIED, alpha=0.08, lw=0)
         for side in (-limit, limit):
             axis.axhline(side, color=IDENTIFIED, lw=0.8)
-        axis.plot(own.number, own.z.clip(-edge, edge), ".", color=DOUBTFUL, ms=4)
-        axis.plot(own.number, own.chart.clip(-edge, edge), "-o", color=IDENTIFIED, ms=3, lw=1.2)
-        beyond = own[own.beyond]
+        axis.plot(rows.number, rows.z.clip(-edge, edge), ".", color=DOUBTFUL, ms=4)
+        axis.plot(rows.number, rows.chart.clip(-edge, edge), "-o", color=IDENTIFIED, ms=3, lw=1.2)
+        beyond = rows[rows.beyond]
         axis.plot(beyond.number, beyond.chart.clip(-edge, edge), "o", color=INITIAL, ms=5)
         axis.set_ylim(-1.05 * edge, 1.05 * edge)
         axis.set_ylabel(parameter.replace("_", "\n", 1), rotation=0, ha="right", va="center", fontsize=8)

@@ -16,10 +16,14 @@ from upkeep.origin import imported
     ],
 )
 def test_of_what_is_imported_all_counts_but_what_changes_no_number(tmp_path, name, counts):
-    files = {name: "import trunkline.model.statics\n", "trunkline/statics.py": "LENGTH = 1\n", "studies/some.py": ""}
+    files = {
+        name: "import trunkline.model.statics\n",
+        "trunkline/model/statics.py": "LENGTH = 1\n",
+        "studies/some.py": "",
+    }
     files["studies/some.py"] = f"import {name.removesuffix('.py').replace('/', '.')}\n"
     for file, text in files.items():
         (tmp_path / file).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / file).write_text(text)
-    found = imported(tmp_path, ["studies/some.py"])
-    assert found == {"studies/some.py"} | ({name, "trunkline/statics.py"} if counts else set())
+    files = imported(tmp_path, ["studies/some.py"])
+    assert files == {"studies/some.py"} | ({name, "trunkline/model/statics.py"} if counts else set())

@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.design`: what to record next, and what it is expected to tell."""
+"""`trunkline suggest`: what to record next, and what it is expected to tell."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +15,7 @@ from tests.support.workbench import workbench
 from trunkline.identification.fit.identify import with_parameters
 from trunkline.identification.parameters.parameters import PARAMETERS
 from trunkline.identification.parameters.per_session import make_room
-from trunkline.identification.uncertainty.identifiability import to_identify_from, told_by
+from trunkline.identification.uncertainty.identifiability import expected_identifiability, to_identify_from
 from trunkline.model.arm.joints import Joints, add_elements
 from trunkline.pipeline.config import load_folder
 from trunkline.recordings.session.session import read_session
@@ -55,8 +55,8 @@ def stage_of(model, grid, kinds, ranges, trials, share=SHARE, **changed) -> tupl
 
 
 def best(stage, every, model, grid, goal="intervals", count=1):
-    found = suggest([stage], weights_for(goal, [stage], model, grid), every, count)
-    return [one.candidate for one in found]
+    suggestions = suggest([stage], weights_for(goal, [stage], model, grid), every, count)
+    return [suggestion.candidate for suggestion in suggestions]
 
 
 def paper_loss():
@@ -69,11 +69,11 @@ def test_a_side_to_which_nothing_tilted_the_arm_comes_first(model, grid):
     ranges = {"stiffness": (0.1, 20.0), "mount_tilt_x": (-0.3, 0.3), "mount_tilt_y": (-0.3, 0.3)}
     trials = [tilt(model, angle) for angle in (20, 50, 80)]  # about y: gravity towards +x
     stage, every = stage_of(model, grid, ["static_tilt"], ranges, trials, 2e-4, loss=paper_loss())
-    told = {one.name: one.share for one in stage.told([])}
-    assert told["mount_tilt_x"] > 1 > 2 * told["mount_tilt_y"], "undetermined, and determined"
+    before = {estimate.name: estimate.share for estimate in stage.identifiability([])}
+    assert before["mount_tilt_x"] > 1 > 2 * before["mount_tilt_y"], "undetermined, and determined"
     (first,) = best(stage, every, model, grid)
     assert abs(first.gravity[1]) > abs(first.gravity[0]), first.name
-    after = {one.name: one.share for one in stage.told([first.name])}
+    after = {estimate.name: estimate.share for estimate in stage.identifiability([first.name])}
     assert after["mount_tilt_x"] < 0.5
     weights = weights_for("intervals", [stage], model, grid)
     why = why_words([stage], weights, suggest([stage], weights, every, 1)[0])
@@ -115,8 +115,8 @@ def test_information_adds_and_never_takes_away(model, grid):
     ("static_pull", "pull_1_061", lambda model: static_pull(model, (61, -300, -300))),
 ])  # fmt: skip
 def test_the_expected_interval_is_that_with_the_trial_really_added(grid, kind, name, made):
-    """By `told_by`, the arithmetic of `check`, on a trial that plain steps of MuJoCo simulate; within 3 %. Of an arm
-    whose tendons have no friction, which `check` leaves out."""
+    """By `expected_identifiability`, the arithmetic of `check`, on a trial that plain steps of MuJoCo simulate; within
+    3 %. The arm's tendons have no friction, which `check` leaves out."""
     model = small_model(4, kp=100)
     model.tendon_frictionloss[:] = 0
     kinds = ["static_tilt", "static_pull"]
@@ -124,12 +124,13 @@ def test_the_expected_interval_is_that_with_the_trial_really_added(grid, kind, n
     trials = [tilt(model, 40), tilt(model, 70), static_pull(model, (30, -300, -300)),
               static_pull(model, (-300, 45, -300))]  # fmt: skip
     stage, every = stage_of(model, grid, kinds, ranges, trials, 0.002)
-    assert name in {one.name for one in every if one.kind == kind}
-    now, expected = stage.told([]), stage.told([name])
-    really, _ = told_by(*to_identify_from(settings(kinds, kinds, ranges), model, [*trials, made(model)]), 0.002)
-    for before, one, other in zip(now, expected, really, strict=True):
-        assert one.half_width == pytest.approx(other.half_width, rel=0.03), one.name
-        assert one.half_width < before.half_width
+    assert name in {candidate.name for candidate in every if candidate.kind == kind}
+    now, expected = stage.identifiability([]), stage.identifiability([name])
+    prepared = to_identify_from(settings(kinds, kinds, ranges), model, [*trials, made(model)])
+    really, _ = expected_identifiability(*prepared, 0.002)
+    for before, estimate, other in zip(now, expected, really, strict=True):
+        assert estimate.half_width == pytest.approx(other.half_width, rel=0.03), estimate.name
+        assert estimate.half_width < before.half_width
 
 
 def test_a_pull_that_friction_may_hold_elsewhere_tells_less(model):
@@ -150,18 +151,18 @@ def test_each_suggestion_knows_those_before_it(model, grid):
     trials = [tilt(model, 40), static_pull(model, (30, -300, -300))]
     stage, every = stage_of(model, grid, kinds, ELASTIC | {"kp": (10.0, 1e4)}, trials)
     weights = weights_for("intervals", [stage], model, grid)
-    found = suggest([stage], weights, every, 4)
-    assert len({one.candidate.name for one in found}) == 4
-    for earlier, later in zip(found, found[1:], strict=False):
+    suggestions = suggest([stage], weights, every, 4)
+    assert len({suggestion.candidate.name for suggestion in suggestions}) == 4
+    for earlier, later in zip(suggestions, suggestions[1:], strict=False):
         assert later.before == earlier.after
         assert later.chosen[:-1] == earlier.chosen
-    for one in found:
-        left = [other for other in every if other.name not in one.chosen[:-1]]
-        assert one.after == pytest.approx(expected_loss([stage], weights, one.chosen))
-        assert one.after == pytest.approx(after_each([stage], weights, left, one.chosen[:-1]).min())
+    for suggestion in suggestions:
+        left = [other for other in every if other.name not in suggestion.chosen[:-1]]
+        assert suggestion.after == pytest.approx(expected_loss([stage], weights, suggestion.chosen))
+        assert suggestion.after == pytest.approx(after_each([stage], weights, left, suggestion.chosen[:-1]).min())
     quick = suggest([stage], weights, every, 1, per_minute=True)[0]
-    gains = np.sqrt(found[0].before) - np.sqrt(after_each([stage], weights, every, []))
-    assert quick.candidate == every[int(np.argmax(gains / [one.minutes for one in every]))]
+    gains = np.sqrt(suggestions[0].before) - np.sqrt(after_each([stage], weights, every, []))
+    assert quick.candidate == every[int(np.argmax(gains / [candidate.minutes for candidate in every]))]
 
 
 def test_what_the_session_holds_is_not_suggested_again(model, grid):
@@ -173,9 +174,9 @@ def test_what_the_session_holds_is_not_suggested_again(model, grid):
 
 def test_a_stage_without_any_of_its_trials_knows_the_ranges_alone(model, grid):
     stage, _ = stage_of(model, grid, ["static_pull"], {"kp": (10.0, 1e4)}, [tilt(model, 30)])
-    (told,) = stage.told([])
-    assert told.words() == "kp stays undetermined within its range"
-    assert min(stage.told([name])[0].share for name in stage.added) < 1
+    (estimate,) = stage.identifiability([])
+    assert estimate.words() == "kp stays undetermined within its range"
+    assert min(stage.identifiability([name])[0].share for name in stage.added) < 1
 
 
 def test_the_tip_answers_a_parameter_as_another_arm_does(model, grid):
@@ -201,34 +202,34 @@ def test_what_another_session_has_for_itself_moves_no_tip_of_the_first(grid):
 def test_two_sessions_on_an_arm_that_no_stage_identified_have_a_mount_each(project, model):
     monday = [replace(tilt(model, angle), session="monday") for angle in (20, 60)]
     friday = [replace(tilt(model, 40), session="friday")]
-    spec, told = twin(None, project)
-    assert told == DESCRIBED
-    found = with_room(spec, monday + friday, project)
-    held = [found.numeric(index).name for index in range(found.nnumeric)]
-    assert "mount_tilt_x@friday" in held
-    assert not [name for name in held if name.endswith("@monday")]
+    spec, source = twin(None, project)
+    assert source == DESCRIBED
+    model_with_room = with_room(spec, monday + friday, project)
+    names = [model_with_room.numeric(index).name for index in range(model_with_room.nnumeric)]
+    assert "mount_tilt_x@friday" in names
+    assert not [name for name in names if name.endswith("@monday")]
 
 
 def test_a_release_is_bent_towards_its_side(model, grid):
     stage, every = stage_of(model, grid, ["release"], {"damping": (1e-4, 1.0)}, [release(model, 0.2)])
-    assert {one.kind for one in every} == {"release"}
-    assert set(stage.added) == {one.name for one in every}
+    assert {candidate.kind for candidate in every} == {"release"}
+    assert set(stage.added) == {candidate.name for candidate in every}
     assert all(matrix[0, 0] > 0 for matrix in stage.added.values())
 
 
 def test_entries_are_read_back(model, grid, tmp_path):
     kinds = ("static_tilt", "release", "static_pull", "curl", "motion")
     every = candidates(grid, model, kinds, FRAMES)
-    assert {one.kind for one in every} == set(kinds)
+    assert {candidate.kind for candidate in every} == set(kinds)
     lines = entry_lines(every, {every[0].name})
     text = "\n".join(["frame: {up: [0, 1, 0]}", "base: base", "trials:", *lines])
     (tmp_path / "session.yaml").write_text(text)
     for entry in yaml.safe_load(text)["trials"]:
         (tmp_path / entry["file"]).write_bytes(entry["file"].encode())
     session = read_session(tmp_path)
-    assert [t.experiment for t in session.trials] == [one.kind for one in every]
-    assert [t.level for t in session.trials] == [one.level for one in every]
-    assert [t.load for t in session.trials] == [one.load for one in every]
+    assert [t.experiment for t in session.trials] == [candidate.kind for candidate in every]
+    assert [t.level for t in session.trials] == [candidate.level for candidate in every]
+    assert [t.load for t in session.trials] == [candidate.load for candidate in every]
     assert {t.split for t in session.trials} == {"identify"}
     assert every[0].name not in {t.name for t in session.trials}, "a name that is taken"
 
@@ -237,12 +238,12 @@ def test_the_command_says_all_and_writes_nothing(project, monkeypatch, capsys):
     monkeypatch.chdir(project)
     files = sorted(path for path in project.rglob("*") if path.is_file())
     assert main(["data/raw/demo", "--only", "static_tilt", "--count", "2"]) == 0
-    told = capsys.readouterr().out
-    assert "twin: as described in params.yaml, as no stage has identified one yet" in told
-    assert "suggested, of " in told
-    assert "  - {file: tilt_0" in told
-    assert "experiment: static_tilt, level: " in told
-    assert "python -m trunkline.tools.preflight data/raw/demo" in told
+    output = capsys.readouterr().out
+    assert "twin: as described in params.yaml, as no stage has identified one yet" in output
+    assert "suggested, of " in output
+    assert "  - {file: tilt_0" in output
+    assert "experiment: static_tilt, level: " in output
+    assert "trunkline check data/raw/demo" in output
     assert sorted(path for path in project.rglob("*") if path.is_file()) == files
 
 
@@ -258,10 +259,10 @@ def test_the_command_says_all_and_writes_nothing(project, monkeypatch, capsys):
 def test_a_mistake_is_one_line(project, monkeypatch, capsys, arguments, line):
     monkeypatch.chdir(project)
     assert main(arguments) == 1
-    told = capsys.readouterr()
-    assert line in told.err.splitlines()[-1]
-    assert "Traceback" not in told.err
-    assert "suggested" not in told.out
+    output = capsys.readouterr()
+    assert line in output.err.splitlines()[-1]
+    assert "Traceback" not in output.err
+    assert "suggested" not in output.out
 
 
 def test_a_cost_that_is_none_is_refused(tmp_path):

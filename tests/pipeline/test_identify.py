@@ -125,8 +125,8 @@ def later(project, tmp_path, monkeypatch):
 def test_evaluate_tells_of_each_session_and_knows_one_alone(later, capsys):
     model = "artifacts/identify_control/arm.xml"
     assert evaluate([model, f"{FILTERED}"]) == 0
-    told = capsys.readouterr().out
-    assert told.index("\nsession monday\n") < told.index("\nsession friday\n")
+    output = capsys.readouterr().out
+    assert output.index("\nsession monday\n") < output.index("\nsession friday\n")
     whole = json.loads((later / "evaluation/filter/metrics.json").read_text())
     for session in MOUNTS:
         assert whole["by_session"][session]["model"]["trials"] == 15
@@ -138,8 +138,8 @@ def test_evaluate_tells_of_each_session_and_knows_one_alone(later, capsys):
     write_trials(folder, alone)
     assert evaluate([model, "friday"]) == 0
     assert "evaluate: the session friday of those that the model was fitted to" in capsys.readouterr().out
-    one = json.loads((later / "evaluation/friday/metrics.json").read_text())
-    assert one["model"] == whole["by_session"]["friday"]["model"]
+    friday = json.loads((later / "evaluation/friday/metrics.json").read_text())
+    assert friday["model"] == whole["by_session"]["friday"]["model"]
 
 
 @pytest.mark.usefixtures("figures_not_laid_out")

@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.monitor`: what it finds in a folder, what it says, and that nothing is lost or scored
+"""`trunkline monitor`: what it finds in a folder, what it says, and that nothing is lost or scored
 twice."""
 
 import json
@@ -30,8 +30,8 @@ def made(tmp_path_factory):
 
 
 def words(root: Path, *more: str) -> list[str]:
-    given = [root / "arm.xml", root / "drop", "--reference", root / "sessions/reference", "--settings", root]
-    return [*map(str, given), "--out", str(root / "out"), "--once", *more]
+    arguments = [root / "arm.xml", root / "drop", "--reference", root / "sessions/reference", "--settings", root]
+    return [*map(str, arguments), "--out", str(root / "out"), "--once", *more]
 
 
 @pytest.fixture
@@ -59,15 +59,15 @@ def scored(root: Path) -> list[str]:
 def test_an_unchanged_arm_is_within_limits_and_a_softer_one_is_found_within_three_trials(lab, capsys):
     drop(lab, "same")
     assert watch(lab) == 0
-    said = capsys.readouterr().out
-    assert said.count("within limits") == len(TILTS)
+    output = capsys.readouterr().out
+    assert output.count("within limits") == len(TILTS)
     drop(lab, "softer")
     assert watch(lab) == 1
-    said = capsys.readouterr().out
+    output = capsys.readouterr().out
     table = pd.read_csv(lab / "out/chart.csv")
     softer = list(dict.fromkeys(table.trial[table.trial.str.startswith("softer")]))
     assert softer.index(table.trial[table.beyond].iloc[0]) < 3
-    explained = next(line for line in said.splitlines() if "explained best by" in line)
+    explained = next(line for line in output.splitlines() if "explained best by" in line)
     assert "stiffness -" in explained
     assert float(explained.split("stiffness ")[1].split()[0]) == pytest.approx(-5, abs=0.8)
     assert (lab / "out/chart.png").stat().st_size > 10_000
@@ -76,9 +76,9 @@ def test_an_unchanged_arm_is_within_limits_and_a_softer_one_is_found_within_thre
 def test_a_reference_of_few_conditions_is_said(lab, capsys):
     shutil.rmtree(lab / "out")
     assert watch(lab) == 0
-    said = capsys.readouterr().out
-    assert f"reference: {4 * len(TILTS)} static_tilt under {len(TILTS)} conditions" in said
-    assert "few conditions of static_tilt, as where a session is planned for identification" in said
+    output = capsys.readouterr().out
+    assert f"reference: {4 * len(TILTS)} static_tilt under {len(TILTS)} conditions" in output
+    assert "few conditions of static_tilt, as where a session is planned for identification" in output
 
 
 def test_nothing_is_scored_twice(lab, capsys):
@@ -87,7 +87,7 @@ def test_nothing_is_scored_twice(lab, capsys):
     before = (lab / "out/scores.jsonl").read_bytes()
     capsys.readouterr()
     assert watch(lab) == 0
-    assert capsys.readouterr().out == f"watch: {len(TILTS)} of {len(TILTS)} trials judged: no change is seen\n"
+    assert capsys.readouterr().out == f"monitor: {len(TILTS)} of {len(TILTS)} trials judged: no change is seen\n"
     assert (lab / "out/scores.jsonl").read_bytes() == before
 
 
@@ -98,13 +98,13 @@ def test_a_half_written_log_is_said_in_one_line_and_scored_once_it_is_whole(lab,
     log.write_bytes(whole[: len(whole) // 2])
     assert watch(lab) == 0
     assert [line for line in capsys.readouterr().out.splitlines() if "not whole yet" in line] == [
-        f"watch: {log}: not whole yet ({len(whole) // 2} bytes, no end): waits until it changes"
+        f"monitor: {log}: not whole yet ({len(whole) // 2} bytes, no end): waits until it changes"
     ]
     assert len(scored(lab)) == len(TILTS) - 1
     log.write_bytes(whole[: 2 * len(whole) // 3])
     watch(lab)
     (line,) = capsys.readouterr().out.splitlines()  # it grows: said before
-    assert line == f"watch: {len(TILTS) - 1} of {len(TILTS) - 1} trials judged: no change is seen"
+    assert line == f"monitor: {len(TILTS) - 1} of {len(TILTS) - 1} trials judged: no change is seen"
     log.write_bytes(whole)
     watch(lab)
     assert "tilt_50_0: within limits" in capsys.readouterr().out
@@ -125,11 +125,11 @@ def test_a_log_that_was_cut_off_is_taken_in_the_end(lab, capsys, monkeypatch):
 
 def test_a_log_that_is_named_and_yet_to_come_is_awaited(lab):
     session = drop(lab, "same")
-    kept = lab / "tilt_50_0.mcap"
-    (session / kept.name).rename(kept)
+    elsewhere = lab / "tilt_50_0.mcap"
+    (session / elsewhere.name).rename(elsewhere)
     assert watch(lab) == 0
     assert len(scored(lab)) == len(TILTS) - 1
-    kept.rename(session / kept.name)
+    elsewhere.rename(session / elsewhere.name)
     watch(lab)
     assert len(scored(lab)) == len(TILTS)
 
@@ -140,9 +140,9 @@ def test_a_session_with_a_mistake_stops_no_other_and_is_scored_once_it_is_put_ri
     text = (wrong / "session.yaml").read_text()
     (wrong / "session.yaml").write_text(text.replace("experiment: static_tilt", "experiment: tilted", 1))
     assert watch(lab) == 2
-    said = [line for line in capsys.readouterr().out.splitlines() if "softer" in line]
-    assert len(said) == 1
-    assert f"{wrong}/session.yaml: trials.0.experiment: found 'tilted', expected" in said[0]
+    lines = [line for line in capsys.readouterr().out.splitlines() if "softer" in line]
+    assert len(lines) == 1
+    assert f"{wrong}/session.yaml: trials.0.experiment: found 'tilted', expected" in lines[0]
     assert len(scored(lab)) == len(TILTS)
     (wrong / "session.yaml").write_text(text)
     assert watch(lab) == 1
@@ -156,7 +156,7 @@ def test_a_trial_of_another_arm_is_refused_in_one_line(lab, capsys):
     (session / "session.yaml").write_text(text.replace("trials:", f"{named}trials:"))
     assert watch(lab) == 2
     *lines, last = capsys.readouterr().out.splitlines()
-    assert last == "watch: 0 of 0 trials judged"
+    assert last == "monitor: 0 of 0 trials judged"
     assert len(lines) == len(TILTS)
     assert all("refused: session.yaml: segments: " in line and "found 'joint_02'" in line for line in lines)
 
@@ -179,15 +179,15 @@ def test_the_state_of_another_model_is_refused(lab, capsys):
 def test_without_a_reference_the_first_trials_of_a_kind_stand_for_the_unchanged_arm(lab, capsys):
     shutil.copytree(lab / "sessions/reference", lab / "drop/a")
     drop(lab, "softer")
-    given = [str(lab / "arm.xml"), str(lab / "drop"), "--settings", str(lab), "--out", str(lab / "learned"), "--once"]
-    assert main(given) == 1
-    said = capsys.readouterr().out
-    assert said.count("kept to learn from") == LEARN
-    assert f"of {LEARN + len(TILTS) + 1} trials judged: the arm has changed" in said
-    assert "explained best by stiffness -" in said
+    words = [str(lab / "arm.xml"), str(lab / "drop"), "--settings", str(lab), "--out", str(lab / "learned"), "--once"]
+    assert main(words) == 1
+    output = capsys.readouterr().out
+    assert output.count("kept to learn from") == LEARN
+    assert f"of {LEARN + len(TILTS) + 1} trials judged: the arm has changed" in output
+    assert "explained best by stiffness -" in output
 
 
 def test_a_folder_that_is_not_there_is_refused_in_one_line(lab, capsys):
-    given = [str(lab / "arm.xml"), str(lab / "nowhere"), "--settings", str(lab), "--out", str(lab / "o"), "--once"]
-    assert main(given) == 2
+    arguments = [str(lab / "arm.xml"), str(lab / "nowhere"), "--settings", str(lab), "--out", str(lab / "o"), "--once"]
+    assert main(arguments) == 2
     assert "nowhere: no such folder, expected one into which sessions are dropped" in capsys.readouterr().err

@@ -17,8 +17,8 @@ from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.report.certificate.identified import identified
 from trunkline.tools.randomize.__main__ import main
 from trunkline.tools.randomize.fields import drawn_fields
-from trunkline.tools.randomize.file import read_randomisation
-from trunkline.tools.randomize.randomisation import Randomisation, of_arm, of_population
+from trunkline.tools.randomize.file import read_randomization
+from trunkline.tools.randomize.randomization import Randomization, of_arm, of_population
 
 ROOT = Path(__file__).parents[3]
 TOLD = {"identify_stiffness": ("stiffness", "mount_tilt_x"), "identify_control": ("kp", "damping", "force_range")}
@@ -64,7 +64,7 @@ def model(written) -> mujoco.MjModel:
 
 
 def test_draws_have_the_covariance_that_the_file_states(written):
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     stated = json.loads(written.read_text())
     values = drawn.values(drawn.draw(40_000, np.random.default_rng(1)))
     for group in stated["groups"].values():
@@ -79,21 +79,21 @@ def test_draws_have_the_covariance_that_the_file_states(written):
         assert covariance[0, 1] / scale[0, 1] == pytest.approx(0.6)
     between = np.corrcoef(np.log(values["stiffness"]), np.log(values["kp"]))[0, 1]
     assert abs(between) < 0.03
-    for name, one in stated["parameters"].items():
-        found = np.quantile(values[name], [0.025, 0.5, 0.975])
-        np.testing.assert_allclose(found[[0, 2]], one["interval_95"], rtol=0.03, atol=1e-3)
-        assert found[1] == pytest.approx(one["centre"], rel=0.01, abs=1e-3)
-        assert PARAMETERS[name].unit == one["unit"]
+    for name, row in stated["parameters"].items():
+        quantiles = np.quantile(values[name], [0.025, 0.5, 0.975])
+        np.testing.assert_allclose(quantiles[[0, 2]], row["interval_95"], rtol=0.03, atol=1e-3)
+        assert quantiles[1] == pytest.approx(row["centre"], rel=0.01, abs=1e-3)
+        assert PARAMETERS[name].unit == row["unit"]
 
 
 def test_its_intervals_are_narrower_than_student_s_by_the_degrees_of_freedom(written):
     """2.262 standard uncertainties for 10 trials, 1.960 for a normal distribution."""
-    one = json.loads(written.read_text())["parameters"]["stiffness"]
-    assert np.log(one["interval_95"][1] / one["centre"]) == pytest.approx(np.log(1.2) * 1.960 / 2.262, rel=1e-3)
+    row = json.loads(written.read_text())["parameters"]["stiffness"]
+    assert np.log(row["interval_95"][1] / row["centre"]) == pytest.approx(np.log(1.2) * 1.960 / 2.262, rel=1e-3)
 
 
 def test_the_centre_is_the_calibrated_arm_to_the_last_bit(written, model):
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     fields = drawn_fields(model, drawn.values(np.zeros((2, len(drawn.names)))))
     assert {"jnt_stiffness", "body_quat", "actuator_gainprm", "dof_damping"} <= set(fields)
     for name, values in fields.items():
@@ -102,7 +102,7 @@ def test_the_centre_is_the_calibrated_arm_to_the_last_bit(written, model):
 
 def test_what_is_written_is_read_again(written, model):
     """So the difference that is added to the model is the parameter's whole effect."""
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     values = drawn.values(drawn.draw(3, np.random.default_rng(4)))
     fields = drawn_fields(model, values)
     for number in range(3):
@@ -114,16 +114,16 @@ def test_what_is_written_is_read_again(written, model):
 
 
 def test_the_file_names_the_fields_that_a_parameter_writes_and_no_others(written, model):
-    for name, one in json.loads(written.read_text())["parameters"].items():
+    for name, row in json.loads(written.read_text())["parameters"].items():
         value = np.array([PARAMETERS[name].read(model)])
         fields = drawn_fields(model, {name: value + 0.01 if PARAMETERS[name].signed else value * 1.1})
         changed = {f: int(np.sum(v[0] != getattr(model, f))) for f, v in fields.items()}
-        assert one["fields"] == {f: count for f, count in changed.items() if count}
-        assert one["read_by"] == "mujoco"
+        assert row["fields"] == {f: count for f, count in changed.items() if count}
+        assert row["read_by"] == "mujoco"
 
 
 def test_every_drawn_arm_compiles_steps_and_is_another(written, model):
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     fields = drawn_fields(model, drawn.values(drawn.draw(16, np.random.default_rng(2))))
     batch = batch_of(model, 16)
     for name, values in fields.items():
@@ -137,7 +137,7 @@ def test_every_drawn_arm_compiles_steps_and_is_another(written, model):
 
 
 def test_packed_draws_are_those_fields(written, model):
-    drawn, _ = read_randomisation(written)
+    drawn, _ = read_randomization(written)
     expected = drawn_fields(model, drawn.values(drawn.draw(5, np.random.default_rng(0))))
     with np.load(written.with_suffix(".npz")) as packed:
         assert set(packed) == set(expected)
@@ -148,51 +148,51 @@ def test_packed_draws_are_those_fields(written, model):
 def test_the_example_s_first_arm_is_the_calibrated_one_and_the_others_spread_about_it(written, model):
     command = [sys.executable, str(ROOT / "examples/randomise/batch.py"),
                str(written.parent / "artifacts/identify_control/arm.xml"), str(written), "8", "0.5"]  # fmt: skip
-    said = subprocess.run(command, cwd=written.parent, capture_output=True, text=True, check=True).stdout.splitlines()
-    assert said[0].startswith("8 arms, ")
-    assert said[0].endswith(": 8 moved")
+    lines = subprocess.run(command, cwd=written.parent, capture_output=True, text=True, check=True).stdout.splitlines()
+    assert lines[0].startswith("8 arms, ")
+    assert lines[0].endswith(": 8 moved")
     batch = batch_of(model, 1)
     straight = model.tendon_length0[model.actuator_trnid[:, 0]][None]
     hold(batch, model, straight)
     controls = np.repeat((straight - 0.03 * np.eye(1, model.nu))[:, None], 500, axis=1)
     tip = move(batch, controls, ("site_xpos",))["site_xpos"][0, -1, model.site("tip").id]
-    assert said[1].partition("): ")[2] == ", ".join(f"{t:.6f}" for t in tip)
-    assert float(re.search(r"median ([\d.]+),", said[2])[1]) > 0.1
+    assert lines[1].partition("): ")[2] == ", ".join(f"{t:.6f}" for t in tip)
+    assert float(re.search(r"median ([\d.]+),", lines[2])[1]) > 0.1
 
 
 # --- populations
 
 
-def arm(centre: float, deviation: float) -> Randomisation:
+def arm(centre: float, deviation: float) -> Randomization:
     """Of one parameter whose logarithm is `centre`."""
     low, high = np.array([1e-9]), np.array([1e9])
-    return Randomisation(["stiffness"], ["a"], np.exp([centre]), np.array([[deviation**2]]), low, high)
+    return Randomization(["stiffness"], ["a"], np.exp([centre]), np.array([[deviation**2]]), low, high)
 
 
 def test_arms_that_differ_by_no_more_than_they_are_uncertain_are_one_kind_of_arm():
-    found = of_population([arm(1.0, 0.5), arm(1.1, 0.5), arm(0.9, 0.5)])
-    assert found.centre[0] == pytest.approx(np.e)
-    assert found.deviation[0] == pytest.approx(0.5 * np.sqrt(4 / 3))
+    population = of_population([arm(1.0, 0.5), arm(1.1, 0.5), arm(0.9, 0.5)])
+    assert population.centre[0] == pytest.approx(np.e)
+    assert population.deviation[0] == pytest.approx(0.5 * np.sqrt(4 / 3))
 
 
 def test_arms_that_differ_spread_as_far_as_they_do():
     rng = np.random.default_rng(3)
     truths = 1.0 + 0.3 * rng.standard_normal(400)
-    found = of_population([arm(truth + 0.2 * rng.standard_normal(), 0.2) for truth in truths])
-    assert found.deviation[0] == pytest.approx(np.hypot(0.3, 0.2), rel=0.1)
-    assert found.arms == 400
+    population = of_population([arm(truth + 0.2 * rng.standard_normal(), 0.2) for truth in truths])
+    assert population.deviation[0] == pytest.approx(np.hypot(0.3, 0.2), rel=0.1)
+    assert population.arms == 400
 
 
 def test_two_folders_are_a_population_about_their_mean(tmp_path, written):
     folders = [artifacts(tmp_path / name, stiffer) for name, stiffer in (("soft", 1.0), ("stiff", 2.0))]
     out = tmp_path / "both.json"
     assert main([*map(str, folders), "--out", str(out)]) == 0
-    both, one = json.loads(out.read_text()), json.loads(written.read_text())
+    both, single = json.loads(out.read_text()), json.loads(written.read_text())
     assert both["arms"] == 2
     assert both["parameters"]["stiffness"]["centre"] == pytest.approx(
-        np.sqrt(2) * one["parameters"]["stiffness"]["centre"]
+        np.sqrt(2) * single["parameters"]["stiffness"]["centre"]
     )
-    assert both["parameters"]["stiffness"]["sd"] > 3 * one["parameters"]["stiffness"]["sd"]
+    assert both["parameters"]["stiffness"]["sd"] > 3 * single["parameters"]["stiffness"]["sd"]
 
 
 # --- the command
@@ -214,9 +214,9 @@ def test_of_the_committed_stages_it_takes_what_the_last_one_found():
 def test_widened_it_spreads_as_much_more(tmp_path, written):
     out = tmp_path / "wide.json"
     assert main([str(written.parent / "artifacts"), "--out", str(out), "--widen", "3"]) == 0
-    wide, one = (json.loads(path.read_text())["parameters"]["kp"] for path in (out, written))
-    assert wide["sd"] == pytest.approx(3 * one["sd"])
-    assert wide["centre"] == pytest.approx(one["centre"])
+    wide, narrow = (json.loads(path.read_text())["parameters"]["kp"] for path in (out, written))
+    assert wide["sd"] == pytest.approx(3 * narrow["sd"])
+    assert wide["centre"] == pytest.approx(narrow["centre"])
 
 
 @pytest.mark.parametrize("spoil", ["nothing", "model", "json", "parameter"])
@@ -246,4 +246,4 @@ def test_another_file_is_refused_by_name(tmp_path):
     for text in ("{}", "no json", '{"format": "other"}'):
         (tmp_path / "x.json").write_text(text)
         with pytest.raises(InputError, match="x.json"):
-            read_randomisation(tmp_path / "x.json")
+            read_randomization(tmp_path / "x.json")

@@ -11,12 +11,12 @@ from trunkline.identification.simulate.experiment import SLACK
 from trunkline.recordings.trials.splits import IDENTIFY, TEST, VALIDATE
 from trunkline.report.certificate import budget as budgets
 from trunkline.report.certificate.arms import arm_of
-from trunkline.report.certificate.budget import Inputs, Source, budget, held_out, parameter_shifts, radius_of
+from trunkline.report.certificate.budget import Inputs, UncertaintySource, budget, held_out, parameter_shifts, radius_of
 from trunkline.report.certificate.certificate import FEWEST, inputs_of
 from trunkline.report.certificate.facts import uncertainty_facts
 from trunkline.report.certificate.held_out import at_rest, tip_residuals
 from trunkline.report.certificate.identified import Identified
-from trunkline.report.certificate.poses import Conditions, Poses
+from trunkline.report.certificate.poses import Conditions, StaticPoses
 from trunkline.report.certificate.words import open_lines
 
 NOISE = 1e-3  # m
@@ -53,22 +53,22 @@ def test_a_radius_holds_95_of_100_draws_and_no_more_than_it_needs():
 
 
 def test_a_pose_whose_draws_find_no_rest_is_counted_and_not_averaged(model):
-    lines = [Source("cameras", "normal", 1.0, "mm", np.inf, np.full(3, NOISE))]
-    found = budgets.Budget(np.zeros((3, 3)), lines, np.zeros(3), np.array([0.004, np.inf, 0.008]))
-    told = uncertainty_facts(found, Conditions(0.0, 0.0, 0.0, 0.0), 0.5, 100)
-    assert (told["poses"], told["without_rest"]) == (3, 1)
-    assert told["radius_mm"] == pytest.approx({"median": 6.0, "p95": 7.8, "max": 8.0})
-    assert np.isfinite(told["combined_mm"])
+    lines = [UncertaintySource("cameras", "normal", 1.0, "mm", np.inf, np.full(3, NOISE))]
+    result = budgets.Budget(np.zeros((3, 3)), lines, np.zeros(3), np.array([0.004, np.inf, 0.008]))
+    facts = uncertainty_facts(result, Conditions(0.0, 0.0, 0.0, 0.0), 0.5, 100)
+    assert (facts["poses"], facts["without_rest"]) == (3, 1)
+    assert facts["radius_mm"] == pytest.approx({"median": 6.0, "p95": 7.8, "max": 8.0})
+    assert np.isfinite(facts["combined_mm"])
 
 
-def hanging(model, count=1) -> Poses:
+def hanging(model, count=1) -> StaticPoses:
     chain = arm_of(model).chain
-    return Poses(np.tile([0.0, 0.0, -9.81], (count, 1)), np.tile(chain.straight_lengths + SLACK, (count, 1)))
+    return StaticPoses(np.tile([0.0, 0.0, -9.81], (count, 1)), np.tile(chain.straight_lengths + SLACK, (count, 1)))
 
 
-def pulled(model) -> Poses:
+def pulled(model) -> StaticPoses:
     chain = arm_of(model).chain
-    return Poses(np.array([[0.0, 0.0, -9.81]]), chain.straight_lengths - np.array([[0.015, -SLACK, -SLACK]]))
+    return StaticPoses(np.array([[0.0, 0.0, -9.81]]), chain.straight_lengths - np.array([[0.015, -SLACK, -SLACK]]))
 
 
 def rubbing(model):
@@ -85,33 +85,33 @@ SOURCES = {
 }
 
 
-@pytest.mark.parametrize(("rubs", "known", "noise", "poses"), SOURCES.values(), ids=SOURCES)
+@pytest.mark.parametrize(("rubs", "uncertain", "noise", "poses"), SOURCES.values(), ids=SOURCES)
 def test_other_sources_make_of_a_held_out_trial_what_they_make_of_any_pose(
-    model, monkeypatch, rubs, known, noise, poses
+    model, monkeypatch, rubs, uncertain, noise, poses
 ):
     """Their variance is u² of the budget: else what is not theirs goes to what the model lacks, or what it lacks to
     them."""
     model = rubbing(model) if rubs else model
-    parameters = mounts(0.0) if known else nothing_known()
+    parameters = mounts(0.0) if uncertain else nothing_known()
     moves = budgets.sensitivities(model, parameters, arm_of(model), poses(model))  # of tilts as small, all that is left
     drawn = np.random.default_rng(2).standard_normal((20_000, len(moves)))
     monkeypatch.setattr(budgets, "parameter_shifts", lambda *_: np.einsum("dp,pnk->dnk", drawn, moves))
-    asked = []
-    monkeypatch.setattr(budgets, "discrepancy", lambda residuals, ways, variances: asked.append(variances))
+    variances_seen = []
+    monkeypatch.setattr(budgets, "discrepancy", lambda residuals, ways, variances: variances_seen.append(variances))
     held_out(model, parameters, noise, poses(model), np.array([0.01]), 2, np.random.default_rng(0))
     alone = budget(Inputs(model, parameters, None, noise), poses(model), 20_000, 1, np.random.default_rng(1))
     assert alone.combined[0] > 5e-4
-    np.testing.assert_allclose(asked[0], alone.combined**2, rtol=0.05)
+    np.testing.assert_allclose(variances_seen[0], alone.combined**2, rtol=0.05)
 
 
 def test_a_draw_of_the_parameters_without_rest_takes_no_part_in_their_variance(model, monkeypatch):
     shifts = np.zeros((3, 1, 3))
     shifts[:, 0, 0] = [0.003, np.nan, 0.004]
-    asked = []
+    variances_seen = []
     monkeypatch.setattr(budgets, "parameter_shifts", lambda *_: shifts)
-    monkeypatch.setattr(budgets, "discrepancy", lambda residuals, ways, variances: asked.append(variances))
+    monkeypatch.setattr(budgets, "discrepancy", lambda residuals, ways, variances: variances_seen.append(variances))
     held_out(model, nothing_known(), 0.0, straight(model), np.array([0.01]), 3, np.random.default_rng(0))
-    assert asked[0][0] == pytest.approx((0.003**2 + 0.004**2) / 2)
+    assert variances_seen[0][0] == pytest.approx((0.003**2 + 0.004**2) / 2)
 
 
 def test_an_arm_that_finds_no_rest_moves_by_nobody_knows_what(model, monkeypatch):
@@ -120,22 +120,22 @@ def test_an_arm_that_finds_no_rest_moves_by_nobody_knows_what(model, monkeypatch
     shifts = np.zeros((count, 1, 3))
     shifts[:3] = np.nan
     monkeypatch.setattr(budgets, "parameter_shifts", lambda *_: shifts)
-    found = budget(Inputs(model, nothing_known(), None, NOISE), straight(model), count, 1, np.random.default_rng(0))
-    assert found.radius[0] == np.inf
+    result = budget(Inputs(model, nothing_known(), None, NOISE), straight(model), count, 1, np.random.default_rng(0))
+    assert result.radius[0] == np.inf
     shifts[1:3] = 0
-    found = budget(Inputs(model, nothing_known(), None, NOISE), straight(model), count, 1, np.random.default_rng(0))
-    assert 2 * NOISE < found.radius[0] < 5 * NOISE
+    result = budget(Inputs(model, nothing_known(), None, NOISE), straight(model), count, 1, np.random.default_rng(0))
+    assert 2 * NOISE < result.radius[0] < 5 * NOISE
 
 
 def test_shifts_are_nan_where_a_drawn_arm_does_not_come_to_rest(model):
     """Springs of nothing at all hold no arm upside down."""
     far = np.full(1, 1e9)
-    known = Identified(["stiffness"], ["a"], np.log([1e-9]), np.array([1e-3]), far, np.eye(1), -far, far)
+    estimates = Identified(["stiffness"], ["a"], np.log([1e-9]), np.array([1e-3]), far, np.eye(1), -far, far)
     arm = arm_of(model)
-    up = Poses(np.array([[3.0, 0.0, 9.0]]), arm.chain.straight_lengths[None] + SLACK)
-    found = parameter_shifts(model, known, arm, up, 2, np.random.default_rng(0))
-    assert found.shape == (2, 1, 3)
-    assert not np.isfinite(found).any() or np.abs(found).max() > 0.05
+    up = StaticPoses(np.array([[3.0, 0.0, 9.0]]), arm.chain.straight_lengths[None] + SLACK)
+    shifts = parameter_shifts(model, estimates, arm, up, 2, np.random.default_rng(0))
+    assert shifts.shape == (2, 1, 3)
+    assert not np.isfinite(shifts).any() or np.abs(shifts).max() > 0.05
 
 
 @pytest.mark.parametrize(
@@ -157,26 +157,26 @@ def test_only_seen_trials_at_rest_that_were_held_out_and_bore_nothing_tell_what_
 
 def test_a_tip_that_nobody_saw_or_that_finds_no_rest_has_no_residual():
     model = small_model(4)
-    seen = static_pull(model, [0, 15, 0], split=VALIDATE)
-    moved = replace(seen, name="moved", positions=seen.positions + [0.003, 0, 0.004])
-    hidden = replace(seen, name="hidden", measured=np.array([[True, True, True, False]]))
-    lost = replace(seen, name="lost", commands=np.full((1, 3), np.nan))
-    found = tip_residuals(model, [moved, hidden, lost, seen], 3)
-    assert found[0] == pytest.approx(0.005, abs=5e-4)
-    assert np.isnan(found).tolist() == [False, True, True, False]
-    assert found[3] < 1e-3
+    measured = static_pull(model, [0, 15, 0], split=VALIDATE)
+    moved = replace(measured, name="moved", positions=measured.positions + [0.003, 0, 0.004])
+    hidden = replace(measured, name="hidden", measured=np.array([[True, True, True, False]]))
+    lost = replace(measured, name="lost", commands=np.full((1, 3), np.nan))
+    residuals = tip_residuals(model, [moved, hidden, lost, measured], 3)
+    assert residuals[0] == pytest.approx(0.005, abs=5e-4)
+    assert np.isnan(residuals).tolist() == [False, True, True, False]
+    assert residuals[3] < 1e-3
 
 
-@pytest.mark.parametrize(("count", "told"), [(FEWEST - 1, False), (FEWEST, True)])
-def test_so_many_held_out_tips_must_have_been_seen(count, told):
+@pytest.mark.parametrize(("count", "usable"), [(FEWEST - 1, False), (FEWEST, True)])
+def test_so_many_held_out_tips_must_have_been_seen(count, usable):
     model = small_model(4)
     trials = [tilt(model, angle, VALIDATE) for angle in (20, 30, 40, 50)]
     for trial in trials[count:]:
         trial.measured[:, 3] = False
     ingested = {"position_noise_mm": 0.3}
-    found = inputs_of(model, trials, {}, ingested, 2, np.random.default_rng(0))
-    assert (found.lacking is not None) is told
-    assert found.lacking is None or found.lacking.trials == count
+    inputs = inputs_of(model, trials, {}, ingested, 2, np.random.default_rng(0))
+    assert (inputs.lacking is not None) is usable
+    assert inputs.lacking is None or inputs.lacking.trials == count
 
 
 ROW = {"at_bound": False, "undetermined": False, "interval_95_given_model": [-0.02, 0.03], "range": [-0.1, 0.1]}
@@ -196,6 +196,6 @@ ROW = {"at_bound": False, "undetermined": False, "interval_95_given_model": [-0.
     ],
 )
 def test_what_is_open_is_said_for_one_reason_the_first(change, says):
-    found = open_lines({"parameters": {"mount_tilt_x": ROW | change}})
-    assert len(found) == (says is not None)
-    assert says is None or f"mount_tilt_x {'is told ' if 'side' in says else ''}{says}" in found[0]
+    lines = open_lines({"parameters": {"mount_tilt_x": ROW | change}})
+    assert len(lines) == (says is not None)
+    assert says is None or f"mount_tilt_x {'is told ' if 'side' in says else ''}{says}" in lines[0]

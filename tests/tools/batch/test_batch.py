@@ -1,4 +1,4 @@
-"""`python -m trunkline.tools.batch`: a table and a picture over arms, and pipelines that run in folders of their
+"""`trunkline batch`: a table and a picture over arms, and pipelines that run in folders of their
 own."""
 
 import json
@@ -30,9 +30,9 @@ def aged(folder: Path, share: float) -> Path:
     shutil.copytree(EXAMPLES / "asl_trunk/artifacts", folder / "artifacts")
     file = folder / "artifacts/identify_damping/parameters.json"
     table = json.loads(file.read_text())
-    own = table["parameters"]["damping"]
-    own["value"] *= share
-    own["interval_95_given_model"] = [share * end for end in own["interval_95_given_model"]]
+    row = table["parameters"]["damping"]
+    row["value"] *= share
+    row["interval_95_given_model"] = [share * end for end in row["interval_95_given_model"]]
     file.write_text(json.dumps(table))
     return folder
 
@@ -41,15 +41,15 @@ def test_a_table_and_a_picture_over_arms_that_have_run(tmp_path, capsys):
     arms = [{"name": name, "folder": str(EXAMPLES / name)} for name in ("asl_trunk", "pairs", "ftdcr")]
     path = listing(tmp_path, arms, reference="none")
     assert main([str(path), "--out", str(tmp_path / "out"), "--only-table"]) == 0
-    said = capsys.readouterr().out
+    output = capsys.readouterr().out
     scored = json.loads((EXAMPLES / "pairs/artifacts/score/metrics.json").read_text())
     errors = next(iter(scored.values()))["identified"]["test"]
     pair = f"{errors['e_position_mm']:.3g} / {errors['e_tip_mm']:.3g}"
-    assert f"| pairs | {errors['trials']} of `test` | {pair} |" in said
+    assert f"| pairs | {errors['trials']} of `test` | {pair} |" in output
     table = pd.read_csv(tmp_path / "out/fleet.csv")
     assert set(table.arm) == {"asl_trunk", "pairs", "ftdcr"}
     assert table.drift.isna().all()
-    assert (tmp_path / "out/fleet.md").read_text().strip() in said
+    assert (tmp_path / "out/fleet.md").read_text().strip() in output
     assert (tmp_path / "out/fleet.png").stat().st_size > 20_000
 
 
@@ -61,9 +61,9 @@ def test_a_drift_is_told_apart_where_it_is_larger_than_both_intervals(tmp_path, 
     row = next(line for line in capsys.readouterr().out.splitlines() if line.startswith("| `damping`"))
     assert ("**" in row) == is_beyond
     table = pd.read_csv(tmp_path / "out/fleet.csv")
-    found = table[(table.arm == "autumn") & (table.name == "damping")].iloc[0]
-    assert found.drift == pytest.approx(np.log(share), rel=1e-4)
-    assert found.since == "spring"
+    row = table[(table.arm == "autumn") & (table.name == "damping")].iloc[0]
+    assert row.drift == pytest.approx(np.log(share), rel=1e-4)
+    assert row.since == "spring"
 
 
 def test_pipelines_run_in_folders_of_their_own_go_on_and_one_that_fails_stops_no_other(tmp_path, capsys):
@@ -75,11 +75,11 @@ def test_pipelines_run_in_folders_of_their_own_go_on_and_one_that_fails_stops_no
     arms = [{"name": name, "session": name} for name in ("bad", "good", "both")]
     words = [str(listing(tmp_path, arms)), "--out", str(tmp_path / "out"), "--until", "ingest"]
     assert main(words) == 1
-    told = capsys.readouterr()
-    assert "fleet: good: done after" in told.out
-    failed = [line for line in told.err.splitlines() if "failed" in line]
+    output = capsys.readouterr()
+    assert "batch: good: done after" in output.out
+    failed = [line for line in output.err.splitlines() if "failed" in line]
     assert len(failed) == 1
-    assert "fleet: bad: failed: data/raw/bad/session.yaml: " in failed[0]
+    assert "batch: bad: failed: data/raw/bad/session.yaml: " in failed[0]
     log = tmp_path / "out/good/fleet.log"
     assert json.loads((tmp_path / "out/good/artifacts/ingest/metrics.json").read_text())["trials"] == 4
     assert json.loads((tmp_path / "out/both/artifacts/ingest/metrics.json").read_text())["trials"] == 8
@@ -101,9 +101,9 @@ def test_pipelines_run_in_folders_of_their_own_go_on_and_one_that_fails_stops_no
 )
 def test_a_mistake_in_the_list_is_one_line(tmp_path, capsys, arms, message):
     assert main([str(listing(tmp_path, arms)), "--only-table"]) == 1
-    said = capsys.readouterr().err.splitlines()
-    assert len(said) == 1
-    assert message in said[0]
+    errors = capsys.readouterr().err.splitlines()
+    assert len(errors) == 1
+    assert message in errors[0]
 
 
 def test_only_what_a_stage_needs_is_run():
