@@ -18,7 +18,7 @@ from trunkline.ar.drivers.driver_process import TELL
 from trunkline.ar.drivers.robot import Machine
 from trunkline.ar.drivers.setpoint_filter import LIMITS
 from trunkline.ar.drivers.time_scaling import PacedRobot
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.plan import Plan
 from trunkline.ar.teleop.trajectory import gentle, limits_of
 from trunkline.errors import InputError, in_one_line

@@ -25,7 +25,7 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT
 from trunkline.unity.package import NETWORK, read_tarball
 from trunkline.unity.proof import scene_of, turns
-from trunkline.unity.start import Twin
+from trunkline.unity.start import TwinComponent
 from trunkline.unity.unpacked import model_of
 from upkeep.results import recorded
 
@@ -80,7 +80,7 @@ def steps_to_start(files: dict[str, bytes], tilt: float) -> int:
     scene = scene_of(files, turns([tilt])[0], 1 / (RATES[0] * steps_a_frame(RATES[0])))
     scene.start()
     (twin,) = scene.components
-    assert isinstance(twin, Twin)
+    assert isinstance(twin, TwinComponent)
     return twin.steps
 
 

@@ -28,7 +28,7 @@ from benchmarks.browser import browsing
 from trunkline.ar.preview.package import only_package, read_package
 from trunkline.ar.session.composition import SEARCH, simulation_of
 from trunkline.ar.session.settings import Config
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder
 from upkeep.results import recorded

@@ -21,9 +21,9 @@ import numpy as np
 
 from benchmarks.preview import LET_GO, STAGES, Placing, grasp
 from trunkline.ar.hybrid import rollouts as room
-from trunkline.ar.hybrid.posterior import draw, read_doubts
+from trunkline.ar.hybrid.posterior import read_posterior, sample
 from trunkline.ar.hybrid.preview import Holding, joined
-from trunkline.ar.hybrid.rollouts import Twin, Way, eased
+from trunkline.ar.hybrid.rollouts import CommandTrajectory, ComposedTwin, eased
 from trunkline.model.arm.contact_geometry import read_geometry
 from trunkline.pipeline.inputs import read_spec
 from upkeep.results import recorded
@@ -56,11 +56,11 @@ class Tries:
 
 @recorded("eased_previews")
 def main(path: Path, grasps: int, futures: int) -> None:
-    doubts = read_doubts([path.parents[1] / stage / "parameters.json" for stage in STAGES])
+    doubts = read_posterior([path.parents[1] / stage / "parameters.json" for stage in STAGES])
     found = {name: Tries() for name in CONTACTS}
     for seed in range(grasps):
         twin, way = grasp(path, placing(seed))
-        draws = draw(doubts, twin.arm, futures, seed)
+        draws = sample(doubts, twin.arm, futures, seed)
         for name, contacts in CONTACTS.items():
             attempt(found[name], twin.stepped(STEP), way, draws, contacts)
     first, *_ = found.values()
@@ -82,11 +82,11 @@ def placing(seed: int) -> Placing:
     )  # fmt: skip
 
 
-def attempt(tries: Tries, twin: Twin, way: Way, draws, contacts: Callable) -> None:
+def attempt(tries: Tries, twin: ComposedTwin, way: CommandTrajectory, draws, contacts: Callable) -> None:
     """The futures of one grasp, added to `tries`."""
     with patch.object(room, "eased", contacts):
         began = time.process_time()
-        motion = joined(list(room.futures(twin, way, draws)))
+        motion = joined(list(room.rollouts(twin, way, draws)))
         tries.seconds += time.process_time() - began
     tries.held += Holding(LET_GO, sag=0.25).holds(motion).tolist()
     tries.tips += list(motion.tip)

@@ -52,7 +52,7 @@ def main() -> int:
             whole, half = (
                 try_masses(arm, replace(own, timestep=chart.timestep / part), cell, wrap, mass) for part in (1, 2)
             )
-            held = [tried.held(chart.sag, chart.slip) for tried in (whole, half)]
+            held = [tried.success(chart.sag, chart.slip) for tried in (whole, half)]
             outcomes.append(np.column_stack(held))
             both = held[0] & held[1]
             apart.append(np.linalg.norm(whole.path[both, -1] - half.path[both, -1], axis=1))

@@ -17,7 +17,7 @@ from omegaconf import OmegaConf
 
 from studies.rows import Rows, digest
 from trunkline.ar.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
-from trunkline.ar.hybrid.payload import Cell, Outcome, PayloadSettings, cells, chart_rows
+from trunkline.ar.hybrid.payload import Cell, HeaviestMass, PayloadSettings, cells, chart_rows
 from trunkline.compute.progress import progress
 from trunkline.errors import in_one_line
 from trunkline.pipeline.config import validated
@@ -35,7 +35,7 @@ QUICK = {
                "frictions": [0.45], "pulls": ["dorsal"], "shortenings": [0.2]}],
     "masses": [0.1, 0.3, 0.6], "wraps": [0.6], "placements": 1,
 }  # fmt: skip
-KEYS, FOUND = ([field.name for field in fields(kind)] for kind in (Cell, Outcome))
+KEYS, FOUND = ([field.name for field in fields(kind)] for kind in (Cell, HeaviestMass))
 
 
 def read_settings(quick: bool) -> PayloadSettings:

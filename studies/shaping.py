@@ -16,8 +16,8 @@ import numpy as np
 from mujoco.batch import Batch
 
 from trunkline.ar.teleop.shaping import Kind, shaped, shaper_of
-from trunkline.ar.teleop.trajectory import Limits, point_to_point
-from trunkline.ar.teleop.vibration import Swings, slowest, swings
+from trunkline.ar.teleop.trajectory import MotionLimits, point_to_point
+from trunkline.ar.teleop.vibration import VibrationModes, slowest, vibration_modes
 from trunkline.frames import gravity_in_base
 from trunkline.model.elements import BACKLASH, RATE_LIMIT, give_way, numeric
 from trunkline.model.simulation.motion import batch_of, hold, move
@@ -52,17 +52,17 @@ def main() -> None:
         for pull in PULLS_MM:
             end = straight + 1e-3 * pull * np.array([-1.0, 0.85, 0.85])
             way = lasting(straight, end, model.opt.timestep)
-            ways = shaped_ways(model, way, swings(model, end, end - straight, gravity))
+            ways = shaped_ways(model, way, vibration_modes(model, end, end - straight, gravity))
             tell(f"{tilt:.0f}° | tendons, {pull:.0f} mm", ways, tip_paths(model, ways, gravity), model.opt.timestep)
         for pull in (0.0, PULLS_MM[1]):
             held = straight + 1e-3 * pull * np.array([-1.0, 0.85, 0.85])
             way = lasting(np.zeros(2), np.array([0.0, MOVED]), model.opt.timestep)
-            ways = shaped_ways(model, way, swings(model, held, None, gravity))
+            ways = shaped_ways(model, way, vibration_modes(model, held, None, gravity))
             name = f"{tilt:.0f}° | mount, {1e3 * MOVED:.0f} mm sideways, pull {pull:.0f} mm"
             tell(name, ways, carried(model, ways, held, gravity), model.opt.timestep)
 
 
-def shaped_ways(model: mujoco.MjModel, way: np.ndarray, found: Swings) -> list[np.ndarray]:
+def shaped_ways(model: mujoco.MjModel, way: np.ndarray, found: VibrationModes) -> list[np.ndarray]:
     """`way` (T, n) by each of SHAPERS."""
     ways = []
     for kind, count in SHAPERS:
@@ -89,7 +89,7 @@ def lasting(start: np.ndarray, end: np.ndarray, step: float) -> np.ndarray:
     rise = WAY / 4  # acceleration up, down, down, up: seven phases without the ones of constant speed
     jerk = size / (2 * rise**3)
     free = np.full(count, 1e3 * size)
-    return point_to_point(start, end, Limits(free, free, np.full(count, jerk)), step)
+    return point_to_point(start, end, MotionLimits(free, free, np.full(count, jerk)), step)
 
 
 def tip_paths(model: mujoco.MjModel, ways: list[np.ndarray], gravity: np.ndarray) -> list[np.ndarray]:

@@ -24,7 +24,7 @@ from rehearsal.robot.stand_in import StandInRobot
 from studies.shaping import MOVED, PULLS_MM, SECONDS, lasting, shaped_ways, tell
 from trunkline.ar.teleop.rigid_ik import RigidIK
 from trunkline.ar.teleop.vectors import DOWN
-from trunkline.ar.teleop.vibration import swings
+from trunkline.ar.teleop.vibration import vibration_modes
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
 from trunkline.pipeline.config import load_config
@@ -51,13 +51,13 @@ def main() -> None:
     for pull in PULLS_MM:
         pulls = 1e-3 * pull * np.array([1.0, -0.85, -0.85])
         way = lasting(np.zeros(3), pulls, model.opt.timestep)
-        ways = shaped_ways(model, way, swings(model, straight - pulls, -pulls, gravity))
+        ways = shaped_ways(model, way, vibration_modes(model, straight - pulls, -pulls, gravity))
         tips = [_moved(arm, np.tile(here, (len(rows), 1)), rows, model) for rows in ways]
         tell(f"tendons, {pull:.0f} mm", ways, tips, model.opt.timestep)
     for pull in (0.0, PULLS_MM[1]):
         pulls = 1e-3 * pull * np.array([1.0, -0.85, -0.85])
         way = lasting(here, there, model.opt.timestep)
-        ways = shaped_ways(model, way, swings(model, straight - pulls, None, gravity))
+        ways = shaped_ways(model, way, vibration_modes(model, straight - pulls, None, gravity))
         tips = [_moved(arm, rows, np.tile(pulls, (len(rows), 1)), model) for rows in ways]
         tell(f"Panda, {1e3 * MOVED:.0f} mm sideways, pull {pull:.0f} mm", ways, tips, model.opt.timestep)
 

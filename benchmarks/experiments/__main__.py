@@ -37,7 +37,7 @@ from studies.rows import Rows
 from trunkline.ar.preview.package import only_package
 from trunkline.ar.session.session import Address, opened
 from trunkline.ar.session.settings import Config
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder
 from upkeep.provenance import SHOWN

@@ -47,7 +47,7 @@ def written(path, joints=True, moves=True):
             journal.standing(Standing(
                 journal.time, 0.0, START + 1.0, STRAIGHT - 0.2, poses[0], poses, at if joints else None, lengths
             ))  # fmt: skip
-            journal.step(1 / 60, operator.given, operator.step())
+            journal.step(1 / 60, operator.message, operator.step())
         journal.settle()
         journal.book.finish()
     return path
