@@ -45,7 +45,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "test_the_first_grasps_hold_what_is_lifted_does_not_slip_and_does_not_hang",
     ),
     "trunkline.ar.hybrid.preview:Holding.holds": ("ar/hybrid/test_preview.py", "test_what_counts_as_held"),
-    "trunkline.ar.hybrid.released:Resting.holds": ("ar/hybrid/test_resting.py", "test_what_rests"),
+    "trunkline.ar.hybrid.released:RestCriterion.holds": ("ar/hybrid/test_released.py", "test_what_rests"),
     "trunkline.ar.hybrid.trials:Tried.success": ("ar/hybrid/test_preview.py", "test_what_counts_as_held_in_a_trial"),
     "trunkline.identification.fit.identify:_at_bound": (
         "identification/test_bounds.py",

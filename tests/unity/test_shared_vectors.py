@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter
 
-from tests.ar.teleop.test_bad_input import LINES
+from tests.ar.teleop.test_core_faults import LINES
 from tests.support.operator import config
 from tests.unity.test_twin import LABEL, TRAJECTORY, sources_in
 from trunkline.ar.conformance.answers import answers_of

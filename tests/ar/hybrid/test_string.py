@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from tests.ar.hybrid.conftest import rubbing_arm
-from tests.ar.hybrid.test_futures import SIZE, way_of
+from tests.ar.hybrid.test_rollouts import SIZE, way_of
 from trunkline.ar.hybrid.assistant import best, try_places
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.objects import GraspObject
