@@ -32,7 +32,7 @@ from trunkline.ar.session.log_reader import tip_path
 from trunkline.ar.session.preview_process import Begun, ForeseerProcess, Order, Planned, Shown
 from trunkline.ar.session.settings import Config
 from trunkline.ar.session.simulated import Plant, Simulation
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import SimulatedRobot
 from trunkline.ar.teleop.messages import Request, Target, Targets, Vector, World
 from trunkline.ar.teleop.plan import Plan

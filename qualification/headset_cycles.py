@@ -37,11 +37,11 @@ from trunkline.ar.session.hardware import hardware_of
 from trunkline.ar.session.server import Server
 from trunkline.ar.session.session import opened
 from trunkline.ar.session.settings import Alignment, Config
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import AT_START
 from trunkline.ar.teleop.messages import ExecutorReport
 from trunkline.ar.teleop.plan import Plan
-from trunkline.ar.teleop.trajectory import Limits, gentle
+from trunkline.ar.teleop.trajectory import MotionLimits, gentle
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
 
@@ -56,7 +56,7 @@ GOAL = 20
 class Led:
     """The robot, which can also be led: then the core sees it at rest, and does not stop it."""
 
-    def __init__(self, robot, limits: Limits, package: str) -> None:
+    def __init__(self, robot, limits: MotionLimits, package: str) -> None:
         self._robot, self._limits, self._package, self._leading = robot, limits, package, False
         self._first = robot.standing().joints
 

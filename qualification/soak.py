@@ -31,7 +31,7 @@ from trunkline.ar.session.controller import Desk
 from trunkline.ar.session.robot import Standing
 from trunkline.ar.session.server import House, Server
 from trunkline.ar.session.session import listening
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.executor import SimulatedRobot
 from trunkline.ar.teleop.following import Following

@@ -45,7 +45,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "test_the_first_grasps_hold_what_is_lifted_does_not_slip_and_does_not_hang",
     ),
     "trunkline.ar.hybrid.preview:Holding.holds": ("ar/hybrid/test_preview.py", "test_what_counts_as_held"),
-    "trunkline.ar.hybrid.released:Resting.holds": ("ar/hybrid/test_resting.py", "test_what_rests"),
+    "trunkline.ar.hybrid.released:RestCriterion.holds": ("ar/hybrid/test_released.py", "test_what_rests"),
     "trunkline.identification.fit.identify:_at_bound": (
         "identification/test_bounds.py",
         "test_a_parameter_is_at_a_bound_within_a_share_of_its_own_range",
@@ -113,8 +113,6 @@ OTHERWISE = {  # what the word stands for there: no verdict
     "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log, as proposed",
     "trunkline.kinematics.reachability.tips:held_by": "lengths of cables",
     "trunkline.compute.scheduler:spread_rows": "shares rows out to workers",
-    "trunkline.ar.teleop.correction:_rest": "where an arm rests",
-    "trunkline.ar.teleop.vibration:swings": "which actuators have a state of their own",
 }
 
 

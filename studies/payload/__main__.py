@@ -15,7 +15,7 @@ from pathlib import Path
 import pandas as pd
 from omegaconf import OmegaConf
 
-from studies.payload.chart import Cell, Outcome, PayloadSettings, cells, chart_rows
+from studies.payload.chart import Cell, HeaviestMass, PayloadSettings, cells, chart_rows
 from studies.payload.figure import payload_figure
 from studies.rows import Rows, digest
 from trunkline.ar.hybrid.friction import IMPRATIO, SOLIMP, SOLREF
@@ -35,7 +35,7 @@ QUICK = {
                "frictions": [0.45], "pulls": ["dorsal"], "shortenings": [0.2]}],
     "masses": [0.1, 0.3, 0.6], "wraps": [0.6], "placements": 1,
 }  # fmt: skip
-KEYS, FOUND = ([field.name for field in fields(kind)] for kind in (Cell, Outcome))
+KEYS, FOUND = ([field.name for field in fields(kind)] for kind in (Cell, HeaviestMass))
 
 
 def read_settings(quick: bool) -> PayloadSettings:

@@ -2,7 +2,7 @@
 
 A cell is one row of the chart. How far the arm is to go round the object is chosen with the lightest mass; the heaviest
 is then looked for on a ladder of masses by bisection. A mass is held if at least `share` of its placements are, each
-off the grasp frame by its own draw. What is held is `Tried.held`.
+off the grasp frame by its own draw. What is held is `Tried.success`.
 
 An object hangs from a hook above it, its axis level and across the bending plane, or stands on a table: a basket with
 its bar level, all others with their axis upright. The arm hangs straight down beside it and bends in a vertical plane.
@@ -20,8 +20,8 @@ from pydantic import Field
 from studies.payload.trials import Schedule, Tried, Tries, try_grasps
 from trunkline.ar.hybrid.compose import Placed, compose
 from trunkline.ar.hybrid.grasps import Grasp, Pull, object_in_base, pulls_of
-from trunkline.ar.hybrid.objects import Shape, Thing
-from trunkline.ar.hybrid.worlds import Surface, World
+from trunkline.ar.hybrid.objects import GraspObject, Shape
+from trunkline.ar.hybrid.worlds import SupportSurface, WorldGeometry
 from trunkline.errors import InputError
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.contact_geometry import read_geometry
@@ -39,7 +39,7 @@ Metres = Annotated[float, Field(gt=0, le=0.5)]
 
 
 @dataclass
-class Grid:
+class ChartGrid:
     """Cells of a part of the chart: every combination of supports, shapes, diameters (m), frictions (sliding
     coefficients), pulls (dorsal or ventral) and shortenings (m of cable, as commanded)."""
 
@@ -62,12 +62,12 @@ class PayloadSettings:
         wraps: turns of the arm round the object, of which the best is taken. gap: between arm and object at first, m.
         placements: of each mass. spread: standard deviation of placements, m, across and along the arm.
         share: of placements that must hold.
-        sag, slip: m, what counts as held, see `Tried.held`.
+        sag, slip: m, what counts as held, see `Tried.success`.
         timestep: s.
         schedule: what is done.
     """
 
-    grids: Annotated[list[Grid], Field(min_length=1)]
+    grids: Annotated[list[ChartGrid], Field(min_length=1)]
     height: Metres
     masses: Annotated[list[Positive], Field(min_length=1)]
     wraps: Annotated[list[Annotated[float, Field(gt=0, le=3)]], Field(min_length=1)]
@@ -99,7 +99,7 @@ class Cell:
 
 
 @dataclass
-class Outcome:
+class HeaviestMass:
     """mass: kg, the heaviest held, 0 if none is. share: of placements that hold it, NaN for none. wrap: turns round the
     object. grasps: tried."""
 
@@ -111,14 +111,14 @@ class Outcome:
 
 def cells(chart: PayloadSettings) -> list[Cell]:
     """Every cell, in the order in which they are tried."""
-    found = [
+    combinations = [
         Cell(*values)
         for grid in chart.grids
         for values in product(
             grid.supports, grid.shapes, grid.diameters, grid.frictions, grid.pulls, grid.shortenings
         )
     ]  # fmt: skip
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(combinations))
 
 
 def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: float, masses: np.ndarray) -> Tried:
@@ -128,7 +128,7 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: flo
         InputError: the object does not fit between table and mount.
     """
     geometry = read_geometry(arm)
-    thing = Thing(cell.shape, cell.diameter, max(chart.height, cell.diameter), BEGIN, "plastic")
+    thing = GraspObject(cell.shape, cell.diameter, max(chart.height, cell.diameter), BEGIN, "plastic")
     middle = object_in_base(geometry, cell.diameter, Grasp(wrap, chart.gap), cell.pull) - thing.grip
     hanging = cell.support == "hanging"
     quaternion, surfaces, hook = (LEVEL if hanging else UPRIGHT), {}, None
@@ -142,8 +142,8 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: flo
             middle[2] = top + thing.half_height
             if middle[2] + thing.half_height > 0:
                 raise InputError(f"height: found {chart.height} m, expected an object below the mount")
-        surfaces = {TABLE: Surface([0.0, 0.0, top], list(TABLE_SIZE), "wood")}
-    mount, world = FixedMount("fixed"), World(None, surfaces, hook)
+        surfaces = {TABLE: SupportSurface([0.0, 0.0, top], list(TABLE_SIZE), "wood")}
+    mount, world = FixedMount("fixed"), WorldGeometry(None, surfaces, hook)
     model = compose(arm, mount, world, Placed(thing, middle, quaternion, hanging)).compile()
     model.opt.timestep = chart.timestep
     draws = np.random.default_rng(chart.seed).normal(size=(chart.placements, 2)) * chart.spread
@@ -159,30 +159,30 @@ def try_masses(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell, wrap: flo
     return try_grasps(model, compose(arm, mount).compile(), tries, chart.schedule, tuple(surfaces))
 
 
-def heaviest(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell) -> Outcome:
+def heaviest(arm: mujoco.MjSpec, chart: PayloadSettings, cell: Cell) -> HeaviestMass:
     """The heaviest mass of the ladder that is held: bisection, as a lighter object is held where a heavier one is."""
 
     def share_of(wrap: float, rung: int) -> float:
         tried = try_masses(arm, chart, cell, wrap, np.array([chart.masses[rung]]))
-        return float(np.mean(tried.held(chart.sag, chart.slip)))
+        return float(np.mean(tried.success(chart.sag, chart.slip)))
 
     lightest = {wrap: share_of(wrap, 0) for wrap in chart.wraps}
     wrap = max(lightest, key=lambda wrap: lightest[wrap])
     grasps, best = len(chart.wraps) * chart.placements, lightest[wrap]
     if best < chart.share:
-        return Outcome(0.0, np.nan, wrap, grasps)
-    held, lost = 0, len(chart.masses)
-    while lost - held > 1:
-        rung = (held + lost) // 2
+        return HeaviestMass(0.0, np.nan, wrap, grasps)
+    heaviest_held, lost = 0, len(chart.masses)
+    while lost - heaviest_held > 1:
+        rung = (heaviest_held + lost) // 2
         share, grasps = share_of(wrap, rung), grasps + chart.placements
         if share >= chart.share:
-            held, best = rung, share
+            heaviest_held, best = rung, share
         else:
             lost = rung
-    return Outcome(chart.masses[held], best, wrap, grasps)
+    return HeaviestMass(chart.masses[heaviest_held], best, wrap, grasps)
 
 
-def chart_rows(arm: mujoco.MjSpec, chart: PayloadSettings, done: set[Cell]) -> Iterator[tuple[Cell, Outcome]]:
+def chart_rows(arm: mujoco.MjSpec, chart: PayloadSettings, done: set[Cell]) -> Iterator[tuple[Cell, HeaviestMass]]:
     """Every cell that is not `done`, with what came of it."""
     for cell in cells(chart):
         if cell not in done:

@@ -117,7 +117,7 @@ class Tried:
         """How far the object came from where it was let go, at last, m. Shape (B,)."""
         return np.linalg.norm(self.path[:, -1] - self.path[:, self.let_go], axis=1)
 
-    def held(self, sag: float, slip: float) -> np.ndarray:
+    def success(self, sag: float, slip: float) -> np.ndarray:
         """Whether the object ended within `sag` m of where it was let go, and no further than `slip` m more from the
         arm's nearest unit. The arm itself may swing. Shape (B,)."""
         with np.errstate(invalid="ignore"):
@@ -141,22 +141,22 @@ def try_grasps(
     motors = actuators(model)
     straight = model.tendon_length0[model.actuator_trnid[motors, 0]]
     begun = np.zeros((count, len(motors))) if tries.before is None else tries.before
-    held = straight + np.where(begun > 0, -begun, 0.0 if tries.before is None else PAID_OUT)
+    initial = straight + np.where(begun > 0, -begun, 0.0 if tries.before is None else PAID_OUT)
     if tries.before is not None:
-        place[:, : arm.nq] = settle(arm, held, to_base.apply(model.opt.gravity)).qpos
+        place[:, : arm.nq] = settle(arm, initial, to_base.apply(model.opt.gravity)).qpos
     give_way(model, place)
     tie = _hang(batch, model, place[:, address : address + 7], to_base.apply(UP))
 
-    steps, own = round(BLOCK / timestep), np.arange(count, dtype=np.int32)
-    hold(batch, model, held)
-    winches = Winches(batch, held)
+    steps, simulations = round(BLOCK / timestep), np.arange(count, dtype=np.int32)
+    hold(batch, model, initial)
+    winches = Winches(batch, initial)
     blocks = round(schedule.length / BLOCK)
     centers = [site for site in range(model.nsite) if UNIT_CENTER.fullmatch(model.site(site).name)]
     distance = np.full((count, blocks), np.nan)
     path, tensions = np.full((count, blocks, 3), np.nan), np.full((count, len(straight)), np.nan)
     grip, sinking = model.site(GRIP).id, [model.geom(name).id for name in surfaces]
     sink = to_base.apply([0, 0, -schedule.sink * BLOCK])
-    moving, let_go = own, round(schedule.let_go / BLOCK)
+    moving, let_go = simulations, round(schedule.let_go / BLOCK)
     for block in range(blocks):
         time = block * BLOCK
         gravity[:] = to_base.apply(model.opt.gravity - schedule.acceleration(time))
@@ -167,10 +167,10 @@ def try_grasps(
         if block >= let_go:
             geoms[:, sinking] += sink[:, None]
         times = time + timestep * np.arange(steps)
-        commands = straight + _drawn(held[moving] - straight, tries.pulls[moving], times, schedule.close)
-        found = move(batch, winches.deliver(commands, moving), RECORD, steps, steps - 1, ids=moving)
-        path[moving, block] = found["site_xpos"][:, 0, grip]
-        away = found["site_xpos"][:, 0, centers] - path[moving, block, None]
+        commands = straight + _drawn(initial[moving] - straight, tries.pulls[moving], times, schedule.close)
+        recorded = move(batch, winches.deliver(commands, moving), RECORD, steps, steps - 1, ids=moving)
+        path[moving, block] = recorded["site_xpos"][:, 0, grip]
+        away = recorded["site_xpos"][:, 0, centers] - path[moving, block, None]
         distance[moving, block] = np.linalg.norm(away, axis=2).min(axis=1)
         moving = moving[~batch.warning[moving].any(axis=(1, 2))]
         if not len(moving):
@@ -196,8 +196,8 @@ def _set_up(batch: Batch, model: mujoco.MjModel, tries: Tries) -> Rotation:
         batch.expand("geom_quat")[:, geom] = wxyz_from_rotation(to_base * rotation_from_wxyz(model.geom_quat[geom]))
     body = model.body("object").id
     for geom in object_geoms(model):
-        own = model.geom_friction[geom]
-        batch.expand("geom_friction")[:, geom, :2] = np.outer(tries.friction, [1, own[1] / own[0]])
+        friction = model.geom_friction[geom]
+        batch.expand("geom_friction")[:, geom, :2] = np.outer(tries.friction, [1, friction[1] / friction[0]])
     batch.expand("body_mass")[:, body] = tries.masses
     batch.expand("body_inertia")[:, body] = model.body_inertia[body] * (tries.masses / model.body_mass[body])[:, None]
     batch.set_const()

@@ -9,15 +9,15 @@ from scipy.spatial.transform import Rotation
 from studies.payload.trials import PAID_OUT, Schedule, Tried, Tries, try_grasps
 from tests.ar.hybrid.conftest import SIZE, rubbing_arm
 from trunkline.ar.hybrid.compose import Placed, compose
-from trunkline.ar.hybrid.objects import Thing
-from trunkline.ar.hybrid.worlds import Surface, World
+from trunkline.ar.hybrid.objects import GraspObject
+from trunkline.ar.hybrid.worlds import SupportSurface, WorldGeometry
 from trunkline.frames import wxyz_from_rotation
 from trunkline.kinematics.panda.mounts import FixedMount
 from trunkline.model.arm.spiral import spiral_chain
 from trunkline.model.elements import arm_hinges
 from trunkline.model.simulation.rest import settle
 
-BAR = Thing("cylinder", 0.04, 0.12, 0.1, "plastic")
+BAR = GraspObject("cylinder", 0.04, 0.12, 0.1, "plastic")
 LEVEL = Rotation.from_euler("x", 90, degrees=True)  # turns the bar's z to base -y
 BESIDE = np.array([0.07, 0.0, -0.34])  # m, of the bar in the base frame
 SHORT = Schedule(close=0.4, settle=0.05, lift=0.1, shakes=0, hold=0.05)
@@ -29,9 +29,9 @@ NEAR = 1e-6  # m, to either side of a border
 def models():
     arm = rubbing_arm(spiral_chain(**SIZE), 8)
     hook = [float(value) for value in BESIDE + [0, 0, 0.17]]
-    table = {"table": Surface([0.0, 0.0, -0.7], [1.0, 1.0, 0.03], "wood")}
+    table = {"table": SupportSurface([0.0, 0.0, -0.7], [1.0, 1.0, 0.03], "wood")}
     placed = Placed(BAR, BESIDE, tuple(wxyz_from_rotation(LEVEL)), True)
-    whole = compose(arm, FixedMount("fixed"), World(None, table, hook), placed).compile()
+    whole = compose(arm, FixedMount("fixed"), WorldGeometry(None, table, hook), placed).compile()
     return whole, compose(arm, FixedMount("fixed")).compile()
 
 
@@ -71,11 +71,11 @@ def test_an_arm_begins_at_rest_under_its_first_pulls(models):
     tries.pulls[:] = before
     tries.poses[:, 0] += 0.5  # out of the way
     hinges = slice(0, arm_hinges(models[1]))
-    held = try_grasps(*models, tries, SHORT).qpos[0, hinges]
+    bent = try_grasps(*models, tries, SHORT).qpos[0, hinges]
     straight = try_grasps(*models, replace(tries, before=None, pulls=0 * tries.pulls), SHORT).qpos[0, hinges]
     rest = settle(models[1], models[1].tendon_length0[:3] + [-0.05, PAID_OUT, PAID_OUT], np.array([0, 0, -9.81])).qpos
     rest = rest[0, hinges]
-    assert np.abs(held - rest).max() < 0.1 * np.abs(held - straight).max()
+    assert np.abs(bent - rest).max() < 0.1 * np.abs(bent - straight).max()
 
 
 def test_a_table_sinks_along_gravity(models):

@@ -20,8 +20,8 @@ def read_sources(root: Path) -> Sources:
     artifacts = root / "artifacts"
     meshes = sorted((artifacts / "reachability/meshes").glob("*.obj"))
     if not meshes:
-        found = f"{artifacts}/reachability/meshes: found no mesh"
-        raise InputError(f"{found}, expected .obj files (run the reachability stage)")
+        place = f"{artifacts}/reachability/meshes: found no mesh"
+        raise InputError(f"{place}, expected .obj files (run the reachability stage)")
     return Sources(
         mjcf=existing(artifacts / "identify_control/arm.xml").read_text(),
         parameters={s: json.loads(existing(artifacts / s / "parameters.json").read_text()) for s in IDENTIFYING},

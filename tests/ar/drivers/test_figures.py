@@ -24,7 +24,7 @@ from trunkline.ar.drivers.settings import Config
 from trunkline.ar.drivers.winch import ReelSettings
 from trunkline.ar.session import auth, client, clock, follow, lease, log_writer, real, robot, server
 from trunkline.ar.session.settings import Config as Live
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.executor import BRAKE
 from trunkline.kinematics.panda.limits import ACCELERATION, VELOCITY
 from trunkline.pipeline.config import PROJECT, load_folder

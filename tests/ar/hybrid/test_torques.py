@@ -36,7 +36,7 @@ def potential(model, q):
 
 def test_static_torques_are_the_slope_of_potential_energy(model):
     step = 1e-6 * np.eye(7)
-    slope = [(potential(model, Q + one) - potential(model, Q - one)) / 2e-6 for one in step]
+    slope = [(potential(model, Q + offset) - potential(model, Q - offset)) / 2e-6 for offset in step]
     torques = joint_torques(model, pose(model, Q)[None], load=LOAD)
     np.testing.assert_allclose(torques[0], slope, atol=1e-6)
     assert np.abs(torques).max() > 20

@@ -27,7 +27,7 @@ from trunkline.ar.session import lease, preview_process, robot
 from trunkline.ar.session.controller import Planning
 from trunkline.ar.session.session import Address, opened
 from trunkline.ar.session.settings import Config
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.messages import Mode
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.config import PROJECT, load_folder

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from trunkline.ar.preview.package import Package, read_package
-from trunkline.ar.preview.preview_twin import believed, compose_twin
+from trunkline.ar.preview.preview_twin import compose_twin, robot_model_of
 from trunkline.ar.preview.world_model import make_world
 from trunkline.ar.session import preview_process, simulated
 from trunkline.ar.session.bodies import drawn
@@ -20,7 +20,7 @@ from trunkline.ar.session.robot import RobotProcess
 from trunkline.ar.session.scene import Shells, scene
 from trunkline.ar.session.settings import Config
 from trunkline.ar.session.simulated import Simulation
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.ar.teleop.core import Teleoperation
 from trunkline.ar.teleop.messages import Box
 from trunkline.ar.teleop.rigid_ik import RigidIK
@@ -107,7 +107,7 @@ def robot_of(simulation: Simulation, hardware: Hardware | None) -> RobotProcess:
 
 def simulation_of(package: Package, teleop: Teleop, config: Config, joints: np.ndarray) -> Simulation:
     """The simulated robot, at rest at `joints` (7,), rad, with its arm straight."""
-    known = believed(config.preview, package.files)
+    known = robot_model_of(config.preview, package.files)
     world = make_world(solids(config))
     twin = compose_twin(known, world, config.thing, joints, package.straight, config.preview)
     limits = limits_of(teleop.motors, package.rate_limit, len(package.straight))

@@ -18,14 +18,14 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from trunkline.ar.hybrid.preview import WITHIN, nominal
-from trunkline.ar.hybrid.rollouts import FRAME, Twin, Way
-from trunkline.ar.preview.grasp_preview import Foreseen, Foresight
+from trunkline.ar.hybrid.rollouts import FRAME, CommandTrajectory, ComposedTwin
+from trunkline.ar.preview.grasp_preview import GraspPreviewer, PlanPrediction
 from trunkline.ar.preview.package import Package, read_package
-from trunkline.ar.preview.preview_twin import at_rest, believed, compose_twin
+from trunkline.ar.preview.preview_twin import at_rest, compose_twin, robot_model_of
 from trunkline.ar.preview.settings import Previewing
 from trunkline.ar.session import messages
 from trunkline.ar.session.bodies import Poses
-from trunkline.ar.teleop.config import Config
+from trunkline.ar.teleop.config import TeleoperationConfig
 from trunkline.ar.teleop.following import sought
 from trunkline.ar.teleop.messages import PlanReport, Request, Target, Targets, Thing, World
 from trunkline.ar.teleop.plan import Plan
@@ -120,20 +120,22 @@ class Overtaken(Exception):
 class Foreseer:
     """Plans and previews. `bodies`: names of those whose poses are told."""
 
-    def __init__(self, planner: Planner, foresight: Foresight, bodies: tuple[str, ...]) -> None:
+    def __init__(self, planner: Planner, foresight: GraspPreviewer, bodies: tuple[str, ...]) -> None:
         self.planner, self.foresight, self.bodies = planner, foresight, bodies
-        self.known, self.previewing = foresight.known, foresight.settings
-        self._kept: tuple[tuple, Twin | None] = ((), None)
-        self._grasped: Foreseen | None = None  # the last grasp: of a thing that is held, the one that was run
+        self.known, self.previewing = foresight.robot_model, foresight.settings
+        self._kept: tuple[tuple, ComposedTwin | None] = ((), None)
+        self._grasped: PlanPrediction | None = None  # the last grasp: of a thing that is held, the one that was run
 
     @classmethod
-    def of(cls, package: Package, config: Config, previewing: Previewing, bodies: tuple[str, ...]) -> "Foreseer":
+    def of(
+        cls, package: Package, config: TeleoperationConfig, previewing: Previewing, bodies: tuple[str, ...]
+    ) -> "Foreseer":
         """By a package alone.
 
         Raises:
             InputError: it has nothing to preview with.
         """
-        foresight = Foresight(believed(previewing, package.files), package.grips(config), previewing)
+        foresight = GraspPreviewer(robot_model_of(previewing, package.files), package.grips(config), previewing)
         return cls(package.planner(config), foresight, bodies)
 
     def answers(self, order: Order | Seek, go_on: Callable[[], None] = lambda: None) -> Iterator[Answer]:
@@ -167,7 +169,7 @@ class Foreseer:
         """Compose its twin, which the next order takes, where nothing has changed."""
         self._twin(order.world, _beside(order), order.joints, order.commands)
 
-    def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> Twin:
+    def _twin(self, world: World, thing: Thing | None, joints: np.ndarray, commands: np.ndarray) -> ComposedTwin:
         """The last one where nothing has changed: to compile another takes longer than a piece of a preview."""
         kept, twin = self._kept
         if twin is not None and kept == (world.boxes, thing):
@@ -177,7 +179,9 @@ class Foreseer:
         self._kept = (world.boxes, thing), twin
         return twin
 
-    def _shown(self, serial: int, twin: Twin, way: Way, go_on: Callable[[], None]) -> Iterator[Answer]:
+    def _shown(
+        self, serial: int, twin: ComposedTwin, way: CommandTrajectory, go_on: Callable[[], None]
+    ) -> Iterator[Answer]:
         poses, first, held = Poses(twin.model, self.bodies), 0, None
         for piece in nominal(twin, way):
             if held is not None:
@@ -193,8 +197,8 @@ class Foreseer:
             yield Shown(serial, held.first, held.time, held.poses, True)
 
     def _foreseen(
-        self, order: Order, plan: Plan, twin: Twin, way: Way, go_on: Callable[[], None]
-    ) -> Iterator[Foreseen]:
+        self, order: Order, plan: Plan, twin: ComposedTwin, way: CommandTrajectory, go_on: Callable[[], None]
+    ) -> Iterator[PlanPrediction]:
         targets, serial = order.request.targets, order.request.serial
         thing, held = order.world.thing(targets.thing) if targets.thing else None, _held(order)
         if thing is not None and held is None:
@@ -207,14 +211,14 @@ class Foreseer:
             yield self.foresight.free(twin, way, serial, go_on)
 
 
-def told(digest: str, found: Foreseen) -> messages.Foreseen:
+def told(digest: str, found: PlanPrediction) -> messages.Foreseen:
     """As clients hear it: times from the plan's beginning on."""
     preview, stated = found.preview, found.preview.stated
     low_high = preview.interval or (None, None)
     tips = tuple((float(x), float(y), float(z)) for x, y, z in stated.tips)
     return messages.Foreseen(
         digest, preview.probability, *low_high, tuple(map(float, found.begins + stated.times)), tips,
-        tuple(map(float, stated.radii)), WITHIN, len(preview.draws), found.offer,
+        tuple(map(float, stated.radii)), WITHIN, len(preview.samples), found.offer,
     )  # fmt: skip
 
 
@@ -303,7 +307,14 @@ class ForeseerProcess:
 
 
 def run(
-    answers, orders, newest, path: Path, config: Config, previewing: Previewing, bodies: tuple[str, ...], world: World
+    answers,
+    orders,
+    newest,
+    path: Path,
+    config: TeleoperationConfig,
+    previewing: Previewing,
+    bodies: tuple[str, ...],
+    world: World,
 ) -> None:
     """The process: until its parent is gone. world: the first plans are likely to be asked for in it."""
     leave_signals_to_parent()

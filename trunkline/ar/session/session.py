@@ -23,7 +23,7 @@ from trunkline.ar.session.hardware import Hardware, hardware_of
 from trunkline.ar.session.preview_process import Answer
 from trunkline.ar.session.server import PARTING, House, Server
 from trunkline.ar.session.settings import Alignment, Config
-from trunkline.ar.teleop.config import Config as Teleop
+from trunkline.ar.teleop.config import TeleoperationConfig as Teleop
 from trunkline.errors import InputError
 from trunkline.pipeline.config import PROJECT, load_folder
 

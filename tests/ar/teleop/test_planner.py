@@ -93,9 +93,9 @@ def test_legs_with_a_gravity_are_shaped_by_what_swings_the_arm(plan):
     legs = [Leg("a", THERE, STRAIGHT), Leg("b", THERE, PULLED, GRAVITY), Leg("c", START, MORE, OTHER, change=still)]
     made, _ = plan(*legs, shaper=shaper)
     expected = [(GRAVITY, PULLED, PULLED - STRAIGHT), (OTHER, MORE, still)]
-    for found, right in zip(asked, expected, strict=True):
-        for one, other in zip(found, right, strict=True):
-            np.testing.assert_allclose(one, other, atol=1e-12)
+    for arguments, right in zip(asked, expected, strict=True):
+        for value, wanted in zip(arguments, right, strict=True):
+            np.testing.assert_allclose(value, wanted, atol=1e-12)
     plain = point_to_point(axes(START, STRAIGHT), axes(THERE, STRAIGHT), LIMITS, STEP)
     curl = shaped(point_to_point(axes(THERE, STRAIGHT), axes(THERE, PULLED), LIMITS, STEP), STEP, SHAPER)
     np.testing.assert_allclose(rows(made)[: len(plain) + len(curl) - 1], np.concatenate([plain, curl[1:]]), atol=1e-12)

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from trunkline.ar.hybrid.friction import CONDIM, SOLIMP, SOLREF, TPU_ON, coefficients, make_holding
-from trunkline.ar.hybrid.objects import Thing
+from trunkline.ar.hybrid.objects import GraspObject
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.model.arm.contact_geometry import ARM, WORLD, unit_corners
 
@@ -35,7 +35,7 @@ def squeezed(chain, shape, mass, holding=True):
                      condim=CONDIM, friction=coefficients("plastic"), solref=SOLREF, solimp=SOLIMP)  # fmt: skip
         motor = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         motor.set_to_motor()
-    Thing(shape, WIDTH, 0.12, mass, "plastic").add_to(spec, np.zeros(3))
+    GraspObject(shape, WIDTH, 0.12, mass, "plastic").add_to(spec, np.zeros(3))
     model = spec.compile()
     data, number = mujoco.MjData(model), model.body("object").id
     data.ctrl[:] = SQUEEZE
@@ -69,5 +69,5 @@ def test_friction_ends_where_coulomb_says(chain):
 
 def test_mujocos_own_settings_would_creep(chain):
     mass = 0.6 * 2 * TPU_ON["plastic"] * SQUEEZE / STANDARD_GRAVITY
-    ours, own = (squeezed(chain, "cylinder", mass, holding)[0] for holding in (True, False))
-    assert own[240] - own[-1] > 5 * (ours[240] - ours[-1])
+    ours, default = (squeezed(chain, "cylinder", mass, holding)[0] for holding in (True, False))
+    assert default[240] - default[-1] > 5 * (ours[240] - ours[-1])

@@ -18,9 +18,9 @@ FREE = FixedMount("fixed")
 
 def test_the_arms_file_says_its_geometry(arm, chain):
     read = read_geometry(mujoco.MjSpec.from_string(arm.to_xml()))
-    for found, expected in zip((read.lengths, read.widths, read.joint_range), (chain.lengths, chain.widths,
+    for value, expected in zip((read.lengths, read.widths, read.joint_range), (chain.lengths, chain.widths,
                                chain.joint_range), strict=True):  # fmt: skip
-        np.testing.assert_allclose(found, expected, rtol=1e-4)  # a file has six digits, and lengths are differences
+        np.testing.assert_allclose(value, expected, rtol=1e-4)  # a file has six digits, and lengths are differences
     assert read.ratio == pytest.approx(chain.ratio, rel=1e-4)
 
 

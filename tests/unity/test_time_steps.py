@@ -39,10 +39,10 @@ def program(tmp_path_factory):
     return out
 
 
-def told(program, what: str, numbers) -> list[str]:
+def output_of(program, what: str, numbers) -> list[str]:
     words = {math.inf: "Infinity"}
-    given = ["NaN" if math.isnan(number) else words.get(number, repr(number)) for number in numbers]
-    arguments = ["mono", str(program), what, ",".join(given)]
+    values = ["NaN" if math.isnan(number) else words.get(number, repr(number)) for number in numbers]
+    arguments = ["mono", str(program), what, ",".join(values)]
     return subprocess.run(arguments, capture_output=True, text=True, check=True).stdout.splitlines()
 
 
@@ -52,27 +52,27 @@ def test_steps_are_whole_parts_of_a_frame_and_as_few_as_may_be(program, rate):
     step = 1 / (rate * count)
     assert step <= LONGEST_STEP * (1 + 1e-8)
     assert count == 1 or 1 / (rate * (count - 1)) > LONGEST_STEP
-    ((found, length),) = (line.split() for line in told(program, "step", [rate, LONGEST_STEP]))
-    assert (int(found), float(length)) == (count, pytest.approx(step))
+    ((steps, length),) = (line.split() for line in output_of(program, "step", [rate, LONGEST_STEP]))
+    assert (int(steps), float(length)) == (count, pytest.approx(step))
 
 
 def test_the_steps_of_common_displays(program):
     assert [steps_per_frame(rate) for rate in (60, 72, 90, 120)] == [5, 4, 3, 3]
     assert max(steps_taken()) <= LONGEST_STEP
-    silent = [told(program, "step", [rate, LONGEST_STEP]) for rate in (0.0, math.nan, math.inf, -1.0)]
-    assert silent == 4 * [told(program, "step", [60.0, LONGEST_STEP])]
+    silent = [output_of(program, "step", [rate, LONGEST_STEP]) for rate in (0.0, math.nan, math.inf, -1.0)]
+    assert silent == 4 * [output_of(program, "step", [60.0, LONGEST_STEP])]
 
 
 def test_a_device_that_falls_behind_for_two_seconds_is_told_by_how_much(program):
     frame = 1 / 72
     slow = [value for _ in range(216) for value in (frame, 0.62 * frame)]
-    *lines, warning = told(program, "keep", slow)
+    *lines, warning = output_of(program, "keep", slow)
     full = [line.split() for line in lines if line.startswith("True")]
     assert [float(share) for _, share, _ in full] == pytest.approx([0.62, 0.62])
     assert [behind for *_, behind in full] == ["False", "True"]  # the first second may be a hitch
     assert warning.startswith("Trunkline: found 62 % of real time simulated in steps of 4.0 ms, expected 100 %")
     well = [value for k in range(288) for value in (frame, 0.0 if k == 100 else frame)]
-    assert all(line.endswith("False") for line in told(program, "keep", well)[:-1])
+    assert all(line.endswith("False") for line in output_of(program, "keep", well)[:-1])
 
 
 @pytest.fixture(scope="module")
@@ -84,22 +84,22 @@ def models() -> tuple[mujoco.MjModel, mujoco.MjModel]:
 
 
 def test_shorter_steps_err_less(models):
-    found = step_errors(*models, **CURL)
-    assert [(one.display_rate, one.steps_per_frame) for one in found] == [
+    errors = step_errors(*models, **CURL)
+    assert [(error.display_rate, error.steps_per_frame) for error in errors] == [
         (rate, count) for rate in DISPLAY_RATES for count in range(1, steps_per_frame(rate) + 1)
     ]
-    for one in found:
-        assert one.step == pytest.approx(1 / (one.display_rate * one.steps_per_frame))
-    taken = [one for one in found if one.steps_per_frame == steps_per_frame(one.display_rate)]
-    longer = [one for one in found if one.step > LONGEST_STEP]
-    worst = [math.inf if one.tip_error_mm is None else one.tip_error_mm for one in longer]
-    assert max(one.tip_error_mm for one in taken) < min(worst)
+    for error in errors:
+        assert error.step == pytest.approx(1 / (error.display_rate * error.steps_per_frame))
+    taken = [error for error in errors if error.steps_per_frame == steps_per_frame(error.display_rate)]
+    longer = [error for error in errors if error.step > LONGEST_STEP]
+    worst = [math.inf if error.tip_error_mm is None else error.tip_error_mm for error in longer]
+    assert max(error.tip_error_mm for error in taken) < min(worst)
 
 
 def test_the_calibrated_step_errs_nothing_and_one_that_diverges_says_so(models, monkeypatch):
     calibrated, packed = models
     monkeypatch.setattr("trunkline.unity.time_steps.DISPLAY_RATES", (1000.0,))  # the time step of the small arm
-    assert [one.tip_error_mm for one in step_errors(calibrated, packed, **CURL)] == [pytest.approx(0, abs=1e-3)]
+    assert [error.tip_error_mm for error in step_errors(calibrated, packed, **CURL)] == [pytest.approx(0, abs=1e-3)]
     loose = small_spec(kp=2e7, kv=0.0)
     as_pulls(loose)
     monkeypatch.setattr("trunkline.unity.time_steps.DISPLAY_RATES", (30.0,))
@@ -112,10 +112,10 @@ def test_the_calibrated_step_errs_nothing_and_one_that_diverges_says_so(models, 
 def test_the_table_takes_the_place_that_a_text_leaves_it():
     rows = [StepError(display_rate=72, steps_per_frame=n, step=1 / 72 / n, tip_error_mm=9.0 / n) for n in (3, 4)]
     text = f"before\n\n{TABLE_HERE}\nThe package has it.\n\nafter\n"
-    found = with_steps(text, rows)
-    assert found == f"before\n\n{step_table(rows)}\n\nafter\n"
-    assert "| 72 Hz | 3 | 4.6 ms | 3.0 mm |" in found
-    assert "| 72 Hz | **4** | 3.5 ms | 2.2 mm |" in found
+    text_with_table = with_steps(text, rows)
+    assert text_with_table == f"before\n\n{step_table(rows)}\n\nafter\n"
+    assert "| 72 Hz | 3 | 4.6 ms | 3.0 mm |" in text_with_table
+    assert "| 72 Hz | **4** | 3.5 ms | 2.2 mm |" in text_with_table
     assert with_steps("no place", rows) == "no place"
 
 

@@ -1,4 +1,4 @@
-"""What is trusted, by hand: each reason alone, both sides of each border, and which reason comes first."""
+"""What is trusted, by number: each reason alone, each border and its sides, and which comes first."""
 
 import math
 from dataclasses import replace
@@ -94,8 +94,8 @@ def test_a_client_is_silent_by_its_stamps_or_by_what_does_not_come(last, stamp, 
     ],
 )
 def test_package_base_and_joints_are_those_that_are_known(change, fault):
-    given = SimpleNamespace(**({"package": PACKAGE, "alignment": BASE, "joints": (0.0,) * 7} | change))
-    assert setting_fault(given, PACKAGE) == fault
+    message = SimpleNamespace(**({"package": PACKAGE, "alignment": BASE, "joints": (0.0,) * 7} | change))
+    assert setting_fault(message, PACKAGE) == fault
 
 
 def at(*position: float) -> Controller:
@@ -124,5 +124,5 @@ LEFT, RIGHT = at(0.0, 0.0, 0.0), at(1.0, 0.0, 0.0)
 def test_controllers_have_changed_places_where_both_are_near_to_the_others_and_far_from_their_own(
     before, left, right, changed_places
 ):
-    hands = [Hand(1.0, seen=seen) for seen in before]
+    hands = [Hand(1.0, controller=controller) for controller in before]
     assert swapped(*hands, SimpleNamespace(left=left, right=right), 0.25) is changed_places

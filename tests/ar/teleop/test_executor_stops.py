@@ -27,35 +27,35 @@ def followed(monkeypatch):
     """A robot that follows, and its follower."""
     follower = Follower()
     monkeypatch.setattr(executor, "Follower", lambda *_: follower)
-    found = robot()
-    assert found.follow(None, 0.01) == ""  # type: ignore[arg-type]
-    return found, follower
+    simulated = robot()
+    assert simulated.follow(None, 0.01) == ""  # type: ignore[arg-type]
+    return simulated, follower
 
 
 def test_a_stop_brakes_what_follows_and_once(followed):
-    found, follower = followed
-    found.stop()
+    simulated, follower = followed
+    simulated.stop()
     assert follower.braked == 1
-    found.stop()
+    simulated.stop()
     assert follower.braked == 1
-    assert found.state() == ExecutorReport("running", executor.FOLLOWS)  # until it rests
+    assert simulated.state() == ExecutorReport("running", executor.FOLLOWS)  # until it rests
 
 
 def test_what_runs_takes_nothing_else(followed):
-    plan, found = plan_of(still()), robot()
-    assert found.start(plan, plan.digest()) == ""
-    for runs in (found, followed[0]):
+    plan, simulated = plan_of(still()), robot()
+    assert simulated.start(plan, plan.digest()) == ""
+    for runs in (simulated, followed[0]):
         assert runs.start(plan, plan.digest()) == "busy: another plan runs"
         assert runs.follow(None, 0.01) == "busy: another plan runs"  # type: ignore[arg-type]
 
 
 def test_a_stop_of_what_does_not_run_stops_nothing_later():
-    found, plan = robot(), plan_of(still())
-    found.stop()
-    assert found.state() == ExecutorReport()
-    assert found.start(plan, plan.digest()) == ""
-    found.advance(1.0)
-    assert found.state() == ExecutorReport("done", plan.digest())
+    simulated, plan = robot(), plan_of(still())
+    simulated.stop()
+    assert simulated.state() == ExecutorReport()
+    assert simulated.start(plan, plan.digest()) == ""
+    simulated.advance(1.0)
+    assert simulated.state() == ExecutorReport("done", plan.digest())
 
 
 BUTTONS = {
@@ -71,13 +71,13 @@ BUTTONS = {
 @pytest.mark.parametrize("name", BUTTONS)
 def test_an_event_of_a_button_is_of_that_button_as_it_goes_down(name, button):
     mode, wanted = BUTTONS[name]
-    hand = replace(OPEN, pressed=(button,) if button else (), held=(wanted,))
+    hand = replace(OPEN, pressed=(button,) if button else (), buttons=(wanted,))
     before = state(mode, right=hand, stamp=100.0, history=((99.0, TARGETS),), **GRIPPED)
     assert event(name, before, heard()) == (button == wanted)
 
 
 @pytest.mark.parametrize(
-    ("name", "before", "given", "happens"),
+    ("name", "before", "fields", "happens"),
     [
         ("planned", {"mode": "plan"}, {}, True),
         ("planned", {"mode": "plan"}, {"plan": None}, False),
@@ -88,9 +88,9 @@ def test_an_event_of_a_button_is_of_that_button_as_it_goes_down(name, button):
         ("settled", {"mode": "hold", "sound_for": 0.0} | LET_GO, {}, False),
     ],
 )
-def test_a_plan_that_is_there_is_planned_or_refused(name, before, given, happens):
+def test_a_plan_that_is_there_is_planned_or_refused(name, before, fields, happens):
     before = dict(before)
-    assert event(name, state(before.pop("mode"), **before), heard(**given)) == happens
+    assert event(name, state(before.pop("mode"), **before), heard(**fields)) == happens
 
 
 BACK = SETTINGS.look_back
@@ -110,6 +110,6 @@ BEYOND = replace(TARGETS, tip=replace(TARGETS.tip, reach="outside"))
 )
 def test_targets_are_those_of_before_the_triggers_jerk(history, asked):
     """Those of `history` by their age, s, the oldest first."""
-    told = tuple((100.0 - age, targets) for age, targets in history)
-    before = state("aim", right=replace(OPEN, pressed=("trigger",)), stamp=100.0, history=told, **GRIPPED)
+    stamped = tuple((100.0 - age, targets) for age, targets in history)
+    before = state("aim", right=replace(OPEN, pressed=("trigger",)), stamp=100.0, history=stamped, **GRIPPED)
     assert event("ask", before, heard()) == asked

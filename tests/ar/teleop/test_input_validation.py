@@ -12,7 +12,7 @@ from trunkline.ar.teleop.tracked_controller import Hand
 NAN, INFINITY, NEAR = float("nan"), float("inf"), 1e-6
 SAFETY, FORWARD = config().core.safety, (1.0, 0.0, 0.0, 0.0)
 HAND = Controller((0.1, 0.2, 0.3), FORWARD)
-GIVEN = Input(100.0, HAND, HAND, REFERENCE, (0.0,) * 7, World("world"), PACKAGE)
+MESSAGE = Input(100.0, HAND, HAND, REFERENCE, (0.0,) * 7, World("world"), PACKAGE)
 
 
 def of_length(length):
@@ -59,7 +59,7 @@ def test_a_controller(controller, fault):
     ],
 )
 def test_a_clock(last, stamp, dt, fault):
-    assert clock_fault(last, replace(GIVEN, stamp=stamp), dt) == fault
+    assert clock_fault(last, replace(MESSAGE, stamp=stamp), dt) == fault
 
 
 @pytest.mark.parametrize(
@@ -98,21 +98,21 @@ def test_silence(last, stamp, silent, faulty):
     ],
 )  # fmt: skip
 def test_settings(changes, fault):
-    assert setting_fault(replace(GIVEN, **changes), PACKAGE) == fault
+    assert setting_fault(replace(MESSAGE, **changes), PACKAGE) == fault
 
 
-def swap(apart, left, right, seen=(True, True)):
+def swap(apart, left, right, visible=(True, True)):
     """Hands that were `apart` m, and are now `left` and `right` m from where the left one was."""
-    before = [Hand(0.6, seen=replace(HAND, position=(at, 0.0, 0.0)) if there else None)
-              for at, there in zip((0.0, apart), seen, strict=True)]  # fmt: skip
-    given = replace(
-        GIVEN, left=replace(HAND, position=(left, 0.0, 0.0)), right=replace(HAND, position=(right, 0.0, 0.0))
+    before = [Hand(0.6, controller=replace(HAND, position=(at, 0.0, 0.0)) if there else None)
+              for at, there in zip((0.0, apart), visible, strict=True)]  # fmt: skip
+    message = replace(
+        MESSAGE, left=replace(HAND, position=(left, 0.0, 0.0)), right=replace(HAND, position=(right, 0.0, 0.0))
     )
-    return swapped(*before, given, SAFETY.swap)
+    return swapped(*before, message, SAFETY.swap)
 
 
 @pytest.mark.parametrize(
-    ("apart", "left", "right", "seen", "expected"),
+    ("apart", "left", "right", "visible", "expected"),
     [
         (0.4, 0.4, 0.0, (True, True), True),
         (0.4, 0.0, 0.4, (True, True), False),
@@ -126,5 +126,5 @@ def swap(apart, left, right, seen=(True, True)):
         (0.4, 0.4, 0.0, (True, False), False),
     ],
 )
-def test_hands_that_have_changed_places(apart, left, right, seen, expected):
-    assert swap(apart, left, right, seen) == expected
+def test_hands_that_have_changed_places(apart, left, right, visible, expected):
+    assert swap(apart, left, right, visible) == expected

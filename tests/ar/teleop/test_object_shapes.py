@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from trunkline.ar.hybrid.objects import Thing as Shaped
+from trunkline.ar.hybrid.objects import GraspObject as Shaped
 from trunkline.ar.teleop.messages import Box, Quaternion, Thing, World
 from trunkline.ar.teleop.object_shapes import below_grip, beneath, grip_of, way_of_grasping
 
@@ -43,8 +43,8 @@ def test_ways_of_grasping():
     for support in ("hanging", "standing", "held"):
         assert way_of_grasping(replace(BASKET, support=support)) == "basket"
     cylinder = replace(BASKET, shape="cylinder")
-    found = [way_of_grasping(replace(cylinder, support=support)) for support in ("hanging", "standing", "held")]
-    assert found == ["hanging", "standing", "hanging"]
+    ways = [way_of_grasping(replace(cylinder, support=support)) for support in ("hanging", "standing", "held")]
+    assert ways == ["hanging", "standing", "hanging"]
 
 
 def test_the_highest_solid_beneath_a_place():

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from trunkline.ar.hybrid.released import LAST, STILL, Resting
+from trunkline.ar.hybrid.released import LAST, STILL, RestCriterion
 from trunkline.ar.hybrid.rollouts import Piece
 
 TIME = np.linspace(0.0, 4.0, 81)
@@ -14,7 +14,7 @@ MODEL = mujoco.MjModel.from_xml_string("""
   <geom size="0.02" pos="0 0 0.1" contype="2" conaffinity="10"/>
   <body name="object"><joint type="slide" axis="0 0 1"/><geom size="0.02" contype="4" conaffinity="14"/></body>
 </worldbody></mujoco>""")
-RESTING = Resting(1.0, np.array([-0.3, -0.3, -0.13]), np.array([0.3, 0.3, -0.1]), MODEL)
+RESTING = RestCriterion(1.0, np.array([-0.3, -0.3, -0.13]), np.array([0.3, 0.3, -0.1]), MODEL)
 SET_DOWN = np.where(TIME[:, None] < 1.0, [0.1, 0.0, 0.0], [0.1, 0.0, -0.05])
 
 
@@ -42,9 +42,9 @@ def test_what_rests(name):
 
 @pytest.mark.parametrize(("height", "rests"), [(0.0, True), (0.059, True), (0.061, False), (np.nan, True)])
 def test_what_the_arm_still_touches_does_not_rest(height, rests):
-    found = motion(SET_DOWN)
-    found.qpos[:, -1] = height
-    assert RESTING.holds(found)[0] == rests
+    motion_at_rest = motion(SET_DOWN)
+    motion_at_rest.qpos[:, -1] = height
+    assert RESTING.holds(motion_at_rest)[0] == rests
 
 
 def test_a_future_that_is_not_sound_does_not_count():

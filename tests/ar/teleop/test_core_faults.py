@@ -52,8 +52,8 @@ def test_robot_holds_and_says_why(mode, bad):
     start = len(operator.intents)
     intent = FAULTS[bad](operator)
     assert intent.motion == "hold"
-    kept = mode == "stopped" or (mode in WATCHING and bad in UNHEARD)
-    assert intent.mode == (mode if kept else "hold")
+    unchanged = mode == "stopped" or (mode in WATCHING and bad in UNHEARD)
+    assert intent.mode == (mode if unchanged else "hold")
     if bad == "silent":  # said as soon as it is known
         intent = next(intent for intent in operator.intents[start:] if intent.notice.startswith("client"))
     later = {("hold", "silent"): "client silent for 0.20 s; holding"}  # another line comes before it
@@ -65,9 +65,9 @@ def test_robot_holds_and_says_why(mode, bad):
 def test_robot_may_be_moved_again_only_by_a_new_plan_and_a_new_confirmation(bad):
     operator = Operator()
     operator.to("execute")
-    good = operator.given
+    good = operator.message
     FAULTS[bad](operator)
-    operator.given = replace(good, stamp=operator.given.stamp if operator.given.stamp > 0 else good.stamp)
+    operator.message = replace(good, stamp=operator.message.stamp if operator.message.stamp > 0 else good.stamp)
     for _ in range(120):
         assert operator.step().motion == "hold"
     assert operator.wait(1.0, left={"grip": False}, right={"grip": False}).mode == "aim"
@@ -78,9 +78,9 @@ def test_robot_may_be_moved_again_only_by_a_new_plan_and_a_new_confirmation(bad)
 def test_a_plan_outlives_that_its_user_is_not_heard_and_is_confirmed_by_a_fresh_press_alone(mode, bad):
     operator = Operator()
     operator.to(mode)
-    good, hand = operator.given, "left" if bad == "nan position" else "right"
+    good, hand = operator.message, "left" if bad == "nan position" else "right"
     FAULTS[bad](operator)
-    operator.given = replace(good, stamp=operator.given.stamp)
+    operator.message = replace(good, stamp=operator.message.stamp)
     heard = operator.step(**{hand: {"trigger": True, "grip": True}})  # held when it appears: no press
     assert (heard.mode, heard.notice) == (mode, "")
     if mode == "plan":
@@ -116,9 +116,9 @@ def test_a_controller_lost_for_a_moment_changes_nothing():
 def test_motion_stops_within_150_ms_of_the_last_pose():
     operator = Operator()
     operator.to("execute")
-    lost = operator.given.stamp
+    lost = operator.message.stamp
     while operator.step(right={"tracked": False}).motion == "execute":
-        assert operator.given.stamp - lost < 0.15
+        assert operator.message.stamp - lost < 0.15
 
 
 def test_motion_stops_within_400_ms_of_the_last_word_of_a_client():

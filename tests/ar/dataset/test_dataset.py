@@ -51,11 +51,11 @@ def array(data: pd.DataFrame, name: str) -> np.ndarray:
 
 
 def test_every_motion_is_an_episode_that_knows_how_it_ended(recording):
-    found = list(episodes(recording, FPS))
-    assert [(one.task, one.end, one.succeeded) for one in found] == [
+    recorded = list(episodes(recording, FPS))
+    assert [(episode.task, episode.end, episode.succeeded) for episode in recorded] == [
         (TASKS[0], "done", True), (TASKS[0], "held", False), (TASKS[1], "not held", False), (TASKS[2], "done", True),
     ]  # fmt: skip
-    assert [len(one.frames[ACTION]) for one in found] == [51, 26, 26, 38]  # 2, 1, 1 and 1.5 s, both ends
+    assert [len(episode.frames[ACTION]) for episode in recorded] == [51, 26, 26, 38]  # 2, 1, 1 and 1.5 s, both ends
 
 
 def test_a_frame_has_what_was_measured_by_then_and_what_was_sent_by_the_next(recording):
@@ -65,17 +65,17 @@ def test_a_frame_has_what_was_measured_by_then_and_what_was_sent_by_the_next(rec
     zero = recording.logbook.zero
     for number in range(len(first.frames[ACTION]) - 1):
         at = 1e-9 * (began - zero) + number / FPS
-        told = np.floor(round((at - 100.0) * RATE, 6)) / RATE + 100.0  # the step of the log that was last by then
+        last_step = np.floor(round((at - 100.0) * RATE, 6)) / RATE + 100.0  # the step of the log that was last by then
         ahead = np.floor(round((at + 1 / FPS - 100.0) * RATE, 6)) / RATE + 100.0
         np.testing.assert_allclose(first.frames[ACTION][number], np.concatenate(sent(ahead)), atol=1e-9)
         state = first.frames[STATE][number]
-        np.testing.assert_allclose(state[:10], np.concatenate(sent(told - 0.02)), atol=1e-9)
-        tip = [0.1 * told, 0.0, -PLACE[2]]  # the last body is turned by half a turn about x
+        np.testing.assert_allclose(state[:10], np.concatenate(sent(last_step - 0.02)), atol=1e-9)
+        tip = [0.1 * last_step, 0.0, -PLACE[2]]  # the last body is turned by half a turn about x
         np.testing.assert_allclose(state[10:], tip, atol=1e-9)
 
 
 def test_the_goal_is_what_the_executed_plan_was_asked_for_or_what_is_followed(recording):
-    done, _, grasp, followed = (one.frames[ENVIRONMENT] for one in episodes(recording, FPS))
+    done, _, grasp, followed = (episode.frames[ENVIRONMENT] for episode in episodes(recording, FPS))
     assert np.unique(done[:, GOAL.index("rigid.x")]).tolist() == [0.5]
     assert np.unique(done[:, GOAL.index("thing.known")]).tolist() == [0.0]
     assert grasp[0, GOAL.index("thing.known") :].tolist() == [1.0, 0.7, 0.1, 0.2]
@@ -125,7 +125,7 @@ def test_episodes_lie_end_to_end_and_only_their_last_frames_are_done(dataset):
     assert last["next.success"].tolist() == [True, False, False, True]
     assert data["next.success"].sum() == 2
     tasks = pd.read_parquet(dataset / "meta/tasks.parquet")
-    assert tasks.index[last["task_index"]].tolist() == [one[0] for one in table["tasks"]] == [TASKS[0], *TASKS]
+    assert tasks.index[last["task_index"]].tolist() == [row[0] for row in table["tasks"]] == [TASKS[0], *TASKS]
 
 
 def test_statistics_are_those_of_the_rows(dataset):
@@ -157,9 +157,9 @@ def test_where_nobody_measures_the_state_is_what_was_sent_and_its_names_say_so(t
 
 def test_a_tip_that_nobody_sees_is_the_twins_and_its_names_say_so(tmp_path, recording):
     write_session(tmp_path / "real.mcap", hardware="the robot panda")
-    first, seen = (next(episodes(one, FPS)) for one in (read_recording(tmp_path / "real.mcap"), recording))
+    first, measured = (next(episodes(log, FPS)) for log in (read_recording(tmp_path / "real.mcap"), recording))
     assert first.names[STATE][-3:] == ("tip.x.twin", "tip.y.twin", "tip.z.twin")
-    np.testing.assert_array_equal(first.frames[STATE], seen.frames[STATE])
+    np.testing.assert_array_equal(first.frames[STATE], measured.frames[STATE])
 
 
 def test_logs_of_different_arms_are_not_mixed(log, tmp_path, capsys):
@@ -193,16 +193,16 @@ def test_lerobot_s_own_loader_reads_it(dataset):
     offline = os.environ | {"HF_HUB_OFFLINE": "1", "HF_HOME": str(dataset.parent / "hub"), "PYTHONPATH": ""}
     done = subprocess.run([OTHER, str(READER), str(dataset)], env=offline, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-2000:]
-    found, data = json.loads(done.stdout.splitlines()[-1]), data_of(dataset)
-    assert (found["episodes"], found["fps"], len(found["frames"])) == (4, FPS, len(data))
-    assert found["features"][STATE] == [13]
+    loaded, data = json.loads(done.stdout.splitlines()[-1]), data_of(dataset)
+    assert (loaded["episodes"], loaded["fps"], len(loaded["frames"])) == (4, FPS, len(data))
+    assert loaded["features"][STATE] == [13]
     for name in (STATE, ACTION, ENVIRONMENT, OPERATOR):
-        np.testing.assert_allclose([frame[name] for frame in found["frames"]], array(data, name), rtol=1e-6)
-        np.testing.assert_allclose(found["stats"][name], array(data, name).mean(axis=0), rtol=1e-4, atol=1e-6)
-    assert [frame["next.success"] for frame in found["frames"]] == data["next.success"].tolist()
-    assert {frame["task"] for frame in found["frames"]} == set(TASKS)
+        np.testing.assert_allclose([frame[name] for frame in loaded["frames"]], array(data, name), rtol=1e-6)
+        np.testing.assert_allclose(loaded["stats"][name], array(data, name).mean(axis=0), rtol=1e-4, atol=1e-6)
+    assert [frame["next.success"] for frame in loaded["frames"]] == data["next.success"].tolist()
+    assert {frame["task"] for frame in loaded["frames"]} == set(TASKS)
     actions, episode = array(data, ACTION), data["episode_index"].to_numpy()
-    for row, (chunk, padded) in enumerate(zip(found["chunks"], found["padded"], strict=True)):
-        own = [row + n < len(data) and episode[row + n] == episode[row] for n in range(len(chunk))]
-        assert padded == [not there for there in own]
-        np.testing.assert_allclose(np.array(chunk)[own], actions[row : row + sum(own)], rtol=1e-6)
+    for row, (chunk, padded) in enumerate(zip(loaded["chunks"], loaded["padded"], strict=True)):
+        within = [row + n < len(data) and episode[row + n] == episode[row] for n in range(len(chunk))]
+        assert padded == [not there for there in within]
+        np.testing.assert_allclose(np.array(chunk)[within], actions[row : row + sum(within)], rtol=1e-6)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from tests.ar.teleop.test_plan import targets
-from trunkline.ar.hybrid.posterior import Doubts
+from trunkline.ar.hybrid.posterior import Posterior
 from trunkline.ar.hybrid.preview import Holding
 from trunkline.ar.preview import grasp_preview
-from trunkline.ar.preview.grasp_preview import Foresight
+from trunkline.ar.preview.grasp_preview import GraspPreviewer
 from trunkline.ar.session.settings import Config
 from trunkline.ar.teleop.messages import Thing, World
 from trunkline.ar.teleop.plan import Plan
@@ -41,7 +41,7 @@ class Tried:
 
     def __init__(self, monkeypatch, probability, shares):
         self.previewed, self.places = [], []
-        monkeypatch.setattr(grasp_preview, "compose_twin", lambda *given: given)
+        monkeypatch.setattr(grasp_preview, "compose_twin", lambda *arguments: arguments)
         monkeypatch.setattr(grasp_preview, "preview", self._preview)
         monkeypatch.setattr(grasp_preview, "try_places", self._try)
         self._probability, self._shares = probability, shares
@@ -58,8 +58,8 @@ class Tried:
 def grasped(monkeypatch, probability, shares=(0.0, 0.0, 0.0), **settings):
     """What is foreseen of a grasp whose futures hold with this `probability`, the places' with these `shares`."""
     tried, grip = Tried(monkeypatch, probability, shares), Grip()
-    known = SimpleNamespace(doubts=Doubts(), lean=lambda hangs: None)
-    made = Foresight(known, {"hanging": grip}, replace(SETTINGS, **settings))
+    robot_model = SimpleNamespace(posterior=Posterior(), lean=lambda hangs: None)
+    made = GraspPreviewer(robot_model, {"hanging": grip}, replace(SETTINGS, **settings))
     asked = replace(targets(MOUNT, CUP.position), thing=CUP.name)
     return list(made.grasp(PLAN, asked, CUP, World("world", (), (CUP,)), None, 7)), tried, grip
 

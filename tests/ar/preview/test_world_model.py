@@ -4,7 +4,7 @@ lifts."""
 import numpy as np
 import pytest
 
-from trunkline.ar.preview.world_model import MOVED, believe, make_world
+from trunkline.ar.preview.world_model import MOVED, make_world, update_world
 from trunkline.ar.teleop.messages import Box, Thing
 
 LIFT = 0.1  # m, of a grasp
@@ -19,7 +19,7 @@ def after(raised=0.0, aside=0.0, phases=(), support="hanging", things=1):
     cup = Thing("the cup", "cylinder", 0.05, 0.1, 0.1, CUP.position, support=support)
     pose = np.array([*CUP.position, 1.0, 0.0, 0.0, 0.0]) + [0.0, aside, raised, 0.0, 0.0, 0.0, 0.0]
     before = make_world((TABLE,), (cup,) * things)
-    return before, believe(before, pose, phases, LIFT)
+    return before, update_world(before, pose, phases, LIFT)
 
 
 @pytest.mark.parametrize(
@@ -71,7 +71,7 @@ def test_where_nothing_is_seen_nothing_changes(number):
     before = make_world((TABLE,), (CUP,))
     pose = np.array([*CUP.position, 1.0, 0.0, 0.0, 0.0]) + 1.0
     pose[number] = np.nan
-    assert believe(before, pose, GRASP, LIFT) is before
+    assert update_world(before, pose, GRASP, LIFT) is before
 
 
 def test_a_world_is_of_its_digest():
@@ -83,11 +83,11 @@ def test_a_world_is_of_its_digest():
 @pytest.mark.parametrize(("aside", "moved"), [(0.0049, False), (0.005, False), (0.0051, True)])
 def test_half_a_centimetre_is_elsewhere(aside, moved):
     before = make_world((), (Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.0, 0.0, 0.0)),))
-    assert (believe(before, np.array([aside, 0, 0, 1, 0, 0, 0]), (), LIFT) is not before) == moved
+    assert (update_world(before, np.array([aside, 0, 0, 1, 0, 0, 0]), (), LIFT) is not before) == moved
 
 
 @pytest.mark.parametrize(("raised", "support"), [(0.25, "hanging"), (np.nextafter(0.25, 1), "held")])
 def test_a_thing_is_lifted_by_more_than_half_of_what_a_grasp_lifts(raised, support):
     before = make_world((), (Thing("the cup", "cylinder", 0.05, 0.1, 0.1, (0.0, 0.0, 0.0)),))
-    now = believe(before, np.array([0, 0, raised, 1, 0, 0, 0]), GRASP, 0.5)
+    now = update_world(before, np.array([0, 0, raised, 1, 0, 0, 0]), GRASP, 0.5)
     assert now.things[0].support == support

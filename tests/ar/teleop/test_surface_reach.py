@@ -47,14 +47,16 @@ def test_outside_is_as_far_as_the_surface_of_the_dish_is_less_the_tolerance():
             if np.arctan2(np.hypot(*below[:2]), -below[2]) > 1.9:
                 continue  # beyond the dish's border
             away = abs(np.linalg.norm(below) - RADIUS)
-            found = REACH.read(point, gravity)
-            places[found.where] += 1
+            reading = REACH.read(point, gravity)
+            places[reading.where] += 1
             # chords of the lattice lie within the sphere by up to a step squared / (8 R), along and around
-            assert found.outside_by == pytest.approx(max(away - TOLERANCE, 0), abs=3.5e-3)
-            if found.offer is not None:
-                assert np.linalg.norm(np.subtract(found.offer, middle)) == pytest.approx(RADIUS, abs=3.5e-3)
-                assert np.linalg.norm(np.subtract(found.offer, point)) == pytest.approx(found.outside_by + TOLERANCE)
-                assert REACH.read(found.offer, gravity).where == "inside"
+            assert reading.outside_by == pytest.approx(max(away - TOLERANCE, 0), abs=3.5e-3)
+            if reading.offer is not None:
+                assert np.linalg.norm(np.subtract(reading.offer, middle)) == pytest.approx(RADIUS, abs=3.5e-3)
+                assert np.linalg.norm(np.subtract(reading.offer, point)) == pytest.approx(
+                    reading.outside_by + TOLERANCE
+                )
+                assert REACH.read(reading.offer, gravity).where == "inside"
     assert min(places.values()) > 10
 
 
@@ -63,21 +65,21 @@ def test_it_answers_as_the_sheets_of_the_stage_do():
         sheet = SHEETS.at(np.array(gravity))
         nearest, away = SHEETS.nearest(sheet, np.array(points(40, 3)))
         for point, place, distance in zip(points(40, 3), nearest, away, strict=True):
-            found = REACH.read(point, gravity)
-            if found.offer is None:
+            reading = REACH.read(point, gravity)
+            if reading.offer is None:
                 assert distance <= TOLERANCE + 1e-6
             else:  # that looks at triangles near the nearest points only, and may miss the nearest
-                assert found.outside_by <= distance - TOLERANCE + 1e-6
-                assert found.outside_by == pytest.approx(distance - TOLERANCE, abs=1e-3)
-                if found.outside_by > distance - TOLERANCE - 1e-9:
-                    np.testing.assert_allclose(found.offer, place, atol=1e-5)
+                assert reading.outside_by <= distance - TOLERANCE + 1e-6
+                assert reading.outside_by == pytest.approx(distance - TOLERANCE, abs=1e-3)
+                if reading.outside_by > distance - TOLERANCE - 1e-9:
+                    np.testing.assert_allclose(reading.offer, place, atol=1e-5)
 
 
 def test_what_was_asked_before_does_not_change_a_bit():
     asked = [(point, gravity) for gravity in gravities(4) for point in points(3)]
     fresh = SheetReach(SHEETS.points, SHEETS.downs, SHEETS.matrix, TOLERANCE)
-    expected = [REACH.read(*one) for one in asked]
-    assert [fresh.read(*one) for one in reversed(asked)] == expected[::-1]
+    expected = [REACH.read(*query) for query in asked]
+    assert [fresh.read(*query) for query in reversed(asked)] == expected[::-1]
 
 
 def test_gravity_beyond_all_directions_is_unknown():
