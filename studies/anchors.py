@@ -22,8 +22,8 @@ import numpy as np
 
 from stages import identify_damping
 from trunkline.errors import in_one_line
+from trunkline.identification.evaluation.baselines import hanging_still
 from trunkline.identification.evaluation.evaluation import replay, survived
-from trunkline.identification.evaluation.null_model import hanging_still
 from trunkline.identification.fit.setup import set_up
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.pipeline.config import load_config

@@ -39,7 +39,7 @@ from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.fit.setup import set_up
 from trunkline.identification.simulate.experiment import Experiment, prepare
 from trunkline.identification.simulate.loss import loss_of
-from trunkline.identification.uncertainty.trial_diagnostics import suspicions
+from trunkline.identification.uncertainty.trial_diagnostics import trial_diagnostics
 from trunkline.model.elements import give_way
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import TRIALS as FILTERED
@@ -202,7 +202,7 @@ def found(stage: str, trials: list[Trial]) -> Found:
     identified, told = result.models["identified"], result.influence.deciding()
     for trial, experiment in zip(trials, experiments, strict=True):
         if trial.name in told:
-            told[trial.name] += suspicions(trial, experiment, experiments, identified, fit)
+            told[trial.name] += trial_diagnostics(trial, experiment, experiments, identified, fit)
     assert fit.plain.vector is not None, "a search begins without weights"
     plain = with_parameters(model, values_of(fit.parameters, fit.plain.vector), rest=fit.rest)
     return Found(*errors_of(identified, experiments, fit), *errors_of(plain, experiments, fit), told)

@@ -22,7 +22,7 @@ from benchmarks.identification.rate import bare_batch
 from benchmarks.identification.recipe import as_first_written, by_recipe
 from benchmarks.identification.sysid import by_sysid, stalled
 from tests.support.matched_plant import curl, release, segments_of, small_model
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.parameters.parameters import candidate_fields, set_fields
@@ -45,7 +45,8 @@ def case():
     experiments = [prepare(trial, model, 20) for trial in trials]
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     method = Method(
-        LeastSquares(4, 1, 4, 1e-3), Rough(2.0, 20, 2), Polish(8, 1e-9), LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1
+        LeastSquares(4, 1, 4, 1e-3), CoarseSearch(2.0, 20, 2), Refinement(8, 1e-9),
+        LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
     )
     fit = Fit(segments_of(model), bounds, (), "positions", weights, method)
     return Case(model, experiments[:2], experiments[2:], fit)

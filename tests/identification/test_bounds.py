@@ -97,12 +97,12 @@ def test_a_pose_is_found_where_the_descent_ended_before_its_iterations_did(bent)
     model, trial = bent
     problem = PoseProblem(model, trial.segments, trial.positions[0])
     free, start = np.ones(problem.angles, bool), np.zeros(problem.angles)
-    needed = _descend(problem, start, problem.seen, free, 300)
+    needed = _descend(problem, start, problem.measured, free, 300)
     assert needed.converged
     assert 2 < needed.iterations < 30
     for iterations, converged in ((1, False), (needed.iterations - 1, False), (needed.iterations, False),
                                   (needed.iterations + 1, True)):  # fmt: skip
-        assert _descend(problem, start, problem.seen, free, iterations).converged is converged
+        assert _descend(problem, start, problem.measured, free, iterations).converged is converged
 
 
 @pytest.mark.parametrize("hidden", [(0,), (2,), (3,), (0, 1)])

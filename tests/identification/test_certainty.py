@@ -9,7 +9,7 @@ from scipy.stats import t as student
 
 from tests.support.matched_plant import curl, segments_of, small_model
 from trunkline.identification.fit.certainty import bootstrap, certainty, weakest_in_words
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.linearisation import Linearisation
 from trunkline.identification.fit.optimizers import LeastSquares
@@ -122,7 +122,7 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
     trials = [curl(model, level, frames=60, noise=3e-4, seed=k, tendon=k) for k, level in enumerate((4, 6, 8))]
     experiments = [prepare(trial, model, 437) for trial in trials]
     method = Method(
-        LeastSquares(0, 1, 4, 1e-3), Rough(1.0, 437, 99), Polish(4, 1e-6),
+        LeastSquares(0, 1, 4, 1e-3), CoarseSearch(1.0, 437, 99), Refinement(4, 1e-6),
         LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
     )
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
@@ -146,7 +146,8 @@ def test_factors_that_one_trial_alone_determines_have_no_width(tmp_path):
     own = PARAMETERS["stiffness"].read(model)
     bounds = {"stiffness": Bounds(0.5 * own, 2 * own)}
     method = Method(
-        LeastSquares(0, 1, 1, 1.0), Rough(1.0, 5, 1), Polish(1, 1.0), LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1
+        LeastSquares(0, 1, 1, 1.0), CoarseSearch(1.0, 5, 1), Refinement(1, 1.0),
+        LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
     )
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
     found = identify(

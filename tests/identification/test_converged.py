@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
-from trunkline.identification.fit.search import AGREEING, Convergence, Found, _apart, _evolve, _several, descend, search
+from trunkline.identification.fit.search import (
+    AGREEING,
+    Convergence,
+    SearchResult,
+    _apart,
+    _evolve,
+    _several,
+    descend,
+    search,
+)
 
 LOW, HIGH = np.log(0.2), np.log(20.0)
 PATIENT, SHORT = 25, 1  # iterations: of a search that ends by itself, and of one whose time is up
@@ -177,7 +186,7 @@ def test_of_each_start_its_best_end_agrees_or_does_not(monkeypatch, ends, agreei
     left = iter(ends)
 
     def made(*_):
-        return [Found(np.array([loss]), loss, Convergence(), True) for loss in next(left)]
+        return [SearchResult(np.array([loss]), loss, Convergence(), True) for loss in next(left)]
 
     monkeypatch.setattr("trunkline.identification.fit.search._ends", made)
     starts = [np.zeros(1)] * len(ends)

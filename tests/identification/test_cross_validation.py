@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.matched_plant import segments_of, small_model, tilt
 from trunkline.identification.evaluation.evaluation import replay, scores
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
@@ -17,7 +17,8 @@ from trunkline.identification.uncertainty.cross_validation import ERRORS, cross_
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 METHOD = Method(
-    LeastSquares(0, 1, 3, 1e-2), Rough(1.0, 1, 99), Polish(4, 1e-4), LeastSquares(0, 1, 3, 1e-2), 0.2, np.inf, seed=1
+    LeastSquares(0, 1, 3, 1e-2), CoarseSearch(1.0, 1, 99), Refinement(4, 1e-4),
+    LeastSquares(0, 1, 3, 1e-2), 0.2, np.inf, seed=1,
 )
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import curl, motion, release, segments_of, small_model, tilt
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import DIVERGED_LOSS, Bounds, Problem
@@ -19,7 +19,8 @@ WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3)):  # noqa: B008
     experiments = [prepare(trial, model, 437) for trial in trials]
     bounds = {name: Bounds(*span) for name, span in parameters.items()}
-    method = Method(optimizer, Rough(1.0, 437, 99), Polish(8, 1e-9), LeastSquares(0, 1, 30, 1e-9), 0.1, np.inf, seed=3)
+    fine = LeastSquares(0, 1, 30, 1e-9)
+    method = Method(optimizer, CoarseSearch(1.0, 437, 99), Refinement(8, 1e-9), fine, 0.1, np.inf, seed=3)
     fit = Fit(segments_of(model), bounds, per_joint, "positions", WEIGHTS, method)
     return identify("test", model, experiments, fit)
 

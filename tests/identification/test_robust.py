@@ -9,17 +9,18 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.matched_plant import release, segments_of, small_model, tilt
 from tests.support.noisy_trials import WEIGHTS, measured, with_values
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.robust import robust_loss, trial_weights, usual_losses
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.uncertainty.trial_diagnostics import suspicions
+from trunkline.identification.uncertainty.trial_diagnostics import trial_diagnostics
 
 UNITS, FRAMES, LATE = 3, 40, 10
 METHOD = Method(
-    LeastSquares(3, 1, 5, 1e-2), Rough(1.0, FRAMES, 4), Polish(8, 1e-5), LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1
+    LeastSquares(3, 1, 5, 1e-2), CoarseSearch(1.0, FRAMES, 4), Refinement(8, 1e-5),
+    LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
 )
 TRUE = {"release": {"damping": 0.07}, "static_tilt": {"stiffness": 2.0}}
 PLANT = small_model(UNITS)
@@ -60,7 +61,7 @@ def found(trials, outlying=4.0):
     told = result.influence.deciding()
     for trial, experiment in zip(trials, experiments, strict=True):
         if trial.name in told:
-            told[trial.name] += suspicions(trial, experiment, experiments, result.models["identified"], fit)
+            told[trial.name] += trial_diagnostics(trial, experiment, experiments, result.models["identified"], fit)
     return next(iter(result.values.values())), result, told
 
 

@@ -13,7 +13,7 @@ from tests.support.matched_plant import begin_project, tilt
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.parameters.per_session import make_room, model_in, names_apart
+from trunkline.identification.parameters.per_session import make_room, model_in, per_session_names
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.recordings.trials.trial import write_trials
 
@@ -105,7 +105,7 @@ def test_the_written_model_holds_both_mounts(found):
 
 def test_what_a_session_has_for_itself_may_be_its_shape_at_rest():
     spec = small_spec(6)
-    names = names_apart(["stiffness", "rest_bend_x", "mount_tilt_x"], ["rest_bend_x"], ["friday"])
+    names = per_session_names(["stiffness", "rest_bend_x", "mount_tilt_x"], ["rest_bend_x"], ["friday"])
     make_room(spec, names)
     model = spec.compile()
     values = {"rest_bend_x": np.array([0.01]), "rest_bend_x@friday": np.array([0.03])}

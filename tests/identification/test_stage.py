@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.matched_plant import begin_project, curl, release, tilt
 from trunkline.errors import InputError
-from trunkline.identification.fit.fit import Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Refinement
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
@@ -31,8 +31,8 @@ def settings(experiments, reported, parameters, per_joint=(), iterations=8, **ch
         "experiments": experiments, "reported": reported, "loss": LOSS,
         "parameters": {name: Bounds(low=low, high=high) for name, (low, high) in parameters.items()},
         "optimizer": LeastSquares(starts=4, descents=1, iterations=4, tolerance=1e-3),
-        "rough": Rough(step_factor=1.0, frames=437, trials=99),
-        "polish": Polish(iterations=iterations, tolerance=1e-8),
+        "rough": CoarseSearch(step_factor=1.0, frames=437, trials=99),
+        "polish": Refinement(iterations=iterations, tolerance=1e-8),
         "per_joint": list(per_joint), "per_joint_range": 0.1, "per_joint_deviation": 1.0,
         "fine": LeastSquares(starts=0, descents=1, iterations=3, tolerance=1e-2),
         "cross_validation_folds": 0,

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.support.swings import FRAMES, LIKE, SEGMENTS, TIP, experiment, swing, trial
+from trunkline.identification.evaluation.baselines import hanging_still
 from trunkline.identification.evaluation.error_tables import segment_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, errors_of, scores
-from trunkline.identification.evaluation.null_model import hanging_still
 from trunkline.identification.evaluation.repeatability import end_shape
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.results.scoring import fingerprint

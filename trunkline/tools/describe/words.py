@@ -144,7 +144,7 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
     lines += _unknown(model, session)
     kinds, weightless = {trial.experiment for trial in session.trials}, session.frame.gravity == "none"
     own = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(model)]
-    untold = [name for name in own if not any(PARAMETERS[name].told_by(EXPERIMENTS[kind]) for kind in kinds)]
+    untold = [name for name in own if not any(PARAMETERS[name].identifiable_from(EXPERIMENTS[kind]) for kind in kinds)]
     if untold:
         lines.append(f"no trial of the session ({', '.join(sorted(kinds))}) tells {', '.join(untold)}")
     if weightless and model.nu and all(EXPERIMENTS[kind].static for kind in kinds):

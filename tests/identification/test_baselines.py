@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import release, segments_of, small_model, tilt
+from trunkline.identification.evaluation.baselines import hanging_still, references
 from trunkline.identification.evaluation.error_tables import segment_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, replay
-from trunkline.identification.evaluation.null_model import hanging_still, references
 from trunkline.identification.simulate.experiment import prepare
 
 
