@@ -96,7 +96,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "kinematics/reachability/test_verdicts.py",
         "test_a_held_out_angle_counts_what_its_signal_calls_within_reach",
     ),
-    "trunkline.kinematics.reachability.surface_check:check_sheets": (
+    "trunkline.kinematics.reachability.surface_check:check_surfaces": (
         "kinematics/reachability/test_verdicts.py",
         "test_sheets_are_checked_with_tips_and_points_beyond",
     ),

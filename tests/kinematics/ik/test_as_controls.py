@@ -8,7 +8,7 @@ import pytest
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.ik import as_controls
 from trunkline.kinematics.ik.as_controls import AsControls, draw_targets, driven, score, settled
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.model.simulation.drive import drive
 
 ANGLES = np.radians([[0.0], [60.0]])
@@ -45,7 +45,7 @@ def exact(chain, wrong: str | None = None):
 
     def ask(poses):
         first = np.tile(chain.straight_lengths, (len(poses), 1))
-        found = polish(chain, poses, first, steps=30)
+        found = refine(chain, poses, first, steps=30)
         commands = found.lengths if wrong else found.commands
         return {"commands": commands, "lengths": found.lengths, "tip": poses[:, 1:4], "doubtful": found.steps < 0}
 

@@ -16,14 +16,14 @@ from trunkline.kinematics.ik.inputs import (
     DIRECTION,
     TILT,
     draw_gravity,
+    gravity_columns,
     gravity_of,
     inputs_of,
     position_of,
     quaternion_of,
-    told_of_gravity,
 )
 from trunkline.kinematics.ik.onnx import to_onnx
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.score import outside_targets, tip_errors
 from trunkline.kinematics.ik.tip_loss import tip_loss
 from trunkline.kinematics.ik.training import Training, train
@@ -113,16 +113,16 @@ def test_exact_commands_settle_on_targets_under_gravity_from_any_side(model, cha
     drawn = draw_targets(model, chain, known, np.full(3, 0.01), 6, np.random.default_rng(0)).targets
     assert drawn.shape[1] == len(DIRECTION)
     assert len(drawn) >= 3
-    assert np.abs(told_of_gravity(drawn)[:, 1]).max() > 0.1
+    assert np.abs(gravity_columns(drawn)[:, 1]).max() > 0.1
 
     def exact(poses):
-        found = polish(chain, poses, np.tile(chain.straight_lengths, (len(poses), 1)), steps=30)
+        found = refine(chain, poses, np.tile(chain.straight_lengths, (len(poses), 1)), steps=30)
         return {"commands": found.commands, "tip": position_of(poses), "doubtful": found.steps < 0}
 
     assert settled(model, exact, drawn).position.max() < 2e-5
 
 
 def test_far_targets_have_any_gravity():
-    far = outside_targets(500, 0.5, np.random.default_rng(0), told=3)
+    far = outside_targets(500, 0.5, np.random.default_rng(0), columns=3)
     assert far.shape == (500, len(DIRECTION))
-    np.testing.assert_allclose(np.linalg.norm(told_of_gravity(far), axis=1), 1)
+    np.testing.assert_allclose(np.linalg.norm(gravity_columns(far), axis=1), 1)

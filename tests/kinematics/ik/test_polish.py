@@ -10,7 +10,7 @@ from trunkline.kinematics.dataset.columns import length_columns
 from trunkline.kinematics.dataset.sampling import pull_directions
 from trunkline.kinematics.dataset.table import sample_table
 from trunkline.kinematics.ik.inputs import TILT
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.score import beyond_range, largest_difference, outside_targets
 from trunkline.model.statics.equilibria import equilibrium, forward
 from trunkline.model.statics.restart import restart
@@ -26,7 +26,7 @@ def samples(chain):
 def test_three_steps_undo_an_error_of_millimetres(chain, samples):
     targets, lengths = samples[TILT].to_numpy(), samples[length_columns(3)].to_numpy()
     wrong = lengths + np.random.default_rng(1).uniform(-2e-3, 2e-3, lengths.shape)
-    before, after = (polish(chain, targets, wrong, steps) for steps in (0, 3))
+    before, after = (refine(chain, targets, wrong, steps) for steps in (0, 3))
     assert before.position_error.max() > 0.005 * chain.length
     assert after.converged.all()
     assert np.quantile(after.position_error, 0.95) < 1e-4 * chain.length
@@ -36,7 +36,7 @@ def test_three_steps_undo_an_error_of_millimetres(chain, samples):
 
 def test_polished_lengths_lead_to_the_error_stated(chain, samples):
     targets = samples[TILT].to_numpy()[:20] + [0, 0.002, 0, 0.004, 0, 0, 0, 0]  # a little off the surface of tips
-    found = polish(chain, targets, samples[length_columns(3)].to_numpy()[:20])
+    found = refine(chain, targets, samples[length_columns(3)].to_numpy()[:20])
     tip = forward(chain, found.lengths, gravity_in_base(targets[:, 0]))
     np.testing.assert_allclose(np.linalg.norm(tip.position - targets[:, 1:4], axis=1), found.position_error, atol=1e-7)
     assert (tip.tensions.min(axis=1) < 1e-3).all()
@@ -44,7 +44,7 @@ def test_polished_lengths_lead_to_the_error_stated(chain, samples):
 
 
 def test_exact_lengths_need_no_step(chain, samples):
-    found = polish(chain, samples[TILT].to_numpy(), samples[length_columns(3)].to_numpy())
+    found = refine(chain, samples[TILT].to_numpy(), samples[length_columns(3)].to_numpy())
     assert (found.steps == 0).all()
     assert found.position_error.max() < 1e-6
 
@@ -62,7 +62,7 @@ def test_restart_finds_the_equilibrium_that_the_loads_lead_to(chain):
 
 
 def test_far_targets_are_far_and_what_is_beyond_the_range_is_seen():
-    targets = outside_targets(2000, 0.5, np.random.default_rng(0), told=1)
+    targets = outside_targets(2000, 0.5, np.random.default_rng(0), columns=1)
     assert (np.linalg.norm(targets[:, 1:4], axis=1) > 0.5).mean() > 0.9
     np.testing.assert_allclose(np.linalg.norm(targets[:, 4:], axis=1), 1)
     known = np.array([[0.3, 0.4], [0.5, 0.6]])

@@ -20,11 +20,11 @@ from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.inputs import draw_gravity, gravity_of, inputs_of
 from trunkline.kinematics.ik.learn import Unseen, doubt_beyond, known_gravities, unseen_targets
 from trunkline.kinematics.ik.onnx import to_onnx
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.tip_loss import tip_loss
 from trunkline.kinematics.ik.training import Training, train
 from trunkline.kinematics.reachability.sampled import read_tips
-from trunkline.kinematics.reachability.soft import SheetSettings, SoftSettings
+from trunkline.kinematics.reachability.soft import SoftSettings, SurfaceSettings
 from trunkline.model.arm.sections import Section, Sections
 from trunkline.model.arm.tendons import Tendon
 from trunkline.model.statics.chain import read_chain
@@ -114,7 +114,7 @@ def test_gauss_newton_steps_bring_the_tip_to_its_target(chain, table):
     targets, lengths = rows[POSE].to_numpy(), rows[length_columns(6)].to_numpy()
     commands = rows[command_columns(6)].to_numpy()
     wrong = commands + np.random.default_rng(1).uniform(-5e-4, 5e-4, commands.shape)
-    before, after = (polish(chain, targets, lengths, steps, commands=wrong) for steps in (0, 4))
+    before, after = (refine(chain, targets, lengths, steps, commands=wrong) for steps in (0, 4))
     assert before.converged.all()
     assert np.median(before.position_error) > 0.01 * chain.length
     assert np.median(after.position_error) < 1e-4 * chain.length
@@ -123,7 +123,7 @@ def test_gauss_newton_steps_bring_the_tip_to_its_target(chain, table):
 
 def test_one_map_of_the_samples_that_train_stands_for_every_tilt(chain, table, tmp_path):
     table.to_parquet(tmp_path / "samples.parquet")
-    soft = SoftSettings(0.01, 0.02, 0.7, 60, 0.01, 5.0, 8, 8, [0.0, 30.0], SheetSettings(8, 8, 8, 1))
+    soft = SoftSettings(0.01, 0.02, 0.7, 60, 0.01, 5.0, 8, 8, [0.0, 30.0], SurfaceSettings(8, 8, 8, 1))
     tips_at = read_tips(tmp_path / "samples.parquet", chain, soft, 0)
     trains = table["split"] == "train"
     assert tips_at.angles.tolist() == [0.0]

@@ -10,7 +10,7 @@ from trunkline.kinematics.panda.downward import sample_downward
 from trunkline.kinematics.panda.kinematics import Q_MAX, mount_pose
 from trunkline.kinematics.panda.labels import agreement, beyond_links, draw_points, label
 from trunkline.kinematics.reachability.hybrid import minkowski_field, swept_cells
-from trunkline.kinematics.reachability.hybrid_check import Poses, draw_inside_and_outside, find_poses, verified
+from trunkline.kinematics.reachability.hybrid_check import ReachingPoses, draw_inside_and_outside, find_poses, verified
 from trunkline.kinematics.reachability.maps import angle_name, build_rigid, build_soft
 from trunkline.kinematics.reachability.reach_signal import held_out, packed, points_beyond, reach_signal
 from trunkline.kinematics.reachability.rigid import profile, rigid_field
@@ -269,12 +269,12 @@ def test_points_of_the_hybrid_map_are_reached_and_points_beside_it_are_not(rigid
     assert len(inside) == len(outside) == 40
     where = {"seed": 0, "mount_offset": OFFSET, "avoid_collisions": True}
     reach = find_poses(inside, tips, rigid.field, rigid.lattice, **where)
-    assert reach.found.mean() >= 0.97
-    mount, rotation = mount_pose(reach.q[reach.found], OFFSET)
+    assert reach.reached.mean() >= 0.97
+    mount, rotation = mount_pose(reach.q[reach.reached], OFFSET)
     assert np.abs(rotation[:, :, 2] - [0, 0, -1]).max() < 1e-3
-    reached = tip_position(mount, rotation, tips[reach.tip[reach.found]])
-    assert np.linalg.norm(reached - inside[reach.found], axis=1).max() < 1e-3
-    assert find_poses(outside, tips, rigid.field, rigid.lattice, **where).found.mean() <= 0.03
+    reached = tip_position(mount, rotation, tips[reach.tip[reach.reached]])
+    assert np.linalg.norm(reached - inside[reach.reached], axis=1).max() < 1e-3
+    assert find_poses(outside, tips, rigid.field, rigid.lattice, **where).reached.mean() <= 0.03
 
 
 def test_a_pose_is_verified_by_joint_angles_and_tendon_lengths_alone(arm):
@@ -284,7 +284,7 @@ def test_a_pose_is_verified_by_joint_angles_and_tendon_lengths_alone(arm):
     mount, rotation = mount_pose(q, OFFSET)
     index = np.array([40, 50, 60, 70, 80])
     points = tip_position(mount, rotation, tips.positions[index])
-    reach = Poses(np.array([1, 1, 1, 1, 0], bool), q, index, np.zeros(5))
+    reach = ReachingPoses(np.array([1, 1, 1, 1, 0], bool), q, index, np.zeros(5))
     assert list(verified(points, reach, tips.lengths, arm, OFFSET)) == [True] * 4 + [False]
     assert not verified(points + [0, 0, 0.005], reach, tips.lengths, arm, OFFSET).any()
     q[:, 5] += 0.1  # no longer straight down: gravity pulls another way

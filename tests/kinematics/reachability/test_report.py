@@ -15,7 +15,7 @@ MAPS = SimpleNamespace(soft=SimpleNamespace(meshes=[MESH]), in_space=lambda: {"r
 
 def soft_of(*heldout):
     moved = {"rigid": 0.1, "soft": 0.1}
-    check = SimpleNamespace(heldout=heldout, moved=moved, found={}, rigid=Agreement(1.0, 1.0, 0.0, 1, 1))
+    check = SimpleNamespace(heldout=heldout, moved=moved, verified={}, rigid=Agreement(1.0, 1.0, 0.0, 1, 1))
     return summary(MAPS, check)["soft"]
 
 
