@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, Seen, bench_of, rehearse
+from rehearsal.experiments.bench import Bench, SessionFrame, bench_of, rehearse
 from rehearsal.experiments.follow import Path as Way
 from rehearsal.experiments.follow import on_path
 from rehearsal.operator.hands import Person
@@ -43,7 +43,7 @@ class Run:
 
     path: Way
     session: Session
-    frames: list[Seen]
+    frames: list[SessionFrame]
     views: list[View]
 
 
@@ -94,8 +94,8 @@ def shares(bench: Bench, found: Run) -> list[float]:
     frames = [f for f in found.frames if path.begun + delay <= f.now <= path.begun + delay + path.seconds]
     tip = np.array([frame.truth.tip for frame in frames])
     target = np.array([targets[frame.now] for frame in frames])
-    thing = np.array([session.seen(path(frame.now - delay)) for frame in frames])
-    seen = np.array([session.seen(place) for place in tip])
+    thing = np.array([session.in_client_frame(path(frame.now - delay)) for frame in frames])
+    seen = np.array([session.in_client_frame(place) for place in tip])
     twin = rests(bench, np.array([f.joints for f in frames]), np.array([f.commands for f in frames]))
     still = mean_over(tip, round(2 * bench.package.period * RATE))
     parts = (seen - thing, target - thing, twin - target, still - twin, tip - still, seen - tip)
@@ -128,7 +128,7 @@ def operators_lag(bench: Bench, found: Run) -> float:
     times, target = zip(*((now, tip) for now, tip in shown if 1 <= now - path.begun <= path.seconds), strict=True)
 
     def apart(lag: float) -> float:
-        thing = np.array([found.session.seen(path(now - lag)) for now in times])
+        thing = np.array([found.session.in_client_frame(path(now - lag)) for now in times])
         return float(((target - thing) ** 2).sum())
 
     return float(min(lags, key=apart))

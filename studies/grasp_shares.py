@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from rehearsal.experiments.ablations import varied
-from rehearsal.experiments.bench import Bench, Seen, bench_of, rehearse
+from rehearsal.experiments.bench import Bench, SessionFrame, bench_of, rehearse
 from rehearsal.experiments.grasp import grasp
 from rehearsal.session import Session
 from trunkline.ar.preview.package import only_package
@@ -54,7 +54,7 @@ def tell(bench: Bench, runs: int) -> None:
     print(_line("median", np.median(rows, axis=0)))
 
 
-def shares(session: Session, frames: list[Seen]) -> list[float]:
+def shares(session: Session, frames: list[SessionFrame]) -> list[float]:
     """Median length, m, of each of SHARES."""
     assert session.foreseen is not None
     assert session.plan is not None
@@ -64,7 +64,7 @@ def shares(session: Session, frames: list[Seen]) -> list[float]:
     tip = np.array([frame.truth.tip for frame in ran])
     mount, _ = mount_pose(np.array([frame.truth.joints for frame in ran]), session.config.mount_offset)
     shown, carried = (_at(time - begins, nominal.time, rows[0]) for rows in (nominal.tip, nominal.mount))
-    seen = np.array([session.seen(place) for place in tip])
+    seen = np.array([session.in_client_frame(place) for place in tip])
     arm = (tip - mount) - (shown - carried)
     rest, lifting = arm[0], time >= session.plan.step * dict(session.plan.phases)["lift"]
     bending = arm - rest

@@ -22,7 +22,7 @@ from trunkline.errors import in_one_line
 from trunkline.kinematics.dataset.columns import command_columns, length_columns, tension_columns
 from trunkline.kinematics.dataset.table import command_by_tension, tip_by_tension, turn_by_tension
 from trunkline.kinematics.ik.inputs import inputs_of
-from trunkline.kinematics.ik.learn import Unseen, known_gravities, unseen_targets
+from trunkline.kinematics.ik.learn import Unseen, sampled_gravities, unseen_targets
 from trunkline.kinematics.ik.score import tip_errors
 from trunkline.kinematics.ik.tip_loss import tip_loss
 from trunkline.kinematics.ik.training import Training, train
@@ -62,7 +62,7 @@ def main() -> int:
     pose = np.concatenate([tip_by_tension(table, tendons), LEVER * turn_by_tension(table, tendons)], axis=1)
     loss = tip_loss(table[tension_columns(tendons)].to_numpy(), pose, command_by_tension(table, chain.gain))
     inputs_read = inputs_of(table)
-    unseen = unseen_targets(chain, known_gravities(table), replace(UNSEEN, samples=arguments.targets), 1)
+    unseen = unseen_targets(chain, sampled_gravities(table), replace(UNSEEN, samples=arguments.targets), 1)
     held_out = table[table["split"] == "validate"]
     targets = [held_out.sample(min(arguments.targets, len(held_out)), random_state=1), unseen]
     sets = (inputs_read, command_columns(tendons), length_columns(tendons))

@@ -113,7 +113,7 @@ class AtPage:
         intent = Intent(mode, state["motion"], state["notice"], targets, (left, right), preview=state["preview"])
         world = _WORLD.validate_python(_frozen(seen["world"])) if seen["world"] else make_world(())
         tip = tip_path(np.array(seen["tip"], dtype=float)[None], self._tip[1])[0]
-        thing = np.array(grip_of(world.things[0])) if world.things else session.seen(session.place(now))
+        thing = np.array(grip_of(world.things[0])) if world.things else session.in_client_frame(session.place(now))
         found = View(now, intent, thing, tip, None, world)
         if mode in SHOWS and seen["ghost"]:
             found.previewed = tip_path(np.array(seen["ghost"], dtype=float)[None], self._tip[1])[0]

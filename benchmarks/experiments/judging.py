@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rehearsal.experiments.bench import Seen
+from rehearsal.experiments.bench import SessionFrame
 from rehearsal.session import RATE, TICKS, Session
 from trunkline.ar.session.log_format import JOINTS, TENDONS, TYPES
 from trunkline.ar.session.log_reader import read_logbook
@@ -20,7 +20,7 @@ BEFORE = 0.5  # s of rest before the first motion
 MOVES = ("execute", "follow")
 
 
-def done_again(session: Session, log: Path, begun: float) -> list[Seen]:
+def done_again(session: Session, log: Path, begun: float) -> list[SessionFrame]:
     """Frames of the run from where the machines first moved; none where they never did. begun: s of the server's clock
     at which the operator's began.
 
@@ -51,5 +51,5 @@ def done_again(session: Session, log: Path, begun: float) -> list[Seen]:
         if now >= first:
             mode = next((mode for time, mode in reversed(modes) if time <= now), "hold")
             commands, (units, _) = session.package.straight - wound, robot.links()
-            frames.append(Seen(now, mode, robot.truth(), session.place(now), sent, commands, units))
+            frames.append(SessionFrame(now, mode, robot.truth(), session.place(now), sent, commands, units))
     return frames

@@ -153,8 +153,8 @@ def placed(*shares: tuple[float, float]) -> np.ndarray:
 )
 def test_starts_are_distinct_that_are_apart_in_one_parameter_at_least(shares, count, chosen):
     candidates = placed(*shares)
-    found = _apart(Ranges(), candidates, count)  # type: ignore[arg-type]
-    np.testing.assert_array_equal(found, candidates[chosen])
+    starts = _apart(Ranges(), candidates, count)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(starts, candidates[chosen])
 
 
 def test_the_first_start_goes_to_its_own_minimum_and_the_others_leave_plateaus_at_once(monkeypatch):

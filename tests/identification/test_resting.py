@@ -92,10 +92,10 @@ def test_stiffness_and_damping_come_back_without_static_tilts(model, truth, expe
         LeastSquares(0, 1, 1, 1e-2), 0.1, np.inf, seed=3,
     )
     fit = Fit(SEGMENTS, bounds, (), "positions", WEIGHTS, method, rest)
-    found = identify("test", model, experiments, fit)
-    assert found.values["stiffness"] == pytest.approx(1.7, rel=0.05)
-    assert found.values["damping"] == pytest.approx(0.15, rel=0.05)
-    identified = found.models["identified"]
+    result = identify("test", model, experiments, fit)
+    assert result.values["stiffness"] == pytest.approx(1.7, rel=0.05)
+    assert result.values["damping"] == pytest.approx(0.15, rel=0.05)
+    identified = result.models["identified"]
     data = mujoco.MjData(identified)
     data.qpos[:] = rest.pose
     mujoco.mj_forward(identified, data)

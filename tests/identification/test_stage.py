@@ -106,9 +106,9 @@ def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
     halved = metrics["halved_step"]
     assert 0 < halved["max_mm"] < 1.0
     assert halved["validate"] * metrics["identified"]["validate"]["e_internal_mm"] < 0.02  # a share of next to nothing
-    found = json.loads((root / "artifacts/identify_control/parameters.json").read_text())["parameters"]
+    rows = json.loads((root / "artifacts/identify_control/parameters.json").read_text())["parameters"]
     for name, tolerance in (("kp", 0.05), ("kv", 0.10), ("time_constant", 0.10), ("force_range", 0.10)):
-        assert found[name]["value"] == pytest.approx(PARAMETERS[name].read(truth), rel=tolerance), name
+        assert rows[name]["value"] == pytest.approx(PARAMETERS[name].read(truth), rel=tolerance), name
     assert (root / "artifacts/identify_control/errors.png").stat().st_size > 10_000
 
 
@@ -131,7 +131,7 @@ def test_a_missing_split_is_named(project):
 )
 def test_what_to_set_without_an_experiment_is_said(project, experiments, way_out):
     _, model, write = project
-    write([one for split in DECIDING for one in (tilt(model, 30, split), curl(model, 40, split, frames=30))])
+    write([made for split in DECIDING for made in (tilt(model, 30, split), curl(model, 40, split, frames=30))])
     with pytest.raises(InputError, match=way_out.replace("[", r"\[").replace("]", r"\]")):
         read_reported(settings(experiments, experiments, {"stiffness": (0.3, 12.0)}))
 

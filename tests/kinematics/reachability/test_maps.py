@@ -185,11 +185,11 @@ def soft():
 @pytest.mark.parametrize("angle_deg", [2.5, 17.5])
 def test_signal_knows_tips_and_points_beyond_reach_between_the_grids(soft, angle_deg):
     tips = curved_tips(np.radians(angle_deg), 20_000, seed=5).positions
-    found = held_out(packed(soft.fields), soft.angles, soft.lattice, SHAPE, tips, np.radians(angle_deg),
+    check = held_out(packed(soft.fields), soft.angles, soft.lattice, SHAPE, tips, np.radians(angle_deg),
                      beyond=0.03, count=1000, seed=0)
-    assert found.iou > 0.93
-    assert found.reachable > 0.995
-    assert found.beyond < 0.02
+    assert check.iou > 0.93
+    assert check.reachable > 0.995
+    assert check.beyond < 0.02
 
 
 def test_signal_is_the_distance_outside(soft):
@@ -212,10 +212,10 @@ def test_points_beyond_are_as_far_as_asked():
 
 def test_coarse_angles_would_not_do(soft):
     """What the fine step is for: grids 80° apart, blended half-way."""
-    low, own, high = (
+    low, between, high = (
         soft_field(curved_tips(np.radians(deg), 20_000).positions, soft.lattice, SHAPE) for deg in (-30, 10, 50)
     )
-    assert overlap((low + high) / 2, own) < 0.8
+    assert overlap((low + high) / 2, between) < 0.8
 
 
 def test_names_of_angles():
@@ -234,8 +234,8 @@ def test_tips_beside_the_axis_sweep_a_ring():
 
 def test_hybrid_of_a_point_and_a_ball_is_the_ball():
     field, lattice = ball_field(0.2, 0.01)
-    one = Lattice(np.array([0.0, 0.0, -0.32]), 0.016, (1, 1, 1))
-    result, where = minkowski_field(field, lattice, np.ones((1, 1, 1), bool), one, smoothing=0.0, smallest=1)
+    single = Lattice(np.array([0.0, 0.0, -0.32]), 0.016, (1, 1, 1))
+    result, where = minkowski_field(field, lattice, np.ones((1, 1, 1), bool), single, smoothing=0.0, smallest=1)
     grid = np.stack(np.meshgrid(*where.axes(), indexing="ij"), axis=-1)
     true = np.linalg.norm(grid - [0, 0, -0.32], axis=-1) - 0.2
     near = np.abs(true) < 0.03
