@@ -70,7 +70,7 @@ class GraspOutcome:
     2 s, infinite if nothing held it. units: that touch it at last. force: N, sum of their loads. cpu: s of processor
     for a simulated s."""
 
-    object_held: bool
+    success: bool
     lifted: float
     slipped: float
     creep: float
@@ -176,7 +176,7 @@ class GraspTrial:
         loads = np.linalg.norm(last.arm_thing, axis=1)
         lifted, slipped = float(last.thing[2] - first[2]), self.moved("lifted")
         return GraspOutcome(
-            object_held=holds(lifted, slipped, last.hanging), lifted=lifted, slipped=slipped,
+            success=holds(lifted, slipped, last.hanging), lifted=lifted, slipped=slipped,
             creep=self.moved("calm"), units=int((loads > 0).sum()), force=float(loads.sum()),
             cpu=(time.process_time() - begun) / self.robot.time,
         )  # fmt: skip
@@ -212,7 +212,7 @@ def main() -> None:
         trial = GraspTrial(arm, settings, PLACEMENTS[index], seed=1)
         outcome = trial.run()
         print(
-            f"{PLACEMENTS[index].name}: {'held' if outcome.object_held else 'not held'}, "
+            f"{PLACEMENTS[index].name}: {'held' if outcome.success else 'not held'}, "
             f"lifted by {1000 * outcome.lifted:.0f} mm, "
             f"moved by {1000 * outcome.slipped:.1f} mm in {HOLD:.0f} s, {1000 * outcome.creep:.2f} mm in the last 2 s, "
             f"{outcome.units} units press with {outcome.force:.1f} N; {outcome.cpu:.2f} s of processor a second",

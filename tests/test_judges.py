@@ -12,7 +12,7 @@ from tests.support.judges import judges, read_folder
 ROOT = Path(__file__).parents[1]
 JUDGES = {  # by function, the test that has its table, and its file below tests/
     "rehearsal.experiments.bench:Staged.judged": (
-        "rehearsal/test_staged.py",
+        "rehearsal/test_bench.py",
         "test_a_run_succeeds_where_its_script_ended_and_its_judge_names_no_cause",
     ),
     "rehearsal.experiments.follow:failure": (

@@ -46,7 +46,7 @@ CSV = {"index": False, "float_format": "%.6g"}
 
 
 @dataclass
-class Inputs:
+class FitInputs:
     """What a stage identifies from.
 
     spec, model: MJCF that the stage begins with, with room for per-session parameters. from_cad: whether it is the CAD
@@ -82,7 +82,7 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
     save(stage, inputs, result, mjcf, predictions, metrics)
 
 
-def load(stage: str, config: IdentificationSettings, model_path: Path) -> Inputs:
+def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInputs:
     """Read the model and the trials, and check the settings against both.
 
     Raises:
@@ -104,12 +104,12 @@ def load(stage: str, config: IdentificationSettings, model_path: Path) -> Inputs
         make_room(spec, names)
         model = spec.compile()
     model, experiments, settings = set_up(config, reported, model)
-    inputs = Inputs(spec, model, model_path == CAD_MODEL, config, reported, experiments, settings)
+    inputs = FitInputs(spec, model, model_path == CAD_MODEL, config, reported, experiments, settings)
     check_folds(stage, config.cross_validation_folds, inputs.fitted)
     return inputs
 
 
-def fit(stage: str, inputs: Inputs) -> tuple[Identification, str]:
+def fit(stage: str, inputs: FitInputs) -> tuple[Identification, str]:
     """Identify the parameters; returns the result and the MJCF of the identified model."""
     kinds = inputs.config.experiments
     if inputs.from_cad and not any(map(is_static, kinds)):
@@ -120,7 +120,7 @@ def fit(stage: str, inputs: Inputs) -> tuple[Identification, str]:
 
 
 def compare(
-    stage: str, inputs: Inputs, result: Identification, mjcf: str, whole: tuple[str, ...]
+    stage: str, inputs: FitInputs, result: Identification, mjcf: str, whole: tuple[str, ...]
 ) -> tuple[dict[str, Prediction], dict]:
     """Predictions of all models and baselines, and the metrics; prints what a user should know of the result."""
     config, experiments, settings = inputs.config, inputs.experiments, inputs.fit
@@ -162,7 +162,7 @@ def compare(
 
 
 def compared_models(
-    inputs: Inputs, result: Identification, mjcf: str, whole: tuple[str, ...]
+    inputs: FitInputs, result: Identification, mjcf: str, whole: tuple[str, ...]
 ) -> dict[str, mujoco.MjModel]:
     """The models that metrics.json compares, by their names there."""
     # score what is written, not what was in memory: MJCF keeps six digits
@@ -188,7 +188,7 @@ def compared_models(
 
 
 def save(
-    stage: str, inputs: Inputs, result: Identification, mjcf: str, predictions: dict[str, Prediction], metrics: dict
+    stage: str, inputs: FitInputs, result: Identification, mjcf: str, predictions: dict[str, Prediction], metrics: dict
 ) -> None:
     """Write model, parameters, metrics, tables and figures to `artifacts/<stage>/`."""
     config, bounds, segments = inputs.config, inputs.fit.parameters, inputs.fit.segments
