@@ -65,7 +65,7 @@ class Placement:
 
 @dataclass
 class GraspOutcome:
-    """held: lifted by more than half of LIFT, off the hook, and HOLD s later within 20 mm of its place in the arm.
+    """success: lifted by more than half of LIFT, off the hook, and HOLD s later within 20 mm of its place in the arm.
     lifted, slipped: m; slipped is how far it moved in the arm while the Panda stood still, creep the same of the last
     2 s, infinite if nothing held it. units: that touch it at last. force: N, sum of their loads. cpu: s of processor
     for a simulated s."""
