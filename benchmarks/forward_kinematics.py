@@ -14,7 +14,7 @@ import numpy as np
 from trunkline.compute.threads import thread_count
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.dataset.sampling import pull_directions, sample_at
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.model.simulation.rest import settle
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import equilibrium, forward
@@ -34,7 +34,7 @@ def main(path: Path) -> None:
     rest = equilibrium(chain, tensions, gravity)
     forward(chain, rest.lengths[:2], gravity[:2])  # compiles
     sample_at(chain, gravity_in_base(0.5), 8, 8, rng)
-    polish(chain, np.column_stack([np.zeros(2), rest.position[:2], rest.quaternion[:2]]), rest.lengths[:2])
+    refine(chain, np.column_stack([np.zeros(2), rest.position[:2], rest.quaternion[:2]]), rest.lengths[:2])
 
     print(f"{path}: {chain.units} units, {chain.tendons} tendons, {thread_count()} threads")
     few = slice(0, SETTLED)
@@ -46,7 +46,7 @@ def main(path: Path) -> None:
     timed("statics, along paths (as fk_dataset)", count, lambda: sample_at(chain, tilted, DIRECTIONS, STEPS, rng))
     around = rest.lengths + 1e-3 * rng.uniform(-1, 1, rest.lengths.shape)
     targets = np.column_stack([np.arctan2(gravity[:, 0], -gravity[:, 2]), rest.position, rest.quaternion])
-    exact = timed("Gauss-Newton polish of lengths 1 mm off", SOLVED, lambda: polish(chain, targets, around))
+    exact = timed("Gauss-Newton polish of lengths 1 mm off", SOLVED, lambda: refine(chain, targets, around))
     print(f"polished: {(exact.position_error <= 1e-3 * chain.length).mean():.1%} within 0.1 % of the arm's length")
     deviation = np.linalg.norm(settled.position - found.position[few], axis=1) * 1e3
     print(f"tips of the first and the third: median {np.median(deviation):.2g} mm, max {deviation.max():.2g} mm apart")

@@ -15,7 +15,7 @@ import onnxruntime
 from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.kinematics.dataset.sampling import pull_directions
 from trunkline.kinematics.ik.inference import ask
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import equilibrium
 from trunkline.pipeline.inputs import read_model
@@ -46,10 +46,10 @@ def main(path: Path) -> None:
     print(f"{path}: median {1e6 * np.median(times):.1f} us an answer, one thread")
 
     lengths = ask(network, targets)["lengths"].astype(float)
-    polish(chain, targets[:2], lengths[:2])  # compiles
+    refine(chain, targets[:2], lengths[:2])  # compiles
     for steps in (0, 1, 2, 3):
         started = time.perf_counter()
-        found = polish(chain, targets, lengths, steps)
+        found = refine(chain, targets, lengths, steps)
         seconds = (time.perf_counter() - started) / len(targets)
         error = 1e3 * found.position_error
         print(f"{steps} Gauss-Newton steps: tip error median {np.median(error):.2g} mm, 95 % below "

@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 
 from demo.experiments import Experiments, curl_trials, motion_trials, pull_trials, release_trials, tilt_trials
-from demo.plants.bench import COMMAND_RATE, LOOSE, SAMPLE_RATE, Bench, Plant, Seen
+from demo.plants.bench import COMMAND_RATE, LOOSE, SAMPLE_RATE, Bench, Plant, PlantMotion
 from demo.truth import Truth
 from trunkline.frames import STANDARD_GRAVITY, wxyz_from_rotation
 from trunkline.model.arm.mjcf import unit_name
@@ -67,7 +67,7 @@ class Laboratory:
             trials, mounts, loose, steady=experiments.settle, steady_factor=experiments.steady_factor,
             since=experiments.settle,
         )  # fmt: skip
-        return self._seen("tilts", trials, mounts, bench)
+        return self._placed("tilts", trials, mounts, bench)
 
     def releases(self, experiments: Experiments, load: float = 0.0) -> list[Truth]:
         """The arm bent by hand and let go, its cables loose. load: kg at the tip."""
@@ -83,7 +83,7 @@ class Laboratory:
             pulls[index] = strength[:, None] * pull
         upright = [Rotation.identity()] * len(trials)
         bench = self._bench(trials, upright, loose, pulls=pulls, since=bend + experiments.bend_settle)
-        return self._seen("releases", trials, upright, bench, begin=experiments.hold_duration)
+        return self._placed("releases", trials, upright, bench, begin=experiments.hold_duration)
 
     def curls(self, experiments: Experiments) -> list[Truth]:
         """The arm curled and uncurled by its motors; the tendons that do not pull are loose."""
@@ -145,28 +145,28 @@ class Laboratory:
         """Trials under an upright mount in which motors and their commands are recorded."""
         upright = [Rotation.identity()] * len(trials)
         bench = self._bench(trials, upright, commands, since=since)
-        return self._seen(label, trials, upright, bench, begin, with_motors=True)
+        return self._placed(label, trials, upright, bench, begin, with_motors=True)
 
-    def _seen(self, label: str, trials, mounts, bench: Bench, begin: float = 0.0, with_motors=False) -> list[Truth]:
+    def _placed(self, label: str, trials, mounts, bench: Bench, begin: float = 0.0, with_motors=False) -> list[Truth]:
         """The plant's trials, placed in the world. begin: s, from `bench.since`."""
         if not trials:
             return []
-        seen = self.plant.run(label, bench, self.tracked)
+        motion = self.plant.run(label, bench, self.tracked)
         truths = []
         for index, (trial, mount) in enumerate(zip(trials, mounts, strict=True)):
-            truth = self._truth(trial, mount, seen, index, begin)
+            truth = self._truth(trial, mount, motion, index, begin)
             if with_motors:
                 truth.tendons = tuple(f"tendon_{k + 1}" for k in range(self.plant.tendons))
                 first = bench.skipped * bench.stride
                 sampled = slice(first, first + len(truth.time) * bench.stride, bench.stride)
                 truth.command_time, truth.commands = truth.time, bench.commands[index, sampled]
-                truth.tendon_positions = seen.wound[index]
+                truth.tendon_positions = motion.wound[index]
             truths.append(truth)
         return truths
 
-    def _truth(self, trial: Planned, mount: Rotation, seen: Seen, index: int, begin: float) -> Truth:
+    def _truth(self, trial: Planned, mount: Rotation, motion: PlantMotion, index: int, begin: float) -> Truth:
         """The trial of this index, under a mount turned by `mount` (world ← base)."""
-        positions, rotations = seen.positions[index], seen.rotations[index]
+        positions, rotations = motion.positions[index], motion.rotations[index]
         local = Rotation.from_matrix(rotations.reshape(-1, 3, 3))
         origin = np.array(self.mount_position)
         return Truth(

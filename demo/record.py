@@ -30,8 +30,8 @@ class Config(Choice):
         super().__post_init__()
         arm, tests = self.arm, self.experiments
         for group in [*tests.curl_tendons, *tests.test.curl_tendons]:
-            known = max(group) <= arm.tendons and distinct(group)
-            expect(known, "experiments.curl_tendons", group, f"distinct tendons from 1 to {arm.tendons}")
+            valid = max(group) <= arm.tendons and distinct(group)
+            expect(valid, "experiments.curl_tendons", group, f"distinct tendons from 1 to {arm.tendons}")
         for key, pulls in (("experiments.pulls", tests.pulls), ("experiments.test.pulls", tests.test.pulls)):
             for pull in pulls:
                 expect(len(pull.levels) == arm.tendons, key, pull.levels, f"a level for each of {arm.tendons} tendons")

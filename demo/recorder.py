@@ -74,10 +74,10 @@ def _rigid_bodies(stamp: int, frame: int, bodies, positions: np.ndarray, quatern
                     "orientation": dict(zip("wxyz", quaternion.tolist(), strict=True)),
                 },
             }
-            for name, position, quaternion, seen in zip(
+            for name, position, quaternion, tracked in zip(
                 bodies, positions, quaternions, visible, strict=True
             )
-            if seen
+            if tracked
         ],
     }
 

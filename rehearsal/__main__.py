@@ -35,19 +35,19 @@ def main() -> int:
     parser.add_argument("--seed", type=_count, default=0, help="of the run that is filmed")
     parser.add_argument("--package", type=Path, default=None)
     parser.add_argument("--out", type=Path, default=Path("build/rehearse"))
-    given = parser.parse_args()
-    names = [given.only] if given.only else list(EXPERIMENTS)
+    arguments = parser.parse_args()
+    names = [arguments.only] if arguments.only else list(EXPERIMENTS)
     require_checkout(Path("."))
-    package = given.package or only_package()
-    if given.animate:
-        animate(bench_of(package), names, given.seed, Path("artifacts/rehearse"))
+    package = arguments.package or only_package()
+    if arguments.animate:
+        animate(bench_of(package), names, arguments.seed, Path("artifacts/rehearse"))
         return 0
-    runs = wanted({name: given.runs for name in names}, given.variants)
+    runs = wanted({name: arguments.runs for name in names}, arguments.variants)
     source = source_of(package)
-    results = make(runs, package, source, given.out / "runs.csv", thread_count())
+    results = make(runs, package, source, arguments.out / "runs.csv", thread_count())
     goals = read_limits(Path("tests/limits.yaml"))["rehearse"]
     print(rehearsal_table(summary(results), goals, f"with package `{source.package}`", variants=True))
-    draw(results, given.out / "rehearsal.png")
+    draw(results, arguments.out / "rehearsal.png")
     return 0
 
 

@@ -28,8 +28,8 @@ def animate(bench: Bench, names: list[str], seed: int, folder: Path) -> None:
         result, _ = perform(staged)
         write_gif(shots, name, folder / f"{name}.gif")
         stills[name] = shots[: telling(shots) + 1]
-        told = "success" if result.success else result.cause
-        print(f"{folder / name}.gif: seed {seed}, {told}, {result.seconds:.0f} s", flush=True)
+        outcome = "success" if result.success else result.cause
+        print(f"{folder / name}.gif: seed {seed}, {outcome}, {result.seconds:.0f} s", flush=True)
     figure, plots = _figure(len(names))
     for plot, (name, shots) in zip(plots, stills.items(), strict=True):
         draw(plot, shots, name)
@@ -49,9 +49,9 @@ def write_gif(shots: list[Shot], name: str, file: Path) -> None:
 def telling(shots: list[Shot]) -> int:
     """Which is the last in which the robot goes where it was sent, or, where it follows, in the midst of that."""
     for mode, share in (("execute", 1.0), ("follow", 0.5)):
-        found = [index for index, shot in enumerate(shots) if shot.mode == mode]
-        if found:
-            return found[round(share * (len(found) - 1))]
+        places = [index for index, shot in enumerate(shots) if shot.mode == mode]
+        if places:
+            return places[round(share * (len(places) - 1))]
     return len(shots) - 1
 
 
@@ -108,7 +108,7 @@ def _figure(count: int):
     return figure, plots
 
 
-def _seen(points: np.ndarray) -> np.ndarray:
+def _projected(points: np.ndarray) -> np.ndarray:
     """(N, 2), m, in the picture's plane: to the right and up, of points (N, 3)."""
     right = np.array([-np.sin(AZIMUTH), np.cos(AZIMUTH), 0.0])
     return points @ np.column_stack([right, np.cross(_towards(), right)])
@@ -126,11 +126,11 @@ def _below(points: np.ndarray) -> np.ndarray:
 
 
 def _line(plot, points: np.ndarray, **style) -> None:
-    plot.plot(*_seen(points).T, **style)
+    plot.plot(*_projected(points).T, **style)
 
 
 def _fill(plot, points: np.ndarray, **style) -> None:
-    plot.fill(*_seen(points).T, **style)
+    plot.fill(*_projected(points).T, **style)
 
 
 def _circle(centre: np.ndarray, axis: np.ndarray, radius: float) -> np.ndarray:
@@ -151,7 +151,7 @@ def _outlines(shot: Shot) -> list[np.ndarray]:
     else:
         half = np.array([radius, radius, thing.half_height])
         parts = [("cylinder" if thing.shape == "cylinder" else "box", half, np.eye(3), np.zeros(3))]
-    lines = [line @ own.T + place for shape, half, own, place in parts for line in _edges(shape, half)]
+    lines = [line @ axes.T + place for shape, half, axes, place in parts for line in _edges(shape, half)]
     return [turn.apply(line) + shot.thing for line in lines]
 
 

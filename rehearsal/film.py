@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rehearsal.robot.scene import Object, Surface
+from rehearsal.robot.scene import Object, SupportSurface
 from rehearsal.session import RATE, Session
 from trunkline.frames import rotation_from_wxyz
 from trunkline.kinematics.panda.kinematics import FLANGE, joint_frames
@@ -37,7 +37,7 @@ class Shot:
     turn: np.ndarray
     hook: np.ndarray | None
     object: Object
-    surfaces: list[Surface]
+    surfaces: list[SupportSurface]
 
 
 def filmed(session: Session) -> list[Shot]:
@@ -77,6 +77,6 @@ def shoot(session: Session, mode: str) -> Shot:
 
 
 def _true(session: Session, places: np.ndarray) -> np.ndarray:
-    """The inverse of `Session.seen`."""
+    """The inverse of `Session.in_client_frame`."""
     instruments = session.robot.instruments
     return instruments.turn.inv().apply(places - instruments.shift)

@@ -24,7 +24,7 @@ from demo.plants.stranger import Stranger
 from demo.rig import ROOT as LAB
 from demo.rig import Config as Lab
 from rehearsal.operator.hands import as_hands_move
-from rehearsal.robot.scene import Object, Scene, Surface
+from rehearsal.robot.scene import Object, Scene, SupportSurface
 from rehearsal.robot.stand_in import SUBSTEPS, StandIn, StandInRobot, Truth
 from trunkline.frames import wxyz_from_rotation
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
@@ -65,13 +65,13 @@ class Placement:
 
 
 @dataclass
-class Held:
-    """held: lifted by more than half of LIFT, off the hook, and HOLD s later within 20 mm of its place in the arm.
+class GraspOutcome:
+    """success: lifted by more than half of LIFT, off the hook, and HOLD s later within 20 mm of its place in the arm.
     lifted, slipped: m; slipped is how far it moved in the arm while the Panda stood still, creep the same of the last
     2 s, infinite if nothing held it. units: that touch it at last. force: N, sum of their loads. cpu: s of processor
     for a simulated s."""
 
-    held: bool
+    success: bool
     lifted: float
     slipped: float
     creep: float
@@ -91,15 +91,15 @@ def joints_for(place: np.ndarray, rotation: np.ndarray, offset: float, start: np
     flange = rotation @ np.diag([1.0, -1.0, -1.0])
 
     def off(q: np.ndarray) -> np.ndarray:
-        found, turn = mount_pose(q[None], offset)
+        places, turn = mount_pose(q[None], offset)
         return np.concatenate([
-            10 * (found[0] - place), Rotation.from_matrix(turn[0] @ flange.T).as_rotvec(), 0.01 * (q - start)
+            10 * (places[0] - place), Rotation.from_matrix(turn[0] @ flange.T).as_rotvec(), 0.01 * (q - start)
         ])  # fmt: skip
 
     return least_squares(off, start, bounds=(Q_MIN, Q_MAX)).x
 
 
-class Trial:
+class GraspTrial:
     """One placement: the scene, the robot in it, and pictures of the way."""
 
     def __init__(
@@ -127,7 +127,7 @@ class Trial:
                 place[2] = centres[-1][2] + thing.half_height - CLEARANCE
             thing.position = place.tolist()
             top = place - [0, 0, thing.half_height]
-            self.scene = Scene(FLOOR, thing, {"table": Surface(top.tolist(), TABLES[placement.shape])})
+            self.scene = Scene(FLOOR, thing, {"table": SupportSurface(top.tolist(), TABLES[placement.shape])})
         self.robot = StandInRobot(arm, self.scene, settings, self.aside, seed, LOOSENED, substeps)
         self.pictures: list[tuple[str, np.ndarray, Truth]] = []
 
@@ -150,7 +150,7 @@ class Trial:
         before, after = (truth.grip - centres[holding].mean(axis=0) for centres, truth in (then, now))
         return float(np.linalg.norm(after - before))
 
-    def run(self) -> Held:
+    def run(self) -> GraspOutcome:
         loose, drawn = LOOSENED, np.array([PULL, -LOOSE, -LOOSE])
         begun = time.process_time()
         first = self.robot.truth().thing
@@ -170,8 +170,8 @@ class Trial:
         last = self.robot.truth()
         loads = np.linalg.norm(last.arm_thing, axis=1)
         lifted, slipped = float(last.thing[2] - first[2]), self.moved("lifted")
-        return Held(
-            held=holds(lifted, slipped, last.hanging), lifted=lifted, slipped=slipped,
+        return GraspOutcome(
+            success=holds(lifted, slipped, last.hanging), lifted=lifted, slipped=slipped,
             creep=self.moved("calm"), units=int((loads > 0).sum()), force=float(loads.sum()),
             cpu=(time.process_time() - begun) / self.robot.time,
         )  # fmt: skip
@@ -204,13 +204,13 @@ def main() -> None:
     arm = plant_of(load_config(Lab, "record", LAB))
     assert isinstance(arm, Stranger)
     for index in only:
-        trial = Trial(arm, settings, PLACEMENTS[index], seed=1)
-        found = trial.run()
+        trial = GraspTrial(arm, settings, PLACEMENTS[index], seed=1)
+        outcome = trial.run()
         print(
-            f"{PLACEMENTS[index].name}: {'held' if found.held else 'not held'}, "
-            f"lifted by {1000 * found.lifted:.0f} mm, "
-            f"moved by {1000 * found.slipped:.1f} mm in {HOLD:.0f} s, {1000 * found.creep:.2f} mm in the last 2 s, "
-            f"{found.units} units press with {found.force:.1f} N; {found.cpu:.2f} s of processor a second",
+            f"{PLACEMENTS[index].name}: {'held' if outcome.success else 'not held'}, "
+            f"lifted by {1000 * outcome.lifted:.0f} mm, "
+            f"moved by {1000 * outcome.slipped:.1f} mm in {HOLD:.0f} s, {1000 * outcome.creep:.2f} mm in the last 2 s, "
+            f"{outcome.units} units press with {outcome.force:.1f} N; {outcome.cpu:.2f} s of processor a second",
             flush=True,
         )
         if folder is not None:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from rehearsal.robot.shapes import BOX
-from rehearsal.robot.thing import Thing, rotation
+from rehearsal.robot.thing import RigidObject, rotation
 
 CORNERS = np.array([(-1, -1), (-1, 1), (1, -1), (1, 1)])
 
@@ -44,7 +44,7 @@ def draw(trial, file: Path) -> None:
     figure.savefig(file, dpi=70)
 
 
-def outline(thing: Thing) -> list[np.ndarray]:
+def outline(thing: RigidObject) -> list[np.ndarray]:
     """Lines in the thing's frame that show its shapes, m: two ends of each, and what joins them. Shapes (n, 3)."""
     angle = np.linspace(0, 2 * np.pi, 25)
     circle, square = np.column_stack([np.cos(angle), np.sin(angle)]), CORNERS[[0, 1, 3, 2, 0]]

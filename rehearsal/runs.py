@@ -25,7 +25,7 @@ from upkeep.provenance import REHEARSAL, SHOWN, stage_code
 
 
 @dataclass(frozen=True)
-class Source:
+class Provenance:
     """What runs are made of: `package` and `code`, digests; rows of another source do not count.
 
     code: of the files and settings that rehearsal/dvc.yaml lists for the stage, as DVC sees them, without the package.
@@ -45,9 +45,9 @@ class Run:
     variant: str = ""
 
 
-def source_of(package: Path) -> Source:
+def source_of(package: Path) -> Provenance:
     """Of a package and of the checkout in whose top we are."""
-    return Source(package_digest(read_files(package))[:SHOWN], stage_code(Path("."), *REHEARSAL))
+    return Provenance(package_digest(read_files(package))[:SHOWN], stage_code(Path("."), *REHEARSAL))
 
 
 def wanted(runs: dict[str, int], of_variants: int) -> list[Run]:
@@ -59,15 +59,15 @@ def wanted(runs: dict[str, int], of_variants: int) -> list[Run]:
     return sorted(plain, key=lambda run: run.seed) + variants
 
 
-def make(runs: list[Run], package: Path, source: Source, table: Path, workers: int) -> list[Result]:
+def make(runs: list[Run], package: Path, source: Provenance, table: Path, workers: int) -> list[Result]:
     """Those of `runs` that `table` has not, of this source; then all of `runs` that it has."""
     made = {run_of(result) for result in source.of(read_results(table))}
     missing = [run for run in runs if run not in made]
     for number, (result, seconds) in enumerate(performed(missing, package, workers), start=1):
         append_result(table, replace(result, package=source.package, code=source.code))
-        told = "success" if result.success else result.cause
+        outcome = "success" if result.success else result.cause
         name = f"{result.experiment}, {result.variant}" if result.variant else result.experiment
-        print(f"{number} of {len(missing)}: {name} {result.seed}: {told}; {seconds:.0f} s of processor", flush=True)
+        print(f"{number} of {len(missing)}: {name} {result.seed}: {outcome}; {seconds:.0f} s of processor", flush=True)
     chosen = set(runs)
     return [result for result in source.of(read_results(table)) if run_of(result) in chosen]
 
@@ -89,7 +89,7 @@ def performed(runs: list[Run], package: Path, workers: int) -> Iterator[tuple[Re
         return
     if elsewhere():
         sent = _Sent(package.read_bytes(), source_of(package))
-        yield from (found for _, found in arriving(_make_sent, runs, sent))
+        yield from (result for _, result in arriving(_make_sent, runs, sent))
         return
     if workers == 1 or len(runs) == 1:
         bench = bench_of(package)
@@ -110,16 +110,16 @@ class _Sent:
     """What a worker of a scheduler makes runs with: the package's bytes, and where `source` is from."""
 
     packed: bytes
-    source: Source
+    source: Provenance
 
     @cached_property
     def bench(self) -> Bench:
         with TemporaryDirectory() as folder:
             package = Path(folder) / "package.tgz"
             package.write_bytes(self.packed)
-            if (own := source_of(package)) != self.source:
+            if (local := source_of(package)) != self.source:
                 raise InputError(
-                    f"{VARIABLE}: a worker: found code and settings {own.code}, expected {self.source.code} as here"
+                    f"{VARIABLE}: a worker: found code and settings {local.code}, expected {self.source.code} as here"
                 )
             return bench_of(package)
 

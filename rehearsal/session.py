@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from rehearsal.operator.hands import RayHand
-from rehearsal.robot.sensors import Seen
+from rehearsal.robot.sensors import Readings
 from rehearsal.robot.stand_in import StandInRobot
 from trunkline.ar.preview.grasp_preview import GraspPreviewer, PlanPrediction
 from trunkline.ar.preview.package import Package
@@ -87,7 +87,7 @@ class Session:
         self.tips: list[tuple[float, np.ndarray]] = []  # s since a plan began, and where its tip is seen, m
         self.refusals: list[tuple[float, str]] = []  # times at which targets were not followed, and why
 
-    def seen(self, place: np.ndarray) -> np.ndarray:
+    def in_client_frame(self, place: np.ndarray) -> np.ndarray:
         """A true place (3,), m, in the frame that the client takes for the Panda's base."""
         return self.robot.instruments.turn.apply(place) + self.robot.instruments.shift
 
@@ -109,39 +109,39 @@ class Session:
         self.now += 1 / RATE
         left, right = (hand.controller(self.now, end) for hand, end in zip(self.hands, self.rays, strict=True))
         executor = ExecutorReport("fault", "", self.fault) if self.fault else self.executor.state()
-        seen = self.robot.seen()
-        joints: Joints = tuple(float(q) for q in seen.joints)  # type: ignore[assignment]
+        readings = self.robot.readings()
+        joints: Joints = tuple(float(q) for q in readings.joints)  # type: ignore[assignment]
         if self.state.mode in ("hold", "aim"):
-            self._believe(seen)
+            self._believe(readings)
         if not self.moved:
-            mount, flange = (found[0] for found in mount_pose(seen.joints[None], self.config.mount_offset))
-            self.straight.append((seen.tip - mount) @ flange * [1, -1, -1])  # y and z are opposite to the flange's
-        given = Input(
+            mount, flange = (part[0] for part in mount_pose(readings.joints[None], self.config.mount_offset))
+            self.straight.append((readings.tip - mount) @ flange * [1, -1, -1])  # y and z are opposite to the flange's
+        inputs = Input(
             self.now, left, right, REFERENCE, joints, self.world, self.package.digest, self.report, self.shown,
             executor, self.foreseen.offer if self.foreseen is not None else None,
         )  # fmt: skip
-        self.state, intent = self.core.step(self.state, given, 1 / RATE)
+        self.state, intent = self.core.step(self.state, inputs, 1 / RATE)
         self.rays = intent.rays
         if intent.request is not None and (self.report is None or self.report.serial != intent.request.serial):
             self._plan(intent)
         self._show(intent)
         self._drive(intent)
-        tip = self.seen(self.robot.truth().tip)
+        tip = self.in_client_frame(self.robot.truth().tip)
         if intent.motion == "execute":
             self.tips.append((self.now - self.began, tip))
-        found = View(self.now, intent, self.seen(self.place(self.now)), tip, None, self.world)
+        view = View(self.now, intent, self.in_client_frame(self.place(self.now)), tip, None, self.world)
         if intent.mode in ("preview", "ready", "delay"):
-            found.previewed = self.previewed
+            view.previewed = self.previewed
             if self.foreseen is not None:
-                found.probability, found.offer = self.foreseen.probability, self.foreseen.offer
-        return found
+                view.probability, view.offer = self.foreseen.probability, self.foreseen.offer
+        return view
 
-    def _believe(self, seen: Seen) -> None:
+    def _believe(self, readings: Readings) -> None:
         """The world as it is seen: where things are, and what holds them after a plan has been run."""
         report, phases = self.executor.state(), ()
         if report.mode == "done" and report.digest != self.believed and self.plan is not None:
             self.believed, phases = report.digest, tuple(dict(self.plan.phases))
-        pose = np.append(seen.thing, seen.thing_quaternion)
+        pose = np.append(readings.thing, readings.thing_quaternion)
         self.world = update_world(self.world, pose, phases, self.config.handling.lift)
 
     def _plan(self, intent: Intent) -> None:

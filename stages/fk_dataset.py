@@ -26,16 +26,16 @@ def main(config: Config) -> None:
     model = read_model(Path(config.model))
     chain = read_chain(model).smooth
     with progress(len(config.gravity.downs), "fk_dataset", "gravities") as bar:
-        found = gather(model, chain, config, lambda **counts: bar.update(1, **counts))
+        gathered = gather(model, chain, config, lambda **counts: bar.update(1, **counts))
 
     with output_folder(DATA) as folder:
-        found.table.to_parquet(folder / "samples.parquet", index=False)
+        gathered.table.to_parquet(folder / "samples.parquet", index=False)
     with output_folder(ARTIFACTS) as folder:
-        save_figure(density_figure(found.densities), folder / "density.png")
-        save_figure(deviation_figure(found.deviation), folder / "deviation.png")
-        unevenness_table(found.densities).to_csv(folder / "density.csv", index=False, float_format="%.6g")
-        found.deviation.to_csv(folder / "deviation.csv", index=False, float_format="%.6g")
-        write_metrics(folder, summary(found))
+        save_figure(density_figure(gathered.densities), folder / "density.png")
+        save_figure(deviation_figure(gathered.deviation), folder / "deviation.png")
+        unevenness_table(gathered.densities).to_csv(folder / "density.csv", index=False, float_format="%.6g")
+        gathered.deviation.to_csv(folder / "deviation.csv", index=False, float_format="%.6g")
+        write_metrics(folder, summary(gathered))
 
 
 if __name__ == "__main__":

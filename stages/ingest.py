@@ -36,14 +36,14 @@ class Config:
 
 def main(config: Config) -> None:
     folders = session_folders(RAW / config.session, config.only)
-    found = gather_each(folders, partial(gathered_of, config=config), config.plausible.distance)
-    gathered = together(list(found.values()))
-    qualities = [judge(take, found) for take, found in zip(gathered.takes, gathered.findings, strict=True)]
-    for take, said in zip(gathered.takes, gathered.findings, strict=True):
-        take.repairs = len(said.repairs)
+    sessions = gather_each(folders, partial(gathered_of, config=config), config.plausible.distance)
+    gathered = together(list(sessions.values()))
+    qualities = [judge(take, sessions) for take, sessions in zip(gathered.takes, gathered.findings, strict=True)]
+    for take, finding in zip(gathered.takes, gathered.findings, strict=True):
+        take.repairs = len(finding.repairs)
     for line in remarks(qualities):
         print(f"ingest: {line}")
-    clocks = {name: clock_facts(one.clock) for name, one in found.items()} if len(found) > 1 else None
+    clocks = {name: clock_facts(session.clock) for name, session in sessions.items()} if len(sessions) > 1 else None
     with output_folder(PROCESSED) as processed, output_folder(ARTIFACTS) as artifacts:
         write_takes(processed, gathered.takes)
         write_json(artifacts / "quality.json", report(qualities, gathered) | ({"clocks": clocks} if clocks else {}))
@@ -51,9 +51,9 @@ def main(config: Config) -> None:
         save_figure(quality_figure(qualities, gathered), artifacts / "quality.png")
     for reason in gathered.refused.values():
         print(f"ingest: warning: left out: {reason}", file=sys.stderr)
-    for line in by_sentence(qualities, lambda found: found.repairs):
+    for line in by_sentence(qualities, lambda sessions: sessions.repairs):
         print(f"ingest: repaired: {line}", file=sys.stderr)
-    for line in by_sentence(qualities, lambda found: found.warnings):
+    for line in by_sentence(qualities, lambda sessions: sessions.warnings):
         print(f"ingest: warning: {line}", file=sys.stderr)
 
 
@@ -61,10 +61,10 @@ def gathered_of(folder: Path, session: Session, config: Config) -> Gathered:
     """The takes of one session, whose clock and vertical are its own."""
     with progress(len(session.trials), "ingest", "trials") as bar:
         taken = []
-        for trial, take, found in take_in(folder, session, config.limits):
+        for trial, take, findings in take_in(folder, session, config.limits):
             if isinstance(take, InputError) and config.refused_trials == "stop":
                 raise take
-            taken.append((trial, take, found))
+            taken.append((trial, take, findings))
             bar.update(1, trial=trial.name)
     gathered = gather(taken, session, config.plausible, config.refused_trials, f"{folder}")
     require_enough(gathered, session.trials)

@@ -8,7 +8,7 @@ from trunkline.compute.progress import progress
 from trunkline.kinematics.panda.mjcf import panda_spec
 from trunkline.kinematics.reachability.report import heldout_table, summary
 from trunkline.kinematics.reachability.sampled import read_tips
-from trunkline.kinematics.reachability.survey import Survey, survey
+from trunkline.kinematics.reachability.survey import SurveySettings, survey
 from trunkline.kinematics.sdf.mesh import write_obj
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.inputs import read_model
@@ -22,7 +22,7 @@ ARTIFACTS = Path("artifacts/reachability")
 
 
 @settings
-class Config(Survey):
+class Config(SurveySettings):
     """See conf/reachability/config.yaml. model: MJCF file of the arm."""
 
     model: str

@@ -28,24 +28,25 @@ class Config(CertificateSettings):
 
 
 def main(config: Config) -> None:
-    def told(stage: str, name: str = "metrics") -> dict:
+    def read(stage: str, name: str = "metrics") -> dict:
         return json.loads(existing(ARTIFACTS / stage / f"{name}.json").read_text())
 
     bring = None if config.rig is None else load_rig("report.rig", config.rig, "bring")
-    tables = {stage: told(stage, "parameters") for stage in STAGES}
-    metrics = {stage: told(stage) for stage in (*STAGES, "score", "ingest", "filter")}
-    found = certify(config, read_model(MODEL), read_trials(TRIALS, DECIDING), tables, metrics, bring)
-    facts = found.facts | {
+    tables = {stage: read(stage, "parameters") for stage in STAGES}
+    metrics = {stage: read(stage) for stage in (*STAGES, "score", "ingest", "filter")}
+    certificate = certify(config, read_model(MODEL), read_trials(TRIALS, DECIDING), tables, metrics, bring)
+    facts = certificate.facts | {
         "files": digests([MODEL, *(ARTIFACTS / s / "parameters.json" for s in STAGES)]),
         "code": digest_of_code(CHECKOUT, code()),
     }
     with output_folder(ARTIFACTS / "report") as folder:
-        save_figure(uncertainty_figure(found.budget.tips, found.budget.radius), folder / "uncertainty.png", 110)
-        save_figure(pose_figure(found.shapes), folder / "poses.png", 110)
+        budget = certificate.budget
+        save_figure(uncertainty_figure(budget.tips, budget.radius), folder / "uncertainty.png", 110)
+        save_figure(pose_figure(certificate.shapes), folder / "poses.png", 110)
         pictures = {name: (folder / f"{name}.png").read_bytes() for name in ("uncertainty", "poses")}
-        (folder / "certificate.html").write_text(page(facts, found.replays, pictures), encoding="utf-8")
+        (folder / "certificate.html").write_text(page(facts, certificate.replays, pictures), encoding="utf-8")
         write_json(folder / "facts.json", facts)
-        write_metrics(folder, found.metrics)
+        write_metrics(folder, certificate.metrics)
 
 
 def code() -> list[str]:

@@ -29,8 +29,8 @@ from studies.choices import Chain, next_link
 from studies.demo_session import STAGES, require_demo
 from studies.rows import Rows, digest
 from trunkline.errors import in_one_line
+from trunkline.identification.evaluation.baselines import hanging_still, noise_floor
 from trunkline.identification.evaluation.evaluation import Prediction, replay
-from trunkline.identification.evaluation.null_model import hanging_still, noise_floor
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.simulate.experiment import own_starts

@@ -12,7 +12,7 @@ from tests.support.judges import judges, read_folder
 ROOT = Path(__file__).parents[1]
 JUDGES = {  # by function, the test that has its table, and its file below tests/
     "rehearsal.experiments.bench:Staged.judged": (
-        "rehearsal/test_staged.py",
+        "rehearsal/test_bench.py",
         "test_a_run_succeeds_where_its_script_ended_and_its_judge_names_no_cause",
     ),
     "rehearsal.experiments.follow:failure": (
@@ -95,7 +95,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "kinematics/reachability/test_verdicts.py",
         "test_a_held_out_angle_counts_what_its_signal_calls_within_reach",
     ),
-    "trunkline.kinematics.reachability.surface_check:check_sheets": (
+    "trunkline.kinematics.reachability.surface_check:check_surfaces": (
         "kinematics/reachability/test_verdicts.py",
         "test_sheets_are_checked_with_tips_and_points_beyond",
     ),
@@ -105,13 +105,10 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
     ),
 }
 OTHERWISE = {  # what the word stands for there: no verdict
-    "trunkline.identification.simulate.experiment:start_frames": "frames in which an arm is held before its release",
-    "trunkline.identification.results.parameter_table:parameter_table": "looks names up among those at a bound",
-    "trunkline.kinematics.ik.training:pieces": "rows that are held out",
+    "trunkline.identification.results.parameter_table:parameter_table": "looks a name up among those at a bound",
     "trunkline.ar.session.controller_input:_controller": "buttons that are held down",
     "trunkline.ar.session.preview_process:_held": "the thing that is in the arm, looked up in the world",
-    "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log, as proposed",
-    "trunkline.kinematics.reachability.tips:held_by": "lengths of cables",
+    "trunkline.recordings.preparation.proposal:_experiment": "whether motors hold in a log; a user confirms it",
     "trunkline.compute.scheduler:spread_rows": "shares rows out to workers",
 }
 

@@ -66,7 +66,7 @@ class Bench:
 
 
 @dataclass
-class Seen:
+class PlantMotion:
     """F samples at SAMPLE_RATE, from `since` on; the base marker's frame.
 
     positions (n, F, S, 3): m, of the tracked units' centres. rotations (n, F, S, 3, 3): of their axes.
@@ -83,7 +83,7 @@ class Plant(Protocol):
 
     tendons: int
 
-    def run(self, label: str, bench: Bench, tracked: list[int]) -> Seen:
+    def run(self, label: str, bench: Bench, tracked: list[int]) -> PlantMotion:
         """Do the trials and look at the units of these indices. `label` says what is done, for a bar of progress."""
         ...
 

@@ -16,7 +16,7 @@ PlantSettings = Annotated[CousinSettings | StrangerSettings, Field(discriminator
 
 
 @dataclass
-class Arm:
+class ArmChoice:
     """The drawing. length, base_width, tip_width: m. tracked: numbers from 1 of the units that carry markers."""
 
     length: Annotated[float, Field(ge=0.01, le=10)]
@@ -32,7 +32,7 @@ class Choice:
     """What of the lab's settings decides which plant it has; `seed` draws its scatter."""
 
     seed: Seed
-    arm: Arm
+    arm: ArmChoice
     plant: PlantSettings
 
     def __post_init__(self):
@@ -50,10 +50,10 @@ def plant_of(choice: Choice) -> Plant:
     return kind(chain, choice.plant, arm.tendons, rng)
 
 
-def expect(holds: bool, key: str, found, expected: str) -> None:
+def expect(holds: bool, key: str, value, expected: str) -> None:
     """Refuse a setting that breaks a rule between fields, naming its key."""
     if not holds:
-        raise ValueError(f"{key}: found {found}, expected {expected}")
+        raise ValueError(f"{key}: found {value}, expected {expected}")
 
 
 def distinct(values: list) -> bool:

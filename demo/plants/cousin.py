@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 from pydantic import Field
 
-from demo.plants.bench import COMMAND_RATE, SAMPLE_RATE, Bench, PrintedArm, Seen, Share
+from demo.plants.bench import COMMAND_RATE, SAMPLE_RATE, Bench, PlantMotion, PrintedArm, Share
 from trunkline.compute.progress import progress
 from trunkline.frames import STANDARD_GRAVITY
 from trunkline.model.arm.geometry import ChainGeometry
@@ -28,7 +28,7 @@ LONGEST_REST = 8.0  # s
 
 
 @dataclass
-class Motors:
+class WinchMotors:
     """What winds the cables: it follows commands late and no faster than it can.
 
     rate_limit: m/s of cable. command_delay: s.
@@ -56,7 +56,7 @@ class CousinSettings(PrintedArm):
     link_mass_ratio: Share
     armature: Annotated[float, Field(ge=0, le=1)]
     limit_solref: Solref
-    motors: Motors
+    motors: WinchMotors
 
 
 class Cousin:
@@ -66,7 +66,7 @@ class Cousin:
         self.chain, self.settings, self.tendons = chain, settings, tendons
         self.model = build_model(chain, settings, tendons, rng)
 
-    def run(self, label: str, bench: Bench, tracked: list[int]) -> Seen:
+    def run(self, label: str, bench: Bench, tracked: list[int]) -> PlantMotion:
         wound = wind(bench.commands, self.settings.motors)
         controls = np.concatenate([self.model.tendon_length0 - wound, bench.pulls], axis=2)
         angles = self._simulate(label, bench, controls)[:, bench.skipped :]
@@ -80,7 +80,7 @@ class Cousin:
                 mujoco.mj_kinematics(self.model, data)
                 positions[trial, frame] = data.site_xpos[sites]
                 rotations[trial, frame] = data.site_xmat[sites].reshape(-1, 3, 3)
-        return Seen(positions, rotations, wound[:, :: bench.stride][:, bench.skipped :][:, : angles.shape[1]])
+        return PlantMotion(positions, rotations, wound[:, :: bench.stride][:, bench.skipped :][:, : angles.shape[1]])
 
     def reach(self, pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
         model = copy.copy(self.model)
@@ -94,7 +94,7 @@ class Cousin:
         properties = unit_properties(self.chain, s.modulus, s.density, s.core_ratio, s.damping_ratio)
         hinges = model.nv // self.chain.units  # two joints of two hinges a unit, each joint twice as stiff as the unit
         scatter = model.jnt_stiffness[::hinges] / 2 / properties.stiffness
-        found = {
+        values = {
             "stiffness": scatter.mean() * properties.stiffness[0],
             "joint_place": 0.0,  # two joints, evenly on both sides of it
             "hardening": s.hardening,
@@ -107,7 +107,7 @@ class Cousin:
             "time_constant": None,
         }
         return {
-            "parameters": found,
+            "parameters": values,
             "forces": ["stiffness", "damping", "tendon_friction", "kp", "kv", "force_range"],
             "mass_factor": s.mass_factor,
             "stiffness_factors": scatter / scatter.mean(),
@@ -135,7 +135,7 @@ class Cousin:
         return np.concatenate(parts, axis=1)[:, :instants]
 
 
-def wind(commands: np.ndarray, motors: Motors) -> np.ndarray:
+def wind(commands: np.ndarray, motors: WinchMotors) -> np.ndarray:
     """Cable wound by motors that follow `commands` (n, T, K) at COMMAND_RATE late and at a limited rate, in m."""
     delay, furthest = round(motors.command_delay * COMMAND_RATE), motors.rate_limit / COMMAND_RATE
     wound = np.empty_like(commands)

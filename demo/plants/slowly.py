@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, Plant
-from demo.plants.choice import Arm
+from demo.plants.choice import ArmChoice
 from trunkline.model.arm.spiral import spiral_chain
 
 LOOK = 0.1  # s, for which the arm is looked at
@@ -26,7 +26,7 @@ class Slow:
 
 
 def slow_tips(
-    plant: Plant, drawn: Arm, slow: Slow, pulls: np.ndarray, gravity: np.ndarray, back: np.ndarray
+    plant: Plant, drawn: ArmChoice, slow: Slow, pulls: np.ndarray, gravity: np.ndarray, back: np.ndarray
 ) -> np.ndarray:
     """Where the tip rests, m, in the frame of the base marker; NaN where the arm still swings. Shape (N, 3).
 
@@ -53,8 +53,8 @@ def slow_tips(
             gravity[chosen], commands, np.zeros_like(commands), np.zeros(len(chosen)),
             steady=0.0 if pulled else slow.settle, steady_factor=slow.steady_factor, since=rest,
         )  # fmt: skip
-        seen = plant.run("poses", bench, [drawn.units - 1])
-        tips[chosen] = rested(seen.positions[:, :, 0] + seen.rotations[:, :, 0] @ from_centre)
+        motion = plant.run("poses", bench, [drawn.units - 1])
+        tips[chosen] = rested(motion.positions[:, :, 0] + motion.rotations[:, :, 0] @ from_centre)
     return tips
 
 

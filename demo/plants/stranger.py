@@ -14,8 +14,8 @@ import numpy as np
 from pydantic import Field
 from scipy.spatial.transform import Rotation
 
-from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, PrintedArm, Seen
-from demo.plants.stranger_kernel import Links, State, come_to_rest, path_lengths, simulate, tip
+from demo.plants.bench import COMMAND_RATE, LOOSE, Bench, PlantMotion, PrintedArm
+from demo.plants.stranger_kernel import Links, LinkState, come_to_rest, path_lengths, simulate, tip
 from trunkline.compute.progress import progress
 from trunkline.compute.threads import thread_count
 from trunkline.frames import STANDARD_GRAVITY
@@ -34,7 +34,7 @@ Bend = Annotated[float, Field(gt=0, le=10)]
 
 
 @dataclass
-class Branch:
+class MaxwellBranch:
     """A Maxwell branch beside every joint's spring. ratio: modulus over the relaxed one. time: constant, s."""
 
     ratio: Ratio
@@ -80,7 +80,7 @@ class StrangerSettings(PrintedArm):
     links_per_unit: Annotated[int, Field(ge=1, le=9)]
     mass_scatter: Annotated[float, Field(ge=0, lt=1)]
     viscous_time: Duration
-    branches: Annotated[list[Branch], Field(max_length=9)]
+    branches: Annotated[list[MaxwellBranch], Field(max_length=9)]
     sliders: Annotated[list[Slider], Field(max_length=9)]
     rest_bend: tuple[Annotated[float, Field(ge=-3, le=3)], Annotated[float, Field(ge=-3, le=3)]]
     rest_growth: tuple[Annotated[float, Field(ge=-3, le=3)], Annotated[float, Field(ge=-3, le=3)]]
@@ -108,41 +108,41 @@ class Stranger:
         self.links = make_links(chain, settings, tendons, rng)
         self.straight = path_lengths(self.links, self._state(np.zeros(tendons)))
 
-    def run(self, label: str, bench: Bench, tracked: list[int]) -> Seen:
+    def run(self, label: str, bench: Bench, tracked: list[int]) -> PlantMotion:
         count, rows, _ = bench.commands.shape
         samples = rows // bench.stride - bench.skipped
         positions = np.empty((count, samples, len(tracked), 3))
         rotations, wound = np.empty((*positions.shape, 3)), np.empty((count, samples, self.tendons))
         watched, heights = _centres(self.chain, self.links.lengths)
         upright, gravity = self.mount.inv().apply(UPRIGHT), self.mount.inv().apply(bench.gravity)
-        starts: dict[tuple, State] = {}  # of trials that begin alike
+        starts: dict[tuple, LinkState] = {}  # of trials that begin alike
         for load, sent in zip(bench.loads, bench.commands[:, 0], strict=True):
             if (load, *sent) not in starts:
                 starts[load, *sent] = self._rest(upright, load, sent)
 
-        def one(index: int) -> None:
+        def simulate_trial(index: int) -> None:
             load, sent = bench.loads[index], bench.commands[index]
-            state = State(*(part.copy() for part in starts[load, *sent[0]]))
+            state = LinkState(*(part.copy() for part in starts[load, *sent[0]]))
             simulate(
                 self.links, state, gravity[index], load, sent, bench.pulls[index], self.straight, COMMAND_RATE,
                 self.settings.substeps, round(bench.steady * COMMAND_RATE), bench.steady_factor, bench.stride,
                 bench.skipped, watched[tracked], heights[tracked], positions[index], rotations[index], wound[index],
             )  # fmt: skip
 
-        self._all(f"record {label}", one, count, "trials")
+        self._all(f"record {label}", simulate_trial, count, "trials")
         assert np.isfinite(positions).all(), "the stranger's engine diverged: its steps are too long"
         turn = self.mount.as_matrix()
-        return Seen(positions @ turn.T, turn @ rotations, wound)
+        return PlantMotion(positions @ turn.T, turn @ rotations, wound)
 
     def reach(self, pulls: np.ndarray, gravity: np.ndarray) -> np.ndarray:
         tips, weight = np.empty((len(pulls), 3)), self.mount.inv().apply(gravity)
         start = self._rest(self.mount.inv().apply(UPRIGHT), 0.0, np.full(self.tendons, -LOOSE))
         start.motors[:] = start.winches[:] = 0.0
 
-        def one(index: int) -> None:
+        def drive(index: int) -> None:
             tips[index] = tip(self.links, self._rest(weight[index], 0.0, pulls[index], start))
 
-        self._all("drive the stranger", one, len(pulls), "drives")
+        self._all("drive the stranger", drive, len(pulls), "drives")
         return self.mount.apply(tips)
 
     def answers(self) -> dict:
@@ -157,7 +157,7 @@ class Stranger:
         properties = unit_properties(self.chain, s.modulus, s.density, s.core_ratio, damping_ratio=1.0)
         scatter = 1 / (1 / links.stiffness.reshape(-1, s.links_per_unit)).sum(axis=1) / properties.stiffness
         stiffness = scatter.mean() * properties.stiffness[0]
-        found = {
+        values = {
             "stiffness": stiffness,
             "hardening": s.hardening,
             "joint_place": (s.links_per_unit - 1) / (2 * s.links_per_unit),
@@ -179,7 +179,7 @@ class Stranger:
             "mount_twist": lean[2],
         }
         return {
-            "parameters": found,
+            "parameters": values,
             "forces": ["stiffness", "damping", "kp", "kv", "force_range"],
             "mass_factor": s.mass_factor,
             "stiffness_factors": scatter / scatter.mean(),
@@ -191,27 +191,27 @@ class Stranger:
             "rest_bend_rad": rest,
         }
 
-    def _state(self, wound: np.ndarray) -> State:
+    def _state(self, wound: np.ndarray) -> LinkState:
         """Straight, nothing bears, the motors at `wound` (K,) m."""
         links, units = len(self.links.lengths), len(self.links.hole_link)
         s = self.settings
-        return State(
+        return LinkState(
             q=np.zeros((links, 2)), v=np.zeros((links, 2)), branches=np.zeros((len(s.branches), links, 2)),
             sliders=np.zeros((len(s.sliders), links, 2)), slips=np.zeros((self.tendons, units + 1)),
             motors=np.array(wound, float), winches=np.array(wound, float),
         )  # fmt: skip
 
-    def _rest(self, gravity: np.ndarray, load: float, sent: np.ndarray, start: State | None = None) -> State:
+    def _rest(self, gravity: np.ndarray, load: float, sent: np.ndarray, start: LinkState | None = None) -> LinkState:
         """The arm long after it was left alone with the motors at `sent` (K,) m, from `start` or from straight."""
-        state = self._state(sent) if start is None else State(*(part.copy() for part in start))
+        state = self._state(sent) if start is None else LinkState(*(part.copy() for part in start))
         steps = round(LONGEST_REST / REST_STEP)
         come_to_rest(self.links, state, gravity, load, sent, self.straight, REST_STEP, steps, CALM, STILL)
         state.v[:] = 0.0
         return state
 
-    def _all(self, label: str, one: Callable[[int], None], count: int, unit: str) -> None:
+    def _all(self, label: str, task: Callable[[int], None], count: int, unit: str) -> None:
         with ThreadPoolExecutor(thread_count()) as pool, progress(count, label, unit) as bar:
-            for done in as_completed([pool.submit(one, index) for index in range(count)]):
+            for done in as_completed([pool.submit(task, index) for index in range(count)]):
                 done.result()
                 bar.update(1)
 

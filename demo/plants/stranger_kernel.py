@@ -64,7 +64,7 @@ class Links(NamedTuple):
     backlash: float
 
 
-class State(NamedTuple):
+class LinkState(NamedTuple):
     """Of one arm. q, v (M, 2): rad and rad/s about x, then y. branches (P, M, 2): N m. sliders (E, M, 2): rad.
     slips (K, U + 1): friction at each hole over its bound, -1 to 1, positive if the tendon slides to the motor.
     motors, winches (K,): m of pull, before and behind the backlash."""
@@ -180,9 +180,9 @@ def bend(links, state, work, h, damping, relaxed):
             for j in range(len(links.branch_time)):
                 x = h / links.branch_time[j]
                 decay = np.exp(-x)
-                kept = stiffness * links.branch_ratio[j] * (1 - decay) / x
+                remaining = stiffness * links.branch_ratio[j] * (1 - decay) / x
                 tx, ty = tx - decay * state.branches[j, i, 0], ty - decay * state.branches[j, i, 1]
-                kx, ky = kx + kept, ky + kept
+                kx, ky = kx + remaining, ky + remaining
         for j in range(len(links.slider_yield)):
             x, y, k = state.sliders[j, i, 0], state.sliders[j, i, 1], stiffness * links.slider_ratio[j]
             tx, ty = tx - k * x, ty - k * y
@@ -401,9 +401,9 @@ def remember(links, state, h, relaxed):
             for j in range(len(links.branch_time)):
                 x = h / links.branch_time[j]
                 decay = np.exp(-x)
-                kept = links.stiffness[i] * links.branch_ratio[j] * (1 - decay) / x
-                state.branches[j, i, 0] = decay * state.branches[j, i, 0] + kept * dx
-                state.branches[j, i, 1] = decay * state.branches[j, i, 1] + kept * dy
+                remaining = links.stiffness[i] * links.branch_ratio[j] * (1 - decay) / x
+                state.branches[j, i, 0] = decay * state.branches[j, i, 0] + remaining * dx
+                state.branches[j, i, 1] = decay * state.branches[j, i, 1] + remaining * dy
         for j in range(len(links.slider_yield)):
             x, y = state.sliders[j, i, 0] + dx, state.sliders[j, i, 1] + dy
             size = np.sqrt(x * x + y * y)
@@ -438,7 +438,7 @@ def advance(links, state, work, h, gravity, load, target, hand, straight, dampin
 @njit(cache=True, nogil=True, error_model="numpy")
 def simulate(
     links, state, gravity, load, sent, hand, straight, rate, substeps, calm, calming, every, skipped, watched, heights,
-    seen, turned, wound,
+    positions, turned, wound,
 ):  # fmt: skip
     """A trial from `state`, which it leaves at the trial's end.
 
@@ -451,12 +451,12 @@ def simulate(
     late = round(links.dead_time * rate)
     for row in range(len(sent)):
         sample = row // every - skipped
-        if row % every == 0 and 0 <= sample < len(seen):
+        if row % every == 0 and 0 <= sample < len(positions):
             place(links, state, work)
             for s in range(len(watched)):
                 frame = work.frames[watched[s]]
                 for a in range(3):
-                    seen[sample, s, a] = work.joints[watched[s], a] + heights[s] * frame[a, 2]
+                    positions[sample, s, a] = work.joints[watched[s], a] + heights[s] * frame[a, 2]
                     for b in range(3):
                         turned[sample, s, a, b] = frame[a, b]
             for k in range(len(state.motors)):

@@ -43,11 +43,11 @@ def read_table(path: Path, columns: tuple[str, ...]) -> list[list[float]]:
         with open(path, encoding="utf-8", newline="") as file:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        found = (getattr(error, "strerror", None) or str(error)).lower()
-        raise InputError(f"{path}: {found}, expected a CSV file of the recordings") from error
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        raise InputError(f"{path}: {reason}, expected a CSV file of the recordings") from error
     if not rows or tuple(rows[0]) != columns:
-        found = ", ".join(rows[0]) if rows else "nothing"
-        raise InputError(f"{path}: row 1: found {found}, expected {', '.join(columns)}")
+        reason = ", ".join(rows[0]) if rows else "nothing"
+        raise InputError(f"{path}: row 1: found {reason}, expected {', '.join(columns)}")
     table = []
     for number, row in enumerate(rows[1:], 2):
         if len(row) != len(columns):
@@ -87,9 +87,9 @@ def write_log(path: Path, positions: np.ndarray, start: int, commands: dict[str,
                 "orientations": [],
             }
             writer.write_message("/trunk_rigid_bodies", schema, message, stamp, stamp, index)
-            for one in joints:
+            for joint in joints:
                 sent = {"header": header, "name": names, "position": motors[index], "velocity": [], "effort": []}
-                writer.write_message("/motor_commands", one, sent, stamp, stamp, index)
+                writer.write_message("/motor_commands", joint, sent, stamp, stamp, index)
 
 
 def make_session(source: Path, session: Path = SESSION) -> int:
@@ -141,11 +141,11 @@ def main(arguments: list[str] | None = None) -> int:
     )
     parser.add_argument("source", type=Path, metavar="SOURCE", help="folder of logs, or the CSV")
     parser.add_argument("--load", type=float, metavar="KG", help="at the tip, beside the 200 g that the arm has")
-    told = parser.parse_args(arguments)
-    if told.load is None:
-        session, count = SESSION, make_session(told.source)
+    options = parser.parse_args(arguments)
+    if options.load is None:
+        session, count = SESSION, make_session(options.source)
     else:
-        session, count = LOADED, make_loaded_session(told.source, told.load)
+        session, count = LOADED, make_loaded_session(options.source, options.load)
     print(f"{session}: {count} logs and session.yaml")
     return 0
 

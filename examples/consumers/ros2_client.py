@@ -37,7 +37,7 @@ model.body("base").quat = 1, 0, 0, 0  # the world is the base frame
 data, end, heard = mujoco.MjData(model), time.monotonic() + float(sys.argv[2]), 0
 while time.monotonic() < end:  # until it rests
     teller.write(JointState(Header(Time(0, 0), ""), list(straight), pulls, [], []))
-    for state in [one for one in hearer.take() if isinstance(one, JointState)]:
+    for state in [message for message in hearer.take() if isinstance(message, JointState)]:
         data.qpos, heard = state.position, heard + 1
     time.sleep(0.1)
 if not heard:

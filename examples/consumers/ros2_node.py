@@ -35,7 +35,7 @@ data.ctrl = data.act = list(straight.values())  # its controls are commands: at 
 joints = [model.joint(i).name for i in range(model.njnt)]
 begun = time.monotonic()
 while True:
-    for command in [one for one in heard.take() if isinstance(one, JointState)]:
+    for command in [message for message in heard.take() if isinstance(message, JointState)]:
         for name, pull in zip(command.name, command.position, strict=True):  # m
             data.actuator(f"{name}_position").ctrl = straight[name] - pull
     mujoco.mj_step(model, data, nstep=round(0.02 / model.opt.timestep))

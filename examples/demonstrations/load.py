@@ -15,13 +15,13 @@ dataset = LeRobotDataset("any/name", root=sys.argv[1])
 ahead = {"action": [step / dataset.fps for step in range(CHUNK)]}
 chunks = LeRobotDataset("any/name", root=sys.argv[1], delta_timestamps=ahead)
 frames = [{k: v.tolist() if hasattr(v, "tolist") else v for k, v in dataset[n].items()} for n in range(len(dataset))]
-found = {
+summary = {
     "episodes": dataset.num_episodes,
     "fps": dataset.fps,
-    "features": {name: list(one["shape"]) for name, one in dataset.features.items()},
-    "stats": {name: one["mean"].tolist() for name, one in dataset.meta.stats.items()},
+    "features": {name: list(feature["shape"]) for name, feature in dataset.features.items()},
+    "stats": {name: feature["mean"].tolist() for name, feature in dataset.meta.stats.items()},
     "frames": frames,
     "chunks": [chunks[n]["action"].tolist() for n in range(len(chunks))],
     "padded": [chunks[n]["action_is_pad"].tolist() for n in range(len(chunks))],
 }
-print(json.dumps(found))
+print(json.dumps(summary))

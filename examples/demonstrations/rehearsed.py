@@ -60,15 +60,15 @@ class Logged(Bench):
         return session
 
 
-class Heard:
+class RecordedCore:
     """A core whose steps are told to a journal."""
 
     def __init__(self, core: Teleoperation, journal: Journal) -> None:
         self.core, self.journal = core, journal
 
-    def step(self, state, given, dt):
-        state, intent = self.core.step(state, given, dt)
-        self.journal.step(dt, given, intent)
+    def step(self, state, inputs, dt):
+        state, intent = self.core.step(state, inputs, dt)
+        self.journal.step(dt, inputs, intent)
         return state, intent
 
     def __getattr__(self, name: str):
@@ -77,11 +77,11 @@ class Heard:
 
 def listen(session: Session, journal: Journal) -> None:
     """Tell the journal all that passes in a session, and change nothing of it."""
-    frame, seen, start = session.frame, session.robot.seen, session.executor.start
+    frame, readings, start = session.frame, session.robot.readings, session.executor.start
     last: dict = {}
 
     def saw():
-        last["seen"] = seen()
+        last["seen"] = readings()
         return last["seen"]
 
     def started(plan, digest):
@@ -105,14 +105,14 @@ def listen(session: Session, journal: Journal) -> None:
         if changed("report", session.report):
             journal.event("planned", report=session.report)
             if session.foreseen is not None and session.report is not None:
-                told = {"digest": session.report.digest, "probability": session.foreseen.probability, "spread": []}
-                journal.event("foreseen", foreseen=told)
+                event = {"digest": session.report.digest, "probability": session.foreseen.probability, "spread": []}
+                journal.event("foreseen", foreseen=event)
         if changed("robot", sent.state()):
             journal.event("robot", robot=sent.state())
         return view
 
-    session.frame, session.robot.seen, session.executor.start = framed, saw, started
-    session.core = cast(Teleoperation, Heard(session.core, journal))
+    session.frame, session.robot.readings, session.executor.start = framed, saw, started
+    session.core = cast(Teleoperation, RecordedCore(session.core, journal))
 
 
 @in_one_line
@@ -123,17 +123,17 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--experiment", choices=list(EXPERIMENTS), default="reach")
     parser.add_argument("--runs", type=int, default=5)
     parser.add_argument("--out", type=Path, default=Path("rehearsed"), metavar="FOLDER")
-    told = parser.parse_args(arguments)
-    bench = bench_of(told.package)
-    told.out.mkdir(parents=True, exist_ok=True)
-    for seed in range(told.runs):
-        path = told.out / f"{told.experiment}_{seed:03d}.mcap"
+    options = parser.parse_args(arguments)
+    bench = bench_of(options.package)
+    options.out.mkdir(parents=True, exist_ok=True)
+    for seed in range(options.runs):
+        path = options.out / f"{options.experiment}_{seed:03d}.mcap"
         if path.exists():
             raise InputError(f"{path}: found a log there, expected a folder without one of that name")
         tendons = tuple(f"tendon_{number + 1}" for number in range(len(bench.package.straight)))
         journal = Kept(path, Subject(("tip",), JOINTS, tendons, bench.package.straight, ("tip", (0.0, 0.0, 0.0))))
-        logged = Logged(**{one.name: getattr(bench, one.name) for one in fields(bench)}, journal=journal)
-        result, _ = perform(EXPERIMENTS[told.experiment](logged, seed))
+        logged = Logged(**{field.name: getattr(bench, field.name) for field in fields(bench)}, journal=journal)
+        result, _ = perform(EXPERIMENTS[options.experiment](logged, seed))
         journal.close()
         print(f"{path}: {result.seconds:.1f} s, {'success' if result.success else result.cause}", flush=True)
     return 0

@@ -43,11 +43,11 @@ def read_csv(path: Path) -> list[Pose]:
         with open(path, encoding="utf-8", newline="") as file:
             rows = list(csv.reader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        found = (getattr(error, "strerror", None) or str(error)).lower()
-        raise InputError(f"{path}: {found}, expected train.csv or val.csv of the FTDCR's recordings") from error
+        reason = (getattr(error, "strerror", None) or str(error)).lower()
+        raise InputError(f"{path}: {reason}, expected train.csv or val.csv of the FTDCR's recordings") from error
     if not rows or tuple(rows[0]) != COLUMNS:
-        found = ", ".join(rows[0]) if rows else "nothing"
-        raise InputError(f"{path}: row 1: found {found}, expected {', '.join(COLUMNS)}")
+        reason = ", ".join(rows[0]) if rows else "nothing"
+        raise InputError(f"{path}: row 1: found {reason}, expected {', '.join(COLUMNS)}")
     poses = []
     for number, row in enumerate(rows[1:], 2):
         if len(row) != len(COLUMNS):
@@ -72,8 +72,8 @@ def write_log(path: Path, poses: list[Pose]) -> None:
             header = {"stamp": {"sec": seconds, "nanosec": nanoseconds}, "frame_id": "base"}
             tip = {"id_type": 0, "marker_index": 0, "marker_name": "tip",
                    "translation": dict(zip("xyz", pose.tip, strict=True))}  # fmt: skip
-            seen = {"header": header, "frame_number": 0, "markers": [tip]}
-            writer.write_message("/tip", markers, seen, stamp, stamp, number)
+            message = {"header": header, "frame_number": 0, "markers": [tip]}
+            writer.write_message("/tip", markers, message, stamp, stamp, number)
             wound = {"header": header, "name": list(MOTORS), "position": list(pose.pulls), "velocity": [], "effort": []}
             writer.write_message("/motor_commands", joints, wound, stamp, stamp, number)
 
@@ -83,9 +83,9 @@ def trials_of(file: str, poses: list[Pose], split: str) -> list[dict]:
     entries = []
     for number, (pattern, group) in enumerate(groupby(poses, key=lambda pose: pose.pattern)):
         times = [pose.time - poses[0].time for pose in group]
-        own = VALIDATE if split == IDENTIFY and number % VALIDATED == VALIDATED - 1 else split
+        part = VALIDATE if split == IDENTIFY and number % VALIDATED == VALIDATED - 1 else split
         window = [round(times[0] - MARGIN, 3), round(times[-1] + MARGIN, 3)]
-        entries.append({"name": pattern, "file": file, "window": window, "experiment": "static_path", "split": own})
+        entries.append({"name": pattern, "file": file, "window": window, "experiment": "static_path", "split": part})
     return entries
 
 

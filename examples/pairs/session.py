@@ -58,20 +58,20 @@ def turns(rng: np.random.Generator) -> np.ndarray:
     return LARGEST * sines / np.abs(sines).max(axis=0)
 
 
-def moved(model: mujoco.MjModel, told: np.ndarray, names: list[str]) -> list[Truth]:
+def moved(model: mujoco.MjModel, commands: np.ndarray, names: list[str]) -> list[Truth]:
     """What the arm does as its motors are `told` (n, T, 3)."""
-    pulls = np.zeros((*told.shape[:2], model.nu))
+    pulls = np.zeros((*commands.shape[:2], model.nu))
     for column, pair in enumerate(MOTORS.values()):
         for tendon, sign in zip(pair, (1, -1), strict=True):
-            pulls[:, :, tendon - 1] = sign * told[:, :, column]
+            pulls[:, :, tendon - 1] = sign * commands[:, :, column]
     controls = np.stack([wound(model, model.tendon_length0[: model.nu] - each) for each in pulls])
-    batch, every = batch_of(model, len(told)), round(1 / RATE / STEP)
+    batch, every = batch_of(model, len(commands)), round(1 / RATE / STEP)
     hold(batch, model, controls[:, 0])
     move(batch, np.repeat(controls[:, :1], 8000, axis=1), ("qpos",), 8000)  # until it hangs still
     paths = move(batch, controls, ("qpos",), every)["qpos"]
     sites, data = [model.site(f"{name}_center").id for name in SEGMENTS], mujoco.MjData(model)
     truths = []
-    for path, name, split, row in zip(paths, names, SPLITS, told, strict=True):
+    for path, name, split, row in zip(paths, names, SPLITS, commands, strict=True):
         positions, rotations = np.empty((len(path), len(sites), 3)), np.empty((len(path), len(sites), 3, 3))
         for frame, qpos in enumerate(path):
             data.qpos[:] = qpos
@@ -95,8 +95,8 @@ def make_session(session: Path = SESSION) -> int:
     rng = np.random.default_rng(SEED)
     names = [f"motion_{number}" for number in range(len(SPLITS))]
     truths = moved(plant(), np.stack([turns(rng) for _ in names]), names)
-    given = read_yaml(PROJECT / "demo/conf/record/config.yaml").instruments
-    instruments = InstrumentSettings(**given)
+    config = read_yaml(PROJECT / "demo/conf/record/config.yaml").instruments
+    instruments = InstrumentSettings(**config)
     start = 0.0
     with output_folder(session) as folder:
         for truth in truths:

@@ -40,10 +40,10 @@ def varied(bench: Bench, experiment: str, name: str) -> Bench:
     Raises:
         InputError: there is no such variant.
     """
-    known = VARIANTS.get(experiment, {})
-    if name not in known:
-        raise InputError(f"variant: found {name!r}, expected one of {experiment}: {', '.join(known) or 'none'}")
-    return known[name](bench)
+    variants = VARIANTS.get(experiment, {})
+    if name not in variants:
+        raise InputError(f"variant: found {name!r}, expected one of {experiment}: {', '.join(variants) or 'none'}")
+    return variants[name](bench)
 
 
 def _planned_with(bench: Bench, model: mujoco.MjModel) -> Bench:
@@ -84,17 +84,17 @@ def _delay(bench: Bench, seconds: float) -> Bench:
 
 def _single(bench: Bench) -> Bench:
     """One future, with all as it is believed, of the plan and of each place that the assistant tries."""
-    assert bench.known is not None
-    one = replace(bench.previewing, futures=1, assistant=min(bench.previewing.assistant, 1))
-    return replace(bench, known=replace(bench.known, posterior=SURE), previewing=one)
+    assert bench.world_model is not None
+    previewing = replace(bench.previewing, futures=1, assistant=min(bench.previewing.assistant, 1))
+    return replace(bench, world_model=replace(bench.world_model, posterior=SURE), previewing=previewing)
 
 
 def _cad_grasp(bench: Bench, drawing: Path = DRAWING) -> Bench:
     """Shaped and previewed with the drawing's arm. A grasp is planned by its geometry, which the identified one has."""
     bench, spec, model = _single(bench), read_spec(drawing), read_model(drawing)
-    assert bench.known is not None
+    assert bench.world_model is not None
     package = replace(bench.package, model=model, chain=read_chain(model).smooth, geometry=read_geometry(spec))
-    return replace(bench, package=package, known=replace(bench.known, arm=spec))
+    return replace(bench, package=package, world_model=replace(bench.world_model, arm=spec))
 
 
 def _slippery(bench: Bench) -> Bench:

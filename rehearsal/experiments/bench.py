@@ -49,7 +49,7 @@ class Bench:
     person: Person
     settings: Free
     judged: bool = True
-    known: RobotModel | None = None
+    world_model: RobotModel | None = None
     previewing: Previewing = field(default_factory=read_previewing)
 
     def place(self, rng: np.random.Generator) -> np.ndarray:
@@ -71,8 +71,8 @@ class Bench:
         """What plans are previewed with; None where nobody looks at a preview."""
         if not self.judged:
             return None
-        assert self.known is not None
-        return GraspPreviewer(self.known, self.package.grips(self.config), self.previewing)
+        assert self.world_model is not None
+        return GraspPreviewer(self.world_model, self.package.grips(self.config), self.previewing)
 
     def session(
         self, operator: Operator, thing: np.ndarray | None, seed: int, place: Place,
@@ -103,15 +103,15 @@ def bench_of(file: Path) -> Bench:
         raise InputError(f"{LAB}/params.yaml: record.plant: found another plant, expected stranger: the robot's arm")
     config = load_folder(TeleoperationConfig, PROJECT / "conf/teleop")
     package, previewing = read_package(file), read_previewing()
-    known = robot_model_of(previewing, package.files)
+    world_model = robot_model_of(previewing, package.files)
     return Bench(
-        package, config, arm, settings.stand_in(), settings.person(), settings.free(), known=known,
+        package, config, arm, settings.stand_in(), settings.person(), settings.free(), world_model=world_model,
         previewing=previewing,
     )  # fmt: skip
 
 
 @dataclass
-class Seen:
+class SessionFrame:
     """A frame of the run as it truly was: time, s, core's mode, the robot's state, the object's place (3,), m, what the
     robot was sent last: joints (7,), rad, and commands (K,), m, and the centres of the arm's units (U, 3), m."""
 
@@ -124,7 +124,7 @@ class Seen:
     units: np.ndarray
 
 
-def executed(frames: list[Seen]) -> Seen | None:
+def executed(frames: list[SessionFrame]) -> SessionFrame | None:
     """The first frame after the first execution, None where none came to an end."""
     pairs = zip(frames, frames[1:], strict=False)
     return next((after for frame, after in pairs if frame.mode == "execute" != after.mode), None)
@@ -141,11 +141,11 @@ class Staged:
     seed: int
     session: Session
     script: Script
-    judge: Callable[[Result, Ending, list[Seen], list[View]], str]
+    judge: Callable[[Result, Ending, list[SessionFrame], list[View]], str]
     thing: str = ""
-    watch: Callable[[Result, Ending, list[Seen]], None] | None = None
+    watch: Callable[[Result, Ending, list[SessionFrame]], None] | None = None
 
-    def judged(self, ending: object, frames: list[Seen], views: list[View], seconds: float) -> Result:
+    def judged(self, ending: object, frames: list[SessionFrame], views: list[View], seconds: float) -> Result:
         """What a run of `seconds` came to, whose script ended so."""
         result = Result(self.name, self.seed, False, seconds=seconds, object=self.thing)
         if isinstance(ending, Ending):
@@ -156,7 +156,7 @@ class Staged:
         return result
 
 
-def perform(staged: Staged) -> tuple[Result, list[Seen]]:
+def perform(staged: Staged) -> tuple[Result, list[SessionFrame]]:
     """One run, and its frames from where the robot began to move."""
     ending, frames, views = rehearse(staged.session, staged.script)
     result = staged.judged(ending, frames, views, staged.session.now)
@@ -165,7 +165,7 @@ def perform(staged: Staged) -> tuple[Result, list[Seen]]:
     return result, frames
 
 
-def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list[View]]:
+def rehearse(session: Session, script: Script) -> tuple[object, list[SessionFrame], list[View]]:
     """Run a script to its end: what it returned, and every frame in which the robot may have moved."""
     frames, views = [], []
     next(script)
@@ -175,7 +175,7 @@ def rehearse(session: Session, script: Script) -> tuple[object, list[Seen], list
         if session.moved:
             truth, sent = session.robot.truth(), session.executor
             thing, (units, _) = session.place(session.now), session.robot.links()
-            frames.append(Seen(session.now, view.intent.mode, truth, thing, sent.joints, sent.commands, units))
+            frames.append(SessionFrame(session.now, view.intent.mode, truth, thing, sent.joints, sent.commands, units))
         try:
             script.send(view)
         except StopIteration as end:

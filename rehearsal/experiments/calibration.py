@@ -29,8 +29,9 @@ class Bin:
 
 def stated(results: list[Result]) -> tuple[np.ndarray, np.ndarray]:
     """Probabilities and outcomes of the runs that have one. Shape (n,) each."""
-    told = [result for result in results if np.isfinite(result.probability)]
-    return np.array([result.probability for result in told]), np.array([float(result.success) for result in told])
+    probable = [result for result in results if np.isfinite(result.probability)]
+    outcomes = [float(result.success) for result in probable]
+    return np.array([result.probability for result in probable]), np.array(outcomes)
 
 
 def brier(probability: np.ndarray, outcome: np.ndarray) -> float:
@@ -46,13 +47,13 @@ def base_brier(outcome: np.ndarray) -> float:
 def reliability(probability: np.ndarray, outcome: np.ndarray, bins: int = BINS) -> list[Bin]:
     """Runs in `bins` equal ranges of the probability; ranges without runs are left out."""
     number = np.minimum((probability * bins).astype(int), bins - 1)
-    found = []
-    for one in range(bins):
-        mine = number == one
+    rows = []
+    for index in range(bins):
+        mine = number == index
         if mine.any():
             successes, runs = int(outcome[mine].sum()), int(mine.sum())
-            found.append(Bin(float(probability[mine].mean()), runs, successes / runs, wilson(successes, runs)))
-    return found
+            rows.append(Bin(float(probability[mine].mean()), runs, successes / runs, wilson(successes, runs)))
+    return rows
 
 
 def draw_reliability(results: list[Result], file: Path) -> None:
@@ -65,11 +66,11 @@ def draw_reliability(results: list[Result], file: Path) -> None:
     figure = Figure(figsize=(4.2, 4.0), layout="constrained")
     plot = figure.subplots()
     plot.plot([0, 1], [0, 1], color="0.7", lw=1)
-    for one in reliability(probability, outcome):
-        low, high = one.interval
-        plot.errorbar(one.stated, one.share, [[one.share - low], [high - one.share]], fmt="o", capsize=4,
+    for row in reliability(probability, outcome):
+        low, high = row.interval
+        plot.errorbar(row.stated, row.share, [[row.share - low], [high - row.share]], fmt="o", capsize=4,
                       color="tab:blue")  # fmt: skip
-        plot.annotate(f"{one.runs}", (one.stated, one.share), textcoords="offset points", xytext=(6, 6))
+        plot.annotate(f"{row.runs}", (row.stated, row.share), textcoords="offset points", xytext=(6, 6))
     title = (
         f"Brier score {brier(probability, outcome):.3f}, base rate {base_brier(outcome):.3f}" if len(outcome) else ""
     )

@@ -5,7 +5,7 @@ The path is drawn: along each axis two sines, from rest. The object that is foll
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, Seen, Staged
+from rehearsal.experiments.bench import Bench, SessionFrame, Staged
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import View
@@ -49,16 +49,18 @@ def on_path(bench: Bench, seed: int) -> tuple[Path, Staged]:
     path = Path(bench.place(rng), s.path, s.path_hz, s.path_seconds, rng)
     operator = bench.operator(rng)
     session = bench.session(operator, None, seed, path)
-    script = operator.follow(path.begin, lambda now: path.finished(now - delay), lambda now: session.seen(path(now)))
+    script = operator.follow(
+        path.begin, lambda now: path.finished(now - delay), lambda now: session.in_client_frame(path(now))
+    )
 
-    def judge(result: Result, ending: Ending, frames: list[Seen], views: list[View]) -> str:
+    def judge(result: Result, ending: Ending, frames: list[SessionFrame], views: list[View]) -> str:
         tell(result, path, delay, frames, views)
         return failure(ending, views, session.refusals, path, s.interruption)
 
     return path, Staged("follow", seed, session, script, judge)
 
 
-def tell(result: Result, path: Path, delay: float, frames: list[Seen], views: list[View]) -> None:
+def tell(result: Result, path: Path, delay: float, frames: list[SessionFrame], views: list[View]) -> None:
     """How far the tip was from where the object had been `delay` s before, while that was on its way."""
     during = [frame for frame in frames if path.begun + delay <= frame.now <= path.begun + delay + path.seconds]
     if not during:

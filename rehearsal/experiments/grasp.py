@@ -10,10 +10,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from rehearsal import settings
-from rehearsal.experiments.bench import FLOOR, FLOOR_BOX, START, Bench, Seen, Staged, executed
+from rehearsal.experiments.bench import FLOOR, FLOOR_BOX, START, Bench, SessionFrame, Staged, executed
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending, Operator
-from rehearsal.robot.scene import Object, Scene, Surface
+from rehearsal.robot.scene import Object, Scene, SupportSurface
 from rehearsal.robot.stand_in import StandInRobot
 from rehearsal.session import Session
 from trunkline.ar.hybrid.grasps import object_in_base
@@ -34,7 +34,7 @@ class Offered:
 
     thing: Object
     towards: np.ndarray
-    stands: Surface | None
+    stands: SupportSurface | None
 
     @property
     def name(self) -> str:
@@ -73,11 +73,17 @@ def offered(
     if not stands:
         return Offered(thing, towards, None)
     thing.position = (place - thing.grip).tolist()
-    return Offered(thing, towards, Surface([*thing.position[:2], thing.position[2] - thing.half_height], list(s.stand)))
+    top = [*thing.position[:2], thing.position[2] - thing.half_height]
+    return Offered(thing, towards, SupportSurface(top, list(s.stand)))
 
 
 def session_of(
-    bench: Bench, s: settings.Grasped, object: Offered, operator: Operator, seed: int, table: Surface | None = None
+    bench: Bench,
+    s: settings.Grasped,
+    object: Offered,
+    operator: Operator,
+    seed: int,
+    table: SupportSurface | None = None,
 ) -> Session:
     """The stand-in at its ready pose, the object on its string or its stand, the client's world as it is seen at
     first."""
@@ -88,20 +94,20 @@ def session_of(
     scene = Scene(FLOOR, thing, surfaces, None if object.stands else hook)
     robot = StandInRobot(bench.arm, scene, bench.stand_in, ready, seed)
     boxes = (FLOOR_BOX, *(box_of(name, board) for name, board in surfaces.items()))
-    seen = robot.seen()
-    a, b, c = (float(value) for value in seen.thing)
-    d, e, f, g = (float(value) for value in seen.thing_quaternion)
-    told = Thing(
+    readings = robot.readings()
+    a, b, c = (float(value) for value in readings.thing)
+    d, e, f, g = (float(value) for value in readings.thing_quaternion)
+    object_seen = Thing(
         NAME, thing.shape, thing.diameter, thing.height, thing.mass, (a, b, c), (d, e, f, g),
         "standing" if object.stands else "hanging", thing.basket,
     )  # fmt: skip
     return Session(
-        bench.package, bench.config, robot, (operator.left, operator.right), make_world(boxes, (told,)),
+        bench.package, bench.config, robot, (operator.left, operator.right), make_world(boxes, (object_seen,)),
         lambda now: robot.truth().grip, bench.foresight,
     )  # fmt: skip
 
 
-def box_of(name: str, board: Surface) -> Box:
+def box_of(name: str, board: SupportSurface) -> Box:
     """As the client is told of it."""
     half, top = np.array(board.size) / 2, np.array(board.top)
     (a, b, c), (d, e, f) = ((float(v) for v in corner) for corner in (top - half * [1, 1, 2], top + half * [1, 1, 0]))
@@ -121,7 +127,7 @@ def grasp(bench: Bench, seed: int) -> Staged:
     operator = bench.operator(rng)
     session = session_of(bench, s, object, operator, seed)
 
-    def judge(result: Result, ending: Ending, frames: list[Seen], _) -> str:
+    def judge(result: Result, ending: Ending, frames: list[SessionFrame], _) -> str:
         cause = failure(ending, frames, s)
         tell(result, ending, session, not cause)
         return cause
@@ -159,7 +165,7 @@ def tip_difference(tips: list[tuple[float, np.ndarray]], times: np.ndarray, show
     return float(np.median(np.linalg.norm(there - foreseen, axis=1)))
 
 
-def failure(ending: Ending, frames: list[Seen], s: settings.Grasped) -> str:
+def failure(ending: Ending, frames: list[SessionFrame], s: settings.Grasped) -> str:
     """Why the grasp failed, "" if it did not. The first of these that is so:
 
     1. The operator gave up, or the robot did not do what was confirmed: why, else why no plan was to be had.
@@ -185,7 +191,7 @@ def failure(ending: Ending, frames: list[Seen], s: settings.Grasped) -> str:
     return "" if moved < s.slip else f"slip: it moved by {1e3 * moved:.0f} mm in the arm as it was held"
 
 
-def in_arm(before: Seen, after: Seen) -> float:
+def in_arm(before: SessionFrame, after: SessionFrame) -> float:
     """m by which the object has moved against the units that held it before; infinite where none did."""
     holding = np.linalg.norm(before.truth.arm_thing, axis=1) > 0
     if not holding.any():

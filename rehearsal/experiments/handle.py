@@ -3,11 +3,11 @@
 import numpy as np
 
 from rehearsal import settings
-from rehearsal.experiments.bench import Bench, Seen, Staged, executed
+from rehearsal.experiments.bench import Bench, SessionFrame, Staged, executed
 from rehearsal.experiments.grasp import NAME, TABLE, beside, failure, offered, session_of, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
-from rehearsal.robot.scene import Scene, Surface
+from rehearsal.robot.scene import Scene, SupportSurface
 from rehearsal.session import View
 from trunkline.ar.teleop.object_shapes import below_grip
 from trunkline.frames import STANDARD_GRAVITY
@@ -16,11 +16,11 @@ STANDING: tuple[settings.Shape, ...] = ("basket",)
 STILL, BORNE = 0.03, 0.5  # m/s; of its weight, by the table
 
 
-def table_for(s: settings.Grasped, place: list[float], rng: np.random.Generator) -> Surface:
+def table_for(s: settings.Grasped, place: list[float], rng: np.random.Generator) -> SupportSurface:
     """To either side of the object."""
     azimuth = np.arctan2(place[1], place[0]) + rng.choice([-1, 1]) * np.radians(s.table_azimuth_deg)
     top = [s.table_radius * float(np.cos(azimuth)), s.table_radius * float(np.sin(azimuth)), s.table_top]
-    return Surface(top, list(s.table))
+    return SupportSurface(top, list(s.table))
 
 
 def handle(bench: Bench, seed: int) -> Staged:
@@ -32,9 +32,9 @@ def handle(bench: Bench, seed: int) -> Staged:
 
     def spot(view: View) -> np.ndarray:
         """Where the grip is when the lowest point of the thing, as it hangs in the arm, is above the table."""
-        return session.seen(np.array(table.top)) + [0.0, 0.0, below_grip(view.world.thing(NAME)) + s.drop]
+        return session.in_client_frame(np.array(table.top)) + [0.0, 0.0, below_grip(view.world.thing(NAME)) + s.drop]
 
-    def judge(result: Result, ending: Ending, frames: list[Seen], _) -> str:
+    def judge(result: Result, ending: Ending, frames: list[SessionFrame], _) -> str:
         cause = why_not(ending, frames, session.robot.scene, s)
         tell(result, ending, session, not cause)
         return cause
@@ -43,7 +43,7 @@ def handle(bench: Bench, seed: int) -> Staged:
     return Staged("handle", seed, session, script, judge, object.name)
 
 
-def why_not(ending: Ending, frames: list[Seen], scene: Scene, s: settings.Grasped) -> str:
+def why_not(ending: Ending, frames: list[SessionFrame], scene: Scene, s: settings.Grasped) -> str:
     """Why the object does not rest on the table, "" if it does. The first of these that is so:
 
     1. The operator gave up, the robot did not do what was confirmed, or no plan was run to its end: as of a grasp.

@@ -20,18 +20,18 @@ LEVELS = 16  # tensions of each of two taut tendons, from none to the largest
 
 def lookup(chain: Chain) -> Network:
     """Answers for targets that share gravity and tip, as `teleop.tendons` asks them: one row for all."""
-    chain, known = chain.smooth, dict[tuple[float, ...], Equilibrium]()
+    chain, solved = chain.smooth, dict[tuple[float, ...], Equilibrium]()
 
     def ask(targets: np.ndarray) -> dict[str, np.ndarray]:
         gravity, tip = targets[0, :3], targets[0, 3:6]
         key = tuple(np.round(gravity, 3).tolist())
-        if key not in known:
-            known[key] = equilibrium(chain, tensions_of(chain), STANDARD_GRAVITY * np.array(key))
-        rows = known[key]
+        if key not in solved:
+            solved[key] = equilibrium(chain, tensions_of(chain), STANDARD_GRAVITY * np.array(key))
+        rows = solved[key]
         off = np.where(rows.converged, np.linalg.norm(rows.position - tip, axis=1), np.inf)
         best = int(np.argmin(off))
-        found = {"commands": rows.commands, "lengths": rows.lengths, "tip": rows.position}
-        return {name: np.repeat(values[best : best + 1], len(targets), axis=0) for name, values in found.items()}
+        answer = {"commands": rows.commands, "lengths": rows.lengths, "tip": rows.position}
+        return {name: np.repeat(values[best : best + 1], len(targets), axis=0) for name, values in answer.items()}
 
     return Network(ask, len(DIRECTION))
 

@@ -6,7 +6,7 @@ held against where the robot's tip is then, and some seconds later.
 
 import numpy as np
 
-from rehearsal.experiments.bench import Bench, Seen, Staged, executed
+from rehearsal.experiments.bench import Bench, SessionFrame, Staged, executed
 from rehearsal.experiments.result import LATER, Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import Session
@@ -19,14 +19,14 @@ def reach(bench: Bench, seed: int) -> Staged:
     session = bench.session(operator, thing, seed, lambda now: thing, bench.foresight)
     least, radius = bench.arm.chain.units - bench.settings.tip_units, bench.settings.diameter / 2
 
-    def judge(result: Result, ending: Ending, frames: list[Seen], _) -> str:
+    def judge(result: Result, ending: Ending, frames: list[SessionFrame], _) -> str:
         result.plans = ending.plans
         result.aimed_mm, result.previewed_mm = 1e3 * ending.aimed, 1e3 * ending.previewed
         if frames:
             result.nearest_mm = 1e3 * min(float(np.linalg.norm(frame.truth.tip - thing)) for frame in frames)
         return failure(ending, frames, least, radius)
 
-    def watch(result: Result, ending: Ending, frames: list[Seen]) -> None:
+    def watch(result: Result, ending: Ending, frames: list[SessionFrame]) -> None:
         foreseen = session.foresee() if ending.done else None
         if foreseen is not None:
             tell_end(result, foreseen.preview.stated, tips_after(session, frames))
@@ -34,7 +34,7 @@ def reach(bench: Bench, seed: int) -> Staged:
     return Staged("reach", seed, session, operator.reach(), judge, watch=watch)
 
 
-def failure(ending: Ending, frames: list[Seen], least: int, radius: float) -> str:
+def failure(ending: Ending, frames: list[SessionFrame], least: int, radius: float) -> str:
     """Why the tip did not reach the object, "" if it did. The first of these that is so:
 
     1. The robot never moved: why the operator gave up, else why no plan was to be had.
@@ -72,7 +72,7 @@ def failure(ending: Ending, frames: list[Seen], least: int, radius: float) -> st
     return "missed: the preview's tip was on the object, the robot's was not"
 
 
-def _touches(frame: Seen) -> bool:
+def _touches(frame: SessionFrame) -> bool:
     return bool(frame.truth.arm_thing.any() or frame.truth.arm_world.any())
 
 
@@ -83,7 +83,7 @@ def tell_end(result: Result, stated: Stated, tips: dict[str, np.ndarray]) -> Non
         setattr(result, f"{name}_mm", 1e3 * float(np.linalg.norm(tip - stated.tips[-1])))
 
 
-def tips_after(session: Session, frames: list[Seen]) -> dict[str, np.ndarray]:
+def tips_after(session: Session, frames: list[SessionFrame]) -> dict[str, np.ndarray]:
     """Where the tip appears, (3,), m, at the end of the first execution, and by LATER after it. What frames do not
     reach, the robot holds for."""
     done, tips, now = executed(frames), {}, session.now
@@ -95,5 +95,5 @@ def tips_after(session: Session, frames: list[Seen]) -> dict[str, np.ndarray]:
             session.robot.advance(max(done.now + seconds - now, 0.0))
             now = max(now, done.now + seconds)
         truth = session.robot.truth() if frame is None else frame.truth
-        tips[name] = session.seen(truth.tip)
+        tips[name] = session.in_client_frame(truth.tip)
     return tips

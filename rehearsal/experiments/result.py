@@ -105,56 +105,56 @@ def rewrite_results(path: Path, results: list[Result]) -> None:
     """The table anew, whole or not at all, its rows in the order of experiments as they first come, variant, seed."""
     order = list(dict.fromkeys(result.experiment for result in results))
     with written_whole(path) as part:
-        for result in sorted(results, key=lambda one: (order.index(one.experiment), one.variant, one.seed)):
+        for result in sorted(results, key=lambda row: (order.index(row.experiment), row.variant, row.seed)):
             append_result(part, result)
 
 
 def grouped(results: list[Result]) -> dict[tuple[str, str], list[Result]]:
     """By experiment and variant, as they first come; those without a variant before all others."""
-    found: dict[tuple[str, str], list[Result]] = {}
-    for result in sorted(results, key=lambda one: bool(one.variant)):
-        found.setdefault((result.experiment, result.variant), []).append(result)
-    return found
+    groups: dict[tuple[str, str], list[Result]] = {}
+    for result in sorted(results, key=lambda row: bool(row.variant)):
+        groups.setdefault((result.experiment, result.variant), []).append(result)
+    return groups
 
 
 def rate(results: list[Result]) -> tuple[float, float, float]:
     """Share of successes, and its Wilson interval."""
-    found, count = sum(result.success for result in results), len(results)
-    return found / count, *wilson(found, count)
+    successes, count = sum(result.success for result in results), len(results)
+    return successes / count, *wilson(successes, count)
 
 
 def causes(results: list[Result]) -> dict[str, int]:
     """How often each kind of failure was, the most frequent first."""
-    found: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for result in results:
         if not result.success:
             kind = result.cause.partition(":")[0]
-            found[kind] = found.get(kind, 0) + 1
-    return dict(sorted(found.items(), key=lambda item: (-item[1], item[0])))
+            counts[kind] = counts.get(kind, 0) + 1
+    return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
 
 def summary(results: list[Result]) -> dict:
     """metrics.json: by experiment, and in it by variant, runs, successes, rate, its interval from `low` to `high`,
     causes, and of every distance that was measured median and 95th percentile over runs; of experiments with several
     kinds of objects the same of each kind, in `objects`."""
-    found: dict = {}
+    table: dict = {}
     for (experiment, variant), rows in grouped(results).items():
-        told, kinds = _told(rows), sorted({row.object for row in rows})
+        entry, kinds = _summary_of(rows), sorted({row.object for row in rows})
         if len(kinds) > 1:
-            told["objects"] = {kind: _told([row for row in rows if row.object == kind]) for kind in kinds}
+            entry["objects"] = {kind: _summary_of([row for row in rows if row.object == kind]) for kind in kinds}
         if variant:
-            found.setdefault(experiment, {}).setdefault("variants", {})[variant] = told
+            table.setdefault(experiment, {}).setdefault("variants", {})[variant] = entry
         else:
-            found[experiment] = told
-    return found
+            table[experiment] = entry
+    return table
 
 
-def _told(rows: list[Result]) -> dict:
+def _summary_of(rows: list[Result]) -> dict:
     share, low, high = rate(rows)
     successes = sum(row.success for row in rows)
-    told = {"runs": len(rows), "successes": successes, "rate": share, "low": low, "high": high, "causes": causes(rows)}
+    entry = {"runs": len(rows), "successes": successes, "rate": share, "low": low, "high": high, "causes": causes(rows)}
     for name in COLUMNS:
         values = np.array([getattr(row, name) for row in rows]) if name.endswith("_mm") else np.zeros(0)
-        if len(known := values[np.isfinite(values)]):
-            told[name] = dict(zip(("median", "p95"), np.quantile(known, (0.5, 0.95)), strict=True))
-    return told
+        if len(finite := values[np.isfinite(values)]):
+            entry[name] = dict(zip(("median", "p95"), np.quantile(finite, (0.5, 0.95)), strict=True))
+    return entry

@@ -23,8 +23,8 @@ def scores(results: list[Result]) -> dict:
     of the tip's distance over the radius. A tip that is nowhere is outside, and infinitely far.
     """
     plain = [result for result in results if not result.variant]
-    told = [row for row in plain if row.experiment in PROBABLE and np.isfinite(row.probability)]
-    return {**probabilities(told), **_radii([row for row in plain if row.experiment == REACH])}
+    probable = [row for row in plain if row.experiment in PROBABLE and np.isfinite(row.probability)]
+    return {**probabilities(probable), **_radii([row for row in plain if row.experiment == REACH])}
 
 
 def probabilities(rows: list[Result]) -> dict:
@@ -34,9 +34,9 @@ def probabilities(rows: list[Result]) -> dict:
     agreed, (probability, outcome) = int(sum(row.agreed == 1 for row in rows)), stated(rows)
     low, high = wilson(agreed, len(rows))
     paths = [row.path_pct for row in rows if np.isfinite(row.path_pct)]
-    found = {"previews": len(rows), "agreed": agreed, "agreement": agreed / len(rows), "low": low, "high": high}
-    found |= {"brier": brier(probability, outcome), "brier_base": base_brier(outcome)}
-    return found | ({"path_pct_median": float(np.median(paths))} if paths else {})
+    table = {"previews": len(rows), "agreed": agreed, "agreement": agreed / len(rows), "low": low, "high": high}
+    table |= {"brier": brier(probability, outcome), "brier_base": base_brier(outcome)}
+    return table | ({"path_pct_median": float(np.median(paths))} if paths else {})
 
 
 def _radii(rows: list[Result]) -> dict:

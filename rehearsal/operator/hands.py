@@ -54,7 +54,7 @@ class RayHand:
         self.shift = np.array(alignment.position)
         self.rates = rng.uniform(person.tremor_hz[0], person.tremor_hz[1], AXES) * 2 * np.pi
         self.phases = rng.uniform(0, 2 * np.pi, AXES)
-        self.held: set[str] = set()
+        self.pressed: set[str] = set()
         self.start = self.goal = self.turn.apply(origin + [0.0, 0.0, -0.6]) + self.shift
         self.begun, self.lasting, self.jerked = -np.inf, person.movement, -np.inf
         self.error, self.last_error = np.zeros(3), np.zeros(3)  # of this aim, and of that before
@@ -98,12 +98,12 @@ class RayHand:
         return self.last_error + share * (self.error - self.last_error)
 
     def press(self, name: str, now: float) -> None:
-        self.held.add(name)
+        self.pressed.add(name)
         if name == "trigger":
             self.jerked = now
 
     def let_go(self, name: str) -> None:
-        self.held.discard(name)
+        self.pressed.discard(name)
 
     def controller(self, now: float, end: tuple[float, float, float] | None) -> Controller:
         """What is tracked; `end` is the end of the ray as it is seen, base frame, m."""
@@ -123,7 +123,7 @@ class RayHand:
             stick = np.sign(missing) * (self.dead_zone + (1 - self.dead_zone) * min(abs(missing) / STICK_RAMP, 1.0))
         w, x, y, z = (float(value) for value in wxyz_from_rotation(ray))
         ox, oy, oz = (float(value) for value in self.origin)
-        buttons = {name: True for name in sorted(self.held)}
+        buttons = {name: True for name in sorted(self.pressed)}
         return Controller((ox, oy, oz), (w, x, y, z), stick=(0.0, float(stick)), **buttons)
 
     def _reference(self, place: np.ndarray) -> np.ndarray:

@@ -252,7 +252,7 @@ class Operator:
         view = yield from self._react()
         begun, followed, pressed = None, view.now, -np.inf
         while begun is None or not finished(view.now):
-            at = self._foretold(place, view.now)
+            at = self._anticipated(place, view.now)
             self.right.follow(at, view.now)
             self.left.follow(at - self._apart(at), view.now)
             view = yield
@@ -270,11 +270,11 @@ class Operator:
                 pressed = view.now
         return Ending(True)
 
-    def _foretold(self, place: Callable[[float], np.ndarray], now: float) -> np.ndarray:
+    def _anticipated(self, place: Callable[[float], np.ndarray], now: float) -> np.ndarray:
         """Where the object is taken to be, (3,), m: its place and velocity are seen a reaction time late."""
         late = self.person.reaction
-        seen, before = place(now - late), place(now - late - GLANCE)
-        return seen + self.person.forecast * late * (seen - before) / GLANCE
+        latest, before = place(now - late), place(now - late - GLANCE)
+        return latest + self.person.forecast * late * (latest - before) / GLANCE
 
     def _place_tip(self, view: View, beside: np.ndarray):
         """The tip target onto the object, until it looks so."""

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from rehearsal.robot.shapes import BOX, CYLINDER, distance
-from rehearsal.robot.thing import Motion, Thing
+from rehearsal.robot.thing import Motion, RigidObject
 from trunkline.ar.hybrid.basket import Basket, Part, parts_of, unit_inertia
 from trunkline.errors import InputError
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
@@ -28,7 +28,7 @@ CORNERS = np.array(list(product((-1.0, 1.0), repeat=3)))
 
 
 @dataclass
-class Surface:
+class SupportSurface:
     """A level board. top: the middle of its upper side, m. size: along x, y and z, m."""
 
     top: Place
@@ -79,7 +79,7 @@ class Scene:
 
     floor: Metres | None
     object: Object
-    surfaces: dict[str, Surface] = field(default_factory=dict)
+    surfaces: dict[str, SupportSurface] = field(default_factory=dict)
     hook: Place | None = None
 
     def names(self) -> list[str]:
@@ -110,7 +110,7 @@ class String:
     lip: Annotated[float, Field(gt=0, le=1)] = 0.01
 
 
-def make_thing(object: Object, hook: list[float] | None, string: String) -> tuple[Thing, Motion]:
+def make_thing(object: Object, hook: list[float] | None, string: String) -> tuple[RigidObject, Motion]:
     """The object as a rigid body, and where it is at first.
 
     Raises:
@@ -127,7 +127,7 @@ def make_thing(object: Object, hook: list[float] | None, string: String) -> tupl
         end = np.array(hook, dtype=float)
         length = float(np.linalg.norm(end - tied))
     kind, half, edge, place, turns = (np.array(column) for column in zip(*solids, strict=True))
-    thing = Thing(
+    thing = RigidObject(
         kind=kind, half=half, edge=edge, shift=place, turn=turns, mass=object.mass,
         inertia=object.mass * _inertia(object), points=points, radius=radius, eye=eye, hook=end, string=length,
         tautness=string.tautness, loss=string.loss, lip=string.lip,

@@ -32,7 +32,7 @@ class Sensors:
 
 
 @dataclass
-class Seen:
+class Readings:
     """What a client knows of the robot. Poses are in the frame that the client takes for the Panda's base.
 
     time, pose_time: s, of the instants that encoders and poses are of. joints (7,): rad. wound (K,): m of pull.
@@ -58,12 +58,12 @@ class Instruments:
         self.turn = Rotation.from_rotvec(np.radians(sensors.alignment_deg) * axis / np.linalg.norm(axis))
         self.shift = sensors.alignment_mm / 1000 * side / np.linalg.norm(side)
 
-    def read(self, encoders: np.ndarray, poses: np.ndarray, time: float, pose_time: float) -> Seen:
+    def read(self, encoders: np.ndarray, poses: np.ndarray, time: float, pose_time: float) -> Readings:
         """What is told of two rows (`kernel.COLUMNS`,) of the past. Each reading draws noise of its own."""
         s, rng = self.sensors, self.rng
         tip, tip_turn = self._pose(poses[TIP], Rotation.from_matrix(poses[TIP_AXES].reshape(3, 3)))
         thing, thing_turn = self._pose(poses[THING][:3], rotation_from_wxyz(poses[THING][3:]))
-        return Seen(
+        return Readings(
             time, pose_time, encoders[JOINTS] + s.joint_noise * rng.normal(size=7),
             encoders[WOUND] + s.wound_noise_mm / 1000 * rng.normal(size=3), tip, tip_turn, thing, thing_turn,
         )  # fmt: skip

@@ -12,11 +12,11 @@ from pydantic import Field
 from scipy.spatial.transform import Rotation
 
 from demo.plants.stranger import CALM, LONGEST_REST, REST_STEP, STILL, Stranger
-from demo.plants.stranger_kernel import State, come_to_rest, work_for
+from demo.plants.stranger_kernel import LinkState, come_to_rest, work_for
 from rehearsal.robot.flange import Mount, Servos, carry
 from rehearsal.robot.kernel import COLUMNS, THING, TIP, TIP_AXES, look, run
 from rehearsal.robot.scene import Scene, String, make_thing
-from rehearsal.robot.sensors import Instruments, Seen, Sensors
+from rehearsal.robot.sensors import Instruments, Readings, Sensors
 from rehearsal.robot.shapes import nearest
 from rehearsal.robot.thing import rotation
 from rehearsal.robot.touch_settings import Touch, make_touch
@@ -112,7 +112,7 @@ class StandInRobot:
         self.sent = [(0, self.joints[0].copy())]  # tick of arrival, command
         self.pulled = [(0, pulled)]
         self.rows = [self._row()]
-        self.kept = 1 + round(max(settings.sensors.pose_delay, settings.sensors.joint_delay) / TICK)
+        self.history = 1 + round(max(settings.sensors.pose_delay, settings.sensors.joint_delay) / TICK)
 
     @property
     def time(self) -> float:
@@ -153,9 +153,9 @@ class StandInRobot:
         if not (np.isfinite(rows[-1]).all() and np.linalg.norm(self.motion.speed) < FASTEST):
             raise FloatingPointError("the stand-in's engine diverged: its steps are too long")
         self.ticks += count
-        self.rows = [*self.rows, *rows][-self.kept :]
+        self.rows = [*self.rows, *rows][-self.history :]
 
-    def seen(self) -> Seen:
+    def readings(self) -> Readings:
         """What the client is told now. Every call draws noise."""
         s = self.settings.sensors
         joints, poses = (min(round(delay / TICK), len(self.rows) - 1) for delay in (s.joint_delay, s.pose_delay))
@@ -219,24 +219,24 @@ class StandInRobot:
                 inside = tuple((centre - place) @ turn)
                 _, away, _ = nearest(kind, half, edge, inside, tuple(axis @ turn), radius, (0.0, 0.0, 0.0))
                 if away < rim:
-                    found = f"{unit_name(unit)} {1000 * (rim - away):.0f} mm inside {name}"
-                    raise InputError(f"ready: found {found}, expected an arm that touches nothing at the start")
+                    fault = f"{unit_name(unit)} {1000 * (rim - away):.0f} mm inside {name}"
+                    raise InputError(f"ready: found {fault}, expected an arm that touches nothing at the start")
 
     @staticmethod
     def _checked(joints: np.ndarray, count: int, name: str) -> np.ndarray:
-        found = np.array(joints, dtype=float)
-        if found.shape != (count,):
-            raise InputError(f"{name}: found shape {found.shape}, expected ({count},)")
-        for j, (angle, low, high) in enumerate(zip(found, Q_MIN, Q_MAX, strict=True), start=1):
+        angles = np.array(joints, dtype=float)
+        if angles.shape != (count,):
+            raise InputError(f"{name}: found shape {angles.shape}, expected ({count},)")
+        for j, (angle, low, high) in enumerate(zip(angles, Q_MIN, Q_MAX, strict=True), start=1):
             if not low <= angle <= high:
                 raise InputError(f"{name}: joint_{j}: found {angle} rad, expected {low} to {high} rad")
-        return found
+        return angles
 
 
-def straight_state(arm: Stranger, wound: np.ndarray) -> State:
+def straight_state(arm: Stranger, wound: np.ndarray) -> LinkState:
     """Straight, nothing bears, the motors at `wound` (K,) m."""
     joints, units = len(arm.links.lengths), len(arm.links.hole_link)
-    return State(
+    return LinkState(
         q=np.zeros((joints, 2)), v=np.zeros((joints, 2)), branches=np.zeros((len(arm.links.branch_time), joints, 2)),
         sliders=np.zeros((len(arm.links.slider_yield), joints, 2)), slips=np.zeros((arm.tendons, units + 1)),
         motors=wound.copy(), winches=wound.copy(),

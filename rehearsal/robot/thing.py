@@ -8,7 +8,7 @@ from rehearsal.robot.compiled import kernel
 from trunkline.model.statics.vectors import cross, dot, plus, turned
 
 
-class Thing(NamedTuple):
+class RigidObject(NamedTuple):
     """A body of S shapes, its frame in its centre of mass, its axes principal.
 
     kind (S,), half (S, 3), edge (S,): as of `shapes.Shape`. shift (S, 3): m, of their centres. turn (S, 3, 3): the

@@ -8,8 +8,8 @@ from pydantic import Field
 
 from demo.plants.stranger_kernel import Links
 from rehearsal.robot.scene import Friction, Scene
-from rehearsal.robot.thing import Thing
-from rehearsal.robot.touching import Contacts, Discs, World
+from rehearsal.robot.thing import RigidObject
+from rehearsal.robot.touching import Contacts, ContactWorld, Discs
 from trunkline.model.arm.geometry import ChainGeometry
 
 LOWEST = 0.05  # of a coefficient's nominal value, below which scatter does not bring it
@@ -47,8 +47,8 @@ class Touch:
 
 
 def make_touch(
-    chain: ChainGeometry, links: Links, scene: Scene, thing: Thing, touch: Touch, rng: np.random.Generator
-) -> tuple[Discs, World, Contacts]:
+    chain: ChainGeometry, links: Links, scene: Scene, thing: RigidObject, touch: Touch, rng: np.random.Generator
+) -> tuple[Discs, ContactWorld, Contacts]:
     """Discs, world and empty contacts; `rng` draws the friction, always as many numbers of it for the same scene.
 
     A unit is a double cone whose rim is as high as what its neighbours leave of it when they close on each other,
@@ -72,7 +72,7 @@ def make_touch(
         damping=2 * touch.damping_ratio * np.sqrt(stiffness * masses), loss=touch.loss, on_thing=on_thing,
         on_world=on_world,
     )  # fmt: skip
-    world = World(
+    world = ContactWorld(
         kind=kind, half=half, edge=edge, place=place, hardness=touch.world_hardness, stiffness=touch.world_stiffness,
         damping=2 * touch.world_damping_ratio * float(np.sqrt(touch.world_stiffness * thing.mass)),
         loss=touch.world_loss, friction=touch.object_world * np.maximum(1 + drawn[1 + shapes :], LOWEST),

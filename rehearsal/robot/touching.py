@@ -35,7 +35,7 @@ class Discs(NamedTuple):
     on_world: np.ndarray
 
 
-class World(NamedTuple):
+class ContactWorld(NamedTuple):
     """W fixed shapes. kind (W,), half (W, 3) m, edge (W,) m, place (W, 3) m: `shapes.Shape`s that are not turned.
 
     Contacts with the thing: hardness N/m^1.5, stiffness N/m, damping N s/m, loss s/m, friction (W,).

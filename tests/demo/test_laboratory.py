@@ -83,8 +83,8 @@ def test_a_seed_is_one_session_and_another_seed_is_another():
 
 def test_the_test_split_changes_no_other_trial():
     more = replace(SHORT.test, tilts=[20.0, 45.0], release_directions=[60.0, 200.0])
-    for one, other in zip(session(1)[:5], session(1, replace(SHORT, test=more)), strict=False):
-        for key, value in vars(one).items():
+    for trial, other in zip(session(1)[:5], session(1, replace(SHORT, test=more)), strict=False):
+        for key, value in vars(trial).items():
             np.testing.assert_array_equal(value, getattr(other, key), err_msg=key)
 
 
@@ -145,15 +145,15 @@ def test_masses_and_stiffnesses_are_off_by_what_the_settings_say():
 
 
 def test_every_imperfection_of_the_lab_is_there():
-    plant, motors, seen = PLANT, PLANT.motors, CONFIG.instruments
+    plant, motors, lab = PLANT, PLANT.motors, CONFIG.instruments
     assert (plant.stiffness_scatter, abs(plant.mass_factor - 1)) == (0.08, pytest.approx(0.05))
     assert min(plant.hardening, plant.dry_friction, motors.rate_limit, motors.command_delay) > 0
-    assert (seen.position_noise_mm, seen.orientation_noise_deg) == (0.3, 0.3)
-    assert seen.occlusion_ms == (50.0, 300.0)
-    assert min(seen.occlusions_per_s, seen.dropped_frames, seen.outliers, seen.stamp_jitter_ms) > 0
-    assert min(seen.outlier_mm, seen.outlier_deg, seen.delivery_ms, seen.tendon_noise_mm) > 0
-    assert abs(seen.clock_offset_s) > 0
-    assert abs(seen.up[2]) < 1, "the cameras' frame is not z-up"
+    assert (lab.position_noise_mm, lab.orientation_noise_deg) == (0.3, 0.3)
+    assert lab.occlusion_ms == (50.0, 300.0)
+    assert min(lab.occlusions_per_s, lab.dropped_frames, lab.outliers, lab.stamp_jitter_ms) > 0
+    assert min(lab.outlier_mm, lab.outlier_deg, lab.delivery_ms, lab.tendon_noise_mm) > 0
+    assert abs(lab.clock_offset_s) > 0
+    assert abs(lab.up[2]) < 1, "the cameras' frame is not z-up"
 
 
 def test_the_experiments_are_those_of_the_table():
@@ -170,15 +170,15 @@ def test_the_experiments_are_those_of_the_table():
 def test_a_quarter_of_each_experiment_is_for_validation():
     tests = CONFIG.experiments
     tilts, releases, curls = tilt_trials(tests), release_trials(tests), curl_trials(tests)
-    held = [[trial for trial in trials if trial.split == "validate"] for trials in (tilts, releases, curls)]
+    validation = [[trial for trial in trials if trial.split == "validate"] for trials in (tilts, releases, curls)]
     assert [len(trials) for trials in (tilts, releases, curls)] == [16, 12, 15]
-    assert [len(trials) for trials in held] == [4, 3, 4]
-    assert {trial.level for trial in held[0]} == set(tests.tilts)
-    levels = {trial.level for trial in held[2]}
+    assert [len(trials) for trials in validation] == [4, 3, 4]
+    assert {trial.level for trial in validation[0]} == set(tests.tilts)
+    levels = {trial.level for trial in validation[2]}
     assert len(levels) == 4
     assert 100.0 in levels
     assert {trial.level for trial in curls if trial.split == "identify"} == set(tests.curl_levels)
-    groups = {trial.name.rsplit("_", 1)[0] for trial in held[2]}
+    groups = {trial.name.rsplit("_", 1)[0] for trial in validation[2]}
     assert groups == {"curl_1", "curl_2_3", "curl_2"}
 
 
@@ -191,8 +191,8 @@ def test_the_arm_is_fully_bent_when_it_is_let_go():
     assert CONFIG.experiments.release_factors[0] == min(CONFIG.experiments.release_factors)
     tracked = [number - 1 for number in CONFIG.arm.tracked]
     (truth,) = Laboratory(arm(CONFIG.arm.units, 7), tests.mount_position, tracked).releases(tests)
-    held = np.vstack([truth.base_quaternion, truth.quaternions[round(tests.hold_duration * SAMPLE_RATE) - 1]])
-    turns = Rotation.from_quat(held, scalar_first=True)
+    bent = np.vstack([truth.base_quaternion, truth.quaternions[round(tests.hold_duration * SAMPLE_RATE) - 1]])
+    turns = Rotation.from_quat(bent, scalar_first=True)
     bends = (turns[:-1].inv() * turns[1:]).as_rotvec()  # all about +-y: they add up
     assert np.degrees(np.abs(bends.sum(axis=0)[1])) >= 270
 
@@ -220,15 +220,15 @@ def test_more_experiments_change_no_trial_of_the_table():
         pull_turn=0.02, pull_back=0.05, pull_settle=0.1, motions=[Motion([1.0, 2.5], 10.0, -2.0)], motion_rest=0.05,
         motion_fade=0.1, motion_duration=0.3,
     )  # fmt: skip
-    found = session(1, more)
-    for one, other in zip(session(1), found, strict=False):
-        for key, value in vars(one).items():
+    extended = session(1, more)
+    for trial, other in zip(session(1), extended, strict=False):
+        for key, value in vars(trial).items():
             np.testing.assert_array_equal(value, getattr(other, key), err_msg=key)
-    loaded_tilt, loaded_release, pull, motion = found[8:]
+    loaded_tilt, loaded_release, pull, motion = extended[8:]
     names = ["tilt_090_a_50g", "release_000_50g", "pull_20_x_m5_back", "motion_25_10_m2"]
-    assert [truth.name for truth in found[8:]] == names
+    assert [truth.name for truth in extended[8:]] == names
     assert loaded_tilt.load == loaded_release.load == 0.05
-    assert np.abs(loaded_release.positions[-1] - found[2].positions[-1]).max() > 1e-4
+    assert np.abs(loaded_release.positions[-1] - extended[2].positions[-1]).max() > 1e-4
     np.testing.assert_allclose(pull.commands, np.tile([0.02, -0.3, -0.005], (len(pull.commands), 1)))
     assert len(pull.time) == round(SHORT.rest_duration * SAMPLE_RATE)
     start = motion.commands[motion.command_time < motion.begin]

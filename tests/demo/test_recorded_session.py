@@ -23,7 +23,7 @@ def raw():
 
 
 @pytest.fixture(scope="module")
-def found(raw):
+def recorded(raw):
     truth, session = json.loads((raw / "demo.truth.json").read_text()), read_session(raw / "demo")
     chosen = [trial for trial in session.trials if trial.name in TRIALS]
     taken = list(take_in(raw / "demo", session.model_copy(update={"trials": chosen}), LIMITS))
@@ -32,18 +32,18 @@ def found(raw):
     return truth, takes, findings, align_clocks(takes, findings, 0.1)
 
 
-def test_the_clock_of_the_motors_is_right_within_its_uncertainty(found):
-    truth, takes, findings, clock = found
+def test_the_clock_of_the_motors_is_right_within_its_uncertainty(recorded):
+    truth, takes, findings, clock = recorded
     assert clock.by == "log times"
     assert abs(clock.offset + truth["clock_offset_s"]) < clock.uncertainty < 5e-3
     assert all(abs(take.clock_offset + truth["clock_offset_s"]) < clock.uncertainty for take in takes)
-    motion = np.median([said.by_motion.offset for said in findings])
+    motion = np.median([finding.by_motion.offset for finding in findings])
     assert abs(motion + truth["clock_offset_s"]) > 2 * abs(clock.offset + truth["clock_offset_s"])
-    assert not any(said.warnings for said in findings)
+    assert not any(finding.warnings for finding in findings)
 
 
-def test_curls_and_motions_begin_when_their_commands_do(found):
-    truth, takes, *_ = found
+def test_curls_and_motions_begin_when_their_commands_do(recorded):
+    truth, takes, *_ = recorded
     for take in takes:
         trial, _ = filter_take(take, FILTER)
         assert abs(trial.start - truth["starts_s"][take.name]) < 3 * trial.start_sigma < 1 / 120

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from demo.plants.bench import LOOSE, Seen
+from demo.plants.bench import LOOSE, PlantMotion
 from demo.plants.choice import plant_of
 from demo.plants.slowly import LOOK, SWINGING, Slow, rested, slow_tips
 from demo.rig import ROOT, Config
@@ -32,7 +32,8 @@ class Watched:
         samples = bench.commands.shape[1] // bench.stride - bench.skipped
         ways = np.linspace(0, 1, samples)[:, None] * self.way
         positions = np.broadcast_to(ways[:, None], (count, samples, 1, 3))
-        return Seen(positions, np.broadcast_to(np.eye(3), (*positions.shape[:-1], 3, 3)), np.zeros((count, samples, 3)))
+        turns = np.broadcast_to(np.eye(3), (*positions.shape[:-1], 3, 3))
+        return PlantMotion(positions, turns, np.zeros((count, samples, 3)))
 
 
 def slowly(plant, lab, pulls, back):

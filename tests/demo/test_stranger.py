@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from demo.plants.bench import COMMAND_RATE, LOOSE, Bench
 from demo.plants.stranger import Stranger, StrangerSettings
 from demo.plants.stranger_kernel import (
-    State,
+    LinkState,
     advance,
     bend,
     path_lengths,
@@ -55,7 +55,7 @@ def bare(settings: StrangerSettings, units: int = UNITS, **changes) -> Stranger:
     )  # fmt: skip
 
 
-def state_of(plant: Stranger, wound: float = -LOOSE, bent: float = 0.0, speed: float = 0.0) -> State:
+def state_of(plant: Stranger, wound: float = -LOOSE, bent: float = 0.0, speed: float = 0.0) -> LinkState:
     rng = np.random.default_rng(2)
     state = plant._state(np.full(3, wound))
     state.q[:], state.v[:] = bent * rng.normal(size=state.q.shape), speed * rng.normal(size=state.q.shape)
@@ -111,11 +111,11 @@ def test_accelerations_are_those_of_mujoco_s_twin(settings, load, wound):
     mujoco.mj_forward(model, data)
     before = state.v.copy()
     step(plant, state, work_for(plant.links, 3), h, load=load)
-    found = (state.v - before).ravel() / h
-    np.testing.assert_allclose(found, data.qacc, rtol=1e-4, atol=1e-4 * np.abs(data.qacc).max())
+    accelerations = (state.v - before).ravel() / h
+    np.testing.assert_allclose(accelerations, data.qacc, rtol=1e-4, atol=1e-4 * np.abs(data.qacc).max())
 
 
-def energy(plant: Stranger, state: State) -> float:
+def energy(plant: Stranger, state: LinkState) -> float:
     """J, of springs, of gravity and of motion."""
     links, work = plant.links, work_for(plant.links, 3)
     place(links, state, work)
@@ -197,12 +197,12 @@ def test_a_relaxing_joint_swings_as_the_linear_equations_say(settings):
     start[0] = 1e-3
     state, work, h = plant._state(np.full(3, -LOOSE)), work_for(plant.links, 3), 5e-5
     state.q[0, 0] = start[0]
-    found = []
+    angles = []
     for _ in range(40000):
         step(plant, state, work, h, np.array([0, 0, -9.81]))
-        found.append(state.q[0, 0])
+        angles.append(state.q[0, 0])
     expected = [(expm(rates * h * count) @ start)[0] for count in range(2000, 40001, 2000)]
-    np.testing.assert_allclose(found[1999::2000], expected, atol=2e-3 * start[0])
+    np.testing.assert_allclose(angles[1999::2000], expected, atol=2e-3 * start[0])
 
 
 def test_a_slider_s_loop_has_its_area(settings):
@@ -338,20 +338,20 @@ def test_the_tip_comes_to_rest_where_the_rig_says(settings):
     long = np.tile(np.array([0.0, -LOOSE, -LOOSE]), (1, round(20 * COMMAND_RATE), 1))
     long[0, 1:] = commands
     bench = Bench(np.array([[0, 0, -9.81]]), long, np.zeros_like(long), np.zeros(1), since=19.9)
-    seen = plant.run("test", bench, [5])
-    end = seen.positions[0, -1, 0] - plant.chain.lengths[5] / 2 * seen.rotations[0, -1, 0, :, 2]
+    motion = plant.run("test", bench, [5])
+    end = motion.positions[0, -1, 0] - plant.chain.lengths[5] / 2 * motion.rotations[0, -1, 0, :, 2]
     assert np.linalg.norm(tip[0] - end) < 2e-3
 
 
 def test_its_answers_are_those_of_the_arm_that_it_is(settings):
     """A unit pressed by a torque bends by that over the stiffness told; the mean factor is 1; the lean is as large."""
     plant = arm(settings)
-    told = plant.answers()
+    answers = plant.answers()
     first = plant.links.stiffness[:PER]
-    factor = told["stiffness_factors"][0] * told["parameters"]["stiffness"]
+    factor = answers["stiffness_factors"][0] * answers["parameters"]["stiffness"]
     assert 0.3 / factor == pytest.approx((0.3 / first).sum())
-    assert told["stiffness_factors"].mean() == pytest.approx(1)
-    lean = np.hypot(told["parameters"]["mount_tilt_x"], told["parameters"]["mount_tilt_y"])
+    assert answers["stiffness_factors"].mean() == pytest.approx(1)
+    lean = np.hypot(answers["parameters"]["mount_tilt_x"], answers["parameters"]["mount_tilt_y"])
     assert np.degrees(lean) == pytest.approx(settings.mount_tilt_deg)
-    whole = told["rest_bend_rad"].sum(axis=0)
+    whole = answers["rest_bend_rad"].sum(axis=0)
     np.testing.assert_allclose(whole, settings.rest_bend, atol=5 * settings.rest_scatter * np.sqrt(UNITS))

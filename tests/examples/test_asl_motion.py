@@ -49,8 +49,8 @@ def test_each_recording_becomes_trials_of_25_s(source, tmp_path):
 def test_files_that_do_not_belong_together_are_refused(source, tmp_path):
     for file in source.iterdir():
         (tmp_path / file.name).write_text(file.read_text())
-    seen = tmp_path / LOADS["loaded"][0]
-    seen.write_text("\n".join(seen.read_text().splitlines()[:100]) + "\n")
+    recording = tmp_path / LOADS["loaded"][0]
+    recording.write_text("\n".join(recording.read_text().splitlines()[:100]) + "\n")
     with pytest.raises(InputError, match=r"200g.csv: found 99 rows, expected the 15000 of .*control_inputs"):
         make_session(tmp_path, tmp_path / "session")
     assert not (tmp_path / "session").exists()

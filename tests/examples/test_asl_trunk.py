@@ -37,11 +37,11 @@ def test_the_public_csv_becomes_a_session_that_ingest_reads(public, tmp_path):
     session = read_session(folder)
     assert [trial.split for trial in session.trials] == ["identify", "identify", "test"] * 3 + ["validate"] * 4
     positions = read_releases(public)
-    for number, (_, take, found) in enumerate(take_in(folder, session, LIMITS)):
+    for number, (_, take, findings) in enumerate(take_in(folder, session, LIMITS)):
         assert (take.segments, take.tendons, take.quaternions) == (("1", "2", "3"), (), None)
         np.testing.assert_array_equal(take.positions, positions[number][: len(take.time)])  # to the last bit
         np.testing.assert_allclose(np.diff(take.time), 0.01)
-        assert not found.repairs
+        assert not findings.repairs
 
 
 def test_a_folder_of_logs_is_taken_as_it_is(public, tmp_path):
@@ -110,9 +110,9 @@ def test_the_csv_gives_the_very_logs_that_are_shared(recorded, tmp_path):
 
 @with_recordings
 def test_frames_that_the_recorder_lost_are_found_in_two_logs_of_thirteen(recorded):
-    repairs = {take.name: found.repairs for _, take, found in take_in(recorded, read_session(recorded), LIMITS)}
+    repairs = {take.name: findings.repairs for _, take, findings in take_in(recorded, read_session(recorded), LIMITS)}
     assert len(repairs) == 13
-    told = {name: said for name, said in repairs.items() if said}
-    assert set(told) == {"release_200g_09", "release_200g_10"}
-    assert told["release_200g_09"][0].startswith("21 frames lost at 1.31, 1.35, 1.39, 1.46, 1.49, 1.54 s")
-    assert told["release_200g_10"][0].startswith("1 frame lost at 1.13 s")
+    repaired = {name: lines for name, lines in repairs.items() if lines}
+    assert set(repaired) == {"release_200g_09", "release_200g_10"}
+    assert repaired["release_200g_09"][0].startswith("21 frames lost at 1.31, 1.35, 1.39, 1.46, 1.49, 1.54 s")
+    assert repaired["release_200g_10"][0].startswith("1 frame lost at 1.13 s")

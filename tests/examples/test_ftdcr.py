@@ -45,9 +45,9 @@ def test_the_public_csvs_become_a_session_of_settled_poses(public, tmp_path):
     assert make_session(public, folder) == 9
     session = read_session(folder)
     assert [trial.split for trial in session.trials] == ["identify"] * 5 + ["validate", "identify"] + ["test"] * 2
-    for _, take, found in take_in(folder, session, LIMITS):
+    for _, take, findings in take_in(folder, session, LIMITS):
         assert not isinstance(take, InputError), take
-        assert not found.repairs
+        assert not findings.repairs
         trial, _ = filter_take(take, FILTER)
         share = np.linspace(0, 1, 6)
         np.testing.assert_allclose(trial.positions[:, 0], 1e-3 * np.outer(share, [5, 7, 1]) - [0, 0, 0.188], atol=1e-12)

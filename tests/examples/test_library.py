@@ -100,8 +100,8 @@ def test_the_example_is_twenty_lines():
 def test_its_version_is_the_one_written_once(python, tmp_path):
     code = "from importlib.metadata import version as v; from trunkline import version as own; import trunkline as t; "
     done = run(tmp_path, python, "-c", code + "print(own.__version__, v('trunkline'), t.__file__)")
-    own, installed, where = done.stdout.split()
-    assert own == installed
+    version, installed, where = done.stdout.split()
+    assert version == installed
     assert Path(where).is_relative_to(python.parents[1])
 
 

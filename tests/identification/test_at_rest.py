@@ -50,13 +50,13 @@ PULLS = np.random.default_rng(3).uniform(-0.002, 0.006, (5, 4))
 @pytest.mark.parametrize("load", [0.0, 0.1])
 def test_it_is_where_mujoco_settles(load):
     model = made()
-    found = tips(model, path_of(model, PULLS, load))
+    places = tips(model, path_of(model, PULLS, load))
     heavy = arm(tendons=FOUR, tip_load=load).build(ACTUATION, SOLVER, Path(".")).spec.compile()
     heavy.actuator_gainprm[:], heavy.actuator_biasprm[:] = model.actuator_gainprm, model.actuator_biasprm
     settled = settle(heavy, model.tendon_length0 - PULLS, DOWN)
     assert settled.rested.all()
     data = mujoco.MjData(heavy)
-    for qpos, tip in zip(settled.qpos, found, strict=True):
+    for qpos, tip in zip(settled.qpos, places, strict=True):
         data.qpos[:] = qpos
         mujoco.mj_kinematics(heavy, data)
         np.testing.assert_allclose(tip, data.site("tip_center").xpos, atol=1e-7)
@@ -78,19 +78,19 @@ def test_where_it_rests_depends_on_the_way_by_the_winch_s_play():
     model = made(backlash=play)
     there_and_back = np.zeros((3, 4))
     there_and_back[:, 1] = 0.002, 0.006, 0.002
-    found = tips(model, path_of(model, there_and_back), {"backlash": play})
+    places = tips(model, path_of(model, there_and_back), {"backlash": play})
     plain = made()
     behind = np.zeros((3, 4))  # after the first frame the cable trails by half the play, on either side
     behind[:, 1] = 0.002, 0.006 - play / 2, 0.002 + play / 2
-    np.testing.assert_allclose(found, tips(plain, path_of(plain, behind)), atol=1e-9)
+    np.testing.assert_allclose(places, tips(plain, path_of(plain, behind)), atol=1e-9)
 
 
 def test_commands_draw_in_what_the_model_says():
     model, other = made(), made()
     model.numeric_data[numeric_place(model, WINDING)] = 0.8
     model.numeric_data[numbers_place(model, PRELOAD)] = [0.001, 0.0, -0.0005, 0.0]
-    found = tips(model, path_of(model, PULLS))
+    places = tips(model, path_of(model, PULLS))
     drawn = 0.8 * PULLS + [0.001, 0.0, -0.0005, 0.0]
-    np.testing.assert_allclose(found, tips(other, path_of(other, drawn)), atol=1e-9)
+    np.testing.assert_allclose(places, tips(other, path_of(other, drawn)), atol=1e-9)
     as_searched = tips(other, path_of(other, PULLS), {"winding": 0.8, "preload_1": 0.001, "preload_3": -0.0005})
-    np.testing.assert_allclose(found, as_searched, atol=1e-9)
+    np.testing.assert_allclose(places, as_searched, atol=1e-9)

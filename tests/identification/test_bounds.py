@@ -36,8 +36,8 @@ A_LITTLE = 1e-9
 def test_a_parameter_is_at_a_bound_within_a_share_of_its_own_range(z, at_bound):
     """Between two others, one of them far from its wide bounds, one at the lower."""
     low, high = np.array([-100.0, LOW, 0.0]), np.array([100.0, HIGH, 1.0])
-    found = _at_bound(["kp", "damping", "stiffness"], np.array([0.0, z, 0.0]), low, high)
-    assert found == (["damping", "stiffness"] if at_bound else ["stiffness"])
+    names = _at_bound(["kp", "damping", "stiffness"], np.array([0.0, z, 0.0]), low, high)
+    assert names == (["damping", "stiffness"] if at_bound else ["stiffness"])
 
 
 @pytest.mark.parametrize(
@@ -53,8 +53,8 @@ def test_a_parameter_is_at_a_bound_within_a_share_of_its_own_range(z, at_bound):
     ],
 )
 def test_a_factor_at_a_bound_is_named_with_its_unit(factor, at_bound):
-    found = _factors_at_bound({"stiffness": np.array([1.0, factor]), "damping": np.array([1.0, 1.0])}, 0.1)
-    assert found == (["stiffness of unit 2"] if at_bound else [])
+    names = _factors_at_bound({"stiffness": np.array([1.0, factor]), "damping": np.array([1.0, 1.0])}, 0.1)
+    assert names == (["stiffness of unit 2"] if at_bound else [])
 
 
 @pytest.mark.parametrize(
@@ -68,8 +68,8 @@ def test_what_has_an_interval_wider_than_its_range_is_open(half, is_open):
     )
     scale = PARAMETERS["mount_tilt_x"].scale
     bounds = {name: Bounds(-scale, scale) for name in result.values}
-    found = undetermined(result, bounds)  # type: ignore[arg-type]
-    assert found == (["mount_tilt_x"] if is_open else [])
+    names = undetermined(result, bounds)  # type: ignore[arg-type]
+    assert names == (["mount_tilt_x"] if is_open else [])
 
 
 @pytest.mark.parametrize(
@@ -81,8 +81,8 @@ def test_what_one_trial_alone_tells_has_no_interval(others, alone):
     first = np.sqrt([1.0, others / 2, others / 2])
     jacobians = [np.diag([share, 1.0]) for share in first]
     linear = Linearisation(np.zeros(2), [np.array([0.1, 0.1 * k]) for k in range(3)], jacobians)
-    found = certainty(linear)
-    assert np.isinf(found.half_width).tolist() == [alone, False]
+    result = certainty(linear)
+    assert np.isinf(result.half_width).tolist() == [alone, False]
     assert ALONE == 1e-9
 
 
@@ -97,12 +97,12 @@ def test_a_pose_is_found_where_the_descent_ended_before_its_iterations_did(bent)
     model, trial = bent
     problem = PoseProblem(model, trial.segments, trial.positions[0])
     free, start = np.ones(problem.angles, bool), np.zeros(problem.angles)
-    needed = _descend(problem, start, problem.seen, free, 300)
+    needed = _descend(problem, start, problem.measured, free, 300)
     assert needed.converged
     assert 2 < needed.iterations < 30
     for iterations, converged in ((1, False), (needed.iterations - 1, False), (needed.iterations, False),
                                   (needed.iterations + 1, True)):  # fmt: skip
-        assert _descend(problem, start, problem.seen, free, iterations).converged is converged
+        assert _descend(problem, start, problem.measured, free, iterations).converged is converged
 
 
 @pytest.mark.parametrize("hidden", [(0,), (2,), (3,), (0, 1)])
@@ -110,7 +110,7 @@ def test_a_pose_says_how_far_seen_segments_are_and_nothing_of_hidden_ones(bent, 
     model, trial = bent
     positions = trial.positions[0].copy()
     positions[list(hidden)] = np.nan
-    found = fit_pose(model, segments_of(model), positions)
-    assert np.flatnonzero(np.isnan(found.residuals)).tolist() == list(hidden)
-    assert np.nanmax(found.residuals) < 1e-3
-    assert found.converged
+    pose = fit_pose(model, segments_of(model), positions)
+    assert np.flatnonzero(np.isnan(pose.residuals)).tolist() == list(hidden)
+    assert np.nanmax(pose.residuals) < 1e-3
+    assert pose.converged

@@ -9,7 +9,7 @@ from scipy.stats import t as student
 
 from tests.support.matched_plant import curl, segments_of, small_model
 from trunkline.identification.fit.certainty import bootstrap, certainty, weakest_in_words
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.linearisation import Linearisation
 from trunkline.identification.fit.optimizers import LeastSquares
@@ -40,9 +40,9 @@ def straight_line(clusters: int, rows: int = 5) -> tuple[Linearisation, np.ndarr
 def test_clustered_errors_are_the_exact_ones():
     linear, exact, naive = straight_line(clusters=600)
     assert (exact > 1.9 * naive).all()  # else the test could not tell the two apart
-    found = certainty(linear)
-    np.testing.assert_allclose(found.standard_error, exact, rtol=0.08)  # ± 1/√(2·600) is one standard deviation
-    np.testing.assert_allclose(found.half_width, 1.964 * found.standard_error, rtol=1e-3)  # t of 599 degrees
+    result = certainty(linear)
+    np.testing.assert_allclose(result.standard_error, exact, rtol=0.08)  # ± 1/√(2·600) is one standard deviation
+    np.testing.assert_allclose(result.half_width, 1.964 * result.standard_error, rtol=1e-3)  # t of 599 degrees
 
 
 def test_errors_are_those_of_fits_without_each_trial():
@@ -50,8 +50,8 @@ def test_errors_are_those_of_fits_without_each_trial():
     designs, target = np.stack(linear.jacobians), np.stack(linear.jacobians) @ linear.vector - linear.residuals
     fits = []
     for left_out in range(7):
-        kept = [t for t in range(7) if t != left_out]
-        fits.append(np.linalg.lstsq(designs[kept].reshape(-1, 2), target[kept].ravel(), rcond=None)[0])
+        others = [t for t in range(7) if t != left_out]
+        fits.append(np.linalg.lstsq(designs[others].reshape(-1, 2), target[others].ravel(), rcond=None)[0])
     expected = np.sqrt(6 / 7 * ((fits - np.mean(fits, axis=0)) ** 2).sum(axis=0))
     np.testing.assert_allclose(certainty(linear).standard_error, expected, rtol=1e-9)
 
@@ -64,9 +64,9 @@ def test_few_trials_that_tell_unequally_much_do_not_promise_too_much():
     for _ in range(400):
         noise = rng.normal(0, SHARED, (6, 1)) + rng.normal(0, OWN, (6, 4))
         estimate = -(design[..., 0] * noise).sum() / (design**2).sum()
-        found = certainty(Linearisation(np.array([estimate]), list(design[..., 0] * estimate + noise), list(design)))
+        result = certainty(Linearisation(np.array([estimate]), list(design[..., 0] * estimate + noise), list(design)))
         estimates.append(estimate)
-        errors.append(found.standard_error[0])
+        errors.append(result.standard_error[0])
     assert 0.85 < np.mean(errors) / np.std(estimates) < 1.4
 
 
@@ -104,10 +104,10 @@ def test_independent_residuals_of_a_straight_line():
     design = np.stack([x, np.ones_like(x)], axis=1)
     residual = rng.normal(0, 0.5, len(x))
     residual -= design @ np.linalg.lstsq(design, residual, rcond=None)[0]
-    found = certainty(Linearisation(np.zeros(2), list(residual[:, None]), list(design[:, None])))
+    result = certainty(Linearisation(np.zeros(2), list(residual[:, None]), list(design[:, None])))
     expected = 0.5 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
-    np.testing.assert_allclose(found.standard_error, expected, rtol=0.12)
-    assert found.condition == pytest.approx(1, abs=0.01)
+    np.testing.assert_allclose(result.standard_error, expected, rtol=0.12)
+    assert result.condition == pytest.approx(1, abs=0.01)
 
 
 def test_the_weakest_direction_is_named():
@@ -122,16 +122,16 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
     trials = [curl(model, level, frames=60, noise=3e-4, seed=k, tendon=k) for k, level in enumerate((4, 6, 8))]
     experiments = [prepare(trial, model, 437) for trial in trials]
     method = Method(
-        LeastSquares(0, 1, 4, 1e-3), Rough(1.0, 437, 99), Polish(4, 1e-6),
+        LeastSquares(0, 1, 4, 1e-3), CoarseSearch(1.0, 437, 99), Refinement(4, 1e-6),
         LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
     )
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-    found = identify(
+    result = identify(
         "test", model, experiments, Fit(segments_of(model), bounds, (), "positions", weights, method)
     )
-    assert found.certainty.standard_error[1] == found.certainty.half_width[1] == np.inf
-    assert undetermined(found, bounds) == ["force_range"]
-    rows = parameter_table(found, bounds)["parameters"]
+    assert result.certainty.standard_error[1] == result.certainty.half_width[1] == np.inf
+    assert undetermined(result, bounds) == ["force_range"]
+    rows = parameter_table(result, bounds)["parameters"]
     limits = [bounds["force_range"].low, bounds["force_range"].high]
     assert rows["force_range"]["undetermined"]
     assert rows["force_range"]["interval_95_given_model"] == pytest.approx(limits)
@@ -143,16 +143,17 @@ def test_a_force_range_that_no_pull_reaches_is_undetermined():
 def test_factors_that_one_trial_alone_determines_have_no_width(tmp_path):
     model = small_model(3)
     experiments = [prepare(curl(model, 6, frames=5), model, 5)]
-    own = PARAMETERS["stiffness"].read(model)
-    bounds = {"stiffness": Bounds(0.5 * own, 2 * own)}
+    stiffness = PARAMETERS["stiffness"].read(model)
+    bounds = {"stiffness": Bounds(0.5 * stiffness, 2 * stiffness)}
     method = Method(
-        LeastSquares(0, 1, 1, 1.0), Rough(1.0, 5, 1), Polish(1, 1.0), LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1
+        LeastSquares(0, 1, 1, 1.0), CoarseSearch(1.0, 5, 1), Refinement(1, 1.0),
+        LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
     )
     weights = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
-    found = identify(
+    result = identify(
         "test", model, experiments, Fit(segments_of(model), bounds, ("stiffness",), "positions", weights, method)
     )
-    write_json(tmp_path / "parameters.json", parameter_table(found, bounds))
+    write_json(tmp_path / "parameters.json", parameter_table(result, bounds))
     table = json.loads((tmp_path / "parameters.json").read_text())
     assert table["per_joint"]["stiffness"]["half_width_95_given_model"] == [None] * 3
     assert table["parameters"]["stiffness"]["undetermined"]
@@ -164,6 +165,6 @@ def test_a_prior_holds_what_the_trials_do_not_tell_and_says_how_little_that_is()
     designs = [np.array([[1.0, 0.0], [0.8, 0.0]]) for _ in range(6)]
     residuals = [rng.normal(0, 1e-3, 2) for _ in range(6)]
     weights = np.array([0.05, 0.05])
-    found = certainty(Linearisation(np.ones(2), residuals, designs, weights), prior_deviation=0.04)
-    assert found.standard_error[1] == pytest.approx(0.04)
-    assert found.standard_error[0] < 0.002
+    result = certainty(Linearisation(np.ones(2), residuals, designs, weights), prior_deviation=0.04)
+    assert result.standard_error[1] == pytest.approx(0.04)
+    assert result.standard_error[0] < 0.002

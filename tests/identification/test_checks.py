@@ -89,9 +89,9 @@ def test_motions_pass_and_show_exchanged_tendons(model, seed):
     late = {key: getattr(trial, key)[10:] for key in ("time", "positions", "quaternions", "measured")}
     late |= {"commands": trial.commands[:-10], "tendon_positions": trial.commands[:-10]}  # motors 80 ms ahead
     check_trials([replace(trial, **late)], model)
-    said = f"tendons: trial motion_{seed}_0_identify: found the path of 'tendon_.' .* mm longer than commanded"
+    message = f"tendons: trial motion_{seed}_0_identify: found the path of 'tendon_.' .* mm longer than commanded"
     for columns in ([1, 2, 0], [1, 0, 2], [2, 1, 0]):
-        with pytest.raises(InputError, match=said) as caught:
+        with pytest.raises(InputError, match=message) as caught:
             check_trials([with_columns(trial, columns)], model)
         assert "\n" not in str(caught.value)
 
@@ -114,8 +114,8 @@ def test_pulls_that_are_commanded_too_small_show(model, driven, factor):
     for trial in driven:
         if factor == 0.5 and trial.experiment == "motion":
             continue  # the arm lags behind them by as much
-        said = rf"tendons: trial {re.escape(trial.name)}: found paths that are shorter by [\d.e+]+ times the pulls"
-        with pytest.raises(InputError, match=said) as caught:
+        message = rf"tendons: trial {re.escape(trial.name)}: found paths that are shorter by [\d.e+]+ times the pulls"
+        with pytest.raises(InputError, match=message) as caught:
             check_trials([with_scale(trial, factor)], model)
         assert "expected 0.4 to 1.5 times: are signs reversed, are commands in another unit than m" in str(caught.value)
         assert "\n" not in str(caught.value)
@@ -131,8 +131,8 @@ def test_pulls_and_motions_that_are_reversed_or_commanded_too_large_show(model, 
 
 def test_all_trials_of_another_scale_are_counted_and_the_first_are_named(model, driven):
     first, second, third = (re.escape(trial.name) for trial in driven[:3])
-    said = f"trials {first}, {second}, {third} and 3 more: found paths that are shorter by .* to .* times"
-    with pytest.raises(InputError, match=said):
+    message = f"trials {first}, {second}, {third} and 3 more: found paths that are shorter by .* to .* times"
+    with pytest.raises(InputError, match=message):
         check_trials([with_scale(trial, 0.1) for trial in driven], model)
     with pytest.raises(InputError, match=f"trials {first}, {second}: found"):
         check_trials([with_scale(trial, 0.1) for trial in driven[:2]] + driven[2:], model)
@@ -159,8 +159,8 @@ def test_weak_motors_and_soft_cables_are_let_alone(model):
 
 
 def test_what_is_said_names_key_trial_and_both_tendons(model, curls):
-    said = "tendons: trial curl_40_0_identify: found 'tendon_2' wound by 40 mm .* to the side of 'tendon_1', expected"
-    with pytest.raises(InputError, match=said) as caught:
+    text = "tendons: trial curl_40_0_identify: found 'tendon_2' wound by 40 mm .* to the side of 'tendon_1', expected"
+    with pytest.raises(InputError, match=text) as caught:
         check_trials([with_columns(curls[0], [1, 0, 2])], model)
     assert "\n" not in str(caught.value)
 
@@ -196,12 +196,12 @@ def test_a_part_of_the_tendons_is_refused(model, curls):
         curls[0], tendons=("tendon_1",), commands=curls[0].commands[:, :1],
         tendon_positions=curls[0].tendon_positions[:, :1],
     )  # fmt: skip
-    said = "session.yaml: tendons: trial curl_40_0_identify: found tendon_1 alone, expected all of the model: tendon_1,"
-    with pytest.raises(InputError, match=re.escape(said)):
+    text = "session.yaml: tendons: trial curl_40_0_identify: found tendon_1 alone, expected all of the model: tendon_1,"
+    with pytest.raises(InputError, match=re.escape(text)):
         check_trials([some], model)
     named = replace(curls[0], tendons=("m1", "m2", "m3"))
-    said = r"found 'm1', expected names of the model: .*; under `tendons` or `motors`, what moves which"
-    with pytest.raises(InputError, match=said):
+    message = r"found 'm1', expected names of the model: .*; under `tendons` or `motors`, what moves which"
+    with pytest.raises(InputError, match=message):
         check_trials([named], model)
     none = replace(some, tendons=(), commands=np.empty((FRAMES, 0)), tendon_positions=np.empty((FRAMES, 0)))
     check_trials([none], model)

@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
-from trunkline.identification.fit.search import AGREEING, Convergence, Found, _apart, _evolve, _several, descend, search
+from trunkline.identification.fit.search import (
+    AGREEING,
+    Convergence,
+    SearchResult,
+    _apart,
+    _evolve,
+    _several,
+    descend,
+    search,
+)
 
 LOW, HIGH = np.log(0.2), np.log(20.0)
 PATIENT, SHORT = 25, 1  # iterations: of a search that ends by itself, and of one whose time is up
@@ -144,8 +153,8 @@ def placed(*shares: tuple[float, float]) -> np.ndarray:
 )
 def test_starts_are_distinct_that_are_apart_in_one_parameter_at_least(shares, count, chosen):
     candidates = placed(*shares)
-    found = _apart(Ranges(), candidates, count)  # type: ignore[arg-type]
-    np.testing.assert_array_equal(found, candidates[chosen])
+    starts = _apart(Ranges(), candidates, count)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(starts, candidates[chosen])
 
 
 def test_the_first_start_goes_to_its_own_minimum_and_the_others_leave_plateaus_at_once(monkeypatch):
@@ -177,7 +186,7 @@ def test_of_each_start_its_best_end_agrees_or_does_not(monkeypatch, ends, agreei
     left = iter(ends)
 
     def made(*_):
-        return [Found(np.array([loss]), loss, Convergence(), True) for loss in next(left)]
+        return [SearchResult(np.array([loss]), loss, Convergence(), True) for loss in next(left)]
 
     monkeypatch.setattr("trunkline.identification.fit.search._ends", made)
     starts = [np.zeros(1)] * len(ends)

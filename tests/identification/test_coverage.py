@@ -47,14 +47,14 @@ def repetitions(request) -> Repetitions:
     for _ in range(REPETITIONS):
         experiments = [prepare(measured(trial, rng), model, FRAMES) for trial in clean]
         problem = Problem(model, experiments, segments_of(model), bounds, "positions", WEIGHTS)
-        found = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 12, 1e-6, lambda best: None)
-        assert found.converged
-        moves = surrogate(problem, found.vector).moves
-        errors.append(found.vector - exact)
-        widths.append(certainty(found.linear, moves=moves).half_width)
+        result = descend(problem, exact + rng.normal(0, 0.02, len(exact)), 12, 1e-6, lambda best: None)
+        assert result.converged
+        moves = surrogate(problem, result.vector).moves
+        errors.append(result.vector - exact)
+        widths.append(certainty(result.linear, moves=moves).half_width)
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("trunkline.identification.fit.certainty.RESAMPLINGS", RESAMPLINGS)
-            resampled.append(bootstrap(found.linear, 1, moves) - exact)
+            resampled.append(bootstrap(result.linear, 1, moves) - exact)
     return Repetitions(list(stage.true), np.array(errors), np.array(widths), np.array(resampled))
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from tests.support.matched_plant import segments_of, small_model, tilt
 from trunkline.identification.evaluation.evaluation import replay, scores
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
@@ -17,7 +17,8 @@ from trunkline.identification.uncertainty.cross_validation import ERRORS, cross_
 
 WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 METHOD = Method(
-    LeastSquares(0, 1, 3, 1e-2), Rough(1.0, 1, 99), Polish(4, 1e-4), LeastSquares(0, 1, 3, 1e-2), 0.2, np.inf, seed=1
+    LeastSquares(0, 1, 3, 1e-2), CoarseSearch(1.0, 1, 99), Refinement(4, 1e-4),
+    LeastSquares(0, 1, 3, 1e-2), 0.2, np.inf, seed=1,
 )
 
 
@@ -35,8 +36,8 @@ def errors(first: np.ndarray, second: np.ndarray) -> tuple[dict, dict]:
         truth = model.__copy__()
         set_fields(truth, candidate_fields(model, {}, {"stiffness": factors[None]}))
         experiments.append(prepare(tilt(truth, angle), model, 1))
-    segments, own = segments_of(model), PARAMETERS["stiffness"].read(model)
-    bounds = {"stiffness": Bounds(0.5 * own, 2 * own)}
+    segments, stiffness = segments_of(model), PARAMETERS["stiffness"].read(model)
+    bounds = {"stiffness": Bounds(0.5 * stiffness, 2 * stiffness)}
     fit = Fit(segments, bounds, ("stiffness",), "positions", WEIGHTS, METHOD)
     alone = identify("test", model, experiments[:1], fit)
     fitted = {}
@@ -60,10 +61,10 @@ def test_factors_of_the_plant_are_better_on_trials_left_out():
     assert left_out["identified"] < 0.5 * left_out["coarse"]
 
 
-def error_table(found: dict) -> pd.DataFrame:
+def error_table(predictions: dict) -> pd.DataFrame:
     """As `trial_table`, with the number of trials left out with it for the E_internal of each."""
     rows = [{"model": name, "e_internal_mm": float(len(prediction.experiments))} | dict.fromkeys(ERRORS[1:], 1.0)
-            for name, prediction in found.items() for _ in prediction.experiments]  # fmt: skip
+            for name, prediction in predictions.items() for _ in prediction.experiments]  # fmt: skip
     return pd.DataFrame(rows)
 
 
@@ -71,12 +72,12 @@ def test_every_trial_is_left_out_once(monkeypatch):
     """Errors are means over all trials, so folds of unequal size do not weigh more than their trials."""
     model = small_model(4)
     trials = [prepare(tilt(model, angle), model, 1) for angle in (30, 60, 90)]
-    seen = []
+    calls = []
     module = "trunkline.identification.uncertainty.cross_validation"
     monkeypatch.setattr(f"{module}.identify", lambda *args: type("Found", (), {"models": result.models})())
-    monkeypatch.setattr(f"{module}.replay", lambda model, left, segments: seen.append([e.name for e in left]) or left)
-    monkeypatch.setattr(f"{module}.trial_table", lambda found: error_table(found))
+    monkeypatch.setattr(f"{module}.replay", lambda model, left, segments: calls.append([e.name for e in left]) or left)
+    monkeypatch.setattr(f"{module}.trial_table", lambda predictions: error_table(predictions))
     result = type("Result", (), {"models": {"coarse": model, "identified": model}})()
     table = cross_validate("test", result, trials, Fit((), {}, (), "positions", WEIGHTS, METHOD), folds=2)
-    assert seen[::2] == [[trials[0].name, trials[2].name], [trials[1].name]]
+    assert calls[::2] == [[trials[0].name, trials[2].name], [trials[1].name]]
     assert table["coarse"]["e_internal_mm"] == pytest.approx((2 * 2 + 1 * 1) / 3)

@@ -29,10 +29,10 @@ def test_only_trials_in_motion_have_a_velocity():
     model = small_model(4)
     experiments = [prepare(trial, model, 20) for trial in (release(model, 0.2, frames=30), tilt(model, 30))]
     for order in (experiments, experiments[::-1]):
-        found = scores(replay(model, order, segments_of(model)), order, "positions", WEIGHTS)["identify"]
-        kinds = found["by_experiment"]
+        table = scores(replay(model, order, segments_of(model)), order, "positions", WEIGHTS)["identify"]
+        kinds = table["by_experiment"]
         assert "e_velocity_mm_s" not in kinds["static_tilt"]
-        assert found["e_velocity_mm_s"] == kinds["release"]["e_velocity_mm_s"]
+        assert table["e_velocity_mm_s"] == kinds["release"]["e_velocity_mm_s"]
 
 
 def test_half_the_step_moves_little_with_every_option_on():
@@ -46,9 +46,9 @@ def test_half_the_step_moves_little_with_every_option_on():
     model.dof_damping[: arm_hinges(model)] *= 4  # as the plant's
     model.tendon_frictionloss[cables(model)] = plant.tendon_frictionloss[:] = 0
     experiments = [prepare(curl(plant, 30, frames=90), model, 90)]
-    found, halved = (Prediction(replay(model, experiments, segments_of(model), f), experiments) for f in (1.0, 0.5))
-    assert 0.3 < found.scores()["identify"]["e_internal_mm"] < 1.0  # 1 mm is 0.2 % of the arm's length
-    change = halved_step(found, halved)
+    full, halved = (Prediction(replay(model, experiments, segments_of(model), f), experiments) for f in (1.0, 0.5))
+    assert 0.3 < full.scores()["identify"]["e_internal_mm"] < 1.0  # 1 mm is 0.2 % of the arm's length
+    change = halved_step(full, halved)
     assert 0 < change["identify"] < 0.05
     assert 0 < change["tip"]["identify"] < 0.05
 
@@ -56,11 +56,11 @@ def test_half_the_step_moves_little_with_every_option_on():
 def test_trials_that_a_model_does_not_survive_are_counted():
     model = small_model(4)
     experiments = [prepare(release(model, angle, frames=20), model, 20) for angle in (0.2, 0.3)]
-    found = replay(model, experiments, segments_of(model))
-    assert found.diverged == 0
-    found.positions[1][-1, 0] = np.nan
-    assert found.diverged == 1
-    assert scores(found, experiments, "positions", WEIGHTS)["identify"]["e_position_mm"] > 1
+    replayed = replay(model, experiments, segments_of(model))
+    assert replayed.diverged == 0
+    replayed.positions[1][-1, 0] = np.nan
+    assert replayed.diverged == 1
+    assert scores(replayed, experiments, "positions", WEIGHTS)["identify"]["e_position_mm"] > 1
 
 
 def test_every_model_starts_where_its_own_geometry_puts_the_arm():
@@ -68,13 +68,13 @@ def test_every_model_starts_where_its_own_geometry_puts_the_arm():
     set_fields(bent, candidate_fields(cad, {"joint_place": np.array([0.5])}))
     trials = [release(bent, 0.2, frames=20), tilt(bent, 30)]
     experiments = [prepare(trial, bent, 20) for trial in trials]
-    own = own_starts(experiments, trials, bent, cad)
+    started = own_starts(experiments, trials, bent, cad)
     off = [
         np.linalg.norm(segment_positions(cad, segments_of(cad), e.start) - trials[0].positions[0], axis=1).mean()
-        for e in (own[0], experiments[0])
+        for e in (started[0], experiments[0])
     ]
     assert off[0] < 0.5 * off[1]
-    assert own[1] is experiments[1]
+    assert started[1] is experiments[1]
     assert own_starts(experiments, trials, bent, bent.__copy__()) is experiments
 
 
@@ -100,19 +100,19 @@ def test_a_swing_is_compared_about_where_each_trial_rests():
     wave = (np.exp(-4 * time) * np.cos(8 * time))[:, None, None] * 0.05
     experiment.positions = experiment.positions[-1:] + wave
     moved = experiment.positions + [0.003, 0.004, 0.0]
-    found = replay(model, [experiment], segments_of(model))
-    found.positions[0] = moved
-    row = scores(found, [experiment])["identify"]
+    replayed = replay(model, [experiment], segments_of(model))
+    replayed.positions[0] = moved
+    row = scores(replayed, [experiment])["identify"]
     assert row["e_position_mm"] == pytest.approx(5.0)
     assert row["e_tip_about_rest_mm"] == pytest.approx(0.0, abs=1e-9)
     assert row["e_late_speed_pct"] == pytest.approx(0.0, abs=1e-6)
-    found.positions[0] = moved + 0.5 * wave
-    row = scores(found, [experiment])["identify"]
+    replayed.positions[0] = moved + 0.5 * wave
+    row = scores(replayed, [experiment])["identify"]
     assert row["e_late_speed_pct"] == pytest.approx(50.0)
     off = 500 * np.sqrt(3) * np.abs(wave[:, 0, 0] - wave[-60:].mean()).mean()
     assert row["e_position_about_rest_mm"] == pytest.approx(off, rel=0.01)
     experiment.positions = experiment.positions + 0.01 * np.sin(8 * time)[:, None, None]
-    assert "e_late_speed_pct" not in scores(found, [experiment])["identify"], "this arm never rests"
+    assert "e_late_speed_pct" not in scores(replayed, [experiment])["identify"], "this arm never rests"
 
 
 def faster(begin: float, end: float, factor: float) -> np.ndarray:
@@ -211,7 +211,7 @@ def test_where_a_simulation_is_lost_it_is_the_arm_s_length_away(bad):
 def test_an_arm_that_hangs_still_has_no_period():
     model = small_model(4)
     experiments = [prepare(release(model, 0.2, frames=60), model, 60)]
-    found = replay(model, experiments, segments_of(model))
-    assert "e_swing_period_pct" in scores(found, experiments)["identify"]
-    found.positions[0][:] = found.positions[0][:1]
-    assert "e_swing_period_pct" not in scores(found, experiments)["identify"]
+    replayed = replay(model, experiments, segments_of(model))
+    assert "e_swing_period_pct" in scores(replayed, experiments)["identify"]
+    replayed.positions[0][:] = replayed.positions[0][:1]
+    assert "e_swing_period_pct" not in scores(replayed, experiments)["identify"]

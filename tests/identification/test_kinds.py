@@ -80,8 +80,8 @@ def test_a_trial_without_load_is_simulated_to_the_last_bit_as_if_there_were_none
     population = Population(model, [*(replace(e, load=0.05) for e in experiments), *experiments], segments_of(model))
     for _ in range(2):  # the second call reuses the batch
         beside = population.simulate(fields).positions[len(experiments) :]
-        for one, other in zip(alone, beside, strict=True):
-            np.testing.assert_array_equal(one, other)
+        for first, second in zip(alone, beside, strict=True):
+            np.testing.assert_array_equal(first, second)
 
 
 def test_a_static_pull_starts_from_the_measured_pose_with_its_mean_commands():
@@ -100,9 +100,9 @@ def test_a_static_pull_rests_where_the_plant_does_whatever_the_start(pulls):
     trial = static_pull(model, pulls, 15.0)
     experiment = prepare(trial, model, 437)
     away = replace(experiment, start=experiment.start + 0.02 * np.random.default_rng(0).normal(size=model.nq))
-    for one in (experiment, away):
-        found = replay(model, [one], trial.segments).positions[0]
-        assert position_error(found, one.positions, one.measured) < 0.2e-3
+    for start in (experiment, away):
+        positions = replay(model, [start], trial.segments).positions[0]
+        assert position_error(positions, start.positions, start.measured) < 0.2e-3
 
 
 def test_scores_have_every_kind():

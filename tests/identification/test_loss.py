@@ -50,11 +50,11 @@ def test_moving_distance_loss_by_hand():
 def test_position_loss_sees_a_swing_that_distances_do_not():
     real = np.array([[[0.03, 0.0, -0.4]]])
     simulated = real * [-1, 1, 1]
-    seen = np.ones((1, 1), bool)
-    assert loss_of(distance_residuals(simulated[None], real, seen, WEIGHTS))[0] == pytest.approx(0, abs=1e-20)
+    whole = np.ones((1, 1), bool)
+    assert loss_of(distance_residuals(simulated[None], real, whole, WEIGHTS))[0] == pytest.approx(0, abs=1e-20)
     relative = 0.06 / np.hypot(0.03, 0.4)  # beyond δ = 0.1
     expected = 2.0 * 0.1 * (relative - 0.05)
-    assert loss_of(position_residuals(simulated[None], real, seen, WEIGHTS))[0] == pytest.approx(expected)
+    assert loss_of(position_residuals(simulated[None], real, whole, WEIGHTS))[0] == pytest.approx(expected)
 
 
 def test_moving_position_loss_by_hand():

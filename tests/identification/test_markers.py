@@ -31,9 +31,9 @@ def test_markers_are_found_where_they_sit(model):
     off = model.__copy__()
     moved = np.random.default_rng(1).normal(0, 1e-3, (len(sites(model)), 3))
     off.site_pos[sites(model)] += moved
-    found = with_measured_markers(model, trials(off))
-    np.testing.assert_allclose(found.site_pos[sites(model)], off.site_pos[sites(model)], atol=2e-4)
-    unseen = [prepare(release(off, 0.15, "validate", 3), m, 3).fit.residuals.mean() for m in (model, found)]
+    marked = with_measured_markers(model, trials(off))
+    np.testing.assert_allclose(marked.site_pos[sites(model)], off.site_pos[sites(model)], atol=2e-4)
+    unseen = [prepare(release(off, 0.15, "validate", 3), m, 3).fit.residuals.mean() for m in (model, marked)]
     assert unseen[1] < 0.3 * unseen[0]
 
 
@@ -44,40 +44,40 @@ def test_a_marker_is_found_that_is_tracked_at_its_bodys_origin(model):
     at_origin = at_origin.compile()
     off, marker = model.__copy__(), model.site("unit_03_center").id
     off.site_pos[marker] = [1e-3, -1e-3, 0]
-    found = with_measured_markers(at_origin, trials(off))
-    np.testing.assert_allclose(found.site_pos[marker], off.site_pos[marker], atol=2e-4)
-    residuals = prepare(release(off, 0.15, "validate", 3), found, 3).fit.residuals
+    marked = with_measured_markers(at_origin, trials(off))
+    np.testing.assert_allclose(marked.site_pos[marker], off.site_pos[marker], atol=2e-4)
+    residuals = prepare(release(off, 0.15, "validate", 3), marked, 3).fit.residuals
     assert residuals[segments_of(model).index("unit_03")] < 2e-4
 
 
 def test_markers_on_their_axes_stay_there(model):
     """But for what the expectation of a smooth bend makes of these poses."""
-    found = with_measured_markers(model, trials(model))
-    np.testing.assert_allclose(found.site_pos, model.site_pos, atol=1e-4)
+    marked = with_measured_markers(model, trials(model))
+    np.testing.assert_allclose(marked.site_pos, model.site_pos, atol=1e-4)
 
 
 def test_only_trials_to_identify_from_tell_of_markers(model):
     off = model.__copy__()
     off.site_pos[sites(model)] += 1e-3
     hidden = [replace(trial, split="validate") for trial in trials(off)]
-    found, alone = (with_measured_markers(model, seen) for seen in (trials(model) + hidden, trials(model)))
-    np.testing.assert_array_equal(found.site_pos, alone.site_pos)
+    marked, alone = (with_measured_markers(model, some) for some in (trials(model) + hidden, trials(model)))
+    np.testing.assert_array_equal(marked.site_pos, alone.site_pos)
 
 
 def test_a_tilted_mount_shows_in_shapes_at_rest(model):
     true = {"mount_tilt_x": 0.02, "mount_tilt_y": -0.03}
-    found = identified(
+    result = identified(
         [tilt(changed(model, **true), angle) for angle in (0, 45, 90)], model, dict.fromkeys(true, (-0.1, 0.1))
     )
     for name, value in true.items():
-        assert found.values[name] == pytest.approx(value, abs=1e-4), name
+        assert result.values[name] == pytest.approx(value, abs=1e-4), name
 
 
 def test_a_twisted_mount_shows_in_curls(model):
     truth = changed(model, mount_twist=0.05)
     trials = [curl(truth, level, frames=40, tendon=tendon) for tendon, level in enumerate((8, 6, 7))]
-    found = identified(trials, model, {"mount_twist": (-0.1, 0.1)})
-    assert found.values["mount_twist"] == pytest.approx(0.05, abs=1e-3)
+    result = identified(trials, model, {"mount_twist": (-0.1, 0.1)})
+    assert result.values["mount_twist"] == pytest.approx(0.05, abs=1e-3)
 
 
 def test_a_mount_turned_about_one_axis_stays_turned_about_the_others(model):

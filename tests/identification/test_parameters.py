@@ -123,9 +123,9 @@ def test_scaling_keeps_the_arm_s_proportions():
     arm, stiffer = slice(arm_hinges(start)), 2.5 / start.jnt_stiffness[0]
     np.testing.assert_allclose(model.jnt_stiffness[arm] / start.jnt_stiffness[arm], stiffer)
     np.testing.assert_allclose(model.dof_damping[arm] / start.dof_damping[arm], 0.02 / start.dof_damping[0])
-    for one in all_elements(start, BRANCH):  # branches are as stiff beside their springs as before, and as slow
-        np.testing.assert_allclose(model.tendon_stiffness[one.tendon] / start.tendon_stiffness[one.tendon], stiffer)
-        np.testing.assert_allclose(model.dof_damping[one.own] / start.dof_damping[one.own], stiffer)
+    for part in all_elements(start, BRANCH):  # branches are as stiff beside their springs as before, and as slow
+        np.testing.assert_allclose(model.tendon_stiffness[part.tendon] / start.tendon_stiffness[part.tendon], stiffer)
+        np.testing.assert_allclose(model.dof_damping[part.own] / start.dof_damping[part.own], stiffer)
 
 
 @pytest.mark.parametrize(("place", "error"), [(0.0, 3 / 2 / 20 + 1 / 2 / 20**2), (0.5, -1 / 4 / 20**2)])
@@ -277,8 +277,8 @@ def test_a_unit_s_factor_is_shared_by_its_two_hinges():
     factors = np.linspace(0.9, 1.1, 8)
     model = model_with({}, {"stiffness": factors[None]})
     np.testing.assert_allclose(model.jnt_stiffness[:16] / start.jnt_stiffness[:16], np.repeat(factors, 2))
-    for one in all_elements(start, BRANCH):
-        grown = model.tendon_stiffness[one.tendon] / start.tendon_stiffness[one.tendon]
+    for element in all_elements(start, BRANCH):
+        grown = model.tendon_stiffness[element.tendon] / start.tendon_stiffness[element.tendon]
         np.testing.assert_allclose(grown, np.repeat(factors, 2))
     assert unit_of_hinge(model).tolist() == [index // 2 for index in range(16)]
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import curl, motion, release, segments_of, small_model, tilt
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import DIVERGED_LOSS, Bounds, Problem
@@ -19,7 +19,8 @@ WEIGHTS = LossWeights(0.2, 2.0, 0.02, 0.002, 1.0, 0.03)
 def identified(trials, model, parameters, per_joint=(), optimizer=LeastSquares(5, 2, 6, 1e-3)):  # noqa: B008
     experiments = [prepare(trial, model, 437) for trial in trials]
     bounds = {name: Bounds(*span) for name, span in parameters.items()}
-    method = Method(optimizer, Rough(1.0, 437, 99), Polish(8, 1e-9), LeastSquares(0, 1, 30, 1e-9), 0.1, np.inf, seed=3)
+    fine = LeastSquares(0, 1, 30, 1e-9)
+    method = Method(optimizer, CoarseSearch(1.0, 437, 99), Refinement(8, 1e-9), fine, 0.1, np.inf, seed=3)
     fit = Fit(segments_of(model), bounds, per_joint, "positions", WEIGHTS, method)
     return identify("test", model, experiments, fit)
 
@@ -35,10 +36,10 @@ def test_stiffness_and_hardening_come_back():
     true = {"stiffness": 0.6 * PARAMETERS["stiffness"].read(model), "hardening": 1.5}
     truth = changed(model, **true)
     trials = [tilt(truth, 30), tilt(truth, 60), tilt(truth, 90), tilt(truth, 45, "validate")]
-    found = identified(trials, model, {"stiffness": (0.2, 20.0), "hardening": (0.02, 20.0)})
-    assert found.values["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
-    assert found.values["hardening"] == pytest.approx(true["hardening"], rel=0.05)
-    assert not found.at_bound
+    result = identified(trials, model, {"stiffness": (0.2, 20.0), "hardening": (0.02, 20.0)})
+    assert result.values["stiffness"] == pytest.approx(true["stiffness"], rel=0.02)
+    assert result.values["hardening"] == pytest.approx(true["hardening"], rel=0.05)
+    assert not result.at_bound
 
 
 def test_per_joint_factors_come_back():
@@ -48,8 +49,8 @@ def test_per_joint_factors_come_back():
     set_fields(truth, candidate_fields(model, {}, {"stiffness": factors[None]}))
     trials = [tilt(truth, angle) for angle in (30, 60, 90)]
     span = PARAMETERS["stiffness"].read(model)
-    found = identified(trials, model, {"stiffness": (0.99 * span, 1.01 * span)}, ("stiffness",))
-    stiffness = found.models["identified"].jnt_stiffness / model.jnt_stiffness
+    result = identified(trials, model, {"stiffness": (0.99 * span, 1.01 * span)}, ("stiffness",))
+    stiffness = result.models["identified"].jnt_stiffness / model.jnt_stiffness
     np.testing.assert_allclose(stiffness[::2][:3], factors[:3], atol=0.02)  # beyond, gravity bends too little
 
 
@@ -60,10 +61,10 @@ def test_a_maxwell_branch_comes_back():
     truth = changed(model, **true)
     trials = [release(truth, bend, frames=100) for bend in (0.3, -0.25, 0.15)]
     ranges = {"damping": (0.005, 1.0), "relaxation": (0.05, 3.0), "relaxation_time": (0.02, 3.0)}
-    found = identified(trials, model, ranges)
+    result = identified(trials, model, ranges)
     for name, value in true.items():
-        assert found.values[name] == pytest.approx(value, rel=0.05), name
-    assert not found.at_bound
+        assert result.values[name] == pytest.approx(value, rel=0.05), name
+    assert not result.at_bound
 
 
 def test_a_slider_comes_back():
@@ -71,9 +72,9 @@ def test_a_slider_comes_back():
     true = {"hysteresis": 0.5, "yield_bend": 0.03}
     truth = changed(model, **true)
     trials = [release(truth, bend, frames=100) for bend in (0.3, -0.25, 0.15)]
-    found = identified(trials, model, {"hysteresis": (0.05, 3.0), "yield_bend": (0.005, 0.2)})
+    result = identified(trials, model, {"hysteresis": (0.05, 3.0), "yield_bend": (0.005, 0.2)})
     for name, value in true.items():
-        assert found.values[name] == pytest.approx(value, rel=0.05), name
+        assert result.values[name] == pytest.approx(value, rel=0.05), name
 
 
 def test_damping_and_tendon_friction_and_its_creep_come_back():
@@ -82,9 +83,9 @@ def test_damping_and_tendon_friction_and_its_creep_come_back():
     truth = changed(model, **true)
     trials = [release(truth, 0.3, frames=100), release(truth, -0.25, frames=100)]
     ranges = {"damping": (0.005, 1.0), "tendon_friction": (0.02, 3.0), "friction_time": (0.003, 0.3)}
-    found = identified(trials, model, ranges)
+    result = identified(trials, model, ranges)
     for name, tolerance in (("damping", 0.05), ("tendon_friction", 0.2), ("friction_time", 0.2)):
-        assert found.values[name] == pytest.approx(true[name], rel=tolerance), name
+        assert result.values[name] == pytest.approx(true[name], rel=tolerance), name
 
 
 def test_the_winches_rate_limit_and_backlash_come_back():
@@ -93,25 +94,25 @@ def test_the_winches_rate_limit_and_backlash_come_back():
     true = {"rate_limit": 0.12, "backlash": 4e-3}
     truth = changed(model, **true)
     trials = [curl(truth, 50, frames=110), motion(truth, 30, frames=120), motion(truth, 30, frames=120, seed=1)]
-    found = identified(trials, model, {"rate_limit": (0.02, 2.0), "backlash": (2e-4, 0.02)})
+    result = identified(trials, model, {"rate_limit": (0.02, 2.0), "backlash": (2e-4, 0.02)})
     for name, value in true.items():
-        assert found.values[name] == pytest.approx(value, rel=0.02), name
+        assert result.values[name] == pytest.approx(value, rel=0.02), name
 
 
 def test_validate_trials_are_never_fitted():
     model = small_model()
     truth, other = (changed(model, stiffness=f * PARAMETERS["stiffness"].read(model)) for f in (0.7, 1.6))
     trials = [tilt(truth, 60), tilt(truth, 90), tilt(other, 60, "validate"), tilt(other, 90, "validate")]
-    found = identified(trials, model, {"stiffness": (0.2, 20.0)})
-    assert found.values["stiffness"] == pytest.approx(PARAMETERS["stiffness"].read(truth), rel=0.02)
+    result = identified(trials, model, {"stiffness": (0.2, 20.0)})
+    assert result.values["stiffness"] == pytest.approx(PARAMETERS["stiffness"].read(truth), rel=0.02)
 
 
 def test_a_parameter_on_its_bound_is_named():
     model = small_model()
     trials = [tilt(model, 60), tilt(model, 90)]
     true = PARAMETERS["stiffness"].read(model)
-    found = identified(trials, model, {"stiffness": (1.5 * true, 3 * true)})
-    assert found.at_bound == ["stiffness"]
+    result = identified(trials, model, {"stiffness": (1.5 * true, 3 * true)})
+    assert result.at_bound == ["stiffness"]
 
 
 def test_control_parameters_move_the_loss_the_right_way():

@@ -35,20 +35,20 @@ def still():
 
 def ends(still, shifts, **changes):
     """Trials whose tips end aside by `shifts`, m."""
-    found = []
+    trials = []
     for number, shift in enumerate(shifts):
         positions = still.positions.copy()
         positions[:, -1, 0] += shift
-        found.append(replace(still, name=f"release_{number}", positions=positions, **changes))
-    return found
+        trials.append(replace(still, name=f"release_{number}", positions=positions, **changes))
+    return trials
 
 
 def test_the_scatter_of_three_ends_by_hand(still):
-    found = repeatability(ends(still, (0.0, 0.003, 0.006)), tip=3)["release"]
-    assert found["tip_mm"] == pytest.approx((3 + 0 + 3) / 3 * np.sqrt(3 / 2))
-    assert found["tip_worst_mm"] == pytest.approx(3 * np.sqrt(3 / 2))
-    assert found["mean_mm"] == pytest.approx(found["tip_mm"] / 4)
-    assert (found["trials"], found["groups"]) == (3, 1)
+    table = repeatability(ends(still, (0.0, 0.003, 0.006)), tip=3)["release"]
+    assert table["tip_mm"] == pytest.approx((3 + 0 + 3) / 3 * np.sqrt(3 / 2))
+    assert table["tip_worst_mm"] == pytest.approx(3 * np.sqrt(3 / 2))
+    assert table["mean_mm"] == pytest.approx(table["tip_mm"] / 4)
+    assert (table["trials"], table["groups"]) == (3, 1)
 
 
 def test_it_is_what_the_mean_of_many_would_be_off_however_few_there_are(still):
@@ -110,8 +110,8 @@ def test_a_trial_has_ended_that_was_still_for_long_enough(still, range_mm, long,
     positions = still.positions.copy()
     positions[-30, 2, 1] += range_mm / 1e3
     positions[: len(positions) // 2, 0, 0] += 0.1
-    found = end_shape(replace(still, positions=positions, start=still.time[-1] - long - 1e-9))
-    assert (found is not None) is ended
+    shape = end_shape(replace(still, positions=positions, start=still.time[-1] - long - 1e-9))
+    assert (shape is not None) is ended
 
 
 def test_an_arm_that_still_moves_has_not_ended(still):
@@ -133,7 +133,7 @@ def test_a_real_hose_comes_to_rest_elsewhere_each_time(tmp_path):
     (tmp_path / "session.yaml").write_text((ROOT / "examples/asl_trunk/session.yaml").read_text())
     limits, settings = settings_of("ingest", ROOT).limits, settings_of("filter", ROOT / "examples/asl_trunk")
     trials = [filter_take(take, settings)[0] for _, take, _ in take_in(tmp_path, read_session(tmp_path), limits)]
-    found = repeatability(trials, tip=2)["release"]
-    assert found["trials"] == 13
-    assert 4 < found["tip_mm"] < 11
-    assert found["mean_mm"] < found["tip_mm"] < found["tip_worst_mm"]
+    table = repeatability(trials, tip=2)["release"]
+    assert table["trials"] == 13
+    assert 4 < table["tip_mm"] < 11
+    assert table["mean_mm"] < table["tip_mm"] < table["tip_worst_mm"]

@@ -9,7 +9,7 @@ import pytest
 from tests.support.small_arm import LIMIT
 from trunkline.errors import InputError
 from trunkline.frames import gravity_in_base
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
@@ -88,14 +88,14 @@ def test_stiffness_and_damping_come_back_without_static_tilts(model, truth, expe
     bounds = {"stiffness": Bounds(0.3, 10.0), "damping": Bounds(0.005, 1.0)}
     rest = resting_shape(model, experiments, SEGMENTS)
     method = Method(
-        LeastSquares(5, 1, 6, 1e-2), Rough(1.0, 200, 2), Polish(8, 1e-6),
+        LeastSquares(5, 1, 6, 1e-2), CoarseSearch(1.0, 200, 2), Refinement(8, 1e-6),
         LeastSquares(0, 1, 1, 1e-2), 0.1, np.inf, seed=3,
     )
     fit = Fit(SEGMENTS, bounds, (), "positions", WEIGHTS, method, rest)
-    found = identify("test", model, experiments, fit)
-    assert found.values["stiffness"] == pytest.approx(1.7, rel=0.05)
-    assert found.values["damping"] == pytest.approx(0.15, rel=0.05)
-    identified = found.models["identified"]
+    result = identify("test", model, experiments, fit)
+    assert result.values["stiffness"] == pytest.approx(1.7, rel=0.05)
+    assert result.values["damping"] == pytest.approx(0.15, rel=0.05)
+    identified = result.models["identified"]
     data = mujoco.MjData(identified)
     data.qpos[:] = rest.pose
     mujoco.mj_forward(identified, data)

@@ -9,17 +9,18 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.matched_plant import release, segments_of, small_model, tilt
 from tests.support.noisy_trials import WEIGHTS, measured, with_values
-from trunkline.identification.fit.fit import Fit, Method, Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Fit, Method, Refinement
 from trunkline.identification.fit.identify import identify
 from trunkline.identification.fit.optimizers import LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.robust import robust_loss, trial_weights, usual_losses
 from trunkline.identification.simulate.experiment import prepare
-from trunkline.identification.uncertainty.trial_diagnostics import moving_start, suspicions
+from trunkline.identification.uncertainty.trial_diagnostics import moving_start, trial_diagnostics
 
 UNITS, FRAMES, LATE = 3, 40, 10
 METHOD = Method(
-    LeastSquares(3, 1, 5, 1e-2), Rough(1.0, FRAMES, 4), Polish(8, 1e-5), LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1
+    LeastSquares(3, 1, 5, 1e-2), CoarseSearch(1.0, FRAMES, 4), Refinement(8, 1e-5),
+    LeastSquares(0, 1, 1, 1.0), 0.1, np.inf, seed=1,
 )
 TRUE = {"release": {"damping": 0.07}, "static_tilt": {"stiffness": 2.0}}
 PLANT = small_model(UNITS)
@@ -37,8 +38,8 @@ def session(kind: str) -> list:
 
 def dated_early(trial):
     """As if the arm had been held for `LATE` frames more."""
-    held = np.repeat(trial.positions[:1], LATE, axis=0)
-    return replace(trial, positions=np.concatenate([held, trial.positions[:-LATE]]))
+    still = np.repeat(trial.positions[:1], LATE, axis=0)
+    return replace(trial, positions=np.concatenate([still, trial.positions[:-LATE]]))
 
 
 def exchanged(trial):
@@ -50,34 +51,34 @@ def turned(trial):
     return replace(trial, gravity=Rotation.from_rotvec([0, np.radians(30), 0]).apply(trial.gravity))
 
 
-def found(trials, outlying=4.0):
+def fitted(trials, outlying=4.0):
     """Values, the influence, and what is said of the trials."""
     kind = trials[0].experiment
     experiments = [prepare(trial, PLANT, FRAMES) for trial in trials]
     bounds = {name: Bounds(value / 10, value * 10) for name, value in TRUE[kind].items()}
     fit = Fit(segments_of(PLANT), bounds, (), "positions", replace(WEIGHTS, outlying=outlying), METHOD)
     result = identify("test", PLANT, experiments, fit)
-    told = result.influence.deciding()
+    reasons = result.influence.deciding()
     for trial, experiment in zip(trials, experiments, strict=True):
-        if trial.name in told:
-            told[trial.name] += suspicions(trial, experiment, experiments, result.models["identified"], fit)
-    return next(iter(result.values.values())), result, told
+        if trial.name in reasons:
+            reasons[trial.name] += trial_diagnostics(trial, experiment, experiments, result.models["identified"], fit)
+    return next(iter(result.values.values())), result, reasons
 
 
 CLEAN = {kind: session(kind) for kind in TRUE}
 
 
 @cache
-def found_clean(kind):
-    return found(CLEAN[kind])
+def fitted_clean(kind):
+    return fitted(CLEAN[kind])
 
 
 @pytest.mark.parametrize("kind", TRUE)
 def test_a_session_without_a_bad_trial_is_fitted_as_ever(kind):
-    value, result, told = found_clean(kind)
+    value, result, reasons = fitted_clean(kind)
     assert (result.influence.weights == 1).all()
-    assert not told
-    assert value == pytest.approx(found(CLEAN[kind], outlying=1e9)[0], rel=1e-6)
+    assert not reasons
+    assert value == pytest.approx(fitted(CLEAN[kind], outlying=1e9)[0], rel=1e-6)
     assert result.starts >= 2
     assert result.agreeing == result.starts
 
@@ -95,9 +96,9 @@ def test_one_spoilt_trial_is_named_and_decides_nothing(kind, spoil, says, which)
     trials = list(CLEAN[kind])
     trials[which] = spoil(trials[which])
     (true,) = TRUE[kind].values()
-    clean, (value, result, told), (plain, _, _) = found_clean(kind)[0], found(trials), found(trials, outlying=1e9)
-    assert set(told) == {trials[which].name}
-    assert any(says in sentence for sentence in told[trials[which].name]), told
+    clean, (value, result, reasons), (plain, _, _) = fitted_clean(kind)[0], fitted(trials), fitted(trials, outlying=1e9)
+    assert set(reasons) == {trials[which].name}
+    assert any(says in sentence for sentence in reasons[trials[which].name]), reasons
     assert np.argmin(result.influence.weights) == which
     assert abs(np.log(value / clean)) < 0.25 * abs(np.log(plain / clean)) + 0.01
     assert value == pytest.approx(true, rel=0.1)

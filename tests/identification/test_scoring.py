@@ -47,11 +47,11 @@ def scored(models):
 
 def test_how_well_the_arm_repeats_itself_is_of_all_trials_and_of_its_tip(scored):
     """Two of the three are to identify from: those that are tested alone would say nothing."""
-    found = scored[0]["repeatability_mm"]["static_tilt"]
-    assert (found["trials"], found["groups"]) == (3, 1)
-    assert found["tip_mm"] == pytest.approx((3 + 0 + 3) / 3 * WIDER)
-    assert found["tip_worst_mm"] == pytest.approx(3 * WIDER)
-    assert found["mean_mm"] == pytest.approx(found["tip_mm"] / 4)
+    table = scored[0]["repeatability_mm"]["static_tilt"]
+    assert (table["trials"], table["groups"]) == (3, 1)
+    assert table["tip_mm"] == pytest.approx((3 + 0 + 3) / 3 * WIDER)
+    assert table["tip_worst_mm"] == pytest.approx(3 * WIDER)
+    assert table["mean_mm"] == pytest.approx(table["tip_mm"] / 4)
 
 
 def test_errors_are_of_the_tested_trials_of_the_compared_kinds_alone(scored):
@@ -107,8 +107,8 @@ def test_the_start_fit_is_of_measured_segments_and_counts_what_did_not_converge(
         ("release", PoseFit(np.zeros(6), np.array([1e-3, np.nan, 3e-3]), 9, True)),
         ("curl", PoseFit(np.zeros(6), np.array([6e-3, 4e-3, 8e-3]), 300, False)),
     ]
-    found = start_fit([experiment(swing(), kind=kind, fit=fit) for kind, fit in fits])
-    assert found == {
+    table = start_fit([experiment(swing(), kind=kind, fit=fit) for kind, fit in fits])
+    assert table == {
         "mean_mm": pytest.approx((2 + 6) / 2),
         "max_mm": pytest.approx(8),
         "unconverged": 1,

@@ -39,12 +39,12 @@ def problem():
 )
 def test_an_optimizer_finds_the_plant(problem, optimizer, tolerance):
     reported = []
-    found = search(problem, optimizer, seed=2, report=reported.append)
-    np.testing.assert_allclose(np.exp(found.vector), list(TRUE.values()), rtol=tolerance)
-    assert found.loss == pytest.approx(float(problem.losses(found.vector[None])[0]), rel=1e-9)
-    assert min(reported) <= 1.5 * found.loss
+    result = search(problem, optimizer, seed=2, report=reported.append)
+    np.testing.assert_allclose(np.exp(result.vector), list(TRUE.values()), rtol=tolerance)
+    assert result.loss == pytest.approx(float(problem.losses(result.vector[None])[0]), rel=1e-9)
+    assert min(reported) <= 1.5 * result.loss
     again = search(problem, optimizer, seed=2, report=quiet)
-    np.testing.assert_array_equal(found.vector, again.vector)
+    np.testing.assert_array_equal(result.vector, again.vector)
 
 
 def test_least_squares_takes_the_best_of_its_starts(problem):
@@ -59,36 +59,36 @@ def test_least_squares_takes_the_best_of_its_starts(problem):
 
 
 def test_the_linearisation_where_a_descent_ends_is_that_of_central_differences(problem):
-    found = descend(problem, problem.start() + [0.3, -0.2], 10, 1e-9, quiet)
-    assert found.converged
+    result = descend(problem, problem.start() + [0.3, -0.2], 10, 1e-9, quiet)
+    assert result.converged
     assert not descend(problem, problem.start() + [0.3, -0.2], 1, 1e-9, quiet).converged
-    linear = linearise(problem, found.vector)
+    linear = linearise(problem, result.vector)
     step = 3e-4
     for column in range(2):
         either = np.zeros(2)
         either[column] = step
-        ahead, behind = (problem.residuals((found.vector + sign * either)[None]) for sign in (1, -1))
+        ahead, behind = (problem.residuals((result.vector + sign * either)[None]) for sign in (1, -1))
         for jacobian, a, b in zip(linear.jacobians, ahead, behind, strict=True):
             central = (a[0] - b[0]) / (2 * step)
             np.testing.assert_allclose(jacobian[:, column], central, atol=0.01 * np.abs(central).max())
     at_end = 0.5 * sum(float(r @ r) for r in linear.residuals)
-    assert at_end == pytest.approx(found.loss, rel=1e-9)
+    assert at_end == pytest.approx(result.loss, rel=1e-9)
     gradient = sum(j.T @ r for j, r in zip(linear.jacobians, linear.residuals, strict=True))
-    away = linearise(problem, found.vector + 0.1)
+    away = linearise(problem, result.vector + 0.1)
     steep = sum(j.T @ r for j, r in zip(away.jacobians, away.residuals, strict=True))
     assert np.abs(gradient).max() < 0.02 * np.abs(steep).max()
 
 
 def test_differences_stay_within_the_bounds(problem):
     low, high = problem.bounds()
-    seen = []
+    vectors_tried = []
     watched = Problem(
         *(getattr(problem, name) for name in ("model", "experiments", "segments", "parameters", "loss", "weights"))
     )
     residuals = watched.residuals
-    watched.residuals = lambda vectors, near=None: seen.append(vectors) or residuals(vectors)
+    watched.residuals = lambda vectors, near=None: vectors_tried.append(vectors) or residuals(vectors)
     edge = linearise(watched, high)
-    assert (np.concatenate(seen) <= high).all()
+    assert (np.concatenate(vectors_tried) <= high).all()
     inside = linearise(watched, high - 2e-3)
     for a, b in zip(edge.jacobians, inside.jacobians, strict=True):
         np.testing.assert_allclose(a, b, atol=0.05 * np.abs(b).max())
@@ -156,8 +156,8 @@ def test_starts_on_a_plateau_leave_it_before_they_are_compared():
     stuck = descend(problem, problem.start(), 25, 1e-4, quiet)
     assert stuck.loss > 0.1
     assert np.exp(stuck.vector[1]) == pytest.approx(10.0)  # nothing leads from there to the cap
-    found = search(problem, LeastSquares(7, 3, 25, 1e-4), seed=3, report=quiet)
-    np.testing.assert_allclose(np.exp(found.vector), [2.0, 1.0], rtol=1e-3)
-    assert found.agreeing == found.starts == 3
-    others = np.array([problem.losses(other[None])[0] for other in found.others])
-    assert (others > 2 * found.loss).any()  # some start had to leave one
+    result = search(problem, LeastSquares(7, 3, 25, 1e-4), seed=3, report=quiet)
+    np.testing.assert_allclose(np.exp(result.vector), [2.0, 1.0], rtol=1e-3)
+    assert result.agreeing == result.starts == 3
+    others = np.array([problem.losses(other[None])[0] for other in result.others])
+    assert (others > 2 * result.loss).any()  # some start had to leave one

@@ -51,8 +51,8 @@ def test_pose_fit_leaves_out_what_was_not_seen():
     positions, _ = seen_at(model, qpos, segments)
     positions[2] = np.nan
     fit = fit_pose(model, segments, positions)
-    seen = np.isfinite(positions[:, 0])
-    assert fit.residuals[seen].max() < 1e-3
+    measured = np.isfinite(positions[:, 0])
+    assert fit.residuals[measured].max() < 1e-3
 
 
 @pytest.mark.parametrize("in_motion", [True, False])
@@ -85,8 +85,8 @@ def test_a_start_between_two_frames_is_where_it_was():
     model = small_model()
     trial = release(model, 0.25, frames=60)
     fine = release(model, 0.25, frames=60, substep=0.4)  # its frames are 0.4 of a frame after those of `trial`
-    held = trial.positions[:1].repeat(6, axis=0)
-    fine.positions = np.concatenate([held, fine.positions])
+    still = trial.positions[:1].repeat(6, axis=0)
+    fine.positions = np.concatenate([still, fine.positions])
     fine.quaternions = np.concatenate([trial.quaternions[:1].repeat(6, axis=0), fine.quaternions])
     fine.measured = np.ones(fine.positions.shape[:2], bool)
     fine.commands = fine.commands[:1].repeat(66, axis=0)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.support.matched_plant import begin_project, curl, release, tilt
 from trunkline.errors import InputError
-from trunkline.identification.fit.fit import Polish, Rough
+from trunkline.identification.fit.fit import CoarseSearch, Refinement
 from trunkline.identification.fit.optimizers import DifferentialEvolution, LeastSquares
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
@@ -31,8 +31,8 @@ def settings(experiments, reported, parameters, per_joint=(), iterations=8, **ch
         "experiments": experiments, "reported": reported, "loss": LOSS,
         "parameters": {name: Bounds(low=low, high=high) for name, (low, high) in parameters.items()},
         "optimizer": LeastSquares(starts=4, descents=1, iterations=4, tolerance=1e-3),
-        "rough": Rough(step_factor=1.0, frames=437, trials=99),
-        "polish": Polish(iterations=iterations, tolerance=1e-8),
+        "rough": CoarseSearch(step_factor=1.0, frames=437, trials=99),
+        "polish": Refinement(iterations=iterations, tolerance=1e-8),
         "per_joint": list(per_joint), "per_joint_range": 0.1, "per_joint_deviation": 1.0,
         "fine": LeastSquares(starts=0, descents=1, iterations=3, tolerance=1e-2),
         "cross_validation_folds": 0,
@@ -106,9 +106,9 @@ def test_control_stage_finds_the_actuators_and_scores_the_cad_model(project):
     halved = metrics["halved_step"]
     assert 0 < halved["max_mm"] < 1.0
     assert halved["validate"] * metrics["identified"]["validate"]["e_internal_mm"] < 0.02  # a share of next to nothing
-    found = json.loads((root / "artifacts/identify_control/parameters.json").read_text())["parameters"]
+    rows = json.loads((root / "artifacts/identify_control/parameters.json").read_text())["parameters"]
     for name, tolerance in (("kp", 0.05), ("kv", 0.10), ("time_constant", 0.10), ("force_range", 0.10)):
-        assert found[name]["value"] == pytest.approx(PARAMETERS[name].read(truth), rel=tolerance), name
+        assert rows[name]["value"] == pytest.approx(PARAMETERS[name].read(truth), rel=tolerance), name
     assert (root / "artifacts/identify_control/errors.png").stat().st_size > 10_000
 
 
@@ -131,7 +131,7 @@ def test_a_missing_split_is_named(project):
 )
 def test_what_to_set_without_an_experiment_is_said(project, experiments, way_out):
     _, model, write = project
-    write([one for split in DECIDING for one in (tilt(model, 30, split), curl(model, 40, split, frames=30))])
+    write([made for split in DECIDING for made in (tilt(model, 30, split), curl(model, 40, split, frames=30))])
     with pytest.raises(InputError, match=way_out.replace("[", r"\[").replace("]", r"\]")):
         read_reported(settings(experiments, experiments, {"stiffness": (0.3, 12.0)}))
 

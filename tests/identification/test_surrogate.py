@@ -101,11 +101,11 @@ def test_of_first_order_its_minima_are_those_of_weighted_least_squares():
     rows = np.concatenate([residuals[..., None], jacobians], axis=2)  # r + J d = rows @ (1, d)
     first = Surrogate(rows.transpose(0, 2, 1) @ rows, second=False)
     weights = rng.uniform(0.2, 1.0, (3, 6))
-    for weight, found in zip(weights, first.minima(weights), strict=True):
+    for weight, place_of_one in zip(weights, first.minima(weights), strict=True):
         root = np.sqrt(weight)[:, None]
         stacked = (root[..., None] * jacobians).reshape(-1, 15), -(root * residuals).ravel()
-        np.testing.assert_allclose(found, np.linalg.lstsq(*stacked)[0], atol=1e-8)
+        np.testing.assert_allclose(place_of_one, np.linalg.lstsq(*stacked)[0], atol=1e-8)
     place = rng.normal(size=15)
-    seen = first.moved(place, np.ones(6))
-    np.testing.assert_allclose(seen.losses(np.zeros((1, 15))), first.losses(place[None]))
-    np.testing.assert_allclose(seen.losses(np.ones((1, 15))), first.losses(1 + place[None]))
+    recentred = first.moved(place, np.ones(6))
+    np.testing.assert_allclose(recentred.losses(np.zeros((1, 15))), first.losses(place[None]))
+    np.testing.assert_allclose(recentred.losses(np.ones((1, 15))), first.losses(1 + place[None]))

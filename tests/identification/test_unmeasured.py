@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.support.swings import FRAMES, LIKE, SEGMENTS, TIP, experiment, swing, trial
+from trunkline.identification.evaluation.baselines import hanging_still
 from trunkline.identification.evaluation.error_tables import segment_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, errors_of, scores
-from trunkline.identification.evaluation.null_model import hanging_still
 from trunkline.identification.evaluation.repeatability import end_shape
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.results.scoring import fingerprint
@@ -58,26 +58,26 @@ def of_path(positions, measured):
 
 
 def table(make):
-    def found(positions, measured):
+    def compute(positions, measured):
         prediction = Prediction(replace(LIKE, positions=[SIMULATED]), [experiment(positions, measured)])
         return make({"model": prediction}).select_dtypes("number").to_numpy()
 
-    return found
+    return compute
 
 
 def last_shape(kind: str):
-    def found(positions, measured):
+    def compute(positions, measured):
         ended = [experiment(positions, measured, kind)]
         return hanging_still(ended, LIKE, ended).positions[0][0]
 
-    return found
+    return compute
 
 
 def sentence(judge):
-    def found(positions, measured):
+    def compute(positions, measured):
         return judge(SIMULATED, experiment(positions, measured), FIT)
 
-    return found
+    return compute
 
 
 def exchanged(positions, measured):
@@ -93,19 +93,19 @@ def late(positions, measured):
 
 # by what they give, from positions (T, S, 3) and where they were measured (T, S)
 COMPARED = {
-    "E_internal": lambda p, seen: internal_error(SIMULATED, p, seen),
-    "the position error": lambda p, seen: position_error(SIMULATED, p, seen),
-    "the velocity error": lambda p, seen: velocity_error(SIMULATED, p, seen, 100.0),
-    "the loss of distances": lambda p, seen: loss_of(RESIDUALS["distances"](SIMULATED[None], p, seen, WEIGHTS)),
-    "the loss of positions": lambda p, seen: loss_of(RESIDUALS["positions"](SIMULATED[None], p, seen, WEIGHTS)),
+    "E_internal": lambda p, mask: internal_error(SIMULATED, p, mask),
+    "the position error": lambda p, mask: position_error(SIMULATED, p, mask),
+    "the velocity error": lambda p, mask: velocity_error(SIMULATED, p, mask, 100.0),
+    "the loss of distances": lambda p, mask: loss_of(RESIDUALS["distances"](SIMULATED[None], p, mask, WEIGHTS)),
+    "the loss of positions": lambda p, mask: loss_of(RESIDUALS["positions"](SIMULATED[None], p, mask, WEIGHTS)),
     "the errors of a swing": of_trial,
     "the errors of a path": of_path,
     "the table of trials": table(trial_table),
     "the table along the arm": table(lambda predictions: segment_table(predictions, SEGMENTS)),
     "the null model of a swing": last_shape("release"),
     "the null model of a path": last_shape("static_path"),
-    "where a trial ends": lambda p, seen: np.array(end_shape(trial(p, seen)), dtype=float),
-    "what tells a trial from another": lambda p, seen: fingerprint(trial(p, seen)),
+    "where a trial ends": lambda p, mask: np.array(end_shape(trial(p, mask)), dtype=float),
+    "what tells a trial from another": lambda p, mask: fingerprint(trial(p, mask)),
     "whether it starts otherwise": sentence(started_off),
     "whether labels are exchanged": sentence(exchanged_labels),
     "that it starts otherwise": late,
@@ -130,9 +130,9 @@ def test_what_nobody_measured_counts_nowhere(compared, measured, filler):
 
 
 MEASURES = {
-    "E_internal": lambda s, p, seen: internal_error(s, p, seen),
-    "position": lambda s, p, seen: position_error(s, p, seen),
-    "velocity": lambda s, p, seen: velocity_error(s, p, seen, 1.0),
+    "E_internal": lambda s, p, mask: internal_error(s, p, mask),
+    "position": lambda s, p, mask: position_error(s, p, mask),
+    "velocity": lambda s, p, mask: velocity_error(s, p, mask, 1.0),
 }
 
 

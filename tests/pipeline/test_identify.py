@@ -11,7 +11,7 @@ import pytest
 
 from stages import report as report_stage
 from stages import score as score_stage
-from tests.identification.test_sessions import MOUNTS, mounted
+from tests.identification.test_per_session import MOUNTS, mounted
 from tests.identification.test_stage import metrics_of, settings, truth_of
 from tests.report.certificate.sample import ASKED, INGESTED
 from tests.support.matched_plant import begin_project, curl, release, static_pull, tilt

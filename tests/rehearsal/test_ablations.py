@@ -34,18 +34,19 @@ MODELS = ("statics", "cad")  # that need a package, and a drawing of the arm
 @pytest.fixture(scope="module")
 def bench() -> Bench:
     robot = PandaRobot("panda", 0.05, 0.8, 0.0, list(READY))
-    known = RobotModel(stump_spec(), Posterior(("kp",), np.ones(1), np.eye(1), Contact(FRICTION, PLACE, 0.1)), robot)
-    return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free(), known=known)  # type: ignore[arg-type]
+    posterior = Posterior(("kp",), np.ones(1), np.eye(1), Contact(FRICTION, PLACE, 0.1))
+    world_model = RobotModel(stump_spec(), posterior, robot)
+    return Bench(None, config(), stranger(), stand_in(), settings.person(), settings.free(), world_model=world_model)  # type: ignore[arg-type]
 
 
-def changed(found: Bench, bench: Bench) -> list[str]:
-    return [field.name for field in fields(Bench) if getattr(found, field.name) is not getattr(bench, field.name)
-            and getattr(found, field.name) != getattr(bench, field.name)]  # fmt: skip
+def changed(variant: Bench, bench: Bench) -> list[str]:
+    return [field.name for field in fields(Bench) if getattr(variant, field.name) is not getattr(bench, field.name)
+            and getattr(variant, field.name) != getattr(bench, field.name)]  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("experiment", "name"),
-    [(one, name) for one in ("reach", "follow") for name in VARIANTS[one] if name not in MODELS],
+    [(which, name) for which in ("reach", "follow") for name in VARIANTS[which] if name not in MODELS],
 )
 def test_a_variant_changes_one_thing(bench, experiment, name):
     same = name == f"delay_{config().core.follow_delay:g}s"
@@ -55,8 +56,8 @@ def test_a_variant_changes_one_thing(bench, experiment, name):
 @pytest.mark.parametrize("name", [name for name in VARIANTS["grasp"] if name not in (*MODELS, "single")])
 def test_a_variant_of_a_grasp_changes_one_thing_more_than_what_it_compares_with(bench, name):
     beside = bench if name in ("no_preview", "slippery") else varied(bench, "grasp", "single")
-    found = varied(bench, "grasp", name)
-    assert len(changed(found, beside)) == 1
+    ablated = varied(bench, "grasp", name)
+    assert len(changed(ablated, beside)) == 1
 
 
 @pytest.mark.parametrize(("experiment", "name"), [("reach", "delay_1s"), ("follow", "no_preview")])
@@ -66,11 +67,11 @@ def test_a_variant_of_another_experiment_is_refused_with_those_there_are(bench, 
 
 
 def test_a_single_preview_is_of_what_is_believed(bench):
-    found = varied(bench, "grasp", "single")
-    one = sample(found.known.posterior, found.known.arm.compile(), found.previewing.futures, 0)
-    assert (len(one), one.values) == (1, {})
-    assert (one.friction[0], *one.offsets[0], one.turns[0]) == (1.0, 0.0, 0.0, 0.0, 0.0)
-    assert np.ptp(sample(bench.known.posterior, bench.known.arm.compile(), 8, 0).friction) > 0
+    ablated = varied(bench, "grasp", "single")
+    draws = sample(ablated.world_model.posterior, ablated.world_model.arm.compile(), ablated.previewing.futures, 0)
+    assert (len(draws), draws.values) == (1, {})
+    assert (draws.friction[0], *draws.offsets[0], draws.turns[0]) == (1.0, 0.0, 0.0, 0.0, 0.0)
+    assert np.ptp(sample(bench.world_model.posterior, bench.world_model.arm.compile(), 8, 0).friction) > 0
 
 
 def test_without_a_preview_no_grasp_is_foreseen(bench):
@@ -82,24 +83,24 @@ def test_the_drawings_arm_takes_the_identified_ones_place(bench, tmp_path):
     other.compile()
     other.to_file(str(drawing))
     package = Package("", None, None, None, None, None, np.zeros(3), 0.0, {})  # type: ignore[arg-type]
-    found = _cad_grasp(replace(bench, package=package), drawing)
-    assert found.known.arm.compile().nv == found.package.model.nv == found.package.chain.units * 2 == 10
-    assert found.package.geometry.units == 5
-    assert found.known.robot == bench.known.robot
-    assert found.known.posterior == SURE
+    ablated = _cad_grasp(replace(bench, package=package), drawing)
+    assert ablated.world_model.arm.compile().nv == ablated.package.model.nv == ablated.package.chain.units * 2 == 10
+    assert ablated.package.geometry.units == 5
+    assert ablated.world_model.robot == bench.world_model.robot
+    assert ablated.world_model.posterior == SURE
 
 
 def test_a_slippery_robot_is_so_by_what_is_believed(bench):
-    found = varied(bench, "grasp", "slippery")
-    assert found.stand_in.touch.arm_object == pytest.approx(0.7 * TPU_ON[bench.previewing.material])
-    assert found.stand_in.touch.arm_world == bench.stand_in.touch.arm_world
+    ablated = varied(bench, "grasp", "slippery")
+    assert ablated.stand_in.touch.arm_object == pytest.approx(0.7 * TPU_ON[bench.previewing.material])
+    assert ablated.stand_in.touch.arm_world == bench.stand_in.touch.arm_world
 
 
 def test_without_bending_planes_the_wrist_does_not_turn_for_the_tip(bench):
     wrist, mount, tip = wrist_of(READY, 0.05), (0.5, 0.0, 0.5), (0.5, 0.1, 0.1)
     plain, without = (
-        align(tip, mount, DOWN, wrist, Aligned(0.0, 0, 0.0), one.config.core.bending_plane)
-        for one in (bench, varied(bench, "follow", "no_plane"))
+        align(tip, mount, DOWN, wrist, Aligned(0.0, 0, 0.0), flown.config.core.bending_plane)
+        for flown in (bench, varied(bench, "follow", "no_plane"))
     )
     assert abs(plain.heading) > 0.5
     assert without == Aligned(0.0, 0, 0.0)

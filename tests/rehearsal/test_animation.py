@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from rehearsal.animation import _circle, _outlines, _seen, telling, write_gif
+from rehearsal.animation import _circle, _outlines, _projected, telling, write_gif
 from rehearsal.film import Shot, filmed
 from rehearsal.robot.scene import Object
 
@@ -35,9 +35,9 @@ def test_the_telling_moment_is_the_end_of_an_execution_or_the_midst_of_following
 @pytest.mark.parametrize(("shape", "lines"), [("sphere", 3), ("cylinder", 6), ("box", 6), ("toy", 6)])
 def test_outlines_are_as_large_as_the_object(shape, lines):
     thing = Object(shape, 0.06, 0.2, 0.1, [0.0, 0.0, 0.0])
-    found = _outlines(shot(thing=thing))
-    assert len(found) == lines
-    points = np.concatenate(found) - shot().thing
+    outlines = _outlines(shot(thing=thing))
+    assert len(outlines) == lines
+    points = np.concatenate(outlines) - shot().thing
     half = [0.03, 0.03, 0.03 if shape == "sphere" else 0.1]
     np.testing.assert_allclose(points.max(axis=0), half, atol=1e-9)
     np.testing.assert_allclose(points.min(axis=0), np.negative(half), atol=1e-9)
@@ -51,10 +51,10 @@ def test_a_basket_is_drawn_from_its_floor_to_its_bar():
 
 
 def test_what_is_higher_is_drawn_higher_and_lengths_in_the_picture_s_plane_are_kept():
-    low, high = _seen(np.array([[0.3, 0.2, 0.0], [0.3, 0.2, 0.5]]))
+    low, high = _projected(np.array([[0.3, 0.2, 0.0], [0.3, 0.2, 0.5]]))
     assert low[0] == pytest.approx(high[0])
     assert high[1] > low[1] + 0.4
-    corners = _seen(np.eye(3))
+    corners = _projected(np.eye(3))
     assert np.linalg.norm(corners) ** 2 == pytest.approx(2.0), "two of three directions"
     ring = _circle(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.1)
     np.testing.assert_allclose(np.linalg.norm(ring, axis=1), 0.1)

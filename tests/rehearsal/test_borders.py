@@ -8,7 +8,7 @@ from rehearsal.experiments.grasp import failure
 from rehearsal.experiments.handle import why_not
 from rehearsal.experiments.stated import scores
 from rehearsal.operator.scripts import Ending
-from tests.rehearsal.seen import frame
+from tests.rehearsal.frames import frame
 from tests.rehearsal.test_follow import BEGUN, LONGEST, NEVER, SECONDS, path, views
 from tests.rehearsal.test_held import DONE, HOLD, MASS, SCENE, STAYED, S, borne, handed
 from tests.rehearsal.test_stated import NAN, reach
@@ -38,13 +38,13 @@ def test_at_rest_on_the_table_is_half_the_weight_and_3_cm_in_a_second(share, spe
     (BEGUN, ""), (BEGUN + SECONDS, ""), (BEGUN - 0.25, NEVER), (BEGUN + SECONDS + 0.25, NEVER),
 ])  # fmt: skip
 def test_a_path_that_anybody_saw_was_begun(now, cause):
-    seen = [view for view in views() if view.now == now]
-    assert len(seen) == 1
-    assert not_followed(Ending(True), seen, [], path(), LONGEST) == cause
+    shown = [view for view in views() if view.now == now]
+    assert len(shown) == 1
+    assert not_followed(Ending(True), shown, [], path(), LONGEST) == cause
 
 
 def test_radii_are_of_the_runs_for_which_one_was_stated():
-    told = scores([reach(2.0, 1.0), reach(NAN, 0.0), reach(4.0, 5.0)])
-    assert told["radius_mm"] == {"median": 3.0, "p95": pytest.approx(3.9)}
-    assert told["coverage"]["at_end"]["inside"] == 1
-    assert told["tip_error_radii"]["at_end"]["median"] == np.median([0.5, 1.25])
+    metrics = scores([reach(2.0, 1.0), reach(NAN, 0.0), reach(4.0, 5.0)])
+    assert metrics["radius_mm"] == {"median": 3.0, "p95": pytest.approx(3.9)}
+    assert metrics["coverage"]["at_end"]["inside"] == 1
+    assert metrics["tip_error_radii"]["at_end"]["median"] == np.median([0.5, 1.25])

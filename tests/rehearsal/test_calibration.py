@@ -26,18 +26,18 @@ def test_true_probabilities_lie_on_the_diagonal_and_beat_the_base_rate():
     rng = np.random.default_rng(0)
     probability = rng.uniform(size=20_000)
     outcome = (rng.uniform(size=20_000) < probability).astype(float)
-    for one in reliability(probability, outcome):
-        assert one.share == pytest.approx(one.stated, abs=0.02)
-        assert one.interval[0] < one.share < one.interval[1]
+    for row in reliability(probability, outcome):
+        assert row.share == pytest.approx(row.stated, abs=0.02)
+        assert row.interval[0] < row.share < row.interval[1]
     assert brier(probability, outcome) < base_brier(outcome)
     assert brier(1 - probability, outcome) > base_brier(outcome)
 
 
 def test_runs_without_a_preview_do_not_count():
-    found = [*runs(0.9, 9, 1), Result("grasp", 99, False)]
-    probability, outcome = stated(found)
+    results = [*runs(0.9, 9, 1), Result("grasp", 99, False)]
+    probability, outcome = stated(results)
     assert len(outcome) == 10
-    assert [one.runs for one in reliability(probability, outcome)] == [10]
+    assert [row.runs for row in reliability(probability, outcome)] == [10]
 
 
 def test_the_picture_is_drawn(tmp_path):

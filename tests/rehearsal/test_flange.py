@@ -34,13 +34,13 @@ def test_the_base_moves_as_the_mount_s_pose_does():
 
 def test_a_joint_follows_a_sine_of_its_bandwidth_by_1_over_root_2():
     servos, h = servos_of(PANDA), 1 / 6000
-    joints, size, found = np.array([READY, np.zeros(7), np.zeros(7)]), 1e-3, []
+    joints, size, angles = np.array([READY, np.zeros(7), np.zeros(7)]), 1e-3, []
     for n in range(6000):
         target = READY + size * np.sin(2 * np.pi * PANDA.bandwidth * n * h)
         accelerate_joints(servos, joints, target, h)
         move_joints(joints, h)
-        found.append(joints[0, 0] - READY[0])
-    assert np.max(found[3000:]) / size == pytest.approx(np.sqrt(0.5), rel=0.01)
+        angles.append(joints[0, 0] - READY[0])
+    assert np.max(angles[3000:]) / size == pytest.approx(np.sqrt(0.5), rel=0.01)
 
 
 def test_joints_keep_their_limits_whatever_is_commanded():

@@ -8,7 +8,7 @@ import pytest
 from rehearsal.experiments.follow import Path, failure, interruption, tell
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
-from tests.rehearsal.seen import frame
+from tests.rehearsal.frames import frame
 from trunkline.ar.teleop.core import STAYS
 
 LONGEST, STEP = 1.0, 0.25  # s
@@ -17,9 +17,9 @@ BEYOND = f"rigid target outside; {STAYS}"
 
 
 def path() -> Path:
-    found = Path(np.array([0.5, 0.0, 0.1]), 0.06, 0.12, SECONDS, np.random.default_rng(0))
-    found.begin(BEGUN)
-    return found
+    made = Path(np.array([0.5, 0.0, 0.1]), 0.06, 0.12, SECONDS, np.random.default_rng(0))
+    made.begin(BEGUN)
+    return made
 
 
 def views(notices: dict[float, str] | None = None, until: float = BEGUN + SECONDS + 2) -> list:
@@ -75,7 +75,7 @@ STOPPED = Ending(False, "stopped: the robot is in fault")
 NEVER = "stopped: the path was never begun"
 
 
-@pytest.mark.parametrize(("ending", "seen", "refusals", "cause"), [
+@pytest.mark.parametrize(("ending", "shown", "refusals", "cause"), [
     (Ending(True), views(), [], ""),
     (Ending(True), views(), refused(5.0, 9.0), "interrupted: collision: arm"),
     (STOPPED, views(), [], "stopped: the robot is in fault"),
@@ -85,8 +85,8 @@ NEVER = "stopped: the path was never begun"
     (Ending(True), views(until=BEGUN - STEP), [], NEVER),
     (Ending(True), views(until=BEGUN), [], ""),
 ])  # fmt: skip
-def test_a_path_is_followed_where_the_script_ended_well_and_nothing_interrupted(ending, seen, refusals, cause):
-    assert failure(ending, seen, refusals, path(), LONGEST) == cause
+def test_a_path_is_followed_where_the_script_ended_well_and_nothing_interrupted(ending, shown, refusals, cause):
+    assert failure(ending, shown, refusals, path(), LONGEST) == cause
 
 
 def test_a_path_that_was_never_begun_was_not_followed():
@@ -94,7 +94,7 @@ def test_a_path_that_was_never_begun_was_not_followed():
     assert failure(Ending(True), views(), [], never, LONGEST) == NEVER
 
 
-def told(delay: float, lag: float, off=(0.0, 0.0, 0.0), **more) -> Result:
+def result_of(delay: float, lag: float, off=(0.0, 0.0, 0.0), **more) -> Result:
     """Of a tip that is `off` from where the object was `lag` s before, in frames of all times."""
     way, result = path(), Result("follow", 0, True)
     frames = [frame(now, "follow", tip=way(now - lag) + off) for now in np.arange(0.0, 20.0, 1 / 60)]
@@ -104,7 +104,7 @@ def told(delay: float, lag: float, off=(0.0, 0.0, 0.0), **more) -> Result:
 
 @pytest.mark.parametrize("delay", [0.2, 0.5, 1.0])
 def test_the_tip_is_compared_with_where_the_object_was_the_delay_before(delay):
-    exact, early, late = (told(delay, lag) for lag in (delay, 0.0, 2 * delay))
+    exact, early, late = (result_of(delay, lag) for lag in (delay, 0.0, 2 * delay))
     assert max(exact.tip_mm, exact.worst_mm, exact.nearest_mm) < 1e-9
     for other in (early, late):
         assert other.tip_mm > 1.0
@@ -116,12 +116,12 @@ def test_distances_are_the_median_the_95th_percentile_and_the_least_in_mm():
     times = np.linspace(BEGUN + 0.5, BEGUN + 0.5 + SECONDS, 101)
     along = [frame(now, "follow", tip=way(now - 0.5) + [0.0, 0.0, off]) for now, off in zip(times, offs, strict=True)]
     beyond = [frame(now, "follow", tip=np.full(3, 9.0)) for now in (times[0] - 0.01, times[-1] + 0.01)]
-    result = told(0.5, 0.5, frames=[beyond[0], *along, beyond[1]])
+    result = result_of(0.5, 0.5, frames=[beyond[0], *along, beyond[1]])
     np.testing.assert_allclose((result.tip_mm, result.worst_mm, result.nearest_mm), (50, 95, 0), atol=1e-6)
 
 
 def test_nothing_is_told_of_a_path_that_was_never_begun():
-    result = told(0.5, 0.5, frames=[frame(0.0, "aim")])
+    result = result_of(0.5, 0.5, frames=[frame(0.0, "aim")])
     assert np.isnan([result.tip_mm, result.worst_mm, result.nearest_mm, result.robot_mm]).all()
 
 
@@ -131,12 +131,12 @@ def wish(now: float, off: float | None) -> SimpleNamespace:
     return SimpleNamespace(now=now, tip=np.array([off or 0.0, 0.0, 0.0]), intent=SimpleNamespace(follow=wanted))
 
 
-@pytest.mark.parametrize(("seen", "expected"), [
+@pytest.mark.parametrize(("shown", "expected"), [
     ([wish(5.0, 0.01), wish(6.0, 0.02), wish(7.0, 0.09)], 20.0),
     ([wish(4.25, 9.0), wish(4.5, 0.01)], 10.0),  # from the delay after the beginning on
     ([wish(5.0, None), wish(6.0, 0.02)], 20.0),
     ([wish(5.0, None)], np.nan),
     ([], np.nan),
 ])  # fmt: skip
-def test_what_the_robot_leaves_is_its_distance_from_what_the_rays_wanted(seen, expected):
-    np.testing.assert_allclose(told(0.5, 0.5, seen=seen).robot_mm, expected)
+def test_what_the_robot_leaves_is_its_distance_from_what_the_rays_wanted(shown, expected):
+    np.testing.assert_allclose(result_of(0.5, 0.5, views=shown).robot_mm, expected)

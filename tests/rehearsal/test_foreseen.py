@@ -11,9 +11,9 @@ def test_a_reach_is_foreseen_as_on_a_page():
     page, asked = made(), order(7)
     plan = page.planner.plan(asked.request, asked.world, asked.joints, asked.commands)
     foreseen = page.foresight.reach(plan, asked.world, asked.request.serial)
-    (heard,) = [answer.foreseen for answer in page.answers(asked) if isinstance(answer, Told)]
-    assert told(plan.digest(), foreseen) == heard
+    (reply,) = [answer.foreseen for answer in page.answers(asked) if isinstance(answer, Told)]
+    assert told(plan.digest(), foreseen) == reply
     stated = foreseen.preview.stated
-    assert stated.radii[-1] == heard.spread[-1]
-    np.testing.assert_array_equal(stated.tips[-1], heard.tip[-1])
+    assert stated.radii[-1] == reply.spread[-1]
+    np.testing.assert_array_equal(stated.tips[-1], reply.tip[-1])
     assert stated.times[-1] > plan.duration

@@ -22,10 +22,10 @@ def hand(seed: int = 0, **changes) -> RayHand:
     return RayHand(ORIGIN, REFERENCE, person, 0.15, np.random.default_rng(seed))
 
 
-def end(one: RayHand, now: float, length: float) -> np.ndarray:
+def end(hand: RayHand, now: float, length: float) -> np.ndarray:
     """Of a ray of this length, base frame, m."""
-    found = one.controller(now, None)
-    place = add(found.position, scale(rotate(found.quaternion, (0.0, 0.0, -1.0)), length))
+    state = hand.controller(now, None)
+    place = add(state.position, scale(rotate(state.quaternion, (0.0, 0.0, -1.0)), length))
     return np.array(add(REFERENCE.position, rotate(REFERENCE.quaternion, place)))
 
 
@@ -35,17 +35,17 @@ def distance() -> float:
 
 
 def test_a_hand_without_faults_points_where_it_aims():
-    one = hand(tremor_g=0.0, disparity_deg=0.0)
-    one.aim(PLACE, 0.0, 0.0)
-    np.testing.assert_allclose(end(one, 1.0, distance()), PLACE, atol=1e-9)
+    aiming = hand(tremor_g=0.0, disparity_deg=0.0)
+    aiming.aim(PLACE, 0.0, 0.0)
+    np.testing.assert_allclose(end(aiming, 1.0, distance()), PLACE, atol=1e-9)
 
 
 def test_tremor_accelerates_a_hand_by_its_share_of_gravity():
-    one = hand(disparity_deg=0.0)
-    one.aim(PLACE, 0.0, 0.0)
+    aiming = hand(disparity_deg=0.0)
+    aiming.aim(PLACE, 0.0, 0.0)
     times = np.arange(2.0, 12.0, 1e-3)
-    ends = np.array([end(one, float(now), distance()) for now in times])
-    person = one.person
+    ends = np.array([end(aiming, float(now), distance()) for now in times])
+    person = aiming.person
     # Of the ray's end the acceleration is larger than of the hand, as the one's distance from the wrist over the other.
     acceleration = np.gradient(np.gradient(ends, times, axis=0), times, axis=0)[5:-5]
     away = (PLACE - ends.mean(axis=0)) / distance()
@@ -58,44 +58,44 @@ def test_tremor_accelerates_a_hand_by_its_share_of_gravity():
 
 
 def test_four_of_a_hundred_aims_miss_the_width_of_what_is_aimed_at():
-    one, width, missed = hand(tremor_g=0.0), 0.06, []
+    aiming, width, missed = hand(tremor_g=0.0), 0.06, []
     for _ in range(4000):
-        one.aim(PLACE, width, 0.0)
-        missed.append(one.error[0])
+        aiming.aim(PLACE, width, 0.0)
+        missed.append(aiming.error[0])
     assert np.mean(np.abs(missed) > width / 2) == pytest.approx(0.0388, abs=0.01)
 
 
 def test_an_aim_begins_where_the_hand_is():
-    one = hand(tremor_g=0.0)
-    one.aim(PLACE, 0.06, 0.0)
-    before = end(one, 2.0, distance())
-    one.aim(PLACE + [0.0, 0.1, 0.0], 0.06, 2.0)
-    np.testing.assert_allclose(end(one, 2.0, distance()), before, atol=1e-9)
+    aiming = hand(tremor_g=0.0)
+    aiming.aim(PLACE, 0.06, 0.0)
+    before = end(aiming, 2.0, distance())
+    aiming.aim(PLACE + [0.0, 0.1, 0.0], 0.06, 2.0)
+    np.testing.assert_allclose(end(aiming, 2.0, distance()), before, atol=1e-9)
 
 
 def test_the_stick_brings_the_rays_end_to_the_depth_that_is_aimed_at():
     from tests.support.operator import config
 
-    one, rays, length = hand(tremor_g=0.0, disparity_deg=0.0), config().core.rays, 0.3
-    one.aim(PLACE, 0.0, 0.0)
-    seen = None
+    aiming, rays, length = hand(tremor_g=0.0, disparity_deg=0.0), config().core.rays, 0.3
+    aiming.aim(PLACE, 0.0, 0.0)
+    ray_end = None
     for frame in range(240):
-        found = one.controller(1.0 + frame / RATE, seen)
-        length = ray_length(length, found.stick[1], 1 / RATE, rays)
-        x, y, z = (float(value) for value in end(one, 1.0, length))
-        seen = (x, y, z)
+        aimed = aiming.controller(1.0 + frame / RATE, ray_end)
+        length = ray_length(length, aimed.stick[1], 1 / RATE, rays)
+        x, y, z = (float(value) for value in end(aiming, 1.0, length))
+        ray_end = (x, y, z)
     assert length == pytest.approx(distance(), abs=2e-3)
 
 
 def test_a_hand_that_follows_errs_smoothly_by_about_what_is_not_noticed():
     """In one direction across the ray; without a leap from frame to frame, and slower than 1.8 Hz."""
-    one, missed = hand(tremor_g=0.0), []
-    zone = np.radians(one.person.unnoticed_deg) * distance()
-    for frame in range(int(4000 * one.person.correction * RATE)):
-        one.follow(PLACE, frame / RATE)
-        missed.append(one.missed(frame / RATE))
+    aiming, missed = hand(tremor_g=0.0), []
+    zone = np.radians(aiming.person.unnoticed_deg) * distance()
+    for frame in range(int(4000 * aiming.person.correction * RATE)):
+        aiming.follow(PLACE, frame / RATE)
+        missed.append(aiming.missed(frame / RATE))
     across = np.array(missed)[:, 0]
-    at_corrections = across[:: round(one.person.correction * RATE)]
+    at_corrections = across[:: round(aiming.person.correction * RATE)]
     assert at_corrections.std() == pytest.approx(zone / np.sqrt(3), rel=0.05)
     assert np.abs(np.diff(across)).max() < 0.5 * zone
     power = np.abs(np.fft.rfft(across)) ** 2
@@ -109,5 +109,5 @@ def test_an_operator_is_behind_by_the_part_of_the_reaction_time_that_is_not_fore
     hands = (hand(), hand())
     operator = Operator(person, hands, PLACE, 0.03, 0.03, np.random.default_rng(0))
     velocity = np.array([0.0, 0.05, 0.02])
-    found = operator._foretold(lambda now: PLACE + velocity * now, 3.0)
-    np.testing.assert_allclose(found, PLACE + velocity * (3.0 - behind * person.reaction), atol=1e-12)
+    place = operator._anticipated(lambda now: PLACE + velocity * now, 3.0)
+    np.testing.assert_allclose(place, PLACE + velocity * (3.0 - behind * person.reaction), atol=1e-12)

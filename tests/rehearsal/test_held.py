@@ -12,8 +12,8 @@ from rehearsal.experiments.handle import BORNE, STILL, why_not
 from rehearsal.experiments.result import Result
 from rehearsal.first_grasp import LIFT, SLIP, holds
 from rehearsal.operator.scripts import Ending
-from rehearsal.robot.scene import Object, Scene, Surface
-from tests.rehearsal.seen import FORCE, UNITS, frame
+from rehearsal.robot.scene import Object, Scene, SupportSurface
+from tests.rehearsal.frames import FORCE, UNITS, frame
 from trunkline.frames import STANDARD_GRAVITY
 
 S = settings.grasped()
@@ -25,16 +25,16 @@ MOVED = "slip: it moved by {:.0f} mm in the arm as it was held"
 MORE = "slip: it touched more than the arm as it was held"
 
 
-def run(lifted=2 * S.lifted, moved=0.0, touched=HOLD, held=HOLD, hanging=False, lies=((), (), ()), carried=0.0):
+def run(lifted=2 * S.lifted, moved=0.0, touched=HOLD, grasped=HOLD, hanging=False, lies=((), (), ()), carried=0.0):
     """Frames of a grasp: before it, at its end, and some later, in which the object has `moved` in the arm, which has
     `carried` it somewhere."""
     arm = np.zeros((UNITS, 3))
     up, off, away = np.array([0.0, 0.0, lifted]), np.array([moved, 0.0, 0.0]), np.array([0.0, carried, 0.0])
     return [
         frame(0.0, "execute", touched),
-        frame(1.0, "aim", held, lies=lies[0], place=up, units=arm, hanging=hanging),
-        frame(2.0, "aim", held, lies=lies[1], place=up, units=arm),
-        frame(3.0, "aim", held, lies=lies[2], place=up + off + away, units=arm + away),
+        frame(1.0, "aim", grasped, lies=lies[0], place=up, units=arm, hanging=hanging),
+        frame(2.0, "aim", grasped, lies=lies[1], place=up, units=arm),
+        frame(3.0, "aim", grasped, lies=lies[2], place=up + off + away, units=arm + away),
     ]
 
 
@@ -63,10 +63,10 @@ def lying(force=FORCE) -> tuple:
     (DONE, run(hanging=True), LIFTED.format(2e3 * S.lifted) + ", and hangs"),
     (DONE, run(lifted=0.0, hanging=True), LIFTED.format(0) + ", and hangs"),
     # the arm never touched it
-    (DONE, run(lifted=0.0, touched={}, held={}), "aim: the arm never touched it"),
-    (DONE, run(hanging=True, touched={}, held={}), "aim: the arm never touched it"),
-    (DONE, run(lifted=0.0, touched=HOLD, held={}), LIFTED.format(0)),
-    (DONE, run(lifted=0.0, touched={}, held=HOLD), LIFTED.format(0)),
+    (DONE, run(lifted=0.0, touched={}, grasped={}), "aim: the arm never touched it"),
+    (DONE, run(hanging=True, touched={}, grasped={}), "aim: the arm never touched it"),
+    (DONE, run(lifted=0.0, touched=HOLD, grasped={}), LIFTED.format(0)),
+    (DONE, run(lifted=0.0, touched={}, grasped=HOLD), LIFTED.format(0)),
     # it touches more than the arm, in any frame from the end of the plan on
     (DONE, run(lies=(lying(), (), ())), MORE),
     (DONE, run(lies=((), lying(), ())), MORE),
@@ -78,7 +78,7 @@ def lying(force=FORCE) -> tuple:
     (DONE, run(moved=10 * S.slip), MOVED.format(1e4 * S.slip)),
     (DONE, run(carried=10 * S.slip), ""),
     (DONE, run(moved=np.nan), "slip: it moved by nan mm in the arm as it was held"),
-    (DONE, run(held={}), "slip: it moved by inf mm in the arm as it was held"),
+    (DONE, run(grasped={}), "slip: it moved by inf mm in the arm as it was held"),
     # which comes first
     (DONE, run(lifted=0.0, lies=(lying(),) * 3, moved=1.0), LIFTED.format(0)),
     (DONE, run(lies=(lying(),) * 3, moved=1.0), MORE),
@@ -93,7 +93,7 @@ def test_what_lies_before_it_is_lifted_does_not_count():
     assert failure(DONE, frames, S) == ""
 
 
-@pytest.mark.parametrize(("lifted", "slipped", "hanging", "held"), [
+@pytest.mark.parametrize(("lifted", "slipped", "hanging", "holding"), [
     (LIFT, 0.0, False, True),
     (np.nextafter(LIFT / 2, 1), 0.0, False, True),
     (LIFT / 2, 0.0, False, False),
@@ -104,15 +104,15 @@ def test_what_lies_before_it_is_lifted_does_not_count():
     (LIFT, np.inf, False, False),
     (LIFT, 0.0, True, False),
 ])  # fmt: skip
-def test_the_first_grasps_hold_what_is_lifted_does_not_slip_and_does_not_hang(lifted, slipped, hanging, held):
-    assert bool(holds(lifted, slipped, hanging)) is held
+def test_the_first_grasps_hold_what_is_lifted_does_not_slip_and_does_not_hang(lifted, slipped, hanging, holding):
+    assert bool(holds(lifted, slipped, hanging)) is holding
 
 
 def centres(**moved) -> np.ndarray:
-    found = np.zeros((UNITS, 3))
+    places = np.zeros((UNITS, 3))
     for unit, x in moved.items():
-        found[int(unit[1:]), 0] = x
-    return found
+        places[int(unit[1:]), 0] = x
+    return places
 
 
 @pytest.mark.parametrize(("thing", "place", "units", "moved"), [
@@ -143,7 +143,7 @@ MASS = 0.2
 SCENE = Scene(
     -0.75,
     Object("cylinder", 0.05, 0.1, MASS, [0.5, 0.0, 0.5], hanging=True),
-    {TABLE: Surface([1.0, 0.0, -0.1], [0.5, 0.5, 0.03])},
+    {TABLE: SupportSurface([1.0, 0.0, -0.1], [0.5, 0.5, 0.03])},
     [0.5, 0.0, 0.9],
 )  # its names: the floor, the table, the hook
 HALF = BORNE * MASS * STANDARD_GRAVITY
@@ -246,14 +246,14 @@ def session(begins: float = 10.0):
     return SimpleNamespace(foreseen=foreseen, package=package, tips=[at(begins + 1.5, 0.5, 0.0, 0.02)])
 
 
-@pytest.mark.parametrize(("probability", "foreseen", "told"), [
+@pytest.mark.parametrize(("probability", "foreseen", "expected"), [
     (0.75, True, (3, 0.75, 1.0, 5.0)),
     (0.25, True, (3, 0.25, 0.0, 5.0)),
     (np.nan, True, (3, np.nan, np.nan, np.nan)),
     (0.75, False, (3, 0.75, 1.0, np.nan)),
 ])  # fmt: skip
-def test_what_was_stated_of_a_grasp_is_told_with_how_far_off_its_path_was(probability, foreseen, told):
+def test_what_was_stated_of_a_grasp_is_told_with_how_far_off_its_path_was(probability, foreseen, expected):
     result, ran = Result("grasp", 0, True), session()
     ran.foreseen = ran.foreseen if foreseen else None
     tell(result, Ending(True, plans=3, probability=probability), ran, True)  # type: ignore[arg-type]
-    np.testing.assert_allclose((result.plans, result.probability, result.agreed, result.path_pct), told)
+    np.testing.assert_allclose((result.plans, result.probability, result.agreed, result.path_pct), expected)

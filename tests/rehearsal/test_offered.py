@@ -21,7 +21,7 @@ def objects() -> list[Offered]:
 
 
 def test_some_hang_and_some_stand(objects):
-    names = [one.name for one in objects]
+    names = [object.name for object in objects]
     assert set(names) == {"hanging cylinder", "standing basket"}
     assert 15 < names.count("standing basket") < 45
 
@@ -36,18 +36,18 @@ def test_what_is_handed_over_stood_on_a_surface():
 
 
 def test_what_stands_does_so_on_its_stand_and_what_hangs_has_none(objects):
-    for one in objects:
-        thing = one.thing
-        assert thing.hanging == (one.stands is None)
-        if one.stands is not None:
-            np.testing.assert_allclose(thing.position, np.add(one.stands.top, [0, 0, thing.half_height]), atol=1e-12)
-            assert min(one.stands.size[:2]) > np.hypot(thing.basket.width, thing.basket.length)
+    for object in objects:
+        thing = object.thing
+        assert thing.hanging == (object.stands is None)
+        if object.stands is not None:
+            np.testing.assert_allclose(thing.position, np.add(object.stands.top, [0, 0, thing.half_height]), atol=1e-12)
+            assert min(object.stands.size[:2]) > np.hypot(thing.basket.width, thing.basket.length)
 
 
 def test_what_is_gripped_is_level_across_the_way_of_the_arm_and_within_bounds(objects):
     s = settings.grasped()
-    for one in objects:
-        of, thing = s.shapes[one.thing.shape], one.thing
+    for object in objects:
+        of, thing = s.shapes[object.thing.shape], object.thing
         turn = Rotation.from_quat(thing.quaternion, scalar_first=True)
         grip = np.array(thing.position) + turn.apply(thing.grip)
         assert of.low <= grip[2] <= of.high
@@ -55,5 +55,5 @@ def test_what_is_gripped_is_level_across_the_way_of_the_arm_and_within_bounds(ob
         assert of.thin <= thing.diameter <= of.wide
         assert of.light <= thing.mass <= min(of.heavy, config().handling.heaviest(thing.shape, thing.diameter))
         axis = turn.apply([0, 1, 0] if thing.shape == "basket" else [0, 0, 1])
-        assert abs(axis @ one.towards) < 1e-9
+        assert abs(axis @ object.towards) < 1e-9
         assert abs(axis[2]) < 1e-9

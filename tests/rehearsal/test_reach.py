@@ -10,7 +10,7 @@ from rehearsal.experiments.reach import failure, tell_end, tips_after
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
 from rehearsal.session import Session
-from tests.rehearsal.seen import FORCE, TIP, UNITS, frame
+from tests.rehearsal.frames import FORCE, TIP, UNITS, frame
 from trunkline.ar.hybrid.preview import Stated
 
 RADIUS = 0.03
@@ -88,8 +88,8 @@ def test_how_far_the_tip_ends_from_where_it_was_said_to_is_told_in_mm():
     }
     result = Result("reach", 0, True)
     tell_end(result, stated, tips)
-    told = (result.radius_mm, result.at_end_mm, result.after_2s_mm, result.after_10s_mm)
-    np.testing.assert_allclose(told, (4, 3, 5, 0), atol=1e-9)
+    numbers = (result.radius_mm, result.at_end_mm, result.after_2s_mm, result.after_10s_mm)
+    np.testing.assert_allclose(numbers, (4, 3, 5, 0), atol=1e-9)
 
 
 class Drifting:

@@ -33,23 +33,23 @@ def test_rows_are_read_back(tmp_path):
     assert read_results(file) == []
     append_result(file, first)
     append_result(file, Result("follow", 4, True))
-    found = read_results(file)
-    assert [(one.experiment, one.seed, one.success, one.cause, one.plans) for one in found] == [
+    rows = read_results(file)
+    assert [(row.experiment, row.seed, row.success, row.cause, row.plans) for row in rows] == [
         ("reach", 3, False, "aim: beside, it", 2), ("follow", 4, True, "", 0)
     ]  # fmt: skip
-    assert found[0].aimed_mm == pytest.approx(12.25, abs=0.1)
-    assert np.isnan(found[1].aimed_mm)
+    assert rows[0].aimed_mm == pytest.approx(12.25, abs=0.1)
+    assert np.isnan(rows[1].aimed_mm)
 
 
 def test_kinds_of_objects_are_told_apart_where_there_are_several(tmp_path):
     mixed = [Result("grasp", seed, seed > 1, object="ab"[seed % 2]) for seed in range(6)]
-    told = summary([*mixed, *runs(2, 1)])
-    assert {kind: (one["runs"], one["successes"]) for kind, one in told["grasp"]["objects"].items()} == {
+    table_rows = summary([*mixed, *runs(2, 1)])
+    assert {kind: (entry["runs"], entry["successes"]) for kind, entry in table_rows["grasp"]["objects"].items()} == {
         "a": (3, 2), "b": (3, 2)
     }  # fmt: skip
-    assert told["grasp"]["runs"] == 6
-    assert "objects" not in told["reach"]
-    table = rehearsal_table(told, {}, "of a test", variants=True)
+    assert table_rows["grasp"]["runs"] == 6
+    assert "objects" not in table_rows["reach"]
+    table = rehearsal_table(table_rows, {}, "of a test", variants=True)
     assert [line.split(" | ")[0] for line in table.splitlines()[2:]] == ["| reach", "| grasp", "| … a", "| … b"]
 
 

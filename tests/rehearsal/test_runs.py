@@ -13,14 +13,14 @@ from matplotlib.image import imread
 from rehearsal import runs
 from rehearsal.experiments.result import Result, read_results, summary
 from rehearsal.report import draw
-from rehearsal.runs import Run, Source, make, make_one, source_of, wanted
+from rehearsal.runs import Provenance, Run, make, make_one, source_of, wanted
 from trunkline.ar.preview.package import only_package
 from trunkline.errors import InputError
 from upkeep.limits import Limit
 from upkeep.rehearsal_table import rehearsal_table
 
 ROOT = Path(__file__).parents[2]
-SOURCE = Source("package", "code")
+SOURCE = Provenance("package", "code")
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def test_a_stopped_rehearsal_goes_on(made, tmp_path):
     make(wanted({"touch": 3}, 0), Path("package.tgz"), SOURCE, table, workers=1)
     results = make(wanted({"touch": 5}, 2), Path("package.tgz"), SOURCE, table, workers=1)
     assert made == [("own", 0), ("own", 1), ("own", 2), ("own", 3), ("own", 4), ("off", 0), ("off", 1)]
-    rows = [(one.seed, one.variant) for one in results]
+    rows = [(result.seed, result.variant) for result in results]
     assert rows == [(0, ""), (1, ""), (2, ""), (3, ""), (4, ""), (0, "off by 5 mm"), (1, "off by 5 mm")]
     assert len(make(wanted({"touch": 2}, 0), Path("package.tgz"), SOURCE, table, workers=1)) == 2  # as asked, no more
 
@@ -77,13 +77,13 @@ def test_a_run_that_breaks_off_has_failed(made):
 
 def test_rates_are_told_by_experiment_and_variant(made, tmp_path):
     results = make(wanted({"touch": 4}, 2), Path("package.tgz"), SOURCE, tmp_path / "runs.csv", workers=1)
-    told = summary(results)["touch"]
-    assert (told["runs"], told["successes"], told["rate"], told["causes"]) == (4, 2, 0.5, {"aim": 2})
-    assert 0.1 < told["low"] < 0.5 < told["high"] < 0.9
-    assert told["nearest_mm"] == {"median": pytest.approx(1.5), "p95": pytest.approx(2.85)}
-    assert "tip_mm" not in told, "it was never measured"
-    assert told["variants"]["off by 5 mm"]["runs"] == 2
-    table = rehearsal_table({"package": "abc", "touch": told}, {"touch.rate": Limit(min=0.9)}, "of a test", True)
+    metrics = summary(results)["touch"]
+    assert (metrics["runs"], metrics["successes"], metrics["rate"], metrics["causes"]) == (4, 2, 0.5, {"aim": 2})
+    assert 0.1 < metrics["low"] < 0.5 < metrics["high"] < 0.9
+    assert metrics["nearest_mm"] == {"median": pytest.approx(1.5), "p95": pytest.approx(2.85)}
+    assert "tip_mm" not in metrics, "it was never measured"
+    assert metrics["variants"]["off by 5 mm"]["runs"] == 2
+    table = rehearsal_table({"package": "abc", "touch": metrics}, {"touch.rate": Limit(min=0.9)}, "of a test", True)
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]]
     assert rows[0][:3] == ["touch", "4", "50 %"]
     assert rows[0][4] == "≥ 90 % (missed)"
@@ -92,8 +92,9 @@ def test_rates_are_told_by_experiment_and_variant(made, tmp_path):
 
 
 def test_the_table_is_in_the_paper_s_order_and_names_frequent_causes_first():
-    told = {"runs": 9, "rate": 0.5, "low": 0.2, "high": 0.8, "causes": {"aim": 1, "missed": 4}}
-    table = rehearsal_table({"follow": told, "handle": told, "package": "abc", "reach": told}, {}, "of a test", True)
+    metrics = {"runs": 9, "rate": 0.5, "low": 0.2, "high": 0.8, "causes": {"aim": 1, "missed": 4}}
+    tables = {"follow": metrics, "handle": metrics, "package": "abc", "reach": metrics}
+    table = rehearsal_table(tables, {}, "of a test", True)
     rows = table.splitlines()[2:]
     assert [row.split(" | ")[0] for row in rows] == ["| reach", "| follow", "| handle"]
     assert all(row.endswith("| missed 4, aim 1 |") for row in rows)

@@ -17,10 +17,10 @@ TURN = Rotation.from_rotvec([0.3, -0.5, 1.1])
 
 def row() -> np.ndarray:
     """What the robot keeps of an instant."""
-    found = np.arange(COLUMNS, dtype=float) / COLUMNS
-    found[TIP_AXES] = TURN.as_matrix().ravel()
-    found[THING] = [0.5, 0.1, 0.2, *wxyz_from_rotation(TURN)]
-    return found
+    values = np.arange(COLUMNS, dtype=float) / COLUMNS
+    values[TIP_AXES] = TURN.as_matrix().ravel()
+    values[THING] = [0.5, 0.1, 0.2, *wxyz_from_rotation(TURN)]
+    return values
 
 
 def read(**sensors: float) -> dict[str, np.ndarray]:
@@ -29,7 +29,7 @@ def read(**sensors: float) -> dict[str, np.ndarray]:
     readings, back = [instruments.read(truth, truth, 0.0, 0.0) for _ in range(READINGS)], instruments.turn.inv()
 
     def values(name: str) -> np.ndarray:
-        return np.array([getattr(seen, name) for seen in readings])
+        return np.array([getattr(reading, name) for reading in readings])
 
     def turned(name: str) -> np.ndarray:
         return (back * Rotation.from_quat(values(name), scalar_first=True) * TURN.inv()).as_rotvec()

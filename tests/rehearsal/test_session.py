@@ -43,7 +43,7 @@ class Sent:
         self.joints, self.sent = np.array([START]), []
         self.instruments = SimpleNamespace(turn=Rotation.identity(), shift=np.zeros(3))
 
-    def seen(self):
+    def readings(self):
         none = np.full(4, np.nan)
         return SimpleNamespace(joints=self.joints[0], tip=np.zeros(3), thing=none[:3], thing_quaternion=none)
 
@@ -66,15 +66,15 @@ def session(off: list[float]) -> tuple[Session, Operator]:
     person = replace(settings.person(), patience=3)
     left, right = (RayHand(origin, REFERENCE, person, 0.15, rng) for origin in ORIGINS)
     operator = Operator(person, (left, right), BENT, 0.03, 0.03, rng)
-    found = Session(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: THING)  # type: ignore[arg-type]
-    return found, operator
+    made = Session(Arc(off), config(), Sent(), (left, right), World("world"), lambda now: THING)  # type: ignore[arg-type]
+    return made, operator
 
 
 @pytest.mark.parametrize("off", [[], [0.07, 0.07]])  # m by which the arm is above its target: then aimed below it
 def test_the_robot_moves_only_after_a_preview_on_the_object_was_confirmed(off):
     plans, beside = max(len(off), 1), sum(off[:1])
-    found, operator = session(off)
-    ending, _, views = rehearse(found, operator.reach())
+    made, operator = session(off)
+    ending, _, views = rehearse(made, operator.reach())
     assert ending.done
     assert ending.plans == plans
     modes = [view.intent.mode for view in views]
@@ -82,39 +82,39 @@ def test_the_robot_moves_only_after_a_preview_on_the_object_was_confirmed(off):
     assert sum(a != b == "preview" for a, b in zip(modes, modes[1:], strict=False)) == plans
     first = next(view.now for view in views if view.intent.motion != "hold")
     assert first == next(view.now for view in views if view.intent.mode == "execute")
-    np.testing.assert_allclose(found.robot.joints[0], found.plan.joints[-1], atol=1e-9)
+    np.testing.assert_allclose(made.robot.joints[0], made.plan.joints[-1], atol=1e-9)
     assert np.linalg.norm(np.array(views[-1].intent.targets.tip.position) + [0.0, 0.0, beside] - THING) < 0.05
 
 
 def test_an_operator_without_a_preview_on_the_object_never_moves_the_robot():
-    found, operator = session([0.2, -0.2, 0.2])
-    ending, frames, _ = rehearse(found, operator.reach())
+    made, operator = session([0.2, -0.2, 0.2])
+    ending, frames, _ = rehearse(made, operator.reach())
     assert not ending.done
     assert ending.why.startswith("aim")
     assert ending.plans == 3
     assert frames == []
-    assert found.robot.sent == []
+    assert made.robot.sent == []
 
 
 def test_following_moves_the_robot_until_the_path_is_over():
-    found, operator = session([])
+    made, operator = session([])
     begun = []
     script = operator.follow(begin=begun.append, finished=lambda now: now > begun[0] + 2.0, place=lambda now: THING)
-    found.robot.truth = lambda: SimpleNamespace(tip=THING)
-    ending, frames, views = rehearse(found, script)
+    made.robot.truth = lambda: SimpleNamespace(tip=THING)
+    ending, frames, views = rehearse(made, script)
     assert ending.done
     assert views[-1].intent.mode == "follow"
-    assert len(found.robot.sent) > 0
-    assert found.fault == ""
+    assert len(made.robot.sent) > 0
+    assert made.fault == ""
     # a hand that trembles at the edge of this arm's reach is refused now and then, and the robot holds meanwhile
-    assert {why.partition(":")[0] for _, why in found.refusals} <= {"out of reach"}
-    assert len(found.refusals) < 0.1 * len(views)
+    assert {why.partition(":")[0] for _, why in made.refusals} <= {"out of reach"}
+    assert len(made.refusals) < 0.1 * len(views)
 
 
 def test_an_operator_who_does_not_judge_confirms_the_first_plan():
-    found, operator = session([0.2, 0.2])
+    made, operator = session([0.2, 0.2])
     operator.judged = False
-    ending, _, views = rehearse(found, operator.reach())
+    ending, _, views = rehearse(made, operator.reach())
     assert ending.done
     assert ending.plans == 1
     assert ending.previewed > 0.15
@@ -124,38 +124,38 @@ def test_an_operator_who_does_not_judge_confirms_the_first_plan():
 @pytest.fixture(scope="module")
 def ran() -> tuple[Session, list, list]:
     """A reach whose client takes another frame for the base, with a foresight that counts what it is asked."""
-    found, operator = session([])
-    found.robot.instruments = SimpleNamespace(
+    made, operator = session([])
+    made.robot.instruments = SimpleNamespace(
         turn=Rotation.from_rotvec([0.0, 0.05, 0.1]), shift=np.array([0.01, -0.02, 0.03])
     )
-    found.robot.truth = lambda: SimpleNamespace(tip=np.array([0.5, 0.2, 0.4]))
-    asked, foreseen = [], SimpleNamespace(reach=lambda *given: asked.append(given) or "foreseen")
-    assert found.foresee() is None, "there is no foresight yet"
-    found.foresight = foreseen  # type: ignore[assignment]
-    assert found.foresee() is None, "there is no plan yet"
-    ending, _, views = rehearse(found, operator.reach())
+    made.robot.truth = lambda: SimpleNamespace(tip=np.array([0.5, 0.2, 0.4]))
+    asked, foreseen = [], SimpleNamespace(reach=lambda *arguments: asked.append(arguments) or "foreseen")
+    assert made.foresee() is None, "there is no foresight yet"
+    made.foresight = foreseen  # type: ignore[assignment]
+    assert made.foresee() is None, "there is no plan yet"
+    ending, _, views = rehearse(made, operator.reach())
     assert ending.done
-    return found, views, asked
+    return made, views, asked
 
 
 def test_tip_and_object_are_seen_with_the_whole_error_of_the_alignment(ran):
     """Also the path that is held against the preview's."""
-    found, views, _ = ran
-    turn, shift = found.robot.instruments.turn, found.robot.instruments.shift
+    made, views, _ = ran
+    turn, shift = made.robot.instruments.turn, made.robot.instruments.shift
     tip = turn.apply([0.5, 0.2, 0.4]) + shift
     np.testing.assert_allclose([view.tip for view in views], [tip] * len(views))
     np.testing.assert_allclose([view.thing for view in views], [turn.apply(THING) + shift] * len(views))
-    assert len(found.tips) > 0
-    np.testing.assert_allclose([seen for _, seen in found.tips], [tip] * len(found.tips))
+    assert len(made.tips) > 0
+    np.testing.assert_allclose([place for _, place in made.tips], [tip] * len(made.tips))
 
 
 def test_the_plan_that_was_run_is_foreseen_when_it_is_asked_for(ran):
     """By the foresight of a page, in the client's world, with the plan's number as the seed."""
-    found, _, asked = ran
+    made, _, asked = ran
     assert asked == [], "nothing that the operator does waits for it"
-    assert found.foresee() == "foreseen"
+    assert made.foresee() == "foreseen"
     ((plan, world, seed),) = asked
-    assert plan is found.plan
-    assert world is found.world
-    assert seed == found.report.serial
-    np.testing.assert_allclose(found.robot.joints[0], plan.joints[-1], atol=1e-9)
+    assert plan is made.plan
+    assert world is made.world
+    assert seed == made.report.serial
+    np.testing.assert_allclose(made.robot.joints[0], plan.joints[-1], atol=1e-9)

@@ -55,21 +55,21 @@ def test_what_touches_at_the_start_is_refused():
 
 
 def test_uneven_steps_add_up_to_the_same_time():
-    one = robot()
+    stand_in = robot()
     for _ in range(30):
-        one.advance(1 / 60)
-    assert one.time == pytest.approx(0.5, abs=TICK)
+        stand_in.advance(1 / 60)
+    assert stand_in.time == pytest.approx(0.5, abs=TICK)
 
 
-def wave(one: StandInRobot) -> tuple[list, list]:
+def wave(stand_in: StandInRobot) -> tuple[list, list]:
     """Seen and true, in 20 ms steps, while two joints and a tendon move."""
-    seen, true = [], []
+    read, true = [], []
     for n in range(20):
-        one.send(READY + 0.01 * n * np.eye(7)[0] - 0.005 * n * np.eye(7)[3], np.array([0.004 * n, -0.1, -0.1]))
-        one.advance(0.02)
-        seen.append(one.seen())
-        true.append(one.truth())
-    return seen, true
+        stand_in.send(READY + 0.01 * n * np.eye(7)[0] - 0.005 * n * np.eye(7)[3], np.array([0.004 * n, -0.1, -0.1]))
+        stand_in.advance(0.02)
+        read.append(stand_in.readings())
+        true.append(stand_in.truth())
+    return read, true
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
@@ -80,15 +80,15 @@ def test_the_same_seed_gives_the_same_bytes_and_another_does_not():
 
 
 def test_what_is_seen_is_the_truth_of_some_time_ago_in_a_frame_that_is_off():
-    one = robot(pose_delay=0.04, joint_delay=0.02, alignment_mm=10.0, alignment_deg=2.0, **EXACT)
-    seen, true = wave(one)
+    stand_in = robot(pose_delay=0.04, joint_delay=0.02, alignment_mm=10.0, alignment_deg=2.0, **EXACT)
+    read, true = wave(stand_in)
     for n in range(4, 20):
-        np.testing.assert_array_equal(seen[n].joints, true[n - 1].joints)
-        assert seen[n].pose_time == pytest.approx(true[n - 2].time)
-        back = one.instruments.turn.inv().apply(seen[n].tip - one.instruments.shift)
+        np.testing.assert_array_equal(read[n].joints, true[n - 1].joints)
+        assert read[n].pose_time == pytest.approx(true[n - 2].time)
+        back = stand_in.instruments.turn.inv().apply(read[n].tip - stand_in.instruments.shift)
         np.testing.assert_allclose(back, true[n - 2].tip, atol=1e-12)
-    assert np.linalg.norm(one.instruments.shift) == pytest.approx(0.01)
-    assert np.degrees(one.instruments.turn.magnitude()) == pytest.approx(2.0)
+    assert np.linalg.norm(stand_in.instruments.shift) == pytest.approx(0.01)
+    assert np.degrees(stand_in.instruments.turn.magnitude()) == pytest.approx(2.0)
 
 
 def test_half_the_step_moves_tip_and_object_by_little():

@@ -9,7 +9,7 @@ import pytest
 from rehearsal.experiments.result import LATER, Result
 from rehearsal.experiments.stated import covered, probabilities, scores
 from rehearsal.rehearse import metrics_of
-from rehearsal.runs import Source
+from rehearsal.runs import Provenance
 from trunkline.ar.hybrid.rates import wilson
 
 NAN = float("nan")
@@ -46,26 +46,26 @@ TRUE, FALSE = grasp(True, 0.9, 1.0, 1.0), grasp(False, 0.8, 0.0, 3.0)
     ([TRUE, grasp(True, 0.9, NAN)], 2, 1),  # what was never judged did not agree
 ])  # fmt: skip
 def test_agreement_is_of_grasps_and_hand_overs_that_had_a_probability(rows, previews, agreed):
-    told = scores(rows)
-    assert (told["previews"], told["agreed"], told["agreement"]) == (previews, agreed, agreed / previews)
-    assert (told["low"], told["high"]) == wilson(agreed, previews)
+    metrics = scores(rows)
+    assert (metrics["previews"], metrics["agreed"], metrics["agreement"]) == (previews, agreed, agreed / previews)
+    assert (metrics["low"], metrics["high"]) == wilson(agreed, previews)
 
 
 @pytest.mark.parametrize(("agreed", "count"), [
     ([], None), ([1.0], 1), ([0.0], 0), ([NAN], 0), ([1.0, 1.0, 0.0, NAN], 2), ([0.5], 0),
 ])  # fmt: skip
 def test_only_what_was_judged_to_agree_counts_as_such(agreed, count):
-    told = probabilities([replace(TRUE, agreed=one) for one in agreed])
-    assert told.get("agreed") == count
+    metrics = probabilities([replace(TRUE, agreed=verdict) for verdict in agreed])
+    assert metrics.get("agreed") == count
 
 
 def test_brier_scores_and_the_paths_median_are_of_the_same_runs():
-    told = scores(
+    metrics = scores(
         [TRUE, FALSE, replace(TRUE, path_pct=NAN), replace(FALSE, path_pct=8.0), replace(TRUE, variant="cad")]
     )
-    assert told["brier"] == pytest.approx((2 * 0.1**2 + 2 * 0.8**2) / 4)
-    assert told["brier_base"] == pytest.approx(0.25)
-    assert told["path_pct_median"] == 3.0
+    assert metrics["brier"] == pytest.approx((2 * 0.1**2 + 2 * 0.8**2) / 4)
+    assert metrics["brier_base"] == pytest.approx(0.25)
+    assert metrics["path_pct_median"] == 3.0
 
 
 @pytest.mark.parametrize(("name", "rows", "inside"), [
@@ -88,12 +88,12 @@ def test_coverage_is_of_reaches_with_a_radius_at_each_time(name, rows, inside):
 
 def test_how_many_radii_the_tip_is_off_is_told_at_each_time():
     rows = [reach(2.0, 4.0, 6.0, 8.0), reach(1.0, 3.0, 3.0, 9.0), reach(4.0, 4.0, NAN, 4.0)]
-    told = scores(rows)
-    assert list(told["tip_error_radii"]) == list(LATER) == ["at_end", "after_2s", "after_10s"]
-    assert {name: one["median"] for name, one in told["tip_error_radii"].items()} == {
+    metrics = scores(rows)
+    assert list(metrics["tip_error_radii"]) == list(LATER) == ["at_end", "after_2s", "after_10s"]
+    assert {name: entry["median"] for name, entry in metrics["tip_error_radii"].items()} == {
         "at_end": 2.0, "after_2s": 3.0, "after_10s": 4.0
     }  # fmt: skip
-    assert told["radius_mm"]["median"] == 2.0
+    assert metrics["radius_mm"]["median"] == 2.0
 
 
 @pytest.mark.parametrize(("rows", "keys"), [
@@ -109,9 +109,9 @@ def test_nothing_is_said_of_what_no_run_has(rows, keys):
 
 def test_the_metrics_name_package_code_experiments_and_previews():
     rows = [TRUE, FALSE, replace(TRUE, experiment="handle"), reach(2.0, 4.0)]
-    told = json.loads(json.dumps(metrics_of(Source("abc", "def"), rows)))
-    assert (told["package"], told["code"]) == ("abc", "def")
-    assert set(told) == {"package", "code", "grasp", "handle", "reach", "preview"}
+    metrics = json.loads(json.dumps(metrics_of(Provenance("abc", "def"), rows)))
+    assert (metrics["package"], metrics["code"]) == ("abc", "def")
+    assert set(metrics) == {"package", "code", "grasp", "handle", "reach", "preview"}
     for key in ("agreement", "path_pct_median", "brier", "brier_base"):
-        assert np.isfinite(told["preview"][key])
-    assert "preview" not in metrics_of(Source("abc", "def"), [Result("follow", 0, True)])
+        assert np.isfinite(metrics["preview"][key])
+    assert "preview" not in metrics_of(Provenance("abc", "def"), [Result("follow", 0, True)])

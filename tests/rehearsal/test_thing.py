@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from rehearsal.robot.scene import Object, Scene, String, make_thing
 from rehearsal.robot.shapes import distance
-from rehearsal.robot.thing import Motion, Thing, move_thing, pull_string, rotation, spin_of
-from rehearsal.robot.touching import Contacts, World, lie
+from rehearsal.robot.thing import Motion, RigidObject, move_thing, pull_string, rotation, spin_of
+from rehearsal.robot.touching import Contacts, ContactWorld, lie
 
 G = 9.80665
 H = 1 / 6000
@@ -16,13 +16,14 @@ DOWN = np.array([0.0, 0.0, -G])
 NONE = (0.0, 0.0, 0.0)
 
 
-def body(shape="box", diameter=0.05, height=0.12, mass=0.1, z=0.06, **more) -> tuple[Thing, Motion]:
+def body(shape="box", diameter=0.05, height=0.12, mass=0.1, z=0.06, **more) -> tuple[RigidObject, Motion]:
     return make_thing(Object(shape, diameter, height, mass, [0.0, 0.0, z], **more), [0.0, 0.0, 0.5], String())
 
 
-def floor(thing: Thing, friction=0.35, loss=3.0) -> tuple[World, Contacts]:
+def floor(thing: RigidObject, friction=0.35, loss=3.0) -> tuple[ContactWorld, Contacts]:
     kind, half, edge, place = Scene(0.0, Object("sphere", 0.1, 0.1, 1.0, [0.0, 0.0, 1.0])).shapes()
-    world = World(kind, half, edge, place, 1e6, 2e4, 2 * 0.1 * np.sqrt(2e4 * thing.mass), loss, np.array([friction]))
+    damping = 2 * 0.1 * np.sqrt(2e4 * thing.mass)
+    world = ContactWorld(kind, half, edge, place, 1e6, 2e4, damping, loss, np.array([friction]))
     bristles, near = np.zeros((1, len(thing.kind), 3)), np.zeros((1, len(thing.kind) + 1, 3))
     some = [bristles, np.zeros((1, 1, 3)), np.zeros((len(thing.points), 1, 3)), near]
     return world, Contacts(*some, np.zeros((1, 3)), np.zeros((1, 1, 3)), np.zeros((1, 3)))
@@ -108,8 +109,8 @@ def test_a_free_cylinder_precesses_at_the_rate_of_its_momentum():
         move_thing(thing, motion, NONE, NONE, np.zeros(3), H)
     size = np.linalg.norm(motion.momentum)
     turn = Rotation.from_rotvec(size / thing.inertia[0] * duration * motion.momentum / size)
-    found = np.array(rotation(motion.quaternion)) @ axis
-    np.testing.assert_allclose(found, turn.apply(axis), atol=1e-3)
+    turned = np.array(rotation(motion.quaternion)) @ axis
+    np.testing.assert_allclose(turned, turn.apply(axis), atol=1e-3)
 
 
 def test_a_string_holds_its_weight_and_leaves_the_hook_when_it_is_slack():
@@ -125,11 +126,11 @@ def test_a_string_holds_its_weight_and_leaves_the_hook_when_it_is_slack():
     assert motion.hanging[0] == 0
 
 
-def basket(**more) -> tuple[Thing, Motion]:
+def basket(**more) -> tuple[RigidObject, Motion]:
     return body("basket", diameter=0.03, height=0.06, mass=0.2, **more)
 
 
-def mechanical(thing: Thing, motion: Motion) -> float:
+def mechanical(thing: RigidObject, motion: Motion) -> float:
     """Energy of a thing that falls, J."""
     spin = spin_of(thing, motion, rotation(motion.quaternion))
     kinetic = 0.5 * (thing.mass * motion.speed @ motion.speed + np.dot(spin, motion.momentum))
@@ -165,13 +166,13 @@ def test_a_basket_dropped_askew_gains_no_energy():
     askew = list(Rotation.from_euler("xy", [50, 20], degrees=True).as_quat(scalar_first=True))
     thing, motion = basket(z=0.3, quaternion=askew)
     world, contacts = floor(thing)
-    found = [mechanical(thing, motion)]
+    energies = [mechanical(thing, motion)]
     for _ in range(300):
         fall(thing, motion, world, contacts, DOWN, 0.005)
-        found.append(mechanical(thing, motion))
-    lost = found[0] - found[-1]
+        energies.append(mechanical(thing, motion))
+    lost = energies[0] - energies[-1]
     assert lost > 0.1
-    assert (np.array(found) - np.minimum.accumulate(found)).max() < 0.01 * lost
+    assert (np.array(energies) - np.minimum.accumulate(energies)).max() < 0.01 * lost
     assert motion.place[2] > 0.01
 
 

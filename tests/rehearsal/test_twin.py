@@ -24,45 +24,45 @@ WORLD = World("w", (Box("floor", (-3, -3, -2), (3, 3, -0.75)), Box("stand", (0.4
 
 
 @pytest.fixture(scope="module")
-def known() -> RobotModel:
+def world_model() -> RobotModel:
     arm = rubbing_arm(spiral_chain(length=0.2, base_width=0.05, tip_width=0.02, units=6), 3)
     robot = hybrid_settings(robot="panda").robot
     assert isinstance(robot, PandaRobot)
     return RobotModel(arm, Posterior(), robot)
 
 
-def composed(known: RobotModel, thing: Thing, lean: Rotation, left=None):
-    arm = known.arm.copy().compile()
+def composed(world_model: RobotModel, thing: Thing, lean: Rotation, left=None):
+    arm = world_model.arm.copy().compile()
     straight = arm.tendon_length0[arm.actuator_trnid[:, 0]]
-    return compose_twin(known, WORLD, thing, READY, straight, settings.previewing(), lean, left), straight
+    return compose_twin(world_model, WORLD, thing, READY, straight, settings.previewing(), lean, left), straight
 
 
-def tip_of(twin, known: RobotModel) -> np.ndarray:
+def tip_of(twin, world_model: RobotModel) -> np.ndarray:
     """In the frame of the mount without its lean, m."""
     data = mujoco.MjData(twin.model)
     data.qpos[:] = twin.start
     mujoco.mj_kinematics(twin.model, data)
-    place, turn = (found[0] for found in mount_pose(READY[None], known.robot.mount_offset))
+    place, turn = (part[0] for part in mount_pose(READY[None], world_model.robot.mount_offset))
     return (data.site("tip").xpos - place) @ turn * [1, -1, -1]
 
 
-def test_the_twin_hangs_as_the_robot_was_seen_to(known):
-    twin, _ = composed(known, BASKET, Rotation.identity())
-    plain = tip_of(twin, known)
-    seen = plain + [0.004, -0.002, 0.0]
-    lean = known.lean(seen)
+def test_the_twin_hangs_as_the_robot_was_seen_to(world_model):
+    twin, _ = composed(world_model, BASKET, Rotation.identity())
+    plain = tip_of(twin, world_model)
+    tip_seen = plain + [0.004, -0.002, 0.0]
+    lean = world_model.lean(tip_seen)
     assert 0.01 < lean.magnitude() < 0.05
-    leaning, _ = composed(known, BASKET, lean)
-    np.testing.assert_allclose(tip_of(leaning, known)[:2], seen[:2], atol=2e-4)
+    leaning, _ = composed(world_model, BASKET, lean)
+    np.testing.assert_allclose(tip_of(leaning, world_model)[:2], tip_seen[:2], atol=2e-4)
 
 
 @pytest.mark.parametrize("high", [-0.004, 0.0, 0.006])
-def test_what_stands_stays_where_it_is_seen(known, high):
+def test_what_stands_stays_where_it_is_seen(world_model, high):
     """On a board that the client takes for higher or lower than it is; its bar seen not quite level."""
     x, y, _ = BASKET.position
     turn = Rotation.from_euler("zx", [0.3, 0.005]).as_quat(scalar_first=True)
     thing = replace(BASKET, position=(x, y, BASKET.position[2] + high), quaternion=tuple(map(float, turn)))
-    twin, straight = composed(known, thing, Rotation.identity())
+    twin, straight = composed(world_model, thing, Rotation.identity())
     way = CommandTrajectory(0.1, np.tile(READY, (6, 1)), np.tile(straight, (6, 1)))
     motion = joined(list(rollouts(twin, way, nominal_sample())))
     assert np.abs(motion.object[0, :, :3] - thing.position).max() < 1e-3
@@ -70,12 +70,12 @@ def test_what_stands_stays_where_it_is_seen(known, high):
     assert upright > 1 - 1e-5
 
 
-def test_a_hand_over_begins_as_the_grasp_ended(known):
+def test_a_hand_over_begins_as_the_grasp_ended(world_model):
     hanging = replace(BASKET, shape="cylinder", diameter=0.04, support="hanging", position=(0.5, 0.4, 0.3))
-    first, straight = composed(known, hanging, Rotation.identity())
+    first, straight = composed(world_model, hanging, Rotation.identity())
     assert first.start is not None
     pose = first.start + np.linspace(0.0, 0.01, first.model.nq)
-    then, _ = composed(known, replace(hanging, support="held"), Rotation.identity(), pose)
+    then, _ = composed(world_model, replace(hanging, support="held"), Rotation.identity(), pose)
     assert then.model.nq < first.model.nq  # there is no string
     names = [then.model.joint(number).name for number in range(then.model.njnt)]
     assert names == [first.model.joint(number).name for number in range(then.model.njnt)]

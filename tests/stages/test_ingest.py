@@ -39,12 +39,12 @@ def set_param(project, old, new):
 
 
 def test_takes_report_and_metrics(project, capsys):
-    code, said = run(capsys)
+    code, output = run(capsys)
     assert code == 0
-    told = [line.removeprefix("ingest: warning: ") for line in said.splitlines()]
-    assert [line.split(":")[1].strip() for line in told] == ["splits", "experiments", "splits", "splits"]
-    assert told[0].startswith("all trials: splits: no trial of the split test")
-    assert told[1].startswith("all trials: experiments: no static_pull, motion in the session")
+    warnings = [line.removeprefix("ingest: warning: ") for line in output.splitlines()]
+    assert [line.split(":")[1].strip() for line in warnings] == ["splits", "experiments", "splits", "splits"]
+    assert warnings[0].startswith("all trials: splits: no trial of the split test")
+    assert warnings[1].startswith("all trials: experiments: no static_pull, motion in the session")
     takes = read_takes(ingest.PROCESSED, SPLITS)
     assert [take.name for take in takes] == ["tilt_00", "tilt_60", "release_a", "curl_40"]
     assert {take.segments for take in takes} == {SEGMENTS}
@@ -61,7 +61,7 @@ def test_takes_report_and_metrics(project, capsys):
     assert metrics["rate_hz"] == pytest.approx(120, rel=1e-3)
     report = json.loads((ingest.ARTIFACTS / "quality.json").read_text())
     for trial in report["trials"].values():
-        assert [f"all trials: {warning}" for warning in trial["warnings"]] == told
+        assert [f"all trials: {warning}" for warning in trial["warnings"]] == warnings
     assert report["trials"]["release_a"]["stamp_jitter_ms"] == pytest.approx(1.0, rel=0.3)
     assert set(report["trials"]["release_a"]["coverage"]) == set(SEGMENTS)
     assert (ingest.ARTIFACTS / "quality.png").stat().st_size > 20_000
@@ -111,7 +111,7 @@ def rewritten(change, late=False, **options):
         path = session / "release_a.mcap"
         with open(path, "rb") as file:
             reader = make_reader(file, decoder_factories=[DecoderFactory()])
-            read = [found[2:] for found in reader.iter_decoded_messages(topics=["/rigid_bodies"])]
+            read = [decoded[2:] for decoded in reader.iter_decoded_messages(topics=["/rigid_bodies"])]
         with open(path, "wb") as file, RosWriter(file, **options) as writer:
             schema = writer.register_msgdef("mocap4r2_msgs/msg/RigidBodies", RIGID_BODIES)
             for number, (message, content) in enumerate(read):
@@ -227,8 +227,8 @@ def test_logs_without_checksums_are_said(project, capsys):
     assert "checksums" not in capsys.readouterr().out
     rewritten(lambda number, content: None, enable_crcs=False)(project / "data/raw/demo")
     run_stage("ingest", ingest.Config, ingest.main)
-    said = capsys.readouterr().out
-    assert "ingest: 1 of 4 logs have messages without checksums, such as release_a.mcap" in said
+    output = capsys.readouterr().out
+    assert "ingest: 1 of 4 logs have messages without checksums, such as release_a.mcap" in output
     logs = json.loads((ingest.ARTIFACTS / "quality.json").read_text())["logs"]
     assert logs["tilt_00.mcap"]["without_checksum"] == 0
     assert logs["release_a.mcap"]["without_checksum"] == logs["release_a.mcap"]["messages"] > 0

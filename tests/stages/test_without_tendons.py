@@ -28,7 +28,7 @@ def arm(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("name", "found"),
+    ("name", "start"),
     [
         ("identify_control", "params.yaml: identify_control.parameters.kp: found it for an arm without tendons"),
         ("fk_dataset", "artifacts/identify_control/arm.xml: found no tendons, expected at least one"),
@@ -36,15 +36,15 @@ def arm(tmp_path, monkeypatch):
         ("reachability", "artifacts/identify_control/arm.xml: found no tendons, expected at least one"),
     ],
 )
-def test_asking_for_more_is_an_error_of_one_line(arm, capsys, name, found):
+def test_asking_for_more_is_an_error_of_one_line(arm, capsys, name, start):
     before = sorted(arm.rglob("*"))
     stage = import_module(f"stages.{name}")
     with pytest.raises(SystemExit):
         run_stage(name, stage.Config, stage.main)
-    said = capsys.readouterr()
-    assert said.err.startswith(f"error: {found}")
-    assert "identify_damping" in said.err
-    assert said.err.count("\n") == 1
+    output = capsys.readouterr()
+    assert output.err.startswith(f"error: {start}")
+    assert "identify_damping" in output.err
+    assert output.err.count("\n") == 1
     assert sorted(arm.rglob("*")) == before
 
 
@@ -52,13 +52,13 @@ def test_a_package_names_the_stage_that_is_missing(arm, capsys):
     stage = import_module("stages.package_unity")
     with pytest.raises(SystemExit):
         run_stage("package_unity", stage.Config, stage.main)
-    said = capsys.readouterr().err
-    assert said.startswith("error: artifacts/reachability/meshes: found no mesh, expected .obj files")
-    assert said.count("\n") == 1
+    message = capsys.readouterr().err
+    assert message.startswith("error: artifacts/reachability/meshes: found no mesh, expected .obj files")
+    assert message.count("\n") == 1
 
 
-@pytest.mark.parametrize(("content", "found"), [(None, "no such file"), ("<mujoco>", "not a model that MuJoCo reads")])
-def test_without_a_model_that_is_said(arm, capsys, content, found):
+@pytest.mark.parametrize(("content", "start"), [(None, "no such file"), ("<mujoco>", "not a model that MuJoCo reads")])
+def test_without_a_model_that_is_said(arm, capsys, content, start):
     model = arm / "artifacts/identify_control/arm.xml"
     model.unlink()
     if content is not None:
@@ -66,4 +66,4 @@ def test_without_a_model_that_is_said(arm, capsys, content, found):
     stage = import_module("stages.fk_dataset")
     with pytest.raises(SystemExit):
         run_stage("fk_dataset", stage.Config, stage.main)
-    assert capsys.readouterr().err.startswith(f"error: artifacts/identify_control/arm.xml: {found}")
+    assert capsys.readouterr().err.startswith(f"error: artifacts/identify_control/arm.xml: {start}")

@@ -24,7 +24,7 @@ from trunkline.frames import downwards
 from trunkline.kinematics.dataset.gravities import spread
 from trunkline.kinematics.ik.inputs import TILT
 from trunkline.kinematics.panda.mounts import PandaRobot
-from trunkline.kinematics.reachability.workspace_surface import Sheets
+from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces
 from trunkline.model.arm.joints import Branch, Joints, add_elements
 from trunkline.unity import manifest as schema
 from trunkline.unity.importer import as_imported
@@ -467,12 +467,12 @@ def test_a_missing_input_is_one_line_and_leaves_nothing(project, missing):
     assert not (project / "artifacts/package_unity").exists()
 
 
-def sheets_of_a_ball() -> Sheets:
+def sheets_of_a_ball() -> WorkspaceSurfaces:
     """A hanging ball's lower half, swinging with gravity: linear in its direction."""
     downs = spread(20, 2.0, crowd=True)
     way, place = np.meshgrid(2 * np.pi * np.arange(12) / 12, np.linspace(0, np.pi / 2, 8), indexing="ij")
     half = 0.2 * np.stack([np.sin(place) * np.cos(way), np.sin(place) * np.sin(way), -np.cos(place)], axis=-1)
-    return Sheets(downs, (half + 0.3 * downs[:, None, None]).astype(np.float16), 0.02)
+    return WorkspaceSurfaces(downs, (half + 0.3 * downs[:, None, None]).astype(np.float16), 0.02)
 
 
 @pytest.fixture

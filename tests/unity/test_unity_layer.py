@@ -31,7 +31,7 @@ from trunkline.ar.teleop.vectors import about, conjugate, multiply
 from trunkline.frames import wxyz_from_rotation
 from trunkline.kinematics.reachability.triangles import nearest_on_triangles
 from trunkline.kinematics.reachability.weights import spline_weights
-from trunkline.kinematics.reachability.workspace_surface import sheet_triangles
+from trunkline.kinematics.reachability.workspace_surface import surface_triangles
 from trunkline.unity.package import MANIFEST, SAMPLES, package_json
 from trunkline.unity.twin import CSHARP
 from trunkline.unity.unpacked import maps_of, package_digest
@@ -216,7 +216,7 @@ def reaches(arrays: dict[str, np.ndarray], rng: np.random.Generator) -> list[dic
     if "sheets_points" not in arrays:
         return []
     points, downs, matrix = (arrays[f"sheets_{name}"] for name in ("points", "downs", "matrix"))
-    triangles, cases = sheet_triangles(*points.shape[1:3]), []
+    triangles, cases = surface_triangles(*points.shape[1:3]), []
     while len(cases) < CASES:
         base, gravity = Rotation.random(random_state=int(rng.integers(9999))), rng.normal(size=3)
         down = base.inv().apply(gravity / np.linalg.norm(gravity))

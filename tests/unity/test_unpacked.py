@@ -9,7 +9,7 @@ import pytest
 from trunkline.ar.teleop.reach import MapReach
 from trunkline.errors import InputError
 from trunkline.kinematics.dataset.gravities import spread
-from trunkline.kinematics.reachability.workspace_surface import Sheets
+from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces
 from trunkline.unity.package import MANIFEST, write_tarball
 from trunkline.unity.reach_maps import convert_grids, convert_sheets, describe_reach
 from trunkline.unity.rounding import rounded
@@ -28,7 +28,8 @@ ARRAYS = {
     "soft_threshold": np.array(0.0),
     "soft_tolerance": np.array(0.02),
 }
-SHEETS = Sheets(spread(20, 2.0, crowd=True), RNG.normal(scale=0.2, size=(20, 8, 5, 3)).astype(np.float16), 0.02)
+POINTS = RNG.normal(scale=0.2, size=(20, 8, 5, 3)).astype(np.float16)
+SHEETS = WorkspaceSurfaces(spread(20, 2.0, crowd=True), POINTS, 0.02)
 
 
 @pytest.fixture(params=["one tilt", "any side"])

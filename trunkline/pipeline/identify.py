@@ -1,16 +1,18 @@
 """The edge of the three identification stages: read model and trials, identify, write model, numbers, figures."""
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from trunkline.errors import InputError, existing
+from trunkline.identification.evaluation.baselines import references
 from trunkline.identification.evaluation.error_tables import TABLED, segment_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, halved_step, replay
-from trunkline.identification.evaluation.null_model import references
 from trunkline.identification.evaluation.repeatability import repeatability
+from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.identify import Identification, identify, with_parameters
 from trunkline.identification.fit.problem import Bounds
 from trunkline.identification.fit.settings import IdentificationSettings
@@ -18,17 +20,18 @@ from trunkline.identification.fit.setup import check_folds, check_parameters, se
 from trunkline.identification.parameters.parameters import PARAMETERS, parameter_named
 from trunkline.identification.parameters.per_session import (
     make_room,
-    names_apart,
     names_in,
     other_sessions,
-    untold_apart,
+    per_session_names,
+    unidentifiable_per_session,
 )
 from trunkline.identification.parameters.saving import save_model
 from trunkline.identification.results.parameter_table import parameter_table, undetermined
 from trunkline.identification.results.scoring import Compared, fingerprints, predict, start_fit
 from trunkline.identification.simulate.checks import check_trials
+from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.uncertainty.cross_validation import cross_validate
-from trunkline.identification.uncertainty.trial_diagnostics import suspicions
+from trunkline.identification.uncertainty.trial_diagnostics import trial_diagnostics
 from trunkline.model.elements import BACKLASH, CAPSTAN_FRICTION, RATE_LIMIT, numeric, switch_off
 from trunkline.pipeline.inputs import read_spec
 from trunkline.pipeline.stage import output_folder, write_json, write_metrics
@@ -41,6 +44,29 @@ TRIALS = Path("data/processed/filter")
 CSV = {"index": False, "float_format": "%.6g"}
 
 
+@dataclass
+class FitInputs:
+    """What a stage identifies from.
+
+    spec, model: MJCF that the stage begins with, with room for per-session parameters. from_cad: whether it is the CAD
+        model.
+    trials, experiments: those that are reported, the same ones in the same order.
+    """
+
+    spec: mujoco.MjSpec
+    model: mujoco.MjModel
+    from_cad: bool
+    config: IdentificationSettings
+    trials: list[Trial]
+    experiments: list[Experiment]
+    fit: Fit
+
+    @property
+    def fitted(self) -> list[Experiment]:
+        """Experiments of the kinds that the parameters are fitted to."""
+        return [e for e in self.experiments if e.kind in self.config.experiments]
+
+
 def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tuple[str, ...] = ()) -> None:
     """Identify and write `artifacts/<stage>/`.
 
@@ -49,90 +75,131 @@ def run(stage: str, config: IdentificationSettings, model_path: Path, whole: tup
         whole: earlier stages whose scalars, with this stage's, make the whole arm: the CAD model with all scalars and
             no joint's own factor is then scored on the same trials too.
     """
+    inputs = load(stage, config, model_path)
+    result, mjcf = fit(stage, inputs)
+    predictions, metrics = compare(stage, inputs, result, mjcf, whole)
+    save(stage, inputs, result, mjcf, predictions, metrics)
+
+
+def load(stage: str, config: IdentificationSettings, model_path: Path) -> FitInputs:
+    """Read the model and the trials, and check the settings against both.
+
+    Raises:
+        InputError: if parameters, trials or folds do not fit together.
+    """
     print(f"{stage}: reading the model and the trials", flush=True)
     spec = read_spec(model_path)
     model = spec.compile()
     config = with_every(config, model)
     check_parameters(stage, config, model)
     reported = read_reported(config)
-    # of an arm with tendons also the trials of later stages: a wrong name is told now, not after minutes
+    # of an arm with tendons also the trials of later stages: a wrong name is an error now, not after minutes
     every = read_trials(TRIALS, DECIDING)
     check_trials(every if model.nu else reported, model)
-    names = names_apart(list(config.parameters), config.per_session, other_sessions(every))
-    for line in untold_apart(names, every, config.experiments):
+    names = per_session_names(list(config.parameters), config.per_session, other_sessions(every))
+    for line in unidentifiable_per_session(names, every, config.experiments):
         raise InputError(f"{stage}.{line}")
     if names:
         make_room(spec, names)
         model = spec.compile()
-    model, experiments, fit = set_up(config, reported, model)
-    fitted, segments = [e for e in experiments if e.kind in config.experiments], fit.segments
-    check_folds(stage, config.cross_validation_folds, fitted)
-    if model_path == CAD_MODEL and not any(map(is_static, config.experiments)):
-        kinds = " and ".join(EXPERIMENTS[kind].plural for kind in config.experiments)
-        print(f"{stage}: without trials at rest, stiffness comes from {kinds}, as a ratio to the masses")
-    result = identify(stage, model, fitted, fit)
-    identified = save_model(spec, result.models["identified"])
-    # score what is written, not what was in memory: MJCF keeps six digits
-    models = result.models | {"identified": mujoco.MjModel.from_xml_string(identified)}
-    models["cad"] = read_spec(CAD_MODEL).compile()
-    if model_path == CAD_MODEL and config.markers == "unchanged":
-        models["initial"] = models["cad"]
-    if not result.factors and not any(map(has_factors, whole)):
-        models["coarse"] = models["identified"]
-    elif whole:
-        room = read_spec(CAD_MODEL)
-        make_room(room, names_in(model, PARAMETERS))
-        models["coarse"] = with_parameters(room.compile(), read_scalars(whole) | result.values)
-        # rest shape and markers are no matter of scalars
-        for field in ("qpos_spring", "tendon_lengthspring", "site_pos", "site_sameframe"):
-            getattr(models["coarse"], field)[:] = getattr(model, field)
-    # as it moves where nobody but MuJoCo steps it, in Unity for one: cables do not rub, winches wind as they are told
-    for name, numbers in {"smooth": (CAPSTAN_FRICTION,), "prompt": (RATE_LIMIT, BACKLASH)}.items():
-        if any(numeric(models["identified"], number) for number in numbers):
-            models[name] = mujoco.MjModel.from_xml_string(identified)
-            switch_off(models[name], *numbers)
-    predictions = predict(models, reported, experiments, model)
+    model, experiments, settings = set_up(config, reported, model)
+    inputs = FitInputs(spec, model, model_path == CAD_MODEL, config, reported, experiments, settings)
+    check_folds(stage, config.cross_validation_folds, inputs.fitted)
+    return inputs
+
+
+def fit(stage: str, inputs: FitInputs) -> tuple[Identification, str]:
+    """Identify the parameters; returns the result and the MJCF of the identified model."""
+    kinds = inputs.config.experiments
+    if inputs.from_cad and not any(map(is_static, kinds)):
+        sources = " and ".join(EXPERIMENTS[kind].plural for kind in kinds)
+        print(f"{stage}: without trials at rest, stiffness comes from {sources}, as a ratio to the masses")
+    result = identify(stage, inputs.model, inputs.fitted, inputs.fit)
+    return result, save_model(inputs.spec, result.models["identified"])
+
+
+def compare(
+    stage: str, inputs: FitInputs, result: Identification, mjcf: str, whole: tuple[str, ...]
+) -> tuple[dict[str, Prediction], dict]:
+    """Predictions of all models and baselines, and the metrics; prints what a user should know of the result."""
+    config, experiments, settings = inputs.config, inputs.experiments, inputs.fit
+    models = compared_models(inputs, result, mjcf, whole)
+    predictions = predict(models, inputs.trials, experiments, inputs.model)
     metrics: dict = {"diverged_trials": {name: prediction.replay.diverged for name, prediction in predictions.items()}}
     like = predictions["identified"].replay
-    predictions |= references(reported, predictions["identified"].experiments, models["identified"], like)
-    metrics |= {name: prediction.scores(fit.loss, fit.weights) for name, prediction in predictions.items()}
+    predictions |= references(inputs.trials, predictions["identified"].experiments, models["identified"], like)
+    metrics |= {name: prediction.scores(settings.loss, settings.weights) for name, prediction in predictions.items()}
     metrics |= {
         "noise_floor_mm": metrics["noise_floor"][VALIDATE]["e_position_mm"],
-        "repeatability_mm": repeatability(reported, like.tip),
+        "repeatability_mm": repeatability(inputs.trials, like.tip),
         "evaluations": result.evaluations,
         "diverged": result.diverged,
         "at_bound": len(result.at_bound),
-        "undetermined": len(undetermined(result, fit.parameters)),
+        "undetermined": len(undetermined(result, settings.parameters)),
         "converged": result.converged,
         "starts_agreeing": {"agreeing": result.agreeing, "of": result.starts},
         "deciding_trials": len(result.influence.deciding()),
         "start_fit": start_fit(experiments),
     }
     if not all(is_static(e.kind) for e in experiments):
-        prediction = predictions["identified"]
-        halved = replay(models["identified"], prediction.experiments, segments, step_factor=0.5)
-        metrics["halved_step"] = halved_step(prediction, Prediction(halved, prediction.experiments))
+        full = predictions["identified"]
+        halved = replay(models["identified"], full.experiments, settings.segments, step_factor=0.5)
+        metrics["halved_step"] = halved_step(full, Prediction(halved, full.experiments))
     if result.factors or whole:
         metrics["per_joint_gain"] = _gain(metrics)
     if config.cross_validation_folds:
-        metrics["cross_validation"] = cross_validate(stage, result, fitted, fit, config.cross_validation_folds)
-    looks = {
-        trial.name: suspicions(trial, experiment, fitted, models["identified"], fit)
-        for trial, experiment in zip(reported, experiments, strict=True)
+        folds = config.cross_validation_folds
+        metrics["cross_validation"] = cross_validate(stage, result, inputs.fitted, settings, folds)
+    diagnostics = {
+        trial.name: trial_diagnostics(trial, experiment, inputs.fitted, models["identified"], settings)
+        for trial, experiment in zip(inputs.trials, experiments, strict=True)
         if trial.name in result.influence.deciding()
     }
-    for doubt in doubts(result, fit.parameters, looks):
+    for doubt in doubts(result, settings.parameters, diagnostics):
         print(f"{stage}: {doubt}")
-    artifacts = Path("artifacts") / stage
+    return predictions, metrics
+
+
+def compared_models(
+    inputs: FitInputs, result: Identification, mjcf: str, whole: tuple[str, ...]
+) -> dict[str, mujoco.MjModel]:
+    """The models that metrics.json compares, by their names there."""
+    # score what is written, not what was in memory: MJCF keeps six digits
+    models = result.models | {"identified": mujoco.MjModel.from_xml_string(mjcf)}
+    models["cad"] = read_spec(CAD_MODEL).compile()
+    if inputs.from_cad and inputs.config.markers == "unchanged":
+        models["initial"] = models["cad"]
+    if not result.factors and not any(map(has_factors, whole)):
+        models["coarse"] = models["identified"]
+    elif whole:
+        extended = read_spec(CAD_MODEL)
+        make_room(extended, names_in(inputs.model, PARAMETERS))
+        models["coarse"] = with_parameters(extended.compile(), read_scalars(whole) | result.values)
+        # rest shape and markers are no matter of scalars
+        for field in ("qpos_spring", "tendon_lengthspring", "site_pos", "site_sameframe"):
+            getattr(models["coarse"], field)[:] = getattr(inputs.model, field)
+    # as in MuJoCo alone and in Unity: tendons without friction in their guide holes, winches without rate limit or play
+    for name, numbers in {"smooth": (CAPSTAN_FRICTION,), "prompt": (RATE_LIMIT, BACKLASH)}.items():
+        if any(numeric(models["identified"], number) for number in numbers):
+            models[name] = mujoco.MjModel.from_xml_string(mjcf)
+            switch_off(models[name], *numbers)
+    return models
+
+
+def save(
+    stage: str, inputs: FitInputs, result: Identification, mjcf: str, predictions: dict[str, Prediction], metrics: dict
+) -> None:
+    """Write model, parameters, metrics, tables and figures to `artifacts/<stage>/`."""
+    config, bounds, segments = inputs.config, inputs.fit.parameters, inputs.fit.segments
     rests = any(EXPERIMENTS[kind].static or EXPERIMENTS[kind].hangs for kind in config.reported)
-    with output_folder(artifacts) as folder:
-        (folder / "arm.xml").write_text(identified)
-        table = parameter_table(result, fit.parameters) | {"compared": vars(Compared.of(config))}
-        table["fitted_to"] = fingerprints([t for t in reported if t.experiment in config.experiments])
+    with output_folder(Path("artifacts") / stage) as folder:
+        (folder / "arm.xml").write_text(mjcf)
+        table = parameter_table(result, bounds) | {"compared": vars(Compared.of(config))}
+        table["fitted_to"] = fingerprints([t for t in inputs.trials if t.experiment in config.experiments])
         write_json(folder / "parameters.json", table)
         write_metrics(folder, metrics)
         write_tables(folder, predictions, segments)
-        write_plots(folder, result, fit.parameters, segments, predictions, shapes=model_path == CAD_MODEL and rests)
+        write_plots(folder, result, bounds, segments, predictions, shapes=inputs.from_cad and rests)
 
 
 def has_factors(stage: str) -> bool:
@@ -150,11 +217,13 @@ def read_scalars(stages: tuple[str, ...]) -> dict[str, float]:
     return values
 
 
-def doubts(result: Identification, bounds: dict[str, Bounds], looks: dict[str, list[str]] | None = None) -> list[str]:
+def doubts(
+    result: Identification, bounds: dict[str, Bounds], diagnostics: dict[str, list[str]] | None = None
+) -> list[str]:
     """What a user should know before trusting the result, a line each.
 
     Args:
-        looks: what looks wrong about trials that decide too much.
+        diagnostics: likely faults of trials with too much influence, by trial.
     """
     lone = f"{result.agreeing} of {result.starts} distinct starts ended at the least loss that the coarse search found"
     unfinished = [search.replace("_", " ") for search, converged in result.converged.items() if not converged]
@@ -162,8 +231,8 @@ def doubts(result: Identification, bounds: dict[str, Bounds], looks: dict[str, l
         [f"the {search} search ended before it had converged" for search in unfinished]
         + [lone] * (result.starts > 0 and result.agreeing < 2)
         + [
-            f"{trial} {'; '.join([*reasons, *(looks or {}).get(trial, [])])}"
-            for trial, reasons in result.influence.deciding().items()
+            f"{trial} {'; '.join([*sentences, *(diagnostics or {}).get(trial, [])])}"
+            for trial, sentences in result.influence.deciding().items()
         ]
         + [f"{name} ended on a bound of its range" for name in result.at_bound]
         + [f"{name} is not determined: its 95 % interval spans its range" for name in undetermined(result, bounds)]
@@ -179,10 +248,10 @@ def _gain(metrics: dict) -> dict[str, float]:
 
 
 def write_tables(folder: Path, predictions: dict[str, Prediction], segments: tuple[str, ...]) -> None:
-    """Errors of every trial, and along the arm those of `validate`, beside null model, CAD and noise floor."""
+    """Errors of every trial, and along the arm those of `validate`, beside baseline, CAD and noise floor."""
     trial_table({name: predictions[name] for name in TABLED}).to_csv(folder / "trials.csv", **CSV)
-    unseen = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
-    segment_table(unseen, segments).to_csv(folder / "segments.csv", **CSV)
+    validate = {name: prediction.of(lambda e: e.split == VALIDATE) for name, prediction in predictions.items()}
+    segment_table(validate, segments).to_csv(folder / "segments.csv", **CSV)
 
 
 def write_plots(
@@ -216,11 +285,11 @@ def write_plots(
         save_figure(plots.error_figure(errors, floor), folder / "errors.png")
         kinds = [e for e in experiments if e.kind == experiments[-1].kind]
         widest = max(kinds, key=lambda e: float(np.ptp(e.positions, axis=0).max()))
-        widest_trial = {name: moving[name].of(lambda e: e.name == widest.name) for name in compared}
-        table = curves.distance_table(widest_trial, segments)
+        widest_alone = {name: moving[name].of(lambda e: e.name == widest.name) for name in compared}
+        table = curves.distance_table(widest_alone, segments)
         table.to_csv(folder / "distances.csv", **CSV)
         save_figure(plots.distance_figure(table, widest.name), folder / "distances.png")
-        save_figure(plots.path_figure(widest_trial), folder / "paths.png")
+        save_figure(plots.path_figure(widest_alone), folder / "paths.png")
 
 
 def read_reported(config: IdentificationSettings) -> list[Trial]:
@@ -229,9 +298,9 @@ def read_reported(config: IdentificationSettings) -> list[Trial]:
     for kind in config.experiments:
         for split in DECIDING:
             if not any(t.experiment == kind and t.split == split for t in trials):
-                missing, way_out = f"found no {kind} trial with split {split}", EXPERIMENTS[kind].without
+                reason, way_out = f"found no {kind} trial with split {split}", EXPERIMENTS[kind].without
                 otherwise = f", or in params.yaml {way_out}: data/raw/README.md" if way_out else ""
-                raise InputError(f"session.yaml: {missing}, expected at least one{otherwise}")
+                raise InputError(f"session.yaml: {reason}, expected at least one{otherwise}")
     segments = trials[0].segments
     for trial in trials:
         if trial.segments != segments:

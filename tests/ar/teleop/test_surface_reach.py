@@ -7,7 +7,7 @@ from trunkline.ar.teleop.surface_reach import SheetReach
 from trunkline.errors import InputError
 from trunkline.frames import downwards
 from trunkline.kinematics.dataset.gravities import spread
-from trunkline.kinematics.reachability.workspace_surface import Sheets
+from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces
 
 LARGEST, RADIUS, TOLERANCE = np.radians(100), 0.4, 0.02
 
@@ -21,7 +21,7 @@ def cap(down) -> np.ndarray:
 
 
 NODES = spread(40, LARGEST, crowd=True)
-SHEETS = Sheets(NODES, np.stack([cap(down) for down in NODES]), TOLERANCE)
+SHEETS = WorkspaceSurfaces(NODES, np.stack([cap(down) for down in NODES]), TOLERANCE)
 REACH = SheetReach(SHEETS.points, SHEETS.downs, SHEETS.matrix, TOLERANCE)
 
 

@@ -8,7 +8,7 @@ from tests.support.bent_chain import hardening_stump, stump
 from trunkline.frames import STANDARD_GRAVITY, downwards, gravity_in_base, in_plane_of_tilt, tilt_of_gravity
 from trunkline.kinematics.dataset.deviation import mujoco_deviation
 from trunkline.kinematics.dataset.gravities import Directions, Tilts, spread
-from trunkline.kinematics.dataset.sampling import sheet_at
+from trunkline.kinematics.dataset.sampling import workspace_surface_at
 from trunkline.kinematics.dataset.table import sample_table
 from trunkline.model.statics.chain import read_chain
 from trunkline.model.statics.equilibria import equilibrium
@@ -83,7 +83,7 @@ def test_samples_under_gravity_from_the_side_rest_where_mujoco_does(model, chain
 
 def test_a_sheet_begins_where_the_arm_hangs_and_ends_where_motors_pull_with_all_their_force(chain):
     gravity = STANDARD_GRAVITY * downwards(0.8, 1.0)
-    sheet = sheet_at(chain, gravity, 9, 6)
+    sheet = workspace_surface_at(chain, gravity, 9, 6)
     hanging = equilibrium(chain, np.zeros((1, 3)), gravity).position[0]
     np.testing.assert_allclose(sheet[:, 0], np.tile(hanging, (9, 1)), atol=1e-6)
     dorsal = equilibrium(chain, np.array([[chain.max_tension[0], 0, 0]]), gravity).position[0]

@@ -14,10 +14,10 @@ def test_a_spread_by_hand():
 
 
 def test_one_sample_without_a_deviation_leaves_no_spread_to_write(tmp_path):
-    found = spread(pd.Series([1.0, np.nan, 2.0]), skipna=False)
-    assert np.isnan(list(found.values())).all()
+    spread_of_all = spread(pd.Series([1.0, np.nan, 2.0]), skipna=False)
+    assert np.isnan(list(spread_of_all.values())).all()
     with pytest.raises(InputError, match=r"metrics.json: mujoco_deviation_mm\.max: found nan"):
-        write_json(tmp_path / "metrics.json", {"mujoco_deviation_mm": {"max": found["max"]}})
+        write_json(tmp_path / "metrics.json", {"mujoco_deviation_mm": {"max": spread_of_all["max"]}})
 
 
 def test_a_band_that_was_not_found_is_left_out():

@@ -8,7 +8,7 @@ import pytest
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.ik import as_controls
 from trunkline.kinematics.ik.as_controls import AsControls, draw_targets, driven, score, settled
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.model.simulation.drive import drive
 
 ANGLES = np.radians([[0.0], [60.0]])
@@ -16,9 +16,9 @@ ANGLES = np.radians([[0.0], [60.0]])
 
 @pytest.fixture(scope="module")
 def targets(model, chain):
-    found = draw_targets(model, chain, ANGLES, np.full(3, 0.01), 12, np.random.default_rng(0)).targets
-    assert len(found) >= 6
-    return found
+    drawn = draw_targets(model, chain, ANGLES, np.full(3, 0.01), 12, np.random.default_rng(0)).targets
+    assert len(drawn) >= 6
+    return drawn
 
 
 def test_targets_that_are_left_out_are_counted(model, chain, targets, monkeypatch):
@@ -30,11 +30,11 @@ def test_targets_that_are_left_out_are_counted(model, chain, targets, monkeypatc
     rest_as_it_is = as_controls.settle
 
     def settled_but_three(*arguments):
-        found = rest_as_it_is(*arguments)
-        found.rested[:] = np.arange(12) >= 3
-        found.tensions[2:7] = chain.max_tension
-        found.tensions[7:] = 0.0
-        return found
+        rest = rest_as_it_is(*arguments)
+        rest.rested[:] = np.arange(12) >= 3
+        rest.tensions[2:7] = chain.max_tension
+        rest.tensions[7:] = 0.0
+        return rest
 
     monkeypatch.setattr(as_controls, "settle", settled_but_three)
     assert drawn().counts() == {"targets": 5, "left_out": {"near_limit": 4, "unrested": 3}}
@@ -45,9 +45,9 @@ def exact(chain, wrong: str | None = None):
 
     def ask(poses):
         first = np.tile(chain.straight_lengths, (len(poses), 1))
-        found = polish(chain, poses, first, steps=30)
-        commands = found.lengths if wrong else found.commands
-        return {"commands": commands, "lengths": found.lengths, "tip": poses[:, 1:4], "doubtful": found.steps < 0}
+        answer = refine(chain, poses, first, steps=30)
+        commands = answer.lengths if wrong else answer.commands
+        return {"commands": commands, "lengths": answer.lengths, "tip": poses[:, 1:4], "doubtful": answer.steps < 0}
 
     return ask
 
@@ -61,17 +61,17 @@ def test_exact_commands_settle_on_their_targets_and_lengths_do_not(model, chain,
 
 
 def test_a_drive_without_friction_ends_where_settling_does_and_says_when(model, chain, targets):
-    found = driven(model, exact(chain), targets, 20.0, friction=False)
-    assert found.rested.all()
-    assert found.position.max() < 3e-4
-    assert ((found.seconds > 0) & (found.seconds < 20)).all()
+    reached = driven(model, exact(chain), targets, 20.0, friction=False)
+    assert reached.rested.all()
+    assert reached.position.max() < 3e-4
+    assert ((reached.seconds > 0) & (reached.seconds < 20)).all()
 
 
 def test_what_did_not_rest_is_counted_and_its_time_is_none(model, chain, targets):
-    found = driven(model, exact(chain), targets, 0.5)
-    metrics = found.metrics(chain.length)
+    reached = driven(model, exact(chain), targets, 0.5)
+    metrics = reached.metrics(chain.length)
     assert metrics["rested"] == 0
-    assert found.time_to_rest() == {"median": None, "p95": None}
+    assert reached.time_to_rest() == {"median": None, "p95": None}
 
 
 def test_errors_beyond_one_percent_are_counted_with_what_was_said(model, chain, targets):
@@ -81,9 +81,9 @@ def test_errors_beyond_one_percent_are_counted_with_what_was_said(model, chain, 
         answer["doubtful"] = np.arange(len(poses)) == 0
         return answer
 
-    found = settled(model, careless, targets)
-    metrics = found.metrics(chain.length)
-    far = found.position > 0.01 * chain.length
+    reached = settled(model, careless, targets)
+    metrics = reached.metrics(chain.length)
+    far = reached.position > 0.01 * chain.length
     assert metrics["beyond_1pct"] == far.sum() > 1
     assert metrics["beyond_1pct_unsaid"] == far[1:].sum()
 
@@ -123,12 +123,12 @@ def test_a_model_without_friction_is_driven_once_and_damped_at_last(model, chain
 
     monkeypatch.setattr(as_controls, "drive", counted)
     settings = AsControls(targets=12, timed=2, sent=4, seconds=10.0)
-    found, _ = score(smooth, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, np.random.default_rng(0))
-    assert driven_arms == [2, found["targets"] - 2]
-    friction = found["friction"]
+    metrics, _ = score(smooth, chain, exact(chain), ANGLES, np.full(3, 0.01), settings, np.random.default_rng(0))
+    assert driven_arms == [2, metrics["targets"] - 2]
+    friction = metrics["friction"]
     assert friction["rested"] == 1.0
     assert friction["position_error_mm"]["max"] < 0.02
-    assert friction["seconds_to_rest"] == found["frictionless"]["seconds_to_rest"]
+    assert friction["seconds_to_rest"] == metrics["frictionless"]["seconds_to_rest"]
     assert friction["dry_friction"] == {
         "tendons_n": 0.0, "joints_nm": 0.0, "sliders": 0, "capstan": 0.0, "backlash_m": 0.0,
     }  # fmt: skip
@@ -136,5 +136,5 @@ def test_a_model_without_friction_is_driven_once_and_damped_at_last(model, chain
 
 def test_tips_of_a_drive_are_in_the_base_frame(model, chain, targets):
     answer = exact(chain)(targets)
-    found = drive(model, answer["commands"], gravity_in_base(targets[:, 0]), 20.0, friction=False)
-    np.testing.assert_allclose(found.end, targets[:, 1:4], atol=3e-4)
+    motion = drive(model, answer["commands"], gravity_in_base(targets[:, 0]), 20.0, friction=False)
+    np.testing.assert_allclose(motion.end, targets[:, 1:4], atol=3e-4)

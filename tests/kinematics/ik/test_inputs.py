@@ -16,14 +16,14 @@ from trunkline.kinematics.ik.inputs import (
     DIRECTION,
     TILT,
     draw_gravity,
+    gravity_columns,
     gravity_of,
     inputs_of,
     position_of,
     quaternion_of,
-    told_of_gravity,
 )
 from trunkline.kinematics.ik.onnx import to_onnx
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.score import outside_targets, tip_errors
 from trunkline.kinematics.ik.tip_loss import tip_loss
 from trunkline.kinematics.ik.training import Training, train
@@ -50,10 +50,10 @@ def network(chain, table):
 def test_both_forms_tell_the_same_gravity_and_pose(table):
     pose = table[DIRECTION[3:]].to_numpy()[:2]
     tilts = np.array([0.0, 0.7])
-    told = np.column_stack([tilts, pose]), np.column_stack([downwards(tilts, 0 * tilts), pose])
-    assert [targets.shape[1] for targets in told] == [len(TILT), len(DIRECTION)]
-    np.testing.assert_allclose(gravity_of(told[0]), gravity_of(told[1]), atol=1e-12)
-    for targets in told:
+    forms = np.column_stack([tilts, pose]), np.column_stack([downwards(tilts, 0 * tilts), pose])
+    assert [targets.shape[1] for targets in forms] == [len(TILT), len(DIRECTION)]
+    np.testing.assert_allclose(gravity_of(forms[0]), gravity_of(forms[1]), atol=1e-12)
+    for targets in forms:
         np.testing.assert_array_equal(position_of(targets), pose[:, :3])
         np.testing.assert_array_equal(quaternion_of(targets), pose[:, 3:])
 
@@ -67,8 +67,8 @@ def test_samples_say_which_form_their_network_takes(chain, table):
 
 def test_gravities_are_drawn_within_those_known_and_all_around():
     rng = np.random.default_rng(0)
-    known = downwards(np.array([0.0, 1.2]), np.array([0.0, 1.0]))
-    drawn = draw_gravity(known, 500, rng)
+    sampled = downwards(np.array([0.0, 1.2]), np.array([0.0, 1.0]))
+    drawn = draw_gravity(sampled, 500, rng)
     np.testing.assert_allclose(np.linalg.norm(drawn, axis=1), 1)
     angles = np.arccos(-drawn[:, 2])
     assert 1.1 < angles.max() <= 1.2
@@ -109,20 +109,20 @@ def test_the_file_takes_a_direction_and_refuses_one_that_is_none(table, network)
 
 def test_exact_commands_settle_on_targets_under_gravity_from_any_side(model, chain):
     """In MuJoCo, which shares nothing with the statics that find the commands."""
-    known = downwards(np.array([0.0, 1.0]), np.zeros(2))
-    drawn = draw_targets(model, chain, known, np.full(3, 0.01), 6, np.random.default_rng(0)).targets
+    sampled = downwards(np.array([0.0, 1.0]), np.zeros(2))
+    drawn = draw_targets(model, chain, sampled, np.full(3, 0.01), 6, np.random.default_rng(0)).targets
     assert drawn.shape[1] == len(DIRECTION)
     assert len(drawn) >= 3
-    assert np.abs(told_of_gravity(drawn)[:, 1]).max() > 0.1
+    assert np.abs(gravity_columns(drawn)[:, 1]).max() > 0.1
 
     def exact(poses):
-        found = polish(chain, poses, np.tile(chain.straight_lengths, (len(poses), 1)), steps=30)
-        return {"commands": found.commands, "tip": position_of(poses), "doubtful": found.steps < 0}
+        refined = refine(chain, poses, np.tile(chain.straight_lengths, (len(poses), 1)), steps=30)
+        return {"commands": refined.commands, "tip": position_of(poses), "doubtful": refined.steps < 0}
 
     assert settled(model, exact, drawn).position.max() < 2e-5
 
 
 def test_far_targets_have_any_gravity():
-    far = outside_targets(500, 0.5, np.random.default_rng(0), told=3)
+    far = outside_targets(500, 0.5, np.random.default_rng(0), columns=3)
     assert far.shape == (500, len(DIRECTION))
-    np.testing.assert_allclose(np.linalg.norm(told_of_gravity(far), axis=1), 1)
+    np.testing.assert_allclose(np.linalg.norm(gravity_columns(far), axis=1), 1)

@@ -24,25 +24,25 @@ def reached(position, doubtful=False, seconds=np.nan, rested=True) -> Reached:
 
 @pytest.mark.parametrize("never", NEVER)
 def test_a_command_after_which_no_end_came_misses_by_the_arm_s_length(never):
-    found = reached([0.001, never, 0.002]).metrics(LENGTH)
-    assert found["position_error_mm"] == pytest.approx({"median": 2.0, "p95": 450.2, "max": 500.0})
-    assert found["beyond_1pct"] == found["beyond_1pct_unsaid"] == 1
+    scores = reached([0.001, never, 0.002]).metrics(LENGTH)
+    assert scores["position_error_mm"] == pytest.approx({"median": 2.0, "p95": 450.2, "max": 500.0})
+    assert scores["beyond_1pct"] == scores["beyond_1pct_unsaid"] == 1
 
 
 @pytest.mark.parametrize("never", NEVER)
 def test_an_answer_without_an_equilibrium_misses_by_the_arm_s_length_and_half_a_turn(never):
-    found = TipErrors(np.array([0.001, never, 0.002]), np.radians([1.0, never, 2.0])).metrics(LENGTH)
-    assert found["position_error_mm"] == pytest.approx({"median": 2.0, "p95": 450.2, "max": 500.0})
-    assert found["orientation_error_deg"] == pytest.approx({"median": 2.0, "p95": 162.2})
-    assert (found["targets"], found["failed"]) == (3, 1)
-    assert found["within_1pct"] == pytest.approx(2 / 3)
+    scores = TipErrors(np.array([0.001, never, 0.002]), np.radians([1.0, never, 2.0])).metrics(LENGTH)
+    assert scores["position_error_mm"] == pytest.approx({"median": 2.0, "p95": 450.2, "max": 500.0})
+    assert scores["orientation_error_deg"] == pytest.approx({"median": 2.0, "p95": 162.2})
+    assert (scores["targets"], scores["failed"]) == (3, 1)
+    assert scores["within_1pct"] == pytest.approx(2 / 3)
 
 
 def test_a_position_alone_decides_whether_an_answer_failed():
     """An orientation cannot come without it."""
-    found = TipErrors(np.array([0.001, 0.002]), np.array([0.0, 0.1])).metrics(LENGTH)
-    assert (found["failed"], found["targets"]) == (0, 2)
-    assert "beyond_force" not in found
+    scores = TipErrors(np.array([0.001, 0.002]), np.array([0.0, 0.1])).metrics(LENGTH)
+    assert (scores["failed"], scores["targets"]) == (0, 2)
+    assert "beyond_force" not in scores
 
 
 @pytest.mark.parametrize(
@@ -50,8 +50,8 @@ def test_a_position_alone_decides_whether_an_answer_failed():
     [(0.0, 1, 1), (0.0005, 1, 1), (0.00051, 1, 0), (0.005, 1, 0), (0.00501, 0, 0), (np.nan, 0, 0)],
 )
 def test_within_a_share_of_the_length_is_up_to_it(miss, within, closely):
-    found = TipErrors(np.array([miss]), np.array([0.0])).metrics(LENGTH)
-    assert (found["within_1pct"], found["within_0p1pct"]) == (within, closely)
+    scores = TipErrors(np.array([miss]), np.array([0.0])).metrics(LENGTH)
+    assert (scores["within_1pct"], scores["within_0p1pct"]) == (within, closely)
 
 
 @pytest.mark.parametrize(
@@ -68,21 +68,21 @@ def test_within_a_share_of_the_length_is_up_to_it(miss, within, closely):
 )
 def test_a_miss_is_said_only_where_its_own_answer_was_doubted(miss, doubtful, beyond, unsaid):
     """Beside others that were doubted without need, and missed without."""
-    found = reached([0.0, miss, 0.1], [True, doubtful, False]).metrics(LENGTH)
-    assert (found["beyond_1pct"], found["beyond_1pct_unsaid"]) == (beyond + 1, unsaid + 1)
-    assert found["doubted"] == pytest.approx((1 + doubtful) / 3)
+    scores = reached([0.0, miss, 0.1], [True, doubtful, False]).metrics(LENGTH)
+    assert (scores["beyond_1pct"], scores["beyond_1pct_unsaid"]) == (beyond + 1, unsaid + 1)
+    assert scores["doubted"] == pytest.approx((1 + doubtful) / 3)
 
 
 def test_what_did_not_rest_is_counted_as_a_share():
-    found = reached([0.0, 0.0, 0.0, 0.0], rested=[True, False, True, True]).metrics(LENGTH)
-    assert found["rested"] == 0.75
-    assert "seconds_to_rest" not in found
+    scores = reached([0.0, 0.0, 0.0, 0.0], rested=[True, False, True, True]).metrics(LENGTH)
+    assert scores["rested"] == 0.75
+    assert "seconds_to_rest" not in scores
 
 
 def test_of_rest_that_nobody_looked_at_nothing_is_said():
     """As of an arm on which a rig sends commands and gives back tips."""
-    found = Reached(np.zeros(2), np.zeros(2, bool), np.full(2, np.nan)).metrics(LENGTH)
-    assert not {"rested", "seconds_to_rest"} & set(found)
+    scores = Reached(np.zeros(2), np.zeros(2, bool), np.full(2, np.nan)).metrics(LENGTH)
+    assert not {"rested", "seconds_to_rest"} & set(scores)
 
 
 @pytest.mark.parametrize(
@@ -101,8 +101,8 @@ def test_times_to_rest_count_what_never_did(seconds, median, late):
 
 
 def test_the_time_to_rest_is_beside_errors_where_any_was_looked_at():
-    found = reached([0.0, 0.0], seconds=[2.0, np.nan]).metrics(LENGTH)
-    assert found["seconds_to_rest"] == {"median": None, "p95": None}
+    scores = reached([0.0, 0.0], seconds=[2.0, np.nan]).metrics(LENGTH)
+    assert scores["seconds_to_rest"] == {"median": None, "p95": None}
 
 
 def found_at(positions, quaternions, converged, tensions=None) -> Equilibrium:
@@ -166,11 +166,11 @@ def test_a_drive_that_ends_nowhere_is_a_miss_not_a_hit(end, monkeypatch):
     ends = SimpleNamespace(end=tips, seconds_to_rest=np.where(rested, 2.0, np.nan), rested=rested)
     monkeypatch.setattr(as_controls, "drive", lambda *_, **__: ends)
     monkeypatch.setattr(as_controls, "settle", lambda *_: SimpleNamespace(position=tips, rested=rested))
-    for found in (
+    for reached in (
         as_controls.driven(model, lambda _: answer, targets, 5.0),
         as_controls.settled(model, lambda _: answer, targets),
     ):
-        metrics = found.metrics(LENGTH)
+        metrics = reached.metrics(LENGTH)
         assert metrics["position_error_mm"]["max"] == 500
         assert metrics["beyond_1pct_unsaid"] == 1
         assert metrics["rested"] == pytest.approx(1 / 3)

@@ -68,24 +68,24 @@ def test_failed_samples_are_counted_and_left_out(chain, monkeypatch):
     follow = sampling._follow
 
     def failing(*args):
-        found = follow(*args)
-        found.converged[:7], found.snapped[7:10] = False, True
-        return found
+        paths = follow(*args)
+        paths.converged[:7], paths.snapped[7:10] = False, True
+        return paths
 
     monkeypatch.setattr(sampling, "_follow", failing)
-    found = sampling.sample_at(chain, gravity_in_base(0.0), 8, 8, np.random.default_rng(0))
-    assert (found.failed, found.snapped) == (14, 6)  # of the general and the planar rays
-    assert len(found.kind) == 8 * 8 + 2 * 4 * 8 - 20
-    assert found.equilibrium.converged.all()
+    samples = sampling.sample_at(chain, gravity_in_base(0.0), 8, 8, np.random.default_rng(0))
+    assert (samples.failed, samples.snapped) == (14, 6)  # of the general and the planar rays
+    assert len(samples.kind) == 8 * 8 + 2 * 4 * 8 - 20
+    assert samples.equilibrium.converged.all()
 
 
 def test_thinning_evens_out_a_crowd():
     rng = np.random.default_rng(0)
     crowd = np.concatenate([rng.normal(0, 0.003, (4000, 3)), rng.uniform(-0.1, 0.1, (4000, 3))])
-    kept = sampling.thin(crowd, 1500, rng)
-    assert len(np.unique(kept)) == len(kept)
-    assert 1400 <= len(kept) <= 1500
-    before, after = (sampling.crowding(p, 0.05) for p in (crowd, crowd[kept]))
+    retained = sampling.thin(crowd, 1500, rng)
+    assert len(np.unique(retained)) == len(retained)
+    assert 1400 <= len(retained) <= 1500
+    before, after = (sampling.crowding(p, 0.05) for p in (crowd, crowd[retained]))
     assert after.std() / after.mean() < 0.3 * before.std() / before.mean()
 
 
@@ -143,9 +143,9 @@ def test_training_foresees_where_the_tip_comes_to(chain, trained):
 
 def test_exact_answers_score_zero_and_lengths_are_no_commands(chain, samples):
     inputs, commands, lengths = data_of(samples.sample(50, random_state=1))
-    for found in (tip_errors(chain, inputs, commands), length_errors(chain, inputs, lengths)):
-        assert found.position.max() < 1e-6
-        assert found.orientation.max() < 1e-4
+    for errors in (tip_errors(chain, inputs, commands), length_errors(chain, inputs, lengths)):
+        assert errors.position.max() < 1e-6
+        assert errors.orientation.max() < 1e-4
     assert np.median(tip_errors(chain, inputs, lengths).position) > 1e-4
 
 
@@ -165,8 +165,8 @@ def test_onnx_file_is_the_network_and_says_what_it_takes(trained, samples):
     for pose in (far.astype(np.float32), far[:1].astype(np.float32)):
         with torch.no_grad():
             expected = network(torch.tensor(pose))
-        for found, wanted in zip(session.run(["commands", "lengths", "tip"], {"pose": pose}), expected, strict=True):
-            np.testing.assert_allclose(found, wanted.numpy(), rtol=0, atol=2e-6)
+        for output, wanted in zip(session.run(["commands", "lengths", "tip"], {"pose": pose}), expected, strict=True):
+            np.testing.assert_allclose(output, wanted.numpy(), rtol=0, atol=2e-6)
     out = session.run(None, {"pose": far.astype(np.float32)})[0]
     np.testing.assert_array_equal(session.run(None, {"pose": flipped.astype(np.float32)})[0], out)
     commands = samples[command_columns(3)].to_numpy()

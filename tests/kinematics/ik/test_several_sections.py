@@ -18,13 +18,13 @@ from trunkline.kinematics.dataset.table import command_by_tension, tip_by_tensio
 from trunkline.kinematics.ik.as_controls import DOUBT, draw_targets, settled
 from trunkline.kinematics.ik.inference import ask
 from trunkline.kinematics.ik.inputs import draw_gravity, gravity_of, inputs_of
-from trunkline.kinematics.ik.learn import Unseen, doubt_beyond, known_gravities, unseen_targets
+from trunkline.kinematics.ik.learn import Unseen, doubt_beyond, sampled_gravities, unseen_targets
 from trunkline.kinematics.ik.onnx import to_onnx
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.tip_loss import tip_loss
 from trunkline.kinematics.ik.training import Training, train
 from trunkline.kinematics.reachability.sampled import read_tips
-from trunkline.kinematics.reachability.soft import SheetSettings, SoftSettings
+from trunkline.kinematics.reachability.soft import SoftSettings, SurfaceSettings
 from trunkline.model.arm.sections import Section, Sections
 from trunkline.model.arm.tendons import Tendon
 from trunkline.model.statics.chain import read_chain
@@ -71,11 +71,11 @@ def test_every_section_keeps_a_slack_tendon_and_no_motor_goes_beyond_its_stroke(
 
 def test_what_is_drawn_reaches_as_far_as_one_motor_alone_by_its_stroke(chain):
     rng = np.random.default_rng(0)
-    found, within = in_sections(chain, np.zeros(3), 4000, np.full(6, STROKE), rng)
+    result, within = in_sections(chain, np.zeros(3), 4000, np.full(6, STROKE), rng)
     assert 0.2 < within.mean() < 1
     for tendon in range(6):
         alone = np.zeros((1, 6))
-        alone[0, tendon] = found.tensions[:, tendon].max()
+        alone[0, tendon] = result.tensions[:, tendon].max()
         pull = chain.straight_lengths - equilibrium(chain, alone, np.zeros(3)).commands[0]
         assert pull[tendon] == pytest.approx(STROKE, rel=0.05)
     every, all_within = in_sections(chain, np.zeros(3), 500, None, rng)
@@ -89,7 +89,7 @@ def test_without_gravity_there_is_one_angle_and_the_pose_is_all_that_is_asked(ch
     table.to_parquet(tmp_path / "samples.parquet")
     assert not from_any_side(read_samples(tmp_path / "samples.parquet", 6, "split"))
     assert inputs_of(table) == POSE
-    assert known_gravities(table).shape == (1, 0)
+    assert sampled_gravities(table).shape == (1, 0)
     assert draw_gravity(np.zeros((1, 0)), 5, np.random.default_rng(0)).shape == (5, 0)
     np.testing.assert_array_equal(gravity_of(table[POSE].to_numpy()[:4]), np.zeros((4, 3)))
     fresh = unseen_targets(chain, np.zeros((1, 0)), Unseen(1, 20, 20, 150), 7, np.full(6, STROKE))
@@ -98,9 +98,9 @@ def test_without_gravity_there_is_one_angle_and_the_pose_is_all_that_is_asked(ch
 
 
 def test_the_samples_are_mujoco_s_at_rest(model, chain):
-    found = gather(model, chain, replace(SAMPLING, seed=2), lambda **_: None)
-    assert found.deviation["rested"].all()
-    assert found.deviation["deviation_mm"].max() < 1e-3
+    gathered = gather(model, chain, replace(SAMPLING, seed=2), lambda **_: None)
+    assert gathered.deviation["rested"].all()
+    assert gathered.deviation["deviation_mm"].max() < 1e-3
 
 
 def test_a_stroke_is_of_arms_of_several_sections(model, chain):
@@ -114,7 +114,7 @@ def test_gauss_newton_steps_bring_the_tip_to_its_target(chain, table):
     targets, lengths = rows[POSE].to_numpy(), rows[length_columns(6)].to_numpy()
     commands = rows[command_columns(6)].to_numpy()
     wrong = commands + np.random.default_rng(1).uniform(-5e-4, 5e-4, commands.shape)
-    before, after = (polish(chain, targets, lengths, steps, commands=wrong) for steps in (0, 4))
+    before, after = (refine(chain, targets, lengths, steps, commands=wrong) for steps in (0, 4))
     assert before.converged.all()
     assert np.median(before.position_error) > 0.01 * chain.length
     assert np.median(after.position_error) < 1e-4 * chain.length
@@ -123,7 +123,7 @@ def test_gauss_newton_steps_bring_the_tip_to_its_target(chain, table):
 
 def test_one_map_of_the_samples_that_train_stands_for_every_tilt(chain, table, tmp_path):
     table.to_parquet(tmp_path / "samples.parquet")
-    soft = SoftSettings(0.01, 0.02, 0.7, 60, 0.01, 5.0, 8, 8, [0.0, 30.0], SheetSettings(8, 8, 8, 1))
+    soft = SoftSettings(0.01, 0.02, 0.7, 60, 0.01, 5.0, 8, 8, [0.0, 30.0], SurfaceSettings(8, 8, 8, 1))
     tips_at = read_tips(tmp_path / "samples.parquet", chain, soft, 0)
     trains = table["split"] == "train"
     assert tips_at.angles.tolist() == [0.0]
@@ -131,9 +131,9 @@ def test_one_map_of_the_samples_that_train_stands_for_every_tilt(chain, table, t
         np.testing.assert_array_equal(tips_at(angle).positions, table.loc[trains, ["x", "y", "z"]].to_numpy())
     assert tips_at.unseen is not None
     assert len(tips_at.unseen.positions) == (~trains).sum()
-    held = forward(chain, tips_at(0.0).lengths[:40], np.zeros(3))  # what is slack is paid out, so that all are found
-    assert held.converged.all()
-    np.testing.assert_allclose(held.position, tips_at(0.0).positions[:40], atol=1e-6)
+    fixed = forward(chain, tips_at(0.0).lengths[:40], np.zeros(3))  # what is slack is paid out, so that all are found
+    assert fixed.converged.all()
+    np.testing.assert_allclose(fixed.position, tips_at(0.0).positions[:40], atol=1e-6)
     from_one_side = table.assign(gx=np.sin(table["theta_g"] + 1), gy=0.6, gz=-0.8, theta_g=np.arange(len(table)) % 2)
     from_one_side.to_parquet(tmp_path / "samples.parquet")
     with pytest.raises(InputError, match="from any side, expected tilts or none: it has several sections"):
@@ -151,10 +151,10 @@ def test_a_network_of_poses_alone_is_exported_as_it_is_and_beats_the_straight_ar
     runtime = onnxruntime.InferenceSession(to_onnx(network, names, 0.01).SerializeToString())
     asked = table[POSE].to_numpy()[:50]
     with torch.no_grad():
-        told = network(torch.tensor(asked, dtype=torch.float32))
+        outputs = network(torch.tensor(asked, dtype=torch.float32))
     answer = ask(runtime, asked)
-    np.testing.assert_allclose(answer["commands"], told.commands.numpy(), atol=1e-6)
-    np.testing.assert_allclose(answer["tip"], told.tip.numpy(), atol=1e-6)
+    np.testing.assert_allclose(answer["commands"], outputs.commands.numpy(), atol=1e-6)
+    np.testing.assert_allclose(answer["tip"], outputs.tip.numpy(), atol=1e-6)
     drawn = draw_targets(model, chain, np.zeros((1, 0)), np.full(6, STROKE), 60, np.random.default_rng(3))
     assert drawn.targets.shape[1] == 7
     missed = settled(model, lambda poses: ask(runtime, poses), drawn.targets).position
@@ -162,6 +162,6 @@ def test_a_network_of_poses_alone_is_exported_as_it_is_and_beats_the_straight_ar
     assert np.median(missed) < 0.25 * np.median(straight)
 
     loose, tight = (doubt_beyond(network, table[POSE].to_numpy(), length) for length in (1e-6, 10.0))
-    foreseen = np.linalg.norm(told.tip.numpy() - asked[:, :3], axis=1)
+    foreseen = np.linalg.norm(outputs.tip.numpy() - asked[:, :3], axis=1)
     assert 0.8 < (foreseen <= loose).mean() <= 1, "nineteen in twenty are beyond doubt"
     assert tight == DOUBT * 10.0, "however well it foresees"

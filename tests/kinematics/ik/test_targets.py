@@ -35,26 +35,28 @@ def drawn(model, chain, count):
 
 
 @pytest.mark.parametrize(
-    ("share", "kept"),
+    ("share", "retained"),
     [(0.0, True), (0.5, True), (0.9, True), (0.94, True), (as_controls.NEAR_LIMIT, False), (0.96, False), (1.0, False),
      (1.2, False), (np.nan, False)],
 )  # fmt: skip
 @pytest.mark.parametrize("motor", range(3))
-def test_only_poses_in_which_a_motor_is_all_but_at_its_limit_are_left_out(model, chain, rests, share, kept, motor):
+def test_only_poses_in_which_a_motor_is_all_but_at_its_limit_are_left_out(model, chain, rests, share, retained, motor):
     """There other commands hold the same pose. Up to there a target may be as hard as it likes."""
     tensions = 0.1 * chain.max_tension
     tensions[motor] = share * chain.max_tension[motor]
     rests(tensions, 1.0)
     assert drawn(model, chain, 2) == {
-        "targets": 2 * kept, "left_out": {"near_limit": 2 * (not kept), "unrested": 0},
+        "targets": 2 * retained, "left_out": {"near_limit": 2 * (not retained), "unrested": 0},
     }  # fmt: skip
 
 
-@pytest.mark.parametrize(("seconds", "kept"), [(0.1, True), (2.0, True), (14.0, True), (16.0, False), (np.inf, False)])
-def test_a_pose_that_takes_long_to_rest_is_a_target_too(model, chain, rests, seconds, kept):
+@pytest.mark.parametrize(
+    ("seconds", "retained"), [(0.1, True), (2.0, True), (14.0, True), (16.0, False), (np.inf, False)]
+)
+def test_a_pose_that_takes_long_to_rest_is_a_target_too(model, chain, rests, seconds, retained):
     rests(np.zeros(3), seconds)
     assert drawn(model, chain, 2) == {
-        "targets": 2 * kept, "left_out": {"near_limit": 0, "unrested": 2 * (not kept)},
+        "targets": 2 * retained, "left_out": {"near_limit": 0, "unrested": 2 * (not retained)},
     }  # fmt: skip
 
 
@@ -70,12 +72,12 @@ def test_a_real_arm_leaves_out_none_for_want_of_time(model, chain):
 
 def pulls_of(chain, others_pay_out=True, count=MANY):
     rng = np.random.default_rng(1)
-    told, commands = draw_commands(chain, ANGLES, DEEPEST, count, rng, others_pay_out)
-    return told, (chain.straight_lengths - commands) / DEEPEST
+    gravities, commands = draw_commands(chain, ANGLES, DEEPEST, count, rng, others_pay_out)
+    return gravities, (chain.straight_lengths - commands) / DEEPEST
 
 
 def test_one_or_two_neighbours_pull_and_the_others_pay_out(chain):
-    told, shares = pulls_of(chain)
+    gravities, shares = pulls_of(chain)
     pulling = shares > 0
     assert set(pulling.sum(axis=1).tolist()) == {1, 2}
     assert 0.4 < (pulling.sum(axis=1) == 2).mean() < 0.6
@@ -83,7 +85,7 @@ def test_one_or_two_neighbours_pull_and_the_others_pay_out(chain):
     for pattern in ((0, 1), (1, 2), (0, 2), (0,), (1,), (2,)):
         expected = np.isin(range(3), pattern)
         assert 0.1 < (pulling == expected).all(axis=1).mean() < 0.25
-    assert told.min() < 0.05 < 0.95 * ANGLES.max() < told.max() <= ANGLES.max()
+    assert gravities.min() < 0.05 < 0.95 * ANGLES.max() < gravities.max() <= ANGLES.max()
 
 
 def test_pulls_are_even_from_none_to_the_deepest(chain):

@@ -130,10 +130,10 @@ def descents(monkeypatch):
         gap_of = {}
 
         def descend(q, positions, rotations, mount_offset):
-            found = np.array([next(ends) for _ in range(len(q))], dtype=object)
-            for row, (_, gap) in zip(q, found, strict=True):
+            drawn = np.array([next(ends) for _ in range(len(q))], dtype=object)
+            for row, (_, gap) in zip(q, drawn, strict=True):
                 gap_of[row.tobytes()] = gap
-            pairs = np.array([pair for pair, _ in found], dtype=float)
+            pairs = np.array([pair for pair, _ in drawn], dtype=float)
             return q, pairs[:, 0], pairs[:, 1]
 
         monkeypatch.setattr("trunkline.kinematics.panda.inverse._descend", descend)
@@ -167,9 +167,9 @@ EXACT = (0.5 * POSITION_TOLERANCE, 0.5 * ROTATION_TOLERANCE)
 )
 def test_a_solution_is_within_both_tolerances_and_free(descents, errors, gap, avoid, success):
     descents([errors], [gap])
-    found = solve(np.array([NEAR]), seed=0, starts=1, avoid_collisions=avoid)
-    assert found.success.tolist() == [success]
-    assert found.starts.tolist() == [1]
+    result = solve(np.array([NEAR]), seed=0, starts=1, avoid_collisions=avoid)
+    assert result.success.tolist() == [success]
+    assert result.starts.tolist() == [1]
 
 
 @pytest.mark.parametrize(
@@ -184,14 +184,14 @@ def test_a_solution_is_within_both_tolerances_and_free(descents, errors, gap, av
 )
 def test_starts_follow_each_other_until_one_succeeds(descents, errors, gaps, success, starts, position):
     descents(errors, gaps)
-    found = solve(np.array([NEAR]), seed=0, starts=len(errors))
-    assert (found.success.item(), found.starts.item()) == (success, starts)
-    assert found.position_error.item() == position
+    result = solve(np.array([NEAR]), seed=0, starts=len(errors))
+    assert (result.success.item(), result.starts.item()) == (success, starts)
+    assert result.position_error.item() == position
 
 
 def test_only_the_targets_that_are_asked_for_are_sought():
     q = np.random.default_rng(3).uniform(Q_MIN, Q_MAX, size=(3, 7))
     positions, rotations = mount_pose(q)
-    found = solve(positions, rotations, seed=0, starts=20, avoid_collisions=False, only=np.array([1]))
-    assert found.success.tolist() == [False, True, False]
-    assert found.starts[[0, 2]].tolist() == [0, 0]
+    result = solve(positions, rotations, seed=0, starts=20, avoid_collisions=False, only=np.array([1]))
+    assert result.success.tolist() == [False, True, False]
+    assert result.starts[[0, 2]].tolist() == [0, 0]

@@ -48,6 +48,6 @@ def test_labels_are_those_of_mink_on_the_makers_panda(model):
     points = draw_points(np.array([-0.9, -0.9, -0.5]), np.array([0.9, 0.9, 0.9]), 60, seed=5)
     ours = label(points, seed=0, starts=60, starts_in_doubt=0, mount_offset=OFFSET, avoid_collisions=True)
     solver = Mink(model)
-    found = np.array([solver.solve(point, 8, [5, i]) is not None for i, point in enumerate(points)])
-    assert 10 < found.sum() < 50
-    assert (ours == found).mean() >= 0.96  # a point by the base may tell the simpler shapes apart
+    solved = np.array([solver.solve(point, 8, [5, i]) is not None for i, point in enumerate(points)])
+    assert 10 < solved.sum() < 50
+    assert (ours == solved).mean() >= 0.96  # a point by the base may tell the simpler shapes apart

@@ -10,7 +10,7 @@ from trunkline.kinematics.panda.downward import sample_downward
 from trunkline.kinematics.panda.kinematics import Q_MAX, mount_pose
 from trunkline.kinematics.panda.labels import agreement, beyond_links, draw_points, label
 from trunkline.kinematics.reachability.hybrid import minkowski_field, swept_cells
-from trunkline.kinematics.reachability.hybrid_check import Poses, draw_inside_and_outside, find_poses, verified
+from trunkline.kinematics.reachability.hybrid_check import ReachingPoses, draw_inside_and_outside, find_poses, verified
 from trunkline.kinematics.reachability.maps import angle_name, build_rigid, build_soft
 from trunkline.kinematics.reachability.reach_signal import held_out, packed, points_beyond, reach_signal
 from trunkline.kinematics.reachability.rigid import profile, rigid_field
@@ -185,11 +185,11 @@ def soft():
 @pytest.mark.parametrize("angle_deg", [2.5, 17.5])
 def test_signal_knows_tips_and_points_beyond_reach_between_the_grids(soft, angle_deg):
     tips = curved_tips(np.radians(angle_deg), 20_000, seed=5).positions
-    found = held_out(packed(soft.fields), soft.angles, soft.lattice, SHAPE, tips, np.radians(angle_deg),
+    check = held_out(packed(soft.fields), soft.angles, soft.lattice, SHAPE, tips, np.radians(angle_deg),
                      beyond=0.03, count=1000, seed=0)
-    assert found.iou > 0.93
-    assert found.reachable > 0.995
-    assert found.beyond < 0.02
+    assert check.iou > 0.93
+    assert check.reachable > 0.995
+    assert check.beyond < 0.02
 
 
 def test_signal_is_the_distance_outside(soft):
@@ -212,10 +212,10 @@ def test_points_beyond_are_as_far_as_asked():
 
 def test_coarse_angles_would_not_do(soft):
     """What the fine step is for: grids 80° apart, blended half-way."""
-    low, own, high = (
+    low, between, high = (
         soft_field(curved_tips(np.radians(deg), 20_000).positions, soft.lattice, SHAPE) for deg in (-30, 10, 50)
     )
-    assert overlap((low + high) / 2, own) < 0.8
+    assert overlap((low + high) / 2, between) < 0.8
 
 
 def test_names_of_angles():
@@ -234,8 +234,8 @@ def test_tips_beside_the_axis_sweep_a_ring():
 
 def test_hybrid_of_a_point_and_a_ball_is_the_ball():
     field, lattice = ball_field(0.2, 0.01)
-    one = Lattice(np.array([0.0, 0.0, -0.32]), 0.016, (1, 1, 1))
-    result, where = minkowski_field(field, lattice, np.ones((1, 1, 1), bool), one, smoothing=0.0, smallest=1)
+    single = Lattice(np.array([0.0, 0.0, -0.32]), 0.016, (1, 1, 1))
+    result, where = minkowski_field(field, lattice, np.ones((1, 1, 1), bool), single, smoothing=0.0, smallest=1)
     grid = np.stack(np.meshgrid(*where.axes(), indexing="ij"), axis=-1)
     true = np.linalg.norm(grid - [0, 0, -0.32], axis=-1) - 0.2
     near = np.abs(true) < 0.03
@@ -269,12 +269,12 @@ def test_points_of_the_hybrid_map_are_reached_and_points_beside_it_are_not(rigid
     assert len(inside) == len(outside) == 40
     where = {"seed": 0, "mount_offset": OFFSET, "avoid_collisions": True}
     reach = find_poses(inside, tips, rigid.field, rigid.lattice, **where)
-    assert reach.found.mean() >= 0.97
-    mount, rotation = mount_pose(reach.q[reach.found], OFFSET)
+    assert reach.reached.mean() >= 0.97
+    mount, rotation = mount_pose(reach.q[reach.reached], OFFSET)
     assert np.abs(rotation[:, :, 2] - [0, 0, -1]).max() < 1e-3
-    reached = tip_position(mount, rotation, tips[reach.tip[reach.found]])
-    assert np.linalg.norm(reached - inside[reach.found], axis=1).max() < 1e-3
-    assert find_poses(outside, tips, rigid.field, rigid.lattice, **where).found.mean() <= 0.03
+    reached = tip_position(mount, rotation, tips[reach.tip[reach.reached]])
+    assert np.linalg.norm(reached - inside[reach.reached], axis=1).max() < 1e-3
+    assert find_poses(outside, tips, rigid.field, rigid.lattice, **where).reached.mean() <= 0.03
 
 
 def test_a_pose_is_verified_by_joint_angles_and_tendon_lengths_alone(arm):
@@ -284,7 +284,7 @@ def test_a_pose_is_verified_by_joint_angles_and_tendon_lengths_alone(arm):
     mount, rotation = mount_pose(q, OFFSET)
     index = np.array([40, 50, 60, 70, 80])
     points = tip_position(mount, rotation, tips.positions[index])
-    reach = Poses(np.array([1, 1, 1, 1, 0], bool), q, index, np.zeros(5))
+    reach = ReachingPoses(np.array([1, 1, 1, 1, 0], bool), q, index, np.zeros(5))
     assert list(verified(points, reach, tips.lengths, arm, OFFSET)) == [True] * 4 + [False]
     assert not verified(points + [0, 0, 0.005], reach, tips.lengths, arm, OFFSET).any()
     q[:, 5] += 0.1  # no longer straight down: gravity pulls another way

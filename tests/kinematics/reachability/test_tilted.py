@@ -56,7 +56,7 @@ def test_points_inside_are_reached_at_the_tilt_and_points_outside_are_not(chain,
     inside, outside = draw_inside_and_outside(field, lattice, 0.04, 20, seed=0)
     reach = find_tilted(inside, pairs, tips.positions, seed=0, **HOW)
     assert verified(inside, reach, tips.lengths, chain, OFFSET).mean() >= 0.95
-    pointing = mount_pose(reach.q[reach.found], OFFSET)[1][:, 2, 2]
+    pointing = mount_pose(reach.q[reach.reached], OFFSET)[1][:, 2, 2]
     np.testing.assert_allclose(pointing, -np.cos(TILT), atol=1e-3)
     reach = find_tilted(outside, pairs, tips.positions, seed=0, **HOW)
     assert verified(outside, reach, tips.lengths, chain, OFFSET).mean() <= 0.05

@@ -8,7 +8,7 @@ import pytest
 from trunkline.frames import downwards
 from trunkline.kinematics.reachability import reach_signal, surface_check
 from trunkline.kinematics.reachability.reach_signal import held_out, points_beyond
-from trunkline.kinematics.reachability.surface_check import check_sheets
+from trunkline.kinematics.reachability.surface_check import check_surfaces
 from trunkline.kinematics.sdf.grid import Lattice
 
 A_LITTLE = 1e-9
@@ -33,8 +33,8 @@ def test_a_held_out_angle_counts_what_its_signal_calls_within_reach(monkeypatch,
     )  # fmt: skip
     lattice = Lattice(np.zeros(3), 0.1, (2, 2, 2))
     fields, angles = -np.ones((2, 2, 2, 2), np.float16), np.array([0.0, 1.0])
-    found = held_out(fields, angles, lattice, None, tips, 0.5, beyond=0.02, count=9, seed=1)  # type: ignore[arg-type]
-    assert (found.angle, found.iou, found.reachable, found.beyond) == (0.5, 1.0, reachable, beyond)
+    check = held_out(fields, angles, lattice, None, tips, 0.5, beyond=0.02, count=9, seed=1)  # type: ignore[arg-type]
+    assert (check.angle, check.iou, check.reachable, check.beyond) == (0.5, 1.0, reachable, beyond)
 
 
 @pytest.mark.parametrize(("at_tips", "outside", "reachable", "beyond"), SIGNALS)
@@ -43,7 +43,7 @@ def test_sheets_are_checked_with_tips_and_points_beyond(monkeypatch, at_tips, ou
     tips, away = np.zeros((len(at_tips), 3)), np.ones((len(outside), 3))
     found_there = SimpleNamespace(equilibrium=SimpleNamespace(position=tips))
     for name, value in (
-        ("finer", np.zeros((3, 3))), ("sheet_at", None), ("soft_lattice", None), ("soft_field", None),
+        ("finer", np.zeros((3, 3))), ("workspace_surface_at", None), ("soft_lattice", None), ("soft_field", None),
         ("overlap", 0.75), ("points_beyond", away), ("sample_at", found_there),
     ):  # fmt: skip
         monkeypatch.setattr(surface_check, name, lambda *_, value=value: value)
@@ -52,9 +52,9 @@ def test_sheets_are_checked_with_tips_and_points_beyond(monkeypatch, at_tips, ou
         signal=lambda sheet, points: np.array(outside if points is away else at_tips),
     )  # fmt: skip
     soft = SimpleNamespace(sheets=SimpleNamespace(heldout=3), voxel=0.01)
-    said = []
-    rows = check_sheets(sheets, None, soft, beyond=0.02, count=9, seed=1, done=said.append)  # type: ignore[arg-type]
-    assert len(rows) == len(said) == 3
+    calls = []
+    rows = check_surfaces(sheets, None, soft, beyond=0.02, count=9, seed=1, done=calls.append)  # type: ignore[arg-type]
+    assert len(rows) == len(calls) == 3
     assert [(row.reachable, row.beyond, row.iou) for row in rows] == [(reachable, beyond, 0.75)] * 3
     assert all(0 <= row.angle <= 0.5 for row in rows)
 

@@ -15,7 +15,7 @@ from trunkline.kinematics.sdf.grid import (
     redistance,
     without_specks,
 )
-from trunkline.kinematics.sdf.mesh import LEVEL, Surface, contains, surface, unsimplified, write_obj
+from trunkline.kinematics.sdf.mesh import LEVEL, TriangleMesh, contains, surface, unsimplified, write_obj
 from trunkline.kinematics.sdf.mesh_distance import mesh_distance
 
 SPACING = 0.01  # m
@@ -176,7 +176,7 @@ def test_a_surface_that_touches_lattice_points_reads_back_as_closed(tmp_path):
     middle = ball(lattice, 0.0)
     nearest = np.abs(middle - 0.1).argmin()
     touching = ball(lattice, middle.ravel()[nearest] - LEVEL * lattice.spacing - 1e-8)
-    raw, mesh = Surface(*unsimplified(touching, lattice)), surface(touching, lattice, 10**6, "reachability.rigid")
+    raw, mesh = TriangleMesh(*unsimplified(touching, lattice)), surface(touching, lattice, 10**6, "reachability.rigid")
     read = []
     for name, shape in (("raw", raw), ("mesh", mesh)):
         write_obj(tmp_path / f"{name}.obj", shape, name)

@@ -7,8 +7,8 @@ from pathlib import Path
 import mujoco
 
 from tests.support.matched_plant import curl, release, segments_of, small_model, static_pull, tilt
+from trunkline.identification.evaluation.baselines import references
 from trunkline.identification.evaluation.evaluation import Prediction, replay
-from trunkline.identification.evaluation.null_model import references
 from trunkline.identification.results.scoring import fingerprints
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.recordings.trials.experiments import EXPERIMENTS

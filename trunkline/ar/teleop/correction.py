@@ -1,6 +1,6 @@
 """The network's answer made exact: a few steps nearer to the target, and where the arm then really comes to rest.
 
-Up to three Gauss-Newton steps of `ik.polish` bring the tip nearer, its orientation left free. What is said of the tip
+Up to three Gauss-Newton steps of `ik.refine` bring the tip nearer, its orientation left free. What is said of the tip
 is the equilibrium under the commands themselves, as they are sent (`statics.equilibria.actuated`).
 """
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from trunkline.ar.teleop.vectors import IDENTITY, Vector
 from trunkline.frames import STANDARD_GRAVITY
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import actuated
 
@@ -36,7 +36,7 @@ def corrected(chain: Chain, first: Bent, tip: Vector, gravity: Vector) -> Bent |
     chain, pull, target = chain.smooth, STANDARD_GRAVITY * np.array(gravity), np.array([[*gravity, *tip, *IDENTITY]])
 
     def sent(lengths: np.ndarray) -> Bent | None:
-        better = polish(chain, target, lengths[None], lever=LEVER)
+        better = refine(chain, target, lengths[None], lever=LEVER)
         return _rest(chain, better.commands if better.converged[0] else first.commands[None], pull)
 
     foreseen, improved = np.linalg.norm(first.tip - tip), sent(first.lengths)

@@ -12,7 +12,7 @@ import numpy as np
 from trunkline.ar.teleop.reach_message import Reading
 from trunkline.ar.teleop.vectors import DOWN, Vector
 from trunkline.errors import InputError
-from trunkline.kinematics.reachability.workspace_surface import sheet_triangles
+from trunkline.kinematics.reachability.workspace_surface import surface_triangles
 from trunkline.model.statics.kernel import kernel
 
 ROUNDING = 1e-6  # of a unit vector, by which gravity may be beyond the last directions
@@ -34,7 +34,7 @@ class SheetReach:
                              "and (D, D + 4)")  # fmt: skip
         self._points = np.ascontiguousarray(np.reshape(points, (count, -1)), dtype=np.float32)
         self._downs, self._matrix = (np.ascontiguousarray(array, dtype=np.float64) for array in (downs, matrix))
-        self._triangles = sheet_triangles(*np.shape(points)[1:3])
+        self._triangles = surface_triangles(*np.shape(points)[1:3])
         self._tolerance = tolerance
         self._lowest = float(-self._downs[:, 2].max()) - ROUNDING
         self._last = DOWN, self._sheet(DOWN)

@@ -61,8 +61,8 @@ def segment_table(predictions: dict[str, Prediction], segments: tuple[str, ...])
                 for positions, e in zip(replayed.positions, prediction.experiments, strict=True)
                 if e.kind == kind
             ]
-            seen = np.isfinite(errors)
-            means = np.where(seen, errors, 0).sum(axis=0) / np.where(seen.any(axis=0), seen.sum(axis=0), np.nan)
+            valid = np.isfinite(errors)
+            means = np.where(valid, errors, 0).sum(axis=0) / np.where(valid.any(axis=0), valid.sum(axis=0), np.nan)
             for index in np.argsort(places):
                 rows.append((kind, LABELS[model], segments[index], places[index], means[index] * 1e3))
     return pd.DataFrame(rows, columns=["experiment", "model", "segment", "from_base_mm", "e_position_mm"])
@@ -70,6 +70,6 @@ def segment_table(predictions: dict[str, Prediction], segments: tuple[str, ...])
 
 def _along(positions: np.ndarray, experiment: Experiment, length: float) -> np.ndarray:
     """Mean distance of each segment from its measurement, m; nan for one that was never measured. Shape (S,)."""
-    found = np.linalg.norm(survived(positions, length) - experiment.positions, axis=-1)
+    distances = np.linalg.norm(survived(positions, length) - experiment.positions, axis=-1)
     count = experiment.measured.sum(axis=0)
-    return np.where(experiment.measured, found, 0).sum(axis=0) / np.where(count, count, np.nan)
+    return np.where(experiment.measured, distances, 0).sum(axis=0) / np.where(count, count, np.nan)

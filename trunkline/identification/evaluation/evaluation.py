@@ -55,9 +55,9 @@ class Prediction:
 
     def of(self, chosen: Callable[[Experiment], bool]) -> "Prediction":
         """That of some of the experiments alone."""
-        kept = [i for i, experiment in enumerate(self.experiments) if chosen(experiment)]
-        positions = [self.replay.positions[i] for i in kept]
-        return Prediction(replace(self.replay, positions=positions), [self.experiments[i] for i in kept])
+        indices = [i for i, experiment in enumerate(self.experiments) if chosen(experiment)]
+        positions = [self.replay.positions[i] for i in indices]
+        return Prediction(replace(self.replay, positions=positions), [self.experiments[i] for i in indices])
 
     def scores(self, loss: str | None = None, weights: LossWeights | None = None) -> dict[str, dict]:
         """As the function `scores`."""
@@ -73,7 +73,7 @@ def replay(
 ) -> Replay:
     """Simulate `experiments` with `model` as it is, its time step (times a factor) fitted to divide a frame evenly."""
     simulated = Sessions(model, experiments, segments, step_factor).simulate(
-        lambda _, own: {STRUCTURE: np.array(getattr(own, STRUCTURE))[None]}
+        lambda _, variant: {STRUCTURE: np.array(getattr(variant, STRUCTURE))[None]}
     )
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -103,9 +103,9 @@ def scores(
     rows = trial_errors(Prediction(replayed, experiments), loss, weights)
     table: dict[str, dict] = {}
     for split in SPLITS:
-        own = [(e, row) for e, row in rows if e.split == split]
-        if own:
-            table[split] = _summary(own)
+        subset = [(e, row) for e, row in rows if e.split == split]
+        if subset:
+            table[split] = _summary(subset)
         paths = [
             (survived(positions, replayed.length), e)
             for positions, e in zip(replayed.positions, experiments, strict=True)
@@ -119,7 +119,7 @@ def scores(
 def _tip_over_paths(paths: list[tuple[np.ndarray, Experiment]], tip: int) -> dict[str, float]:
     """Root mean square of the tip's distance over all shapes of all trials, and that of what is left once the mean
     offset is taken out, as quasi-static models of continuum robots are compared. Paths: positions (T, S, 3), m."""
-    off = np.concatenate([(found - e.positions)[:, tip][e.measured[:, tip]] for found, e in paths])
+    off = np.concatenate([(positions - e.positions)[:, tip][e.measured[:, tip]] for positions, e in paths])
     ways = {"e_tip_rms_mm": off, "e_tip_centred_rms_mm": off - off.mean(axis=0)}
     return {name: float(np.sqrt(np.mean(np.sum(way**2, axis=1)))) * 1e3 for name, way in ways.items()}
 
@@ -136,24 +136,24 @@ def _summary(rows: list[tuple[Experiment, dict[str, float]]]) -> dict:
     return table
 
 
-def halved_step(found: Prediction, halved: Prediction) -> dict:
+def halved_step(whole: Prediction, halved: Prediction) -> dict:
     """By which share of itself half the time step moves E_internal, per split, and the tip error (`tip`).
 
     Measured errors hardly change if those of the step hide beside others, hence also the largest distance between the
     two simulations of any segment, and of the tip, in mm.
     """
-    before, after = found.scores(), halved.scores()
+    before, after = whole.scores(), halved.scores()
 
     def change(error: str) -> dict[str, float]:
         both = {split: (before[split].get(error), after[split].get(error)) for split in before}
         return {split: abs(new - old) / old for split, (old, new) in both.items() if old and new is not None}
 
-    pairs = zip(halved.replay.positions, found.replay.positions, strict=True)
+    pairs = zip(halved.replay.positions, whole.replay.positions, strict=True)
     furthest = np.max([np.linalg.norm(a - b, axis=-1).max(axis=0) for a, b in pairs], axis=0) * 1e3
     return change("e_internal_mm") | {
         "tip": change("e_tip_mm"),
         "max_mm": float(furthest.max()),
-        "tip_max_mm": float(furthest[found.replay.tip]),
+        "tip_max_mm": float(furthest[whole.replay.tip]),
     }
 
 
@@ -179,15 +179,15 @@ def errors_of(
     """Loss and errors of one trial, simulated as `positions` (T, S, 3), m."""
     real, measured, length, tip = experiment.positions, experiment.measured, replayed.length, replayed.tip
     positions = survived(positions, length)
-    found = {
+    errors = {
         "e_internal": float(internal_error(positions, real, measured)),
         "e_position": float(position_error(positions, real, measured)),
     }
     if measured[:, tip].any():
-        one = slice(tip, tip + 1)
-        found["e_tip"] = float(position_error(positions[:, one], real[:, one], measured[:, one]))
-    row = {f"{name}_mm": error * 1e3 for name, error in found.items()}
-    row |= {f"{name}_pct": error / length * 100 for name, error in found.items()}
+        tip_alone = slice(tip, tip + 1)
+        errors["e_tip"] = float(position_error(positions[:, tip_alone], real[:, tip_alone], measured[:, tip_alone]))
+    row = {f"{name}_mm": error * 1e3 for name, error in errors.items()}
+    row |= {f"{name}_pct": error / length * 100 for name, error in errors.items()}
     in_order = experiment.frame_step > 0  # else frames taken from here and there, or shapes at rest
     if loss is not None and weights is not None and (in_order or is_static(experiment.kind)):
         weights = weights_for(experiment, weights)
@@ -210,13 +210,13 @@ def about_rest(positions: np.ndarray, experiment: Experiment, tip: int, length: 
     last = slice(-max(round(LAST / step), 1), None)
     if not measured[last].any(axis=0).all() or np.ptp(real[last, tip][measured[last, tip]], axis=0).max() > STILL:
         return {}
-    seen = measured[last][..., None]
-    offset = np.where(seen, positions[last] - real[last], 0).sum(axis=0) / seen.sum(axis=0)
+    valid = measured[last][..., None]
+    offset = np.where(valid, positions[last] - real[last], 0).sum(axis=0) / valid.sum(axis=0)
     away = np.linalg.norm(positions - real - offset, axis=-1)
-    found = {"e_position_about_rest": float(away[measured].mean()),
+    errors = {"e_position_about_rest": float(away[measured].mean()),
              "e_tip_about_rest": float(away[:, tip][measured[:, tip]].mean())}  # fmt: skip
-    row = {f"{name}_mm": 1e3 * error for name, error in found.items()}
-    row |= {f"{name}_pct": 100 * error / length for name, error in found.items()}
+    row = {f"{name}_mm": 1e3 * error for name, error in errors.items()}
+    row |= {f"{name}_pct": 100 * error / length for name, error in errors.items()}
     late = slice(*(round(at / step) for at in LATE))
     speeds = [np.linalg.norm(np.diff(way[late, tip], axis=0), axis=1) for way in (positions, real)]
     if speeds[1].any() and measured[late, tip].all():
@@ -234,8 +234,8 @@ def period_error(simulated: np.ndarray, real: np.ndarray, measured: np.ndarray) 
     times = np.arange(len(real))
     filled = np.stack([np.interp(times, times[measured], axis[measured]) for axis in real.T], axis=1)
     line = np.linalg.svd(filled - filled.mean(axis=0), full_matrices=False)[2][0]
-    found, true = (_frequency(points @ line) for points in (simulated, filled))
-    return abs(true / found - 1)
+    frequency, true_frequency = (_frequency(points @ line) for points in (simulated, filled))
+    return abs(true_frequency / frequency - 1)
 
 
 def _frequency(swing: np.ndarray) -> float:

@@ -29,21 +29,21 @@ def repeatability(trials: list[Trial], tip: int) -> dict[str, dict]:
         `mean_mm` over segments and trials, `tip_mm` of the tip alone, `tip_worst_mm` of the worst trial, `trials`
         that end alike with others, `groups` of them.
     """
-    found = {}
+    table = {}
     for kind in sorted({trial.experiment for trial in trials}):
         ends = [(trial, end_shape(trial)) for trial in trials if trial.experiment == kind]
         groups = _alike([(trial, shape) for trial, shape in ends if shape is not None])
         distances = [_scatter(np.array(shapes)) for shapes in groups if len(shapes) >= FEWEST]
         if distances:
             rows = np.concatenate(distances) * 1e3
-            found[kind] = {
+            table[kind] = {
                 "mean_mm": float(np.nanmean(rows)),
                 "tip_mm": float(np.nanmean(rows[:, tip])),
                 "tip_worst_mm": float(np.nanmax(rows[:, tip])),
                 "trials": len(rows),
                 "groups": len(distances),
             }
-    return found
+    return table
 
 
 def end_shape(trial: Trial) -> np.ndarray | None:
@@ -55,11 +55,11 @@ def end_shape(trial: Trial) -> np.ndarray | None:
         return np.where(trial.measured[0][:, None], trial.positions[0], np.nan)
     last = trial.time >= trial.time[-1] - LAST
     count = trial.measured[last].sum(axis=0)[:, None]
-    seen = trial.measured[last][..., None]
-    low, high = (np.where(seen, trial.positions[last], end).T for end in (np.inf, -np.inf))
+    valid = trial.measured[last][..., None]
+    low, high = (np.where(valid, trial.positions[last], end).T for end in (np.inf, -np.inf))
     if (high.max(axis=2) - low.min(axis=2)).max() >= STILL or trial.time[-1] - trial.start < LAST:
         return None
-    return np.where(seen, trial.positions[last], 0).sum(axis=0) / np.where(count, count, np.nan)
+    return np.where(valid, trial.positions[last], 0).sum(axis=0) / np.where(count, count, np.nan)
 
 
 def _alike(ends: list[tuple[Trial, np.ndarray]]) -> list[list[np.ndarray]]:
@@ -75,14 +75,14 @@ def _alike(ends: list[tuple[Trial, np.ndarray]]) -> list[list[np.ndarray]]:
     return [shapes for _, shapes in groups]
 
 
-def _same(one: Trial, other: Trial) -> bool:
-    if one.session != other.session:
+def _same(first: Trial, second: Trial) -> bool:
+    if first.session != second.session:
         return False
-    if np.abs(one.gravity - other.gravity).max() > SAME_GRAVITY or abs(one.load - other.load) > SAME_LOAD:
+    if np.abs(first.gravity - second.gravity).max() > SAME_GRAVITY or abs(first.load - second.load) > SAME_LOAD:
         return False
-    if one.tendons != other.tendons or not one.tendons:
-        return one.tendons == other.tendons
-    pulls = [np.maximum(trial.commands[-1], 0) for trial in (one, other)]  # slack is slack, by however much
+    if first.tendons != second.tendons or not first.tendons:
+        return first.tendons == second.tendons
+    pulls = [np.maximum(trial.commands[-1], 0) for trial in (first, second)]  # slack is slack, by however much
     return bool(np.abs(pulls[0] - pulls[1]).max() < SAME_PULL)
 
 

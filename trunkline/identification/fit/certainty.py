@@ -61,7 +61,7 @@ def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves 
         pulled = np.linalg.pinv(normal * scaling, hermitian=True) * scaling @ np.diag(linear.prior**2)
         covariance = covariance + prior_deviation**2 * pulled @ pulled.T
     error = np.sqrt(np.diag(covariance))
-    error = np.where(_told_by_one(normal, normals), np.inf, error)
+    error = np.where(_set_by_one_trial(normal, normals), np.inf, error)
     safe = np.where(error > 0, error, 1.0)
     singular, directions = np.linalg.eigh(normal * scaling)
     return Certainty(
@@ -73,9 +73,9 @@ def certainty(linear: Linearisation, prior_deviation: float = 0.0, moves: Moves 
     )
 
 
-def _told_by_one(normal: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def _set_by_one_trial(normal: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Which parameters have no information in `normal` (P, P) without one of the trials' `normals` (T, P, P). (P,)."""
-    least = np.min([np.diag(normal - own) for own in normals], axis=0)
+    least = np.min([np.diag(normal - normal_of_one) for normal_of_one in normals], axis=0)
     return least <= ALONE * np.diag(normal)
 
 
@@ -101,7 +101,7 @@ def bootstrap(linear: Linearisation, seed: int, moves: Moves | None = None) -> n
     degrees = max(trials - 1, 1)
     tail = ndtr(-np.sqrt((trials + 1) / degrees) * stdtrit(degrees, 0.975))
     interval = linear.vector + np.quantile((moves or linear.moves)(weights), [tail, 1 - tail], axis=0)
-    return np.where(_told_by_one(normals.sum(axis=0), normals), [[-np.inf], [np.inf]], interval)
+    return np.where(_set_by_one_trial(normals.sum(axis=0), normals), [[-np.inf], [np.inf]], interval)
 
 
 def weakest_in_words(names: list[str], weakest: np.ndarray) -> str:

@@ -15,7 +15,7 @@ from trunkline.settings import Seed
 
 
 @dataclass
-class Rough:
+class CoarseSearch:
     """A coarser look: a time step `step_factor` times the model's own, over the first `frames` of `trials` trials."""
 
     step_factor: Annotated[float, Field(ge=1, le=4)]
@@ -24,7 +24,7 @@ class Rough:
 
 
 @dataclass
-class Polish:
+class Refinement:
     """Least squares on whole trials at the model's own step."""
 
     iterations: Annotated[int, Field(ge=1, le=10000)]
@@ -41,8 +41,8 @@ class Method:
     """
 
     optimizer: Optimizer
-    rough: Rough
-    polish: Polish
+    rough: CoarseSearch
+    polish: Refinement
     fine: Optimizer
     per_joint_range: Annotated[float, Field(gt=0, lt=1)]
     per_joint_deviation: Annotated[float, Field(gt=0, le=10)]

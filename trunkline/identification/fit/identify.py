@@ -8,13 +8,13 @@ import numpy as np
 from trunkline.compute.progress import progress
 from trunkline.identification.evaluation.evaluation import segment_positions
 from trunkline.identification.fit.certainty import Certainty, bootstrap, certainty
-from trunkline.identification.fit.fit import Fit, Polish
+from trunkline.identification.fit.fit import Fit, Refinement
 from trunkline.identification.fit.influence import Influence, influence
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.optimizers import Optimizer
 from trunkline.identification.fit.problem import Problem
 from trunkline.identification.fit.robust import reweighted
-from trunkline.identification.fit.search import Convergence, Found, descend, search
+from trunkline.identification.fit.search import Convergence, SearchResult, descend, search
 from trunkline.identification.fit.surrogate import Surrogate, surrogate
 from trunkline.identification.parameters.parameters import candidate_fields, follow_rest, parameter_named, set_fields
 from trunkline.identification.simulate.experiment import Experiment
@@ -38,8 +38,8 @@ class Identification:
     factor_certainty: of all factors, given the scalars; None without factors.
     influence: of every trial on every scalar.
     at_bound: names of what ended on a bound.
-    converged: which searches stopped for that reason; the rough one, if its starts agree too.
-    agreeing, starts: of so many distinct starts of the rough search, how many end at its least loss.
+    converged: which searches stopped for that reason; the coarse one, if its starts agree too.
+    agreeing, starts: of so many distinct starts of the coarse search, how many end at its least loss.
     """
 
     models: dict[str, mujoco.MjModel]
@@ -67,41 +67,41 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
         model: the model that the stage begins with.
     """
     method, parameters, per_joint, rest = fit.method, fit.parameters, fit.per_joint, fit.rest
-    seen = [e for e in experiments if e.split == IDENTIFY]
-    short = [e.shortened(method.rough.frames) for e in _few(seen, method.rough.trials)]
-    rough, exact = fit.problem(model, short, method.rough.step_factor), fit.problem(model, seen)
-    searches = {"coarse": _search(rough, method.optimizer, method.seed, f"{label} coarse")}
-    problems, found = [rough, exact], searches["coarse"]
+    fitted = [e for e in experiments if e.split == IDENTIFY]
+    short = [e.shortened(method.rough.frames) for e in _few(fitted, method.rough.trials)]
+    coarse_problem, exact = fit.problem(model, short, method.rough.step_factor), fit.problem(model, fitted)
+    searches = {"coarse": _search(coarse_problem, method.optimizer, method.seed, f"{label} coarse")}
+    problems, result = [coarse_problem, exact], searches["coarse"]
     near, last = exact, "polish"
-    if method.rough.step_factor > 1 and not all(is_static(e.kind) for e in seen):  # at rest, the step changes nothing
-        near, last = fit.problem(model, seen, method.rough.step_factor), "whole"
+    if method.rough.step_factor > 1 and not all(is_static(e.kind) for e in fitted):  # at rest, the step changes nothing
+        near, last = fit.problem(model, fitted, method.rough.step_factor), "whole"
         problems.append(near)
-    found = _polish(near, found, method.polish, f"{label} near")
+    result = _refine(near, result, method.polish, f"{label} near")
     # what outlies, and by how much an estimate answers a trial, is as plain at a coarser step, which costs less
-    searches[last], around = _reweigh(near, found, fit, f"{label} {last}")
-    found = searches[last]
+    searches[last], around = _reweigh(near, result, fit, f"{label} {last}")
+    result = searches[last]
     if near is not exact:
         exact.trial_weights = near.trial_weights
-        searches["polish"] = found = _polish(exact, found, method.polish, f"{label} polish")
-    values = values_of(parameters, found.vector)
+        searches["polish"] = result = _refine(exact, result, method.polish, f"{label} polish")
+    values = values_of(parameters, result.vector)
     coarse = with_parameters(model, values, rest=rest)
-    at_bound = _at_bound(parameters, found.vector, *exact.bounds())
-    linear = found.linear
+    at_bound = _at_bound(parameters, result.vector, *exact.bounds())
+    linear = result.linear
     assert linear is not None, "least squares ends on its own linearisation"
 
     factors: dict[str, np.ndarray] = {}
     factor_certainty = None
     if per_joint:
         # trials count as independent, each with the coarse fit's loss for its variance
-        prior_weight = np.sqrt(2 * found.loss / len(seen)) / method.per_joint_deviation
+        prior_weight = np.sqrt(2 * result.loss / len(fitted)) / method.per_joint_deviation
         joints = replace(
-            replace(fit, parameters={}).problem(coarse, seen),
+            replace(fit, parameters={}).problem(coarse, fitted),
             per_joint=per_joint, per_joint_range=method.per_joint_range, prior_weight=prior_weight,
             trial_weights=exact.trial_weights,
         )  # fmt: skip
-        searches["per_joint"] = found = _search(joints, method.fine, method.seed, f"{label} per joint")
-        factor_certainty = certainty(found.linear or linearise(joints, found.vector), method.per_joint_deviation)
-        factors = dict(zip(per_joint, found.vector.reshape(len(per_joint), -1), strict=True))
+        searches["per_joint"] = result = _search(joints, method.fine, method.seed, f"{label} per joint")
+        factor_certainty = certainty(result.linear or linearise(joints, result.vector), method.per_joint_deviation)
+        factors = dict(zip(per_joint, result.vector.reshape(len(per_joint), -1), strict=True))
         at_bound += _factors_at_bound(factors, method.per_joint_range)
         problems.append(joints)
 
@@ -112,7 +112,7 @@ def identify(label: str, model: mujoco.MjModel, experiments: list[Experiment], f
         certainty=certainty(linear, moves=around.moves),
         bootstrap=bootstrap(linear, method.seed, around.moves),
         factor_certainty=factor_certainty,
-        influence=influence(around, [e.name for e in seen], list(parameters)),
+        influence=influence(around, [e.name for e in fitted], list(parameters)),
         at_bound=at_bound,
         converged={name: search.converged for name, search in searches.items()},
         agreeing=searches["coarse"].agreeing,
@@ -136,57 +136,57 @@ def _few(experiments: list[Experiment], count: int) -> list[Experiment]:
     return [experiments[i] for i in order[places]]
 
 
-def _search(problem: Problem, optimizer: Optimizer, seed: int, label: str) -> Found:
+def _search(problem: Problem, optimizer: Optimizer, seed: int, label: str) -> SearchResult:
     with progress(optimizer.steps(), label, "iterations") as bar:
         return search(
             problem, optimizer, seed, lambda best: bar.update(1, best_loss=best, **problem.effort()), bar.expect
         )
 
 
-def _polish(problem: Problem, rough: Found, polish: Polish, label: str) -> Found:
-    """Least squares from the best, by this problem, of the minima that the rough search found."""
-    start = rough.vector
-    if rough.others:
-        minima = np.stack([rough.vector, *rough.others])
+def _refine(problem: Problem, coarse: SearchResult, settings: Refinement, label: str) -> SearchResult:
+    """Least squares from the best, by this problem, of the minima of the coarse search."""
+    start = coarse.vector
+    if coarse.others:
+        minima = np.stack([coarse.vector, *coarse.others])
         start = minima[np.argmin(problem.losses(minima))]
-    with progress(polish.iterations, label, "iterations") as bar:
+    with progress(settings.iterations, label, "iterations") as bar:
         return descend(
-            problem, start, polish.iterations, polish.tolerance,
+            problem, start, settings.iterations, settings.tolerance,
             lambda best: bar.update(1, best_loss=best, **problem.effort()),
         )  # fmt: skip
 
 
-def _reweigh(problem: Problem, found: Found, fit: Fit, label: str) -> tuple[Found, Surrogate]:
+def _reweigh(problem: Problem, result: SearchResult, fit: Fit, label: str) -> tuple[SearchResult, Surrogate]:
     """The minimum in which outlying trials count less, from near it, and the surrogate around it.
 
     The surrogate says which, and about where the minimum then is; least squares goes there, until the weights stay. A
-    surrogate is made anew where it has not foreseen the losses found.
+    surrogate is made anew where its prediction of the losses was wrong.
     """
-    kinds, polish = [e.kind for e in problem.experiments], fit.method.polish
+    kinds, settings = [e.kind for e in problem.experiments], fit.method.polish
     straight = segment_positions(problem.model, problem.segments, problem.model.qpos0)
     bends = np.array([np.square(e.positions - straight).sum(axis=2)[e.measured].mean() for e in problem.experiments])
-    around = made = surrogate(problem, found.vector, found.linear.residuals if found.linear else None)
-    made_at = found.vector
+    around = made = surrogate(problem, result.vector, result.linear.residuals if result.linear else None)
+    made_at = result.vector
     for turn in range(REWEIGHINGS):
         weights, place = reweighted(around, kinds, bends, fit.weights.outlying)
         if turn and np.abs(weights - problem.trial_weights).max() < SAME_WEIGHT:
             break
         problem.trial_weights = weights
-        tried = np.stack([found.vector, np.clip(found.vector + place, *problem.bounds())])
+        tried = np.stack([result.vector, np.clip(result.vector + place, *problem.bounds())])
         start = tried[np.argmin(problem.losses(tried))]
-        with progress(polish.iterations, label, "iterations") as bar:
-            found = descend(
-                problem, start, polish.iterations, polish.tolerance,
+        with progress(settings.iterations, label, "iterations") as bar:
+            result = descend(
+                problem, start, settings.iterations, settings.tolerance,
                 lambda best, bar=bar: bar.update(1, best_loss=best, **problem.effort()),
             )  # fmt: skip
-        assert found.linear is not None, "least squares ends on its own linearisation"
-        moved, losses = found.vector - made_at, _trial_losses(problem, found.linear.residuals)
+        assert result.linear is not None, "least squares ends on its own linearisation"
+        moved, losses = result.vector - made_at, _trial_losses(problem, result.linear.residuals)
         if np.abs(made.losses(moved[None])[0] - losses).sum() <= SEEN * losses.sum():
             around = made.moved(moved, weights)
         else:
-            around = made = surrogate(problem, found.vector, found.linear.residuals)
-            made_at = found.vector
-    return found, around
+            around = made = surrogate(problem, result.vector, result.linear.residuals)
+            made_at = result.vector
+    return result, around
 
 
 def _trial_losses(problem: Problem, residuals: list[np.ndarray]) -> np.ndarray:

@@ -37,7 +37,7 @@ class Influence:
 
     def deciding(self) -> dict[str, list[str]]:
         """Trials that move a parameter by more than its interval, or are outlying, and a sentence on each."""
-        told = {}
+        sentences = {}
         for trial, row, weight, loss in zip(self.trials, self.moves, self.weights, self.losses, strict=True):
             moved = [
                 f"moves {name} by {abs(move):.1f} of its half widths"
@@ -47,8 +47,8 @@ class Influence:
             if weight < 1:
                 moved.append(f"counts {weight:.2g} as much as the others")
             if moved:
-                told[trial] = [*moved, f"its loss is {loss:.2g} times the median"]
-        return told
+                sentences[trial] = [*moved, f"its loss is {loss:.2g} times the median"]
+        return sentences
 
 
 def influence(surrogate: Surrogate, trials: list[str], parameters: list[str]) -> Influence:
@@ -70,6 +70,6 @@ def influence(surrogate: Surrogate, trials: list[str], parameters: list[str]) ->
         full, without, *again = surrogate.minima(left)
         spread = np.std(again, axis=0) * np.sqrt(len(others) - 1)
         half = spread * stdtrit(len(others) - 1, 0.975)
-        told = surrogate.tells(left[1]) & (half > 0)
-        moves[trial, told] = ((full - without) / np.where(half > 0, half, 1.0))[told]
+        determined = surrogate.determines(left[1]) & (half > 0)
+        moves[trial, determined] = ((full - without) / np.where(half > 0, half, 1.0))[determined]
     return Influence(trials, parameters, moves, weights, losses / max(float(np.median(losses)), 1e-300))

@@ -22,10 +22,10 @@ def usual_losses(losses: np.ndarray, kinds: list[str], bends: np.ndarray) -> np.
     """
     names, usual = np.array(kinds), np.full(len(kinds), np.inf)
     for kind in set(kinds):
-        own = names == kind
-        if own.sum() >= COMPARED:
-            deeper = bends[own] / max(float(np.median(bends[own])), 1e-300)
-            usual[own] = np.median(losses[own]) * np.maximum(deeper, 1.0)
+        same_kind = names == kind
+        if same_kind.sum() >= COMPARED:
+            deeper = bends[same_kind] / max(float(np.median(bends[same_kind])), 1e-300)
+            usual[same_kind] = np.median(losses[same_kind]) * np.maximum(deeper, 1.0)
     return usual
 
 
@@ -58,8 +58,8 @@ def reweighted(
     losses = surrogate.losses(starts)
     best = int(np.argmin(losses.sum(axis=1) - losses.max(axis=1)))
     usual = usual_losses(losses[best], kinds, bends)
-    found = [_settle(surrogate, starts[index], kinds, bends, outlying) for index in (0, best)]
-    return min(found, key=lambda end: robust_loss(surrogate.losses(end[1][None])[0], usual, outlying))
+    candidates = [_settle(surrogate, starts[index], kinds, bends, outlying) for index in (0, best)]
+    return min(candidates, key=lambda end: robust_loss(surrogate.losses(end[1][None])[0], usual, outlying))
 
 
 def _settle(

@@ -31,7 +31,7 @@ class Convergence:
 
 
 @dataclass
-class Found:
+class SearchResult:
     """Result of a search.
 
     vector: the best candidate z. loss: its. converged: stopped for that reason, not because its time was up.
@@ -56,7 +56,7 @@ def _not_shown(_: int) -> None:
 
 def search(
     problem: Problem, optimizer: Optimizer, seed: int, report: Report, expect: Expect = _not_shown
-) -> Found:
+) -> SearchResult:
     """The minimum within bounds, from the problem's own start or with it among the first candidates.
 
     Args:
@@ -71,8 +71,8 @@ def search(
         drawn = _latin_hypercube(rng, CANDIDATES, *problem.bounds())
         ranks = np.argsort(problem.losses(drawn, rough=True), kind="stable")
         candidates = np.concatenate([evolved.vector[None], drawn[ranks]])
-        found = _several(problem, _apart(problem, candidates, STARTS), ITERATIONS, TOLERANCE, report, expect)
-        return replace(found, convergence=evolved.convergence, converged=evolved.converged and found.agreeing > 1)
+        result = _several(problem, _apart(problem, candidates, STARTS), ITERATIONS, TOLERANCE, report, expect)
+        return replace(result, convergence=evolved.convergence, converged=evolved.converged and result.agreeing > 1)
     candidates, count = problem.start()[None], 1
     if optimizer.starts:  # else it goes on from what is known
         drawn = _latin_hypercube(rng, optimizer.starts, *problem.bounds())
@@ -81,10 +81,10 @@ def search(
         count = max(optimizer.descents, STARTS) if problem.parameters else optimizer.descents
     starts = _apart(problem, candidates, count)
     expect(-optimizer.steps())
-    found = _several(problem, starts, optimizer.iterations, optimizer.tolerance, report, expect)
+    result = _several(problem, starts, optimizer.iterations, optimizer.tolerance, report, expect)
     if count == 1:
-        return replace(found, agreeing=0, starts=0)
-    return replace(found, converged=found.converged and found.agreeing > 1)
+        return replace(result, agreeing=0, starts=0)
+    return replace(result, converged=result.converged and result.agreeing > 1)
 
 
 def _apart(problem: Problem, candidates: np.ndarray, count: int) -> list[np.ndarray]:
@@ -105,7 +105,7 @@ def _several(
     tolerance: float,
     report: Report,
     expect: Expect = _not_shown,
-) -> Found:
+) -> SearchResult:
     """The best end of least squares from several starts, the best of them first, and how many of them end as well.
 
     A search that ends for its own reasons may still have ended beside the minimum. It has converged if distinct starts
@@ -132,7 +132,7 @@ def _ends(
     report: Report,
     hasty: bool,
     expect: Expect = _not_shown,
-) -> list[Found]:
+) -> list[SearchResult]:
     """Where least squares ends from `start`, and from where parameters begin to matter that do not matter there.
 
     A force range that no pull reaches is one: the loss is flat above the largest tension, so nothing leads from
@@ -142,7 +142,7 @@ def _ends(
         hasty: leave a plateau at once, not from its own minimum, unless nothing better is found outside.
     """
 
-    def descent(start: np.ndarray, hasty: bool = False) -> Found:
+    def descent(start: np.ndarray, hasty: bool = False) -> SearchResult:
         """Its limit of iterations is expected while it lasts, what it took once it has ended."""
         expect(iterations)
         reported = []
@@ -153,18 +153,18 @@ def _ends(
     ends = [descent(start, hasty)]
     if not problem.parameters:
         return ends
-    (low, high), found = problem.bounds(), ends[0]
-    plateaus = np.flatnonzero(_flat(found.linear or linearise(problem, found.vector)))
+    (low, high), first = problem.bounds(), ends[0]
+    plateaus = np.flatnonzero(_flat(first.linear or linearise(problem, first.vector)))
     for index in plateaus:
-        scan = np.repeat(found.vector[None], PLATEAU_SCAN, axis=0)
+        scan = np.repeat(first.vector[None], PLATEAU_SCAN, axis=0)
         scan[:, index] = np.linspace(low[index], high[index], PLATEAU_SCAN)
         losses = problem.losses(scan)
-        matters = np.abs(losses - found.loss) > PLATEAU_LEVEL * found.loss
+        matters = np.abs(losses - first.loss) > PLATEAU_LEVEL * first.loss
         if matters.any():
             edge = scan[np.argmin(np.where(matters, losses, np.inf))]
             ends.append(descent(edge))
-    if hasty and len(plateaus) and min(ends, key=lambda end: end.loss) is found:
-        ends[0] = descent(found.vector)
+    if hasty and len(plateaus) and min(ends, key=lambda end: end.loss) is first:
+        ends[0] = descent(first.vector)
     return ends
 
 
@@ -175,7 +175,7 @@ def _flat(linear: Linearisation) -> np.ndarray:
 
 def descend(
     problem: Problem, start: np.ndarray, iterations: int, tolerance: float, report: Report, hasty: bool = False
-) -> Found:
+) -> SearchResult:
     """Least squares on the loss's residuals. Only a step that is taken costs a Jacobian.
 
     It ends with the first step that gains less than `tolerance` of the loss, also where less was gained than expected:
@@ -183,31 +183,31 @@ def descend(
     start at which a parameter does not matter, too.
     """
     convergence = Convergence()
-    known: dict[bytes, list[np.ndarray]] = {}
+    tried: dict[bytes, list[np.ndarray]] = {}
     accepted: list[Linearisation] = []
     low, high = problem.bounds()
 
     def blocks_at(vector: np.ndarray) -> list[np.ndarray]:
         key = vector.tobytes()
-        if key not in known:
-            known[key] = [block[0] for block in problem.residuals(vector[None])]
-        return known[key]
+        if key not in tried:
+            tried[key] = [block[0] for block in problem.residuals(vector[None])]
+        return tried[key]
 
     def residuals(vector: np.ndarray) -> np.ndarray:
         return np.concatenate([*blocks_at(vector), problem.prior(vector[None])[0]])
 
     def derivatives(vector: np.ndarray) -> np.ndarray:
-        found = linearise(problem, vector, blocks_at(vector))
-        known.clear()  # steps before this iterate are not tried again
-        known[vector.tobytes()] = found.residuals
-        accepted[:] = [found]  # scipy asks for derivatives at its iterates alone
-        blocks = [*found.residuals, problem.prior(vector[None])[0]]
+        linear = linearise(problem, vector, blocks_at(vector))
+        tried.clear()  # steps before this iterate are not tried again
+        tried[vector.tobytes()] = linear.residuals
+        accepted[:] = [linear]  # scipy asks for derivatives at its iterates alone
+        blocks = [*linear.residuals, problem.prior(vector[None])[0]]
         loss = 0.5 * sum(float(block @ block) for block in blocks)
         convergence.best.append(loss)
         convergence.mean.append(loss)
         report(loss)
-        prior = np.zeros(len(vector)) if found.prior is None else found.prior
-        return np.concatenate([*found.jacobians, np.diag(prior)])
+        prior = np.zeros(len(vector)) if linear.prior is None else linear.prior
+        return np.concatenate([*linear.jacobians, np.diag(prior)])
 
     def enough(_: OptimizeResult) -> None:
         if len(best := convergence.best) > 1 and best[-2] - best[-1] < tolerance * best[-2]:
@@ -226,12 +226,12 @@ def descend(
     last = accepted[0]
     if not np.array_equal(last.vector, result.x):
         last = linearise(problem, result.x, blocks_at(result.x))
-    return Found(result.x, float(result.cost), convergence, result.status != 0, last)
+    return SearchResult(result.x, float(result.cost), convergence, result.status != 0, last)
 
 
 def _evolve(
     problem: Problem, optimizer: DifferentialEvolution, rng: np.random.Generator, report: Report
-) -> Found:
+) -> SearchResult:
     convergence, last = Convergence(), []
     low, high = problem.bounds()
 
@@ -262,7 +262,7 @@ def _evolve(
         vectorized=True,
         callback=note,
     )
-    return Found(result.x, float(result.fun), convergence, bool(result.success))
+    return SearchResult(result.x, float(result.fun), convergence, bool(result.success))
 
 
 def _latin_hypercube(rng: np.random.Generator, count: int, low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -45,9 +45,9 @@ class IdentificationSettings(Method):
             parameter = parameter_named(name)
             if span.low <= 0 and not parameter.signed:
                 raise ValueError(f"parameters.{name}.low: found {span.low}, expected more than 0")
-            telling = [kind for kind in EXPERIMENTS if parameter.told_by(EXPERIMENTS[kind])]
-            if not set(telling) & set(self.experiments):
-                found = f"found it to be identified from {' and '.join(self.experiments)} alone"
-                raise ValueError(f"parameters.{name}: {found}, expected one of {', '.join(telling)} too")
+            kinds = [kind for kind in EXPERIMENTS if parameter.identifiable_from(EXPERIMENTS[kind])]
+            if not set(kinds) & set(self.experiments):
+                reason = f"found it to be identified from {' and '.join(self.experiments)} alone"
+                raise ValueError(f"parameters.{name}: {reason}, expected one of {', '.join(kinds)} too")
             if self.rest_shape == "measured" and "qpos_spring" in parameter.fields:
                 raise ValueError(f"parameters.{name}: found it beside rest_shape: measured, expected one of the two")

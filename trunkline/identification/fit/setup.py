@@ -52,9 +52,9 @@ def with_every(config: IdentificationSettings, model: mujoco.MjModel) -> Identif
     range of an angle is then about where the arm has each."""
     spans: dict[str, Bounds] = {}
     for name, span in config.parameters.items():
-        for one in names_of(name, model) or [name]:
-            middle = PARAMETERS[one].read(model) if name == EVERY_ANGLE else 0.0
-            spans[one] = Bounds(middle + span.low, middle + span.high)
+        for parameter in names_of(name, model) or [name]:
+            middle = PARAMETERS[parameter].read(model) if name == EVERY_ANGLE else 0.0
+            spans[parameter] = Bounds(middle + span.low, middle + span.high)
     return replace(config, parameters=spans)
 
 
@@ -72,13 +72,13 @@ def check_parameters(stage: str, config: IdentificationSettings, model: mujoco.M
 
 def _lacking(part: str) -> str:
     if part == "tendons":
-        found = "found it for an arm without tendons, expected parameters of joints alone"
-        return f"{found}; such an arm's pipeline ends with `dvc repro identify_damping`"
+        reason = "found it for an arm without tendons, expected parameters of joints alone"
+        return f"{reason}; such an arm's pipeline ends with `dvc repro identify_damping`"
     if part.startswith("motor "):
         return f"found it for an arm without {part}, expected a ratio for each motor that it has but the first"
     if part == "dead time":
-        found = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0"
-        return f"{found}; of an arm that comes as MJCF, expected `delay` and `nsample` of its actuators in that file"
+        reason = "found it for motors without, expected build_mjcf.actuation.dead_time of more than 0"
+        return f"{reason}; of an arm that comes as MJCF, expected `delay` and `nsample` of its actuators in that file"
     if part in (RATE_LIMIT, BACKLASH):
         return f"found it for winches without, expected build_mjcf.actuation.{part} of more than 0"
     kind = part.partition(" ")[0]

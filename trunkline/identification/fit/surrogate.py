@@ -64,7 +64,7 @@ class Surrogate:
         shift = np.linalg.inv(features_at(places, self.second)) @ features_at(place + places, self.second)
         return Surrogate(shift @ self.grams @ shift.T, weights, self.second)
 
-    def tells(self, weights: np.ndarray) -> np.ndarray:
+    def determines(self, weights: np.ndarray) -> np.ndarray:
         """Which parameters trials that weigh `weights` (T,) say anything about. Shape (P,)."""
         lengths = [np.diag(np.einsum("t,tfg->fg", w, self.grams))[1 : self.count + 1] for w in (weights, self.weights)]
         return lengths[0] > ALONE * lengths[1]

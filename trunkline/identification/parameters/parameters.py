@@ -53,7 +53,7 @@ class Parameter:
         part: what of an arm it belongs to, if not every arm has it: "tendons", their motors' "dead time", RATE_LIMIT or
             BACKLASH, the "motor 2", …, the "tendon 2", …, what commands draw in, WINDING and PRELOAD, the "section 2",
             …, a joint's "branch 1", "slider 1", …, or "holes" on which cables rub.
-        told_by: whether trials of a kind of experiment tell it: from others alone it comes out wrong, or anyhow.
+        identifiable_from: whether trials of a kind of experiment determine it; from others alone it comes out wrong.
     """
 
     unit: str
@@ -62,7 +62,7 @@ class Parameter:
     write: Callable[[Fields, np.ndarray, mujoco.MjModel], None]
     signed: bool = False
     part: str = ""
-    told_by: Callable[[Kind], bool] = lambda kind: True
+    identifiable_from: Callable[[Kind], bool] = lambda kind: True
     scale: float = 1.0
 
     def belongs_to(self, model: mujoco.MjModel) -> bool:
@@ -104,7 +104,7 @@ def _pulled_and_moving(kind: Kind) -> bool:
     return kind.needs_motors and not kind.static
 
 
-def _start_known(kind: Kind) -> bool:
+def _start_measured(kind: Kind) -> bool:
     """The bent pose from which a release starts is fitted beforehand, with the hinges where they were then."""
     return kind.static or kind.needs_motors
 
@@ -118,11 +118,11 @@ def _scale_stiffness(fields: Fields, factors: np.ndarray, model: mujoco.MjModel)
     arm = factors.shape[1]
     fields["jnt_stiffness"][:, :arm] *= factors
     fields["jnt_stiffnesspoly"][:, :arm] *= factors[..., None]
-    for one in all_elements(model, DIAGONAL):
-        fields["tendon_stiffnesspoly"][:, one.tendon] *= factors[:, one.hinge, None]
-    for one in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
-        fields["tendon_stiffness"][:, one.tendon] *= factors[:, one.hinge]
-        fields["dof_damping"][:, one.own] *= factors[:, one.hinge[: len(one.own)]]
+    for part in all_elements(model, DIAGONAL):
+        fields["tendon_stiffnesspoly"][:, part.tendon] *= factors[:, part.hinge, None]
+    for part in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
+        fields["tendon_stiffness"][:, part.tendon] *= factors[:, part.hinge]
+        fields["dof_damping"][:, part.own] *= factors[:, part.hinge[: len(part.own)]]
 
 
 def _scale_damping(fields: Fields, factors: np.ndarray, model: mujoco.MjModel) -> None:
@@ -206,7 +206,8 @@ def _gain_ratio(number: int) -> Parameter:
         fields["actuator_gainprm"][:, number - 1, 0] = gain
         fields["actuator_biasprm"][:, number - 1, 1] = -gain
 
-    return Parameter("", ("actuator_gainprm", "actuator_biasprm"), read, write, part=f"motor {number}", told_by=_pulled)
+    fields = ("actuator_gainprm", "actuator_biasprm")
+    return Parameter("", fields, read, write, part=f"motor {number}", identifiable_from=_pulled)
 
 
 def _hinge_share(model: mujoco.MjModel) -> float:
@@ -221,8 +222,8 @@ def _read_hardening(model: mujoco.MjModel) -> float:
 def _write_hardening(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
     hardening = values[:, None] * fields["jnt_stiffness"]  # 0 for branches' hinges
     fields["jnt_stiffnesspoly"][:, :, 1] = _hinge_share(model) * hardening
-    for one in all_elements(model, DIAGONAL):
-        fields["tendon_stiffnesspoly"][:, one.tendon, 1] = DIAGONAL_SHARE * hardening[:, one.hinge]
+    for part in all_elements(model, DIAGONAL):
+        fields["tendon_stiffnesspoly"][:, part.tendon, 1] = DIAGONAL_SHARE * hardening[:, part.hinge]
 
 
 def follow_rest(fields: Fields, model: mujoco.MjModel) -> None:
@@ -271,43 +272,43 @@ def _share(kind: str, number: int) -> Parameter:
     """Stiffness of the joints' branches or sliders over that of their springs; a branch keeps its time."""
 
     def read(model: mujoco.MjModel) -> float:
-        one = elements(model, kind, number)
-        shares = model.tendon_stiffness[one.tendon] / model.jnt_stiffness[one.hinge]
+        part = elements(model, kind, number)
+        shares = model.tendon_stiffness[part.tendon] / model.jnt_stiffness[part.hinge]
         return float(shares[0]) if len(shares) else 0.0
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
-        one = elements(model, kind, number)
-        times = fields["dof_damping"][:, one.own] / fields["tendon_stiffness"][:, one.tendon[: len(one.own)]]
-        stiffness = values[:, None] * fields["jnt_stiffness"][:, one.hinge]
-        fields["tendon_stiffness"][:, one.tendon] = stiffness
-        fields["dof_damping"][:, one.own] = times * stiffness[:, : len(one.own)]
+        part = elements(model, kind, number)
+        times = fields["dof_damping"][:, part.own] / fields["tendon_stiffness"][:, part.tendon[: len(part.own)]]
+        stiffness = values[:, None] * fields["jnt_stiffness"][:, part.hinge]
+        fields["tendon_stiffness"][:, part.tendon] = stiffness
+        fields["dof_damping"][:, part.own] = times * stiffness[:, : len(part.own)]
 
     fields = ("tendon_stiffness", "dof_damping", "jnt_stiffness")
-    return Parameter("", fields, read, write, part=f"{kind} {number}", told_by=_moving)
+    return Parameter("", fields, read, write, part=f"{kind} {number}", identifiable_from=_moving)
 
 
 def _relaxation_time(number: int) -> Parameter:
     def read(model: mujoco.MjModel) -> float:
-        one = elements(model, BRANCH, number)
-        return float(model.dof_damping[one.own[0]] / model.tendon_stiffness[one.tendon[0]]) if len(one.own) else 0.0
+        part = elements(model, BRANCH, number)
+        return float(model.dof_damping[part.own[0]] / model.tendon_stiffness[part.tendon[0]]) if len(part.own) else 0.0
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
-        one = elements(model, BRANCH, number)
-        fields["dof_damping"][:, one.own] = values[:, None] * fields["tendon_stiffness"][:, one.tendon]
+        part = elements(model, BRANCH, number)
+        fields["dof_damping"][:, part.own] = values[:, None] * fields["tendon_stiffness"][:, part.tendon]
 
     fields = ("dof_damping", "tendon_stiffness")
-    return Parameter("s", fields, read, write, part=f"{BRANCH} {number}", told_by=_moving)
+    return Parameter("s", fields, read, write, part=f"{BRANCH} {number}", identifiable_from=_moving)
 
 
 def _yield_bend(number: int) -> Parameter:
     def read(model: mujoco.MjModel) -> float:
-        one = elements(model, SLIDER, number)
-        return float(model.tendon_springyield[one.tendon[0]]) if len(one.tendon) else 0.0
+        part = elements(model, SLIDER, number)
+        return float(model.tendon_springyield[part.tendon[0]]) if len(part.tendon) else 0.0
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         fields["tendon_springyield"][:, elements(model, SLIDER, number).tendon] = values[:, None]
 
-    return Parameter("rad", ("tendon_springyield",), read, write, part=f"{SLIDER} {number}", told_by=_moving)
+    return Parameter("rad", ("tendon_springyield",), read, write, part=f"{SLIDER} {number}", identifiable_from=_moving)
 
 
 def _rest_bend(axis: int, power: int) -> Parameter:
@@ -334,14 +335,16 @@ def _rest_bend(axis: int, power: int) -> Parameter:
     return Parameter("rad", ("qpos_spring",), read, write, signed=True)
 
 
-def _number(name: str, unit: str, part: str, told_by: Callable[[Kind], bool] = _pulled_and_moving) -> Parameter:
+def _number(
+    name: str, unit: str, part: str, identifiable_from: Callable[[Kind], bool] = _pulled_and_moving
+) -> Parameter:
     """One that is no field of MuJoCo's but a number of that name, which the stepper reads."""
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         fields["numeric_data"][:, numeric_place(model, name)] = values
 
     read = partial(numeric, name=name)
-    return Parameter(unit, ("numeric_data",), read, write, part=part, told_by=told_by)
+    return Parameter(unit, ("numeric_data",), read, write, part=part, identifiable_from=identifiable_from)
 
 
 def _winds(kind: Kind) -> bool:
@@ -414,8 +417,8 @@ def _section_stiffness(number: int) -> Parameter:
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         edges = np.append(0, np.cumsum(model.numeric_data[numbers_place(model, SECTIONS)]))
         unit = unit_of_hinge(model)
-        own = (unit >= edges[number - 1]) & (unit < edges[number])
-        _scale_stiffness(fields, np.where(own, (values / read(model))[:, None], 1.0), model)
+        in_section = (unit >= edges[number - 1]) & (unit < edges[number])
+        _scale_stiffness(fields, np.where(in_section, (values / read(model))[:, None], 1.0), model)
 
     return Parameter("", STIFFNESS_FIELDS, read, write, part=f"section {number}")
 
@@ -433,18 +436,18 @@ PARAMETERS: dict[str, Parameter] = {
     # radius factor of pseudo-rigid-body models (L. L. Howell, Compliant Mechanisms, 2001)
     "joint_place": Parameter(
         "", ("jnt_pos",), lambda m: float(_places(m, _unit_ends(m))[0]), _write_place, signed=True,
-        told_by=_start_known,
+        identifiable_from=_start_measured,
     ),
     "hardening": Parameter(
         "1/rad²", STIFFNESS_FIELDS, _read_hardening, _write_hardening,
     ),
     "joint_friction": Parameter(
         "rad", ("dof_frictionloss", "jnt_stiffness"),
-        lambda m: float(m.dof_frictionloss[0] / m.jnt_stiffness[0]), _write_joint_friction, told_by=_moving,
+        lambda m: float(m.dof_frictionloss[0] / m.jnt_stiffness[0]), _write_joint_friction, identifiable_from=_moving,
     ),
     "damping": Parameter(
         "N m s/rad", DAMPING_FIELDS, lambda m: float(m.dof_damping[0]),
-        _whole_arm(_scale_damping, lambda m: float(m.dof_damping[0])), told_by=_moving,
+        _whole_arm(_scale_damping, lambda m: float(m.dof_damping[0])), identifiable_from=_moving,
     ),
     "relaxation": _share(BRANCH, 1),
     "relaxation_time": _relaxation_time(1),
@@ -462,43 +465,45 @@ PARAMETERS: dict[str, Parameter] = {
     "rest_gradient_y": _rest_bend(1, 1),
     "tendon_friction": Parameter(
         "N", ("tendon_frictionloss",), lambda m: float(m.tendon_frictionloss[0]), _write_tendons("tendon_frictionloss"),
-        part="tendons", told_by=_moving,
+        part="tendons", identifiable_from=_moving,
     ),
     # the smallest speed at which a regularised friction yields falls with it: a slow one lets a hook creep straight
     "friction_time": Parameter(
         "s", ("tendon_solref_fri",), lambda m: float(m.tendon_solref_fri[0, 0]),
-        _write_tendons("tendon_solref_fri", (0,)), part="tendons", told_by=_moving,
+        _write_tendons("tendon_solref_fri", (0,)), part="tendons", identifiable_from=_moving,
     ),
     # μ of cables on the holes that they pass, in the capstan equation
     "capstan_friction": _number(CAPSTAN_FRICTION, "", "holes"),
     "kp": Parameter(
         "N/m", ("actuator_gainprm", "actuator_biasprm"), lambda m: float(m.actuator_gainprm[0, 0]), _write_kp,
-        part="tendons", told_by=_pulled,
+        part="tendons", identifiable_from=_pulled,
     ),
     # of motors with their cables, which are not all equally stiff
     "kp_ratio_2": _gain_ratio(2),
     "kp_ratio_3": _gain_ratio(3),
     "kv": Parameter(
         "N s/m", ("actuator_biasprm",), lambda m: float(-m.actuator_biasprm[0, 2]),
-        _set("actuator_biasprm", (slice(None), 2), -1.0), part="tendons", told_by=_pulled_and_moving,
+        _set("actuator_biasprm", (slice(None), 2), -1.0), part="tendons", identifiable_from=_pulled_and_moving,
     ),
     "force_range": Parameter(
         "N", ("actuator_forcerange",), lambda m: float(-m.actuator_forcerange[0, 0]),
-        _set("actuator_forcerange", (slice(None), 0), -1.0), part="tendons", told_by=_pulled,
+        _set("actuator_forcerange", (slice(None), 0), -1.0), part="tendons", identifiable_from=_pulled,
     ),
     "time_constant": Parameter(
         "s", ("actuator_dynprm",), lambda m: float(m.actuator_dynprm[0, 0]), _set("actuator_dynprm", (slice(None), 0)),
-        part="tendons", told_by=_pulled_and_moving,
+        part="tendons", identifiable_from=_pulled_and_moving,
     ),
     "dead_time": Parameter(
         "s", ("actuator_delay",), lambda m: float(m.actuator_delay[0]), _set("actuator_delay", ()),
-        part="dead time", told_by=_pulled_and_moving,
+        part="dead time", identifiable_from=_pulled_and_moving,
     ),
     "rate_limit": _number(RATE_LIMIT, "m/s", RATE_LIMIT),
     "backlash": _number(BACKLASH, "m", BACKLASH, _winds),
     # metres of cable that a commanded metre draws in: the drum's radius over what session.yaml takes it for
     "winding": _number(WINDING, "", WINDING, _pulled),
-    "tendon_distance": Parameter("m", ("site_pos",), _read_distance, _write_distance, part="tendons", told_by=_pulled),
+    "tendon_distance": Parameter(
+        "m", ("site_pos",), _read_distance, _write_distance, part="tendons", identifiable_from=_pulled,
+    ),
     "mount_tilt_x": _mount(0),
     "mount_tilt_y": _mount(1),
     "mount_twist": _mount(2),
@@ -508,7 +513,7 @@ NUMBERED: dict[str, tuple[Callable[[int], Parameter], int]] = {  # name to what 
     "tendon_angle": (_angle, 1), "preload": (_preload, 1), "section_stiffness": (_section_stiffness, 2),
 }  # fmt: skip
 PARAMETERS |= {f"{name}_{k}": make(k) for name, (make, first) in NUMBERED.items() for k in range(first, MOST + 1)}
-APART = "@"  # between a parameter and the session that has it for itself
+SESSION_MARK = "@"  # between a parameter and the session that has it for itself
 EVERY = "_*"  # ends the name of one of `NUMBERED` in params.yaml for all that the arm has
 
 # what a factor of each unit's own may scale: the fields, and how
@@ -525,10 +530,10 @@ else:  # so that whoever names another is told which there are
 def parameter_named(name: str) -> Parameter:
     """Of PARAMETERS; of a name that stands for several, the first; of `name@session` one that a number of that name in
     the model holds."""
-    shared, apart, _ = name.partition(APART)
+    shared, apart, _ = name.partition(SESSION_MARK)
     if apart:
-        own, number = PARAMETERS[shared], _number(name, "", "")
-        return replace(own, fields=number.fields, read=number.read, write=number.write)
+        parameter, number = PARAMETERS[shared], _number(name, "", "")
+        return replace(parameter, fields=number.fields, read=number.read, write=number.write)
     stem = name.removesuffix(EVERY)
     return PARAMETERS[name if stem == name else f"{stem}_{NUMBERED[stem][1]}"]
 
@@ -567,7 +572,7 @@ def candidate_fields(
         if parameter in factors:
             PER_JOINT[parameter][1](fields, factors[parameter][:, unit_of_hinge(model)], model)
     for name in values:
-        if APART in name and numeric_place(model, name) is not None:
+        if SESSION_MARK in name and numeric_place(model, name) is not None:
             parameter_named(name).write(fields, np.asarray(values[name], dtype=float), model)
     return fields
 

@@ -1,4 +1,4 @@
-"""What each of several sessions of one arm has for itself, such as how the mount sits in its tracked base.
+"""Per-session parameters: those that each of several sessions of one arm has for itself, such as the mount's tilt.
 
 The model is the first session's. What another has is a number in the MJCF, called `parameter@session`.
 """
@@ -6,7 +6,7 @@ The model is the first session's. What another has is a number in the MJCF, call
 import mujoco
 import numpy as np
 
-from trunkline.identification.parameters.parameters import APART, PARAMETERS, candidate_fields, set_fields
+from trunkline.identification.parameters.parameters import PARAMETERS, SESSION_MARK, candidate_fields, set_fields
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial, sessions_of
 
@@ -15,19 +15,20 @@ def model_in(session: str, model: mujoco.MjModel) -> mujoco.MjModel:
     """The arm as it was in a session: `model` itself, or a copy with the numbers that it holds for that session."""
     values = {}
     for index in range(model.nnumeric):
-        name, apart, owner = model.numeric(index).name.partition(APART)
+        name, apart, owner = model.numeric(index).name.partition(SESSION_MARK)
         if apart and owner == session:
             values[name] = np.array([model.numeric_data[model.numeric_adr[index]]])
     if not values:
         return model
-    own = model.__copy__()
-    set_fields(own, candidate_fields(model, values))
-    return own
+    copy = model.__copy__()
+    set_fields(copy, candidate_fields(model, values))
+    return copy
 
 
 def values_in(session: str, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Of parameters' values those that hold in a session, by the shared names."""
-    return {name: values.get(f"{name}{APART}{session}", value) for name, value in values.items() if APART not in name}
+    shared = {name: value for name, value in values.items() if SESSION_MARK not in name}
+    return {name: values.get(f"{name}{SESSION_MARK}{session}", value) for name, value in shared.items()}
 
 
 def other_sessions(trials: list[Trial]) -> list[str]:
@@ -35,38 +36,39 @@ def other_sessions(trials: list[Trial]) -> list[str]:
     return sessions_of(trials)[1:]
 
 
-def names_apart(parameters: list[str], per_session: list[str], sessions: list[str]) -> dict[str, str]:
-    """Names of what `sessions` have for themselves of a stage's `parameters`, with the shared ones."""
-    own = [name for name in parameters if name in per_session]
-    return {f"{name}{APART}{session}": name for session in sessions for name in own}
+def per_session_names(parameters: list[str], per_session: list[str], sessions: list[str]) -> dict[str, str]:
+    """Names of the per-session parameters of `sessions` among a stage's `parameters`, with the shared names."""
+    selected = [name for name in parameters if name in per_session]
+    return {f"{name}{SESSION_MARK}{session}": name for session in sessions for name in selected}
 
 
 def names_in(model: mujoco.MjModel, parameters) -> dict[str, str]:
-    """Names that a model holds of what sessions have for themselves of `parameters`, with the shared ones."""
-    held = [model.numeric(index).name for index in range(model.nnumeric)]
-    return {name: name.partition(APART)[0] for name in held if APART in name and name.partition(APART)[0] in parameters}
+    """Names of the per-session parameters in a model that belong to `parameters`, with the shared names."""
+    numbers = [model.numeric(index).name for index in range(model.nnumeric)]
+    shared = {name: name.partition(SESSION_MARK)[0] for name in numbers if SESSION_MARK in name}
+    return {name: parameter for name, parameter in shared.items() if parameter in parameters}
 
 
 def make_room(spec: mujoco.MjSpec, names: dict[str, str]) -> None:
-    """Give the MJCF a number for each of `names_apart` that it has not got: first what the model itself has."""
+    """Give the MJCF a number for each of `per_session_names` that it has not got: first what the model itself has."""
     model = spec.compile()
     for name, shared in names.items():
         if mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_NUMERIC, name) < 0:
             spec.add_numeric(name=name, size=1, data=[PARAMETERS[shared].read(model)])
 
 
-def untold_apart(names: dict[str, str], trials: list[Trial], kinds: list[str]) -> list[str]:
-    """Which sessions of `trials` have something for themselves, of which `names_apart` has the `names`, that none of
-    their own trials to identify from tells, a line each.
+def unidentifiable_per_session(names: dict[str, str], trials: list[Trial], kinds: list[str]) -> list[str]:
+    """A line for each session of `trials` whose own trials to identify from do not determine one of its per-session
+    parameters; `names` is from `per_session_names`.
 
     Args:
         kinds: of experiment, to identify from.
     """
-    told = {trial.session for trial in trials if trial.split == IDENTIFY and trial.experiment in kinds}
+    identified = {trial.session for trial in trials if trial.split == IDENTIFY and trial.experiment in kinds}
     return [
         f"per_session: {shared}: found no {' or '.join(kinds)} of the session {session} with split identify to tell "
         f"it, expected one, or {shared} taken out of `per_session`"
         for shared in dict.fromkeys(names.values())
         for session in sessions_of(trials)
-        if session not in told
+        if session not in identified
     ]

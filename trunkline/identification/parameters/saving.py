@@ -67,8 +67,8 @@ def save_model(spec: mujoco.MjSpec, model: mujoco.MjModel) -> str:
 
 
 def _write(element, attribute: str, part: int | slice, value: np.ndarray) -> None:
-    held = getattr(element, attribute)
-    if isinstance(held, np.ndarray):
-        held[part] = value
+    array = getattr(element, attribute)
+    if isinstance(array, np.ndarray):
+        array[part] = value
     else:
         setattr(element, attribute, value)

@@ -87,8 +87,8 @@ def shape_table(predictions: dict[str, Prediction], segments: tuple[str, ...]) -
     tilt_deg, source, segment, x_mm, z_mm. Of a release that is its first swing to the other side."""
     rows = []
     for index, experiment in enumerate(next(iter(predictions.values())).experiments):
-        found = {LABELS[model]: p.replay.positions[index] for model, p in predictions.items()}
-        sources = {"measured": experiment.positions} | found
+        shapes = {LABELS[model]: p.replay.positions[index] for model, p in predictions.items()}
+        sources = {"measured": experiment.positions} | shapes
         from_first = np.linalg.norm(experiment.positions - experiment.positions[0], axis=2)  # (T, segments)
         shown = int(np.nan_to_num(from_first).max(axis=1).argmax())
         for source, positions in sources.items():

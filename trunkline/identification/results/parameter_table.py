@@ -5,7 +5,7 @@ import numpy as np
 from trunkline.identification.fit.certainty import weakest_in_words
 from trunkline.identification.fit.identify import Identification
 from trunkline.identification.fit.problem import Bounds
-from trunkline.identification.parameters.parameters import APART, parameter_named
+from trunkline.identification.parameters.parameters import SESSION_MARK, parameter_named
 
 ENDS = np.array([-1, 1])
 
@@ -36,11 +36,11 @@ def parameter_table(result: Identification, bounds: dict[str, Bounds]) -> dict:
         }
         for i, (name, value) in enumerate(result.values.items())
     }
-    own = {name: row for name, row in scalars.items() if APART in name}
-    names = [name for name in names if name not in own]
+    per_session = {name: row for name, row in scalars.items() if SESSION_MARK in name}
+    names = [name for name in names if name not in per_session]
     return {
         "parameters": {name: scalars[name] for name in names},
-        **({"per_session": own} if own else {}),
+        **({"per_session": per_session} if per_session else {}),
         "correlation": {a: {b: certainty.correlation[place[a], place[b]] for b in names} for a in names},
         "condition": certainty.condition,
         "weakest_direction": weakest_in_words(list(result.values), certainty.weakest),

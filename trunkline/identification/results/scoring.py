@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from trunkline.identification.evaluation.baselines import FLOOR_POSES, references
 from trunkline.identification.evaluation.evaluation import Prediction, replay
-from trunkline.identification.evaluation.null_model import FLOOR_POSES, references
 from trunkline.identification.evaluation.repeatability import repeatability
 from trunkline.identification.fit.settings import IdentificationSettings
 from trunkline.identification.simulate.experiment import Experiment, own_starts, prepare
@@ -77,7 +77,7 @@ def evaluate(
     if len(sessions) > 1:
         metrics["by_session"] = {
             session: _evaluated(
-                {name: one.of(lambda e, own=session: e.session == own) for name, one in predictions.items()},
+                {name: p.of(lambda e, chosen=session: e.session == chosen) for name, p in predictions.items()},
                 [trial for trial in trials if trial.session == session],
             )
             for session in sessions
@@ -97,8 +97,9 @@ def _predictions(
     models, model, trials: list[Trial], experiments: list[Experiment], ended, floor_poses: int = FLOOR_POSES
 ) -> dict[str, Prediction]:
     """Of all `models`, and what stands beside them; `model` is the one to whose segments poses are fitted."""
-    found = predict(models, trials, experiments, model)
-    return found | references(trials, experiments, model, next(iter(found.values())).replay, ended, floor_poses)
+    predictions = predict(models, trials, experiments, model)
+    like = next(iter(predictions.values())).replay
+    return predictions | references(trials, experiments, model, like, ended, floor_poses)
 
 
 def predict(
@@ -106,12 +107,12 @@ def predict(
 ) -> dict[str, Prediction]:
     """What each of `models` says of `experiments`, which were prepared from `trials` with the model `fitted`; each
     starts where its own geometry puts the arm. A model under two names is simulated once."""
-    found: dict[int, Prediction] = {}
+    predictions: dict[int, Prediction] = {}
     for model in models.values():
-        if id(model) not in found:
-            own = own_starts(experiments, trials, fitted, model)
-            found[id(model)] = Prediction(replay(model, own, trials[0].segments), own)
-    return {name: found[id(model)] for name, model in models.items()}
+        if id(model) not in predictions:
+            started = own_starts(experiments, trials, fitted, model)
+            predictions[id(model)] = Prediction(replay(model, started, trials[0].segments), started)
+    return {name: predictions[id(model)] for name, model in models.items()}
 
 
 def start_fit(experiments: list[Experiment]) -> dict:

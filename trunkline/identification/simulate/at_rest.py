@@ -41,33 +41,34 @@ def shapes_at_rest(
         sites: numbers of the segments' sites. Shape (S,).
     """
     count = len(next(iter(fields.values())))
-    own, data = copy.copy(model), mujoco.MjData(model)
+    candidate_model, data = copy.copy(model), mujoco.MjData(model)
     trial = np.repeat(np.arange(len(experiments)), [e.frames for e in experiments])  # of each of R rows
     starts = np.concatenate([_starts(e) for e in experiments])
     if near is not None:
-        known = np.concatenate(near)
-        starts = np.where(np.isfinite(known), known, starts)
+        nearby = np.concatenate(near)
+        starts = np.where(np.isfinite(nearby), nearby, starts)
     gravity, loads = (np.array([getattr(e, name) for e in experiments])[trial] for name in ("gravity", "load"))
     places = np.full((count, len(trial), len(sites), 3), np.nan)
     angles, iterations = np.full((len(trial), arm_hinges(model)), np.nan), 0
     for candidate in range(count):
-        set_fields(own, fields, candidate)
+        set_fields(candidate_model, fields, candidate)
         if "jnt_pos" in fields:  # what softens joint limits follows, as when such a model is compiled
-            mujoco.mj_setConst(own, data)
-        chain = read_chain(own).smooth
-        mujoco.mj_kinematics(own, data)
-        turned = gravity @ data.xmat[own.body("base").id].reshape(3, 3)  # into the mount's frame, which may be tilted
-        sent = np.concatenate([_sent(own, e) for e in experiments])
+            mujoco.mj_setConst(candidate_model, data)
+        chain = read_chain(candidate_model).smooth
+        mujoco.mj_kinematics(candidate_model, data)
+        base = candidate_model.body("base").id
+        turned = gravity @ data.xmat[base].reshape(3, 3)  # into the mount's frame, which may be tilted
+        sent = np.concatenate([_sent(candidate_model, e) for e in experiments])
         qpos = np.full(angles.shape, np.nan)
         for load in np.unique(loads):
             chosen, loaded = np.flatnonzero(loads == load), chain.loaded(load)
             guessed = chosen[np.isfinite(starts[chosen]).all(axis=1)]
-            found = actuated_from(loaded, starts[guessed], sent[guessed], turned[guessed])
-            qpos[guessed[found.converged]] = found.qpos[found.converged]
+            solved = actuated_from(loaded, starts[guessed], sent[guessed], turned[guessed])
+            qpos[guessed[solved.converged]] = solved.qpos[solved.converged]
             left = chosen[np.isnan(qpos[chosen, 0])]
             followed = actuated(loaded, sent[left], turned[left])
             qpos[left[followed.converged]] = followed.qpos[followed.converged]
-            iterations += int(found.iterations.sum() + followed.iterations.sum())
+            iterations += int(solved.iterations.sum() + followed.iterations.sum())
             for aside in (1, -1):  # of a path, from the shape before, or after
                 beside = (chosen - aside) % len(trial)
                 lost = np.isnan(qpos[chosen, 0]) & np.isfinite(qpos[beside, 0]) & (trial[chosen] == trial[beside])
@@ -76,7 +77,7 @@ def shapes_at_rest(
                 iterations += int(again.iterations.sum())
         for row in np.flatnonzero(np.isfinite(qpos[:, 0])):
             data.qpos[: qpos.shape[1]] = qpos[row]
-            mujoco.mj_kinematics(own, data)
+            mujoco.mj_kinematics(candidate_model, data)
             places[candidate, row] = data.site_xpos[sites]
         if candidate == 0:
             angles = qpos
@@ -96,6 +97,6 @@ def _sent(model: mujoco.MjModel, experiment: Experiment) -> np.ndarray:
     controls = wound(model, experiment.controls)[:, actuators(model)]
     play = numeric(model, BACKLASH)
     if play and experiment.frames > 1:
-        held = controls[:1].copy()
-        controls = wind(controls[None], held, held.copy(), np.array([np.inf]), np.array([play]))[0]
+        first = controls[:1].copy()
+        controls = wind(controls[None], first, first.copy(), np.array([np.inf]), np.array([play]))[0]
     return controls

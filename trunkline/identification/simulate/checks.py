@@ -7,7 +7,7 @@ from scipy.optimize import linear_sum_assignment
 
 from trunkline.errors import InputError
 from trunkline.frames import tilt_of_gravity
-from trunkline.identification.simulate.experiment import SEEN_SHARE, check_names, measured_pose, start_frames
+from trunkline.identification.simulate.experiment import MEASURED_SHARE, check_names, measured_pose, start_frames
 from trunkline.identification.simulate.pose_fit import fit_pose
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.trial import Trial
@@ -52,8 +52,8 @@ def check_sides(trial: Trial, model: mujoco.MjModel) -> None:
     start = start_frames(trial)[1]
     taken_in = np.maximum(trial.commands, 0)
     wound = taken_in - taken_in[start]
-    seen = trial.measured.mean(axis=1) >= SEEN_SHARE
-    deepest = int(np.argmax(np.where(seen, wound.max(axis=1), -np.inf)))
+    enough = trial.measured.mean(axis=1) >= MEASURED_SHARE
+    deepest = int(np.argmax(np.where(enough, wound.max(axis=1), -np.inf)))
     pulls = wound[deepest]
     shorter = (_path_lengths(trial, model, start) - _path_lengths(trial, model, deepest))[tendons]
     if min(np.ptp(pulls), np.ptp(shorter)) < WOUND:
@@ -62,9 +62,9 @@ def check_sides(trial: Trial, model: mujoco.MjModel) -> None:
     if agreement >= ALIKE * best:
         return
     most, bent = trial.tendons[int(np.argmax(pulls))], trial.tendons[int(np.argmax(shorter))]
-    found = f"found {most!r} wound by {1e3 * pulls.max():.0f} mm while the arm bends to the side of {bent!r}"
+    fault = f"found {most!r} wound by {1e3 * pulls.max():.0f} mm while the arm bends to the side of {bent!r}"
     raise InputError(
-        f"session.yaml: tendons: trial {trial.name}: {found}, expected it to bend to the side of what is wound: "
+        f"session.yaml: tendons: trial {trial.name}: {fault}, expected it to bend to the side of what is wound: "
         "are names exchanged, signs reversed, or is the base body turned about the arm?"
     )
 
@@ -77,8 +77,8 @@ def check_lengths(trial: Trial, model: mujoco.MjModel) -> None:
     would be stretched in all is compared with what is left if names are exchanged in the best way; tendons that all
     pull against each other leave the same with any names.
     """
-    seen = np.flatnonzero(trial.measured.mean(axis=1) >= SEEN_SHARE)
-    frames = seen[:: max(len(seen) // PLACES, 1)]
+    measured = np.flatnonzero(trial.measured.mean(axis=1) >= MEASURED_SHARE)
+    frames = measured[:: max(len(measured) // PLACES, 1)]
     tendons = [model.tendon(name).id for name in trial.tendons]
     shorter = np.array([model.tendon_length0 - _path_lengths(trial, model, frame) for frame in frames])[:, tendons]
     stretch = np.maximum(trial.commands[frames, :, None] - shorter[:, None, :], 0).mean(axis=0)  # (K names, K paths)
@@ -86,11 +86,11 @@ def check_lengths(trial: Trial, model: mujoco.MjModel) -> None:
     if named - best < STRETCH or best >= SHORTER * named:
         return
     worst = int(np.argmax(np.diag(stretch)))
-    found = f"found the path of {trial.tendons[worst]!r} {1e3 * stretch[worst, worst]:.0f} mm longer than commanded"
+    fault = f"found the path of {trial.tendons[worst]!r} {1e3 * stretch[worst, worst]:.0f} mm longer than commanded"
     mirrored = np.maximum(-trial.commands[frames] - shorter, 0).mean(axis=0).sum()
     cause = "signs reversed" if mirrored < best else "names exchanged"
     raise InputError(
-        f"session.yaml: tendons: trial {trial.name}: {found}, which fits with {cause}, expected a tendon to be "
+        f"session.yaml: tendons: trial {trial.name}: {fault}, which fits with {cause}, expected a tendon to be "
         "slack or about as long as its command: are names exchanged, signs reversed, or is the base body turned about "
         "the arm?"
     )
@@ -127,19 +127,19 @@ def path_scale(trial: Trial, model: mujoco.MjModel) -> float | None:
     step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 else np.inf
     width = 2 * int(APART / step) + 1
     low, high = minimum_filter1d(pulls, width, axis=0), maximum_filter1d(pulls, width, axis=0)
-    seen = trial.measured.mean(axis=1) >= SEEN_SHARE
-    deepest = np.where(seen, low.max(axis=1), 0.0)
-    held = np.flatnonzero(seen & (deepest > 0) & (deepest >= deepest.max() / 2))
-    if not len(held):
+    enough = trial.measured.mean(axis=1) >= MEASURED_SHARE
+    deepest = np.where(enough, low.max(axis=1), 0.0)
+    deep_frames = np.flatnonzero(enough & (deepest > 0) & (deepest >= deepest.max() / 2))
+    if not len(deep_frames):
         return None
-    frames = held[:: -(-len(held) // HELD_FRAMES)]
+    frames = deep_frames[:: -(-len(deep_frames) // HELD_FRAMES)]
     tendons = [model.tendon(name).id for name in trial.tendons]
     shorter = np.array([model.tendon_length0 - _path_lengths(trial, model, frame) for frame in frames])[:, tendons]
 
-    def compared(asked: np.ndarray) -> tuple[float, float]:
+    def compared(commanded: np.ndarray) -> tuple[float, float]:
         """Paths over the deep pulls of `asked` (N, K), and how much deeper those are, m; medians."""
-        deep = asked >= asked.max() / 2
-        return float(np.median(shorter[deep] / asked[deep])), float(np.median(asked[deep] - shorter[deep]))
+        deep = commanded >= commanded.max() / 2
+        return float(np.median(shorter[deep] / commanded[deep])), float(np.median(commanded[deep] - shorter[deep]))
 
     ratio, deeper = compared(low[frames])
     if EXPERIMENTS[trial.experiment].level is None and ratio < SHORTEST and deeper > OFF:

@@ -22,7 +22,7 @@ SWAY_FRAMES = 8  # between the poses that tell how a hand moves the arm that it 
 LOOK_BACK = 30  # frames in which to look for a start pose that enough cameras saw
 GEOMETRY = ("jnt_pos", "jnt_axis", "body_pos", "body_quat", "site_pos")
 SAME_PLACE = 1e-5  # m, and of a quaternion; what MJCF rounds away is less
-SEEN_SHARE = 0.6  # of the segments that must be measured in the frame of the start pose
+MEASURED_SHARE = 0.6  # of the segments that must be measured in the frame of the start pose
 
 
 @dataclass
@@ -89,12 +89,12 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
     check_names(trial, model)
     static, stepwise = is_static(trial.experiment), is_stepwise(trial.experiment)
     step = float(np.median(np.diff(trial.time))) if len(trial.time) > 1 and not static else 0.0
-    held, seen = start_frames(trial)
-    window = slice(None) if stepwise else slice(0, 1) if static else slice(held + 1, held + 1 + frames)
+    last, start_frame = start_frames(trial)
+    window = slice(None) if stepwise else slice(0, 1) if static else slice(last + 1, last + 1 + frames)
     positions, measured = trial.positions[window], trial.measured[window]
     if not measured.any():
         raise InputError(f"trial {trial.name}: found no measured frame after its start at {trial.start:.2f} s")
-    fit, start, velocity = _start(trial, model_in(trial.session, model), seen)
+    fit, start, velocity = _start(trial, model_in(trial.session, model), start_frame)
     lengths = commanded_lengths(trial, model)
     if command_delay and model.nu:
         lengths = np.stack(
@@ -107,8 +107,8 @@ def prepare(trial: Trial, model: mujoco.MjModel, frames: int, command_delay: flo
         gravity=trial.gravity,
         start=start,
         velocity=velocity,
-        lead=0.0 if static else _lead(trial, held),
-        controls=lengths[window] if static else 0.5 * (lengths[:-1] + lengths[1:])[held : held + len(positions)],
+        lead=0.0 if static else _lead(trial, last),
+        controls=lengths[window] if static else 0.5 * (lengths[:-1] + lengths[1:])[last : last + len(positions)],
         positions=positions,
         measured=measured,
         frame_step=step,
@@ -136,44 +136,45 @@ def own_starts(
     """
     same = {
         session: all(
-            np.allclose(getattr(one, name), getattr(other, name), rtol=0, atol=SAME_PLACE) for name in GEOMETRY
+            np.allclose(getattr(first, name), getattr(second, name), rtol=0, atol=SAME_PLACE) for name in GEOMETRY
         )
         for session in {trial.session for trial in trials}
-        for one, other in [(model_in(session, fitted), model_in(session, model))]
+        for first, second in [(model_in(session, fitted), model_in(session, model))]
     }
     if all(same.values()):
         return experiments
-    own = []
+    started = []
     for experiment, trial in zip(experiments, trials, strict=True):
         if not is_static(experiment.kind) and not same[trial.session]:
             fit, start, velocity = _start(trial, model_in(trial.session, model), start_frames(trial)[1])
             experiment = replace(experiment, fit=fit, start=start, velocity=velocity)
-        own.append(experiment)
-    return own
+        started.append(experiment)
+    return started
 
 
-def _start(trial: Trial, model: mujoco.MjModel, seen: int) -> tuple[PoseFit, np.ndarray, np.ndarray]:
-    """The model's pose in frame `seen`, and joint angles, rad, and velocities, rad/s, to start from. Shape (n,)."""
-    fit = _fit_frame(trial, model, seen)
+def _start(trial: Trial, model: mujoco.MjModel, frame: int) -> tuple[PoseFit, np.ndarray, np.ndarray]:
+    """The model's pose in `frame`, and joint angles, rad, and velocities, rad/s, to start from. Shape (n,)."""
+    fit = _fit_frame(trial, model, frame)
     if trial.in_motion:
-        return fit, fit.qpos, _velocity(trial, model, seen)
+        return fit, fit.qpos, _velocity(trial, model, frame)
     if trial.swaying:
-        return fit, *_foreseen(trial, model, seen)
+        return fit, *_extrapolated(trial, model, frame)
     return fit, fit.qpos, np.zeros(arm_hinges(model))
 
 
 def start_frames(trial: Trial) -> tuple[int, int]:
     """The last frame that is not compared, the arm being still held then, and the one of the pose to start from."""
     static = is_static(trial.experiment)
-    held = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
-    seen = _seen_frame(trial, held if trial.in_motion else max(held - QUIET_FRAMES, 0))
-    return (seen if trial.in_motion else held), seen  # of an arm in motion, pose and velocity hold in that frame
+    last = 0 if static else max(int(np.searchsorted(trial.time, trial.start + 1e-9, side="right")) - 1, 0)
+    start_frame = _measured_frame(trial, last if trial.in_motion else max(last - QUIET_FRAMES, 0))
+    # of an arm in motion, pose and velocity hold in that frame
+    return (start_frame if trial.in_motion else last), start_frame
 
 
-def _lead(trial: Trial, held: int) -> float:
+def _lead(trial: Trial, last: int) -> float:
     """Time to simulate until the first frame: from the start, or from the frame whose velocity is known, s."""
-    begin = trial.time[held] if trial.in_motion else max(trial.start, trial.time[held])
-    return max(float(trial.time[held + 1] - begin), 1e-4)
+    begin = trial.time[last] if trial.in_motion else max(trial.start, trial.time[last])
+    return max(float(trial.time[last + 1] - begin), 1e-4)
 
 
 def measured_pose(trial: Trial, frame: int) -> tuple[np.ndarray, np.ndarray | None]:
@@ -193,26 +194,26 @@ def _velocity(trial: Trial, model: mujoco.MjModel, frame: int) -> np.ndarray:
     return turned / (trial.time[after] - trial.time[before])
 
 
-def _foreseen(trial: Trial, model: mujoco.MjModel, seen: int) -> tuple[np.ndarray, np.ndarray]:
+def _extrapolated(trial: Trial, model: mujoco.MjModel, frame: int) -> tuple[np.ndarray, np.ndarray]:
     """Joint angles, rad, and velocities, rad/s, at the start of an arm that a hand still moves then: a parabola through
-    its poses up to frame `seen`, before the low-pass smears in what comes after. Each of shape (n,)."""
-    apart = min(SWAY_FRAMES, seen // 2)
+    its poses up to `frame`, before the low-pass smears in what comes after. Each of shape (n,)."""
+    apart = min(SWAY_FRAMES, frame // 2)
     if not apart:
-        return _fit_frame(trial, model, seen).qpos, _velocity(trial, model, seen)
-    frames = seen - apart * np.arange(3)
+        return _fit_frame(trial, model, frame).qpos, _velocity(trial, model, frame)
+    frames = frame - apart * np.arange(3)
     poses = np.stack([_fit_frame(trial, model, frame).qpos for frame in frames.tolist()])
     parabola = np.polyfit(trial.time[frames] - trial.start, poses, 2)
     return parabola[2], parabola[1]
 
 
-def _seen_frame(trial: Trial, latest: int) -> int:
+def _measured_frame(trial: Trial, latest: int) -> int:
     """The last frame up to `latest` in which enough segments were measured."""
     for frame in range(latest, max(latest - LOOK_BACK, -1), -1):
-        if trial.measured[frame].mean() >= SEEN_SHARE:
+        if trial.measured[frame].mean() >= MEASURED_SHARE:
             return frame
     raise InputError(
         f"trial {trial.name}: found {int(trial.measured[latest].sum())} of {len(trial.segments)} segments measured at "
-        f"its start, {trial.time[latest]:.2f} s, expected {SEEN_SHARE:.0%} of them"
+        f"its start, {trial.time[latest]:.2f} s, expected {MEASURED_SHARE:.0%} of them"
     )
 
 
@@ -233,8 +234,8 @@ def check_names(trial: Trial, model: mujoco.MjModel) -> None:
     sites = [model.site(i).name for i in range(model.nsite)]
     units = [name.removesuffix("_center") for name in sites if name.endswith("_center") and name != "base_center"]
     tendons = [model.tendon(i).name for i in cables(model)]
-    for key, found, names in (("segments", trial.segments, units), ("tendons", trial.tendons, tendons)):
-        unknown = [name for name in found if name not in names]
+    for key, used, names in (("segments", trial.segments, units), ("tendons", trial.tendons, tendons)):
+        unknown = [name for name in used if name not in names]
         if unknown:
             valid = f"names of the model: {', '.join(names)}" if names else "none, as the arm has none"
             if key == "tendons" and names:
@@ -242,5 +243,5 @@ def check_names(trial: Trial, model: mujoco.MjModel) -> None:
             raise InputError(f"session.yaml: {key}: trial {trial.name}: found {unknown[0]!r}, expected {valid}")
     if trial.tendons and len(trial.tendons) < len(tendons):
         expected = f"expected all of the model: {', '.join(tendons)}; slack ones as let out"
-        found = f"found {', '.join(trial.tendons)} alone"
-        raise InputError(f"session.yaml: tendons: trial {trial.name}: {found}, {expected}")
+        used = f"found {', '.join(trial.tendons)} alone"
+        raise InputError(f"session.yaml: tendons: trial {trial.name}: {used}, {expected}")

@@ -73,10 +73,10 @@ class InMotion:
             ids = np.arange(len(controls), dtype=np.int32)
             rows = winches.deliver(np.repeat(controls, substeps, axis=1), ids)
             # a step sees the sites where they are before it: the first of a frame, where the last frame ended
-            seen = move(batch, rows, ("site_xpos",), every=substeps, ids=ids)
-            positions = seen["site_xpos"][:, :, sites].reshape(len(running), count, end - start, len(sites), 3)
-            for result, found in zip(results, positions, strict=False):
-                result[:, start - 1 : end - 1] = found
+            sites_moved = move(batch, rows, ("site_xpos",), every=substeps, ids=ids)
+            positions = sites_moved["site_xpos"][:, :, sites].reshape(len(running), count, end - start, len(sites), 3)
+            for result, part in zip(results, positions, strict=False):
+                result[:, start - 1 : end - 1] = part
         last = batch.bind("site_xpos")
         batch.forward(stage=mujoco.mjtStage.mjSTAGE_POS)
         warned = batch.warning.any(axis=(1, 2)).reshape(len(experiments), count)
@@ -115,9 +115,9 @@ class InMotion:
         """Joints' branches and sliders as long after a straight arm was bent into the start pose."""
         angles = batch.bind("qpos")
         give_way(self._model, angles)
-        for one in all_elements(self._model, SLIDER):
-            bend, give = angles[:, one.hinge], batch.expand("tendon_springyield")[:, one.tendon]
-            place = self._model.tendon_plasticadr[one.tendon]
+        for element in all_elements(self._model, SLIDER):
+            bend, give = angles[:, element.hinge], batch.expand("tendon_springyield")[:, element.tendon]
+            place = self._model.tendon_plasticadr[element.tendon]
             for end in (0, 1):  # of the spring's length at rest
                 batch.bind("plastic")[:, place + end] = bend - np.clip(bend, -give, give)
 
@@ -126,8 +126,8 @@ def _without_idle(model: mujoco.MjModel, slack: bool, fields: Fields, whole: boo
     """A copy of the model without what moves nothing where all cables are slack and takes most of a step: their
     friction on the holes, and, but for `whole`, the cables themselves."""
     model = copy.copy(model)
-    own = (model.tendon_frictionloss, model.tendon_stiffness, model.tendon_damping)
-    bare = "tendon_frictionloss" not in fields and not any(values[cables(model)].any() for values in own)
+    parts = (model.tendon_frictionloss, model.tendon_stiffness, model.tendon_damping)
+    bare = "tendon_frictionloss" not in fields and not any(values[cables(model)].any() for values in parts)
     if slack and bare and not whole:
         let_hang(model)
     elif slack:

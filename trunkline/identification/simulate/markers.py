@@ -16,13 +16,13 @@ ROUNDS = 3  # of fitting poses and moving markers; a round solves for both, but 
 def with_measured_markers(model: mujoco.MjModel, trials: list[Trial]) -> mujoco.MjModel:
     """A copy of `model` whose tracked sites are where the trials to identify from saw them in their start poses."""
     model = model.__copy__()
-    seen = [trial for trial in trials if trial.split == IDENTIFY]
-    sites = segment_sites(model, seen[0].segments)
+    fitted = [trial for trial in trials if trial.split == IDENTIFY]
+    sites = segment_sites(model, fitted[0].segments)
     model.site_sameframe[sites] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE  # else a site at its body's origin stays there
     moved = np.zeros((len(sites), 3))
     straight = model.site_pos[sites].copy()
     for _ in range(ROUNDS):
-        moved += _offsets(model, seen, moved)
+        moved += _offsets(model, fitted, moved)
         model.site_pos[sites] = straight + moved
     return model
 
@@ -39,9 +39,9 @@ def _offsets(model: mujoco.MjModel, trials: list[Trial], moved: np.ndarray) -> n
     for trial in trials:
         pose = measured_pose(trial, start_frames(trial)[1])
         problem = PoseProblem(model, trial.segments, *pose)
-        jacobian, residual = problem.linearise(fit_pose(model, trial.segments, *pose).qpos, problem.seen)
+        jacobian, residual = problem.linearise(fit_pose(model, trial.segments, *pose).qpos, problem.measured)
         design = np.zeros((len(residual), size))
-        for index, rows in zip(problem.seen, problem.position_rows(), strict=True):
+        for index, rows in zip(problem.measured, problem.position_rows(), strict=True):
             body = model.site_bodyid[problem.sites[index]]
             design[np.ix_(rows, 3 * index + np.arange(3))] = problem.data.xmat[body].reshape(3, 3) / POSITION_SIGMA
         basis = np.linalg.qr(jacobian)[0]

@@ -43,7 +43,7 @@ class _Piece:
 
 
 @dataclass
-class _Found:
+class _PieceResult:
     """Of a piece, by the numbers of its trials: positions as in `Simulated`, and rests of those at rest; steps."""
 
     positions: dict[int, np.ndarray]
@@ -83,15 +83,15 @@ class Population:
             rough: as `batch_of` has it.
         """
         parts = self._cut(fields, rests, rough)
-        found = spread(Population.run, parts, self)
+        results = spread(Population.run, parts, self)
         every = range(len(self._experiments))
-        positions = [_joined([part.positions[i] for part in found if i in part.positions]) for i in every]
+        positions = [_joined([part.positions[i] for part in results if i in part.positions]) for i in every]
         diverged = np.zeros(len(next(iter(fields.values()))), dtype=bool)
         for result in positions:
             diverged |= ~np.isfinite(result).all(axis=(1, 2, 3))
         unknown = np.full((1, arm_hinges(self._model)), np.nan)
-        angles = [found[0].rests.get(i, unknown) for i in every]
-        return Simulated(positions, diverged, sum(part.steps for part in found), angles)
+        angles = [results[0].rests.get(i, unknown) for i in every]
+        return Simulated(positions, diverged, sum(part.steps for part in results), angles)
 
     def _cut(self, fields: Fields, rests: list[np.ndarray] | None, rough: bool = False) -> list[_Piece]:
         """All candidates in all trials; where there are workers, in pieces: some candidates each, and where those are
@@ -107,23 +107,23 @@ class Population:
         if each > 1:
             moving = [list(group.trials)[i::each] for group in self._in_motion for i in range(each)]
             trials = [numbers for numbers in (self._at_rest, *moving) if numbers]
-        own = [{name: values[some] for name, values in fields.items()} for some in slices]
-        return [_Piece(candidates, numbers, rests, rough) for candidates in own for numbers in trials]
+        groups = [{name: values[some] for name, values in fields.items()} for some in slices]
+        return [_Piece(candidates, numbers, rests, rough) for candidates in groups for numbers in trials]
 
-    def run(self, piece: _Piece) -> _Found:
-        found = _Found({}, {}, 0)
+    def run(self, piece: _Piece) -> _PieceResult:
+        result = _PieceResult({}, {}, 0)
         if at_rest := [i for i in self._at_rest if i in piece.trials]:
-            own = [self._experiments[i] for i in at_rest]
+            resting = [self._experiments[i] for i in at_rest]
             near = None if piece.rests is None else [piece.rests[i] for i in at_rest]
-            results, angles, found.steps = shapes_at_rest(self._model, piece.fields, own, self._sites, near)
-            found.positions |= zip(at_rest, results, strict=True)
-            found.rests |= zip(at_rest, angles, strict=True)
+            results, angles, result.steps = shapes_at_rest(self._model, piece.fields, resting, self._sites, near)
+            result.positions |= zip(at_rest, results, strict=True)
+            result.rests |= zip(at_rest, angles, strict=True)
         for group in self._in_motion:
             if numbers := [i for i in group.trials if i in piece.trials]:
                 results, steps = group.shapes(piece.fields, numbers, piece.rough)
-                found.positions |= zip(numbers, results, strict=True)
-                found.steps += steps
-        return found
+                result.positions |= zip(numbers, results, strict=True)
+                result.steps += steps
+        return result
 
 
 def _joined(parts: list[np.ndarray]) -> np.ndarray:

@@ -44,7 +44,7 @@ class PoseProblem:
         quaternions: wxyz. Shape (S, 4), or None for positions alone.
 
     Attributes:
-        seen: indices of the measured segments, from the base on.
+        measured: indices of the measured segments, from the base on.
     """
 
     def __init__(
@@ -58,15 +58,16 @@ class PoseProblem:
         self.sites = segment_sites(model, segments)
         self.positions = positions
         self._targets = None if quaternions is None else rotation_from_wxyz(quaternions).as_matrix()
-        seen = np.flatnonzero(np.isfinite(positions).all(axis=1))
-        self.seen = seen[np.argsort(model.site_bodyid[self.sites[seen]])]  # the chain numbers its bodies from the base
+        measured = np.flatnonzero(np.isfinite(positions).all(axis=1))
+        # the chain numbers its bodies from the base
+        self.measured = measured[np.argsort(model.site_bodyid[self.sites[measured]])]
         self.hinges = int(np.bincount(model.jnt_bodyid).max())  # of each joint
         self.angles = arm_hinges(model)
         rows = np.eye(self.angles, k=self.hinges)[: -self.hinges] - np.eye(self.angles)[: -self.hinges]
         self._smooth = rows / BEND_CHANGE_SIGMA
 
-    def linearise(self, qpos: np.ndarray, seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Jacobian (R, n) and residuals (R,) in units of sigma, against the segments `seen`, by the arm's n angles.
+    def linearise(self, qpos: np.ndarray, measured: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Jacobian (R, n) and residuals (R,) in units of sigma, against the segments `measured`, by the arm's n angles.
 
         First the changes of bend; then of every segment three rows for its position, and three for its orientation
         if it has one.
@@ -77,7 +78,7 @@ class PoseProblem:
         mujoco.mj_comPos(model, data)
         rows, residuals = [self._smooth], [self._smooth @ qpos]
         jac_position, jac_rotation = np.empty((3, model.nv)), np.empty((3, model.nv))
-        for index in seen:
+        for index in measured:
             site = self.sites[index]
             mujoco.mj_jacSite(model, data, jac_position, jac_rotation, site)
             rows.append(jac_position[:, : self.angles] / POSITION_SIGMA)
@@ -89,9 +90,9 @@ class PoseProblem:
         return np.concatenate(rows), np.concatenate(residuals)
 
     def position_rows(self) -> np.ndarray:
-        """Which residuals are those of the positions of `seen`, all of them given. Shape (len(seen), 3)."""
+        """Which residuals are those of the positions of all segments `measured`, M of them. Shape (M, 3)."""
         each = 3 if self._targets is None else 6
-        return len(self._smooth) + each * np.arange(len(self.seen))[:, None] + np.arange(3)
+        return len(self._smooth) + each * np.arange(len(self.measured))[:, None] + np.arange(3)
 
 
 def fit_pose(
@@ -103,14 +104,14 @@ def fit_pose(
 ) -> PoseFit:
     """Least squares over the residuals of a `PoseProblem`, whose arguments these are, by `mujoco.minimize`."""
     problem = PoseProblem(model, segments, positions, quaternions)
-    seen, hinges, angles = problem.seen, problem.hinges, problem.angles
+    measured, hinges, angles = problem.measured, problem.hinges, problem.angles
     qpos = np.zeros(angles)
     # From the base on, a few segments at a time, each new joint first bent as the one before it: a coil of more
     # than one turn has many wrong answers near the straight arm, and none on this way.
-    for known in [*range(AT_A_TIME, len(seen), AT_A_TIME), len(seen)]:
-        free = model.jnt_bodyid[:angles] <= model.site_bodyid[problem.sites[seen[known - 1]]]
+    for count in [*range(AT_A_TIME, len(measured), AT_A_TIME), len(measured)]:
+        free = model.jnt_bodyid[:angles] <= model.site_bodyid[problem.sites[measured[count - 1]]]
         first = int(free.sum())
-        fit = _descend(problem, qpos, seen[:known], free, max_iterations)
+        fit = _descend(problem, qpos, measured[:count], free, max_iterations)
         qpos = fit.qpos
         if 0 < first < angles:
             qpos[first:] = np.resize(qpos[first - hinges : first], angles - first)
@@ -118,22 +119,22 @@ def fit_pose(
 
 
 def _descend(
-    problem: PoseProblem, qpos: np.ndarray, seen: np.ndarray, free: np.ndarray, max_iterations: int
+    problem: PoseProblem, qpos: np.ndarray, measured: np.ndarray, free: np.ndarray, max_iterations: int
 ) -> PoseFit:
-    """Least squares over the hinges `free` (n,), against the segments `seen`, from `qpos`, within the limits' give."""
+    """Least squares over the hinges `free` (n,), against segments `measured`, from `qpos`, within the limits' give."""
     model = problem.model
-    known: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+    cache: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
 
     def linear(angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Jacobian and residuals at some angles; MuJoCo asks for both at each iterate."""
         key = angles.tobytes()
-        if key not in known:
-            while len(known) > 1:  # the iterate and the step tried from it
-                known.pop(next(iter(known)))
+        if key not in cache:
+            while len(cache) > 1:  # the iterate and the step tried from it
+                cache.pop(next(iter(cache)))
             pose = qpos.copy()
             pose[free] = angles
-            known[key] = problem.linearise(pose, seen)
-        return known[key]
+            cache[key] = problem.linearise(pose, measured)
+        return cache[key]
 
     arm = len(free)
     limits = model.jnt_range[:arm].T * LIMIT_GIVE

@@ -89,10 +89,10 @@ def resting_shape(model: mujoco.MjModel, experiments: list[Experiment], segments
             shapes.append(np.nanmean(positions, axis=0))
             gravities.append(experiment.gravity)
     if not shapes:
-        found = f"found no release with split identify that is at rest in its last {LAST:g} s"
-        raise InputError(f"rest_shape: {found}, expected at least one, or rest_shape: unchanged")
+        reason = f"found no release with split identify that is at rest in its last {LAST:g} s"
+        raise InputError(f"rest_shape: {reason}, expected at least one, or rest_shape: unchanged")
     if np.ptp(gravities, axis=0).max() > SAME_GRAVITY:
-        found = "found releases under different gravity angles"
-        raise InputError(f"rest_shape: {found}, expected the same for all, or rest_shape: unchanged")
+        reason = "found releases under different gravity angles"
+        raise InputError(f"rest_shape: {reason}, expected the same for all, or rest_shape: unchanged")
     pose = fit_pose(model, segments, np.mean(shapes, axis=0)).qpos
     return rest_shape(model, pose, np.mean(gravities, axis=0))

@@ -20,9 +20,9 @@ class Sessions:
         self._parts = []
         for session in dict.fromkeys(e.session for e in experiments):
             places = [i for i, e in enumerate(experiments) if e.session == session]
-            own = model_in(session, model)
-            population = Population(own, [experiments[i] for i in places], segments, step_factor)
-            self._parts.append((session, own, places, population))
+            arm = model_in(session, model)
+            population = Population(arm, [experiments[i] for i in places], segments, step_factor)
+            self._parts.append((session, arm, places, population))
 
     def simulate(
         self,
@@ -31,18 +31,18 @@ class Sessions:
         rough: bool = False,
     ) -> Simulated:
         """As `Population.simulate`. Args: fields: of the candidates, for a session and its model."""
-        found = {}
+        results = {}
         for session, model, places, population in self._parts:
             near = None if rests is None else [rests[i] for i in places]
-            found[session] = population.simulate(fields(session, model), near, rough)
-        if len(found) == 1:
-            return next(iter(found.values()))
+            results[session] = population.simulate(fields(session, model), near, rough)
+        if len(results) == 1:
+            return next(iter(results.values()))
         trials = {
-            place: (one.positions[i], one.rests[i])
-            for (_, _, places, _), one in zip(self._parts, found.values(), strict=True)
+            place: (result.positions[i], result.rests[i])
+            for (_, _, places, _), result in zip(self._parts, results.values(), strict=True)
             for i, place in enumerate(places)
         }
         order = [trials[place] for place in sorted(trials)]
-        diverged = np.logical_or.reduce([one.diverged for one in found.values()])
-        steps = sum(one.steps for one in found.values())
+        diverged = np.logical_or.reduce([result.diverged for result in results.values()])
+        steps = sum(result.steps for result in results.values())
         return Simulated([places for places, _ in order], diverged, steps, [rest for _, rest in order])

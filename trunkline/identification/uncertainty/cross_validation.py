@@ -28,15 +28,15 @@ def errors_left_out(
     Args:
         folds: into how many groups the trials go, in turn.
     """
-    seen = [e for e in experiments if e.split == IDENTIFY]
+    fitted = [e for e in experiments if e.split == IDENTIFY]
     near = replace(fit.method, optimizer=LeastSquares(starts=0, descents=1, iterations=1, tolerance=1.0))
     tables = []
     for fold in range(folds):
-        left_out = seen[fold::folds]
-        kept = [e for i, e in enumerate(seen) if i % folds != fold]
+        left_out = fitted[fold::folds]
+        others = [e for i, e in enumerate(fitted) if i % folds != fold]
         title = f"{label} fold {fold + 1} of {folds}"
-        found = identify(title, result.models["coarse"], kept, replace(fit, method=near))
-        models = {name: found.models[name] for name in ("coarse", "identified")}
+        refit = identify(title, result.models["coarse"], others, replace(fit, method=near))
+        models = {name: refit.models[name] for name in ("coarse", "identified")}
         replays = {name: replay(model, left_out, fit.segments) for name, model in models.items()}
         tables.append(trial_table({name: Prediction(replayed, left_out) for name, replayed in replays.items()}))
     return pd.concat(tables, ignore_index=True)

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from trunkline.identification.evaluation.baselines import straight
 from trunkline.identification.evaluation.evaluation import Prediction, replay
-from trunkline.identification.evaluation.null_model import straight
 from trunkline.identification.fit.fit import Fit
 from trunkline.identification.fit.linearisation import linearise
 from trunkline.identification.fit.settings import IdentificationSettings

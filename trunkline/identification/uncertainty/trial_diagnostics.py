@@ -1,4 +1,4 @@
-"""What looks wrong about a trial that decides too much: what would have to be otherwise for the model to agree."""
+"""Diagnostics of a trial with too much influence: the change of its data with which the model would agree."""
 
 from dataclasses import replace
 
@@ -23,10 +23,10 @@ UNUSUAL = 3.0  # times the median over the trials
 SWAYING = 0.03  # share of the top speed
 
 
-def suspicions(
+def trial_diagnostics(
     trial: Trial, experiment: Experiment, others: list[Experiment], model: mujoco.MjModel, fit: Fit
 ) -> list[str]:
-    """What looks wrong about a trial, a sentence each; none if nothing that is tried explains it.
+    """A sentence for each likely fault of a trial; none if nothing that is tried explains it.
 
     Args:
         trial, experiment: the same trial. others: experiments to compare with, it may be among them.
@@ -35,14 +35,14 @@ def suspicions(
     simulated = replay(model, [experiment], fit.segments).positions[0]
     if not np.isfinite(simulated).all():
         return ["it diverges"]
-    said = [
+    sentences = [
         started_off(simulated, experiment, fit),
         exchanged_labels(simulated, experiment, fit),
         another_level(simulated, trial, experiment, model, fit),
         unusual_start(experiment, others),
         moving_start(trial, experiment),
     ]
-    return [sentence for sentence in said if sentence]
+    return [sentence for sentence in sentences if sentence]
 
 
 def started_off(simulated: np.ndarray, experiment: Experiment, fit: Fit) -> str:
@@ -66,10 +66,10 @@ def exchanged_labels(simulated: np.ndarray, experiment: Experiment, fit: Fit) ->
     """Whether it fits better with two segments' labels exchanged."""
     segments = experiment.positions.shape[1]
     apart = np.linalg.norm(simulated[:, :, None] - experiment.positions[:, None], axis=-1)  # (T, simulated, measured)
-    seen = experiment.measured[:, None] & experiment.measured[:, :, None]
-    cost = np.where(seen, apart, 0).sum(axis=0) / np.maximum(seen.sum(axis=0), 1)
-    own = np.diag(cost)
-    gain = own[:, None] + own - cost - cost.T
+    both = experiment.measured[:, None] & experiment.measured[:, :, None]
+    cost = np.where(both, apart, 0).sum(axis=0) / np.maximum(both.sum(axis=0), 1)
+    same = np.diag(cost)
+    gain = same[:, None] + same - cost - cost.T
     first, second = np.unravel_index(np.argmax(gain), gain.shape)
     if gain[first, second] <= 0:
         return ""
@@ -110,20 +110,21 @@ def another_level(simulated: np.ndarray, trial: Trial, experiment: Experiment, m
 def unusual_start(experiment: Experiment, others: list[Experiment]) -> str:
     """Whether no pose of the model is near the one that it starts in."""
     usual = float(np.median([np.nanmean(e.fit.residuals) for e in others if e.kind == experiment.kind]))
-    own = float(np.nanmean(experiment.fit.residuals))
-    if own < UNUSUAL * usual:
+    distance = float(np.nanmean(experiment.fit.residuals))
+    if distance < UNUSUAL * usual:
         return ""
-    return f"the pose that it starts in is {1e3 * own:.1f} mm from any of the model, {own / usual:.1f} times the median"
+    times = distance / usual
+    return f"the pose that it starts in is {1e3 * distance:.1f} mm from any of the model, {times:.1f} times the median"
 
 
 def moving_start(trial: Trial, experiment: Experiment) -> str:
     """Whether it is simulated from rest while the arm moves."""
-    held = start_frames(trial)[0] - QUIET_FRAMES
-    if is_static(trial.experiment) or trial.in_motion or held < 1:
+    frame = start_frames(trial)[0] - QUIET_FRAMES
+    if is_static(trial.experiment) or trial.in_motion or frame < 1:
         return ""
-    first = max(held - 2 * QUIET_FRAMES, 0)
-    speeds = np.linalg.norm(trial.positions[held] - trial.positions[first], axis=-1) / (
-        trial.time[held] - trial.time[first]
+    first = max(frame - 2 * QUIET_FRAMES, 0)
+    speeds = np.linalg.norm(trial.positions[frame] - trial.positions[first], axis=-1) / (
+        trial.time[frame] - trial.time[first]
     )
     steps = np.linalg.norm(np.diff(experiment.positions, axis=0), axis=-1) / experiment.frame_step
     speed, top = float(np.quantile(speeds, 0.75)), float(np.quantile(steps, 0.75, axis=1).max())

@@ -47,11 +47,11 @@ def mujoco_deviation(
 
 
 def _settled(
-    given: tuple[mujoco.MjModel, Chain], rows: tuple[np.ndarray, np.ndarray, np.ndarray]
+    fixed: tuple[mujoco.MjModel, Chain], rows: tuple[np.ndarray, np.ndarray, np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of some samples' `tensions`, N, and `commands`, m (n, K), under `gravity`, m/s² (n, 3): the tips in MuJoCo, m
     (n, 3), which of them rested (n,), and how far apart friction may hold them, m (n,)."""
-    (model, chain), (tensions, commands, gravity) = given, rows
+    (model, chain), (tensions, commands, gravity) = fixed, rows
     settled = settle(model, commands[:, model.actuator_trnid[:, 0]], gravity)
     band = friction_band(chain, tensions, gravity, *model_friction(model), capstan=capstan_friction(model))
     return settled.position, settled.rested, band.width

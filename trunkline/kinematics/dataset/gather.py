@@ -35,7 +35,7 @@ class Sampling:
 
 
 @dataclass
-class Gathered:
+class GatheredSamples:
     """The table of samples with its column "split"; how dense tips are under each gravity; the check, a row a
     sample."""
 
@@ -44,7 +44,7 @@ class Gathered:
     deviation: pd.DataFrame
 
 
-def gather(model: mujoco.MjModel, chain: Chain, sampling: Sampling, done: Callable[..., None]) -> Gathered:
+def gather(model: mujoco.MjModel, chain: Chain, sampling: Sampling, done: Callable[..., None]) -> GatheredSamples:
     """Samples of equilibria of a model and its `chain`.
 
     Args:
@@ -68,4 +68,4 @@ def gather(model: mujoco.MjModel, chain: Chain, sampling: Sampling, done: Callab
     table = pd.concat(tables, ignore_index=True)
     table["split"] = split(len(table), sampling.validate_share, rng)
     print(f"fk_dataset: settling {sampling.check} samples in MuJoCo", flush=True)
-    return Gathered(table, densities, mujoco_deviation(model, chain, table, sampling.check, rng))
+    return GatheredSamples(table, densities, mujoco_deviation(model, chain, table, sampling.check, rng))

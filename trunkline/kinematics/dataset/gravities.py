@@ -13,7 +13,7 @@ GOLDEN_ANGLE = np.pi * (3 - np.sqrt(5))  # rad, between two points of a Fibonacc
 
 
 @dataclass
-class Rays:
+class GravityRays:
     """At each gravity: directions, steps: of the candidates, see `sampling.sample_at`."""
 
     directions: Annotated[int, Field(ge=8, le=10000)]
@@ -21,7 +21,7 @@ class Rays:
 
 
 @dataclass
-class Tilts(Rays):
+class Tilts(GravityRays):
     """The mount tilts about base +y alone, by so many degrees: the paper's form."""
 
     kind: Literal["tilt"]
@@ -38,7 +38,7 @@ class Tilts(Rays):
 
 
 @dataclass
-class Directions(Rays):
+class Directions(GravityRays):
     """Gravity from any side: `count` directions, spread evenly up to `largest_deg` from the straight arm."""
 
     kind: Literal["direction"]
@@ -52,7 +52,7 @@ class Directions(Rays):
 
 
 @dataclass
-class Weightless(Rays):
+class Weightless(GravityRays):
     """No gravity: for an arm so stiff or so light that its session says `gravity: none`."""
 
     kind: Literal["none"]

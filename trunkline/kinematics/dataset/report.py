@@ -3,7 +3,7 @@
 import numpy as np
 import pandas as pd
 
-from trunkline.kinematics.dataset.gather import Gathered
+from trunkline.kinematics.dataset.gather import GatheredSamples
 from trunkline.kinematics.dataset.table import Density
 
 
@@ -16,9 +16,9 @@ def unevenness_table(densities: list[Density]) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def summary(found: Gathered) -> dict:
+def summary(gathered: GatheredSamples) -> dict:
     """The data set in a few numbers, for metrics.json."""
-    table, densities, deviation = found.table, found.densities, found.deviation
+    table, densities, deviation = gathered.table, gathered.densities, gathered.deviation
     before, after = np.mean([density.unevenness() for density in densities], axis=0)
     return {
         "samples": len(table),

@@ -20,7 +20,7 @@ from trunkline.model.statics.chain import Chain
 from trunkline.model.statics.equilibria import Equilibrium, equilibrium, equilibrium_paths
 
 COARSE_STEPS = 48  # of the first look at a path, to space the second one evenly along the tip's way
-SHEET_LOOK = 2  # rays of a sheet, of which one is looked at: places are along neighbouring rays as good as the same
+SURFACE_LOOK = 2  # rays of a surface, of which one is looked at: places are along neighbouring rays as good as the same
 LEAST = 1000  # equilibria that are worth being sent to another machine
 COARSE_POWER = 3.0  # tension ~ (step / steps)^power there: the tip's soft units bend under the first newton
 
@@ -85,7 +85,7 @@ def _candidates(gravity: np.ndarray, whole: Equilibrium, kind: np.ndarray) -> Ca
     return Candidates(gravity, whole[good], kind[good], failed, int(np.sum(~good)) - failed)
 
 
-def sheet_at(chain: Chain, gravity: np.ndarray, around: int, along: int) -> np.ndarray:
+def workspace_surface_at(chain: Chain, gravity: np.ndarray, around: int, along: int) -> np.ndarray:
     """The surface of tips as a lattice: even ways to pull around the arm, even places along the tip's way on each.
 
     The first place of every way is where the arm hangs, the last where its motors pull with all their force.
@@ -101,13 +101,13 @@ def sheet_at(chain: Chain, gravity: np.ndarray, around: int, along: int) -> np.n
     """
     rays = pull_directions(chain, np.arange(around) / around * 2 * np.pi)
     places = np.broadcast_to(np.linspace(0, 1, along), (around, along))
-    found = _along(chain, gravity, rays, places, SHEET_LOOK)
-    bad = int((~found.converged | found.snapped).sum())
+    equilibria = _along(chain, gravity, rays, places, SURFACE_LOOK)
+    bad = int((~equilibria.converged | equilibria.snapped).sum())
     if bad:
         raise InputError(
             f"gravity {np.round(gravity, 3)}: found {bad} of {around * along} tips by no steady way, expected a surface"
         )
-    return found.position.reshape(around, along, 3)
+    return equilibria.position.reshape(around, along, 3)
 
 
 def sections(chain: Chain) -> list[np.ndarray]:
@@ -191,10 +191,10 @@ def in_sections(
     for section in sections(chain):
         ways = pull_directions(chain, rng.uniform(-np.pi, np.pi, count), section, most)
         tensions += np.sqrt(rng.random((count, 1))) * ways
-    found = equilibrium(chain, tensions, gravity)
+    result = equilibrium(chain, tensions, gravity)
     if deepest is None:
-        return found, np.ones(count, bool)
-    return found, np.all(chain.straight_lengths - found.commands <= deepest, axis=1)
+        return result, np.ones(count, bool)
+    return result, np.all(chain.straight_lengths - result.commands <= deepest, axis=1)
 
 
 def _forces(chain: Chain, deepest: np.ndarray) -> np.ndarray:
@@ -204,9 +204,9 @@ def _forces(chain: Chain, deepest: np.ndarray) -> np.ndarray:
     for tendon in range(chain.tendons):
         ray = np.zeros((1, COARSE_STEPS, chain.tendons))
         ray[0, :, tendon] = shares * chain.max_tension[tendon]
-        found = equilibrium_paths(chain, ray, np.zeros(3))
-        pulls = chain.straight_lengths[tendon] - found.commands[found.converged, tendon]
-        forces[tendon] = np.interp(deepest[tendon], pulls, ray[0, found.converged, tendon])
+        paths = equilibrium_paths(chain, ray, np.zeros(3))
+        pulls = chain.straight_lengths[tendon] - paths.commands[paths.converged, tendon]
+        forces[tendon] = np.interp(deepest[tendon], pulls, ray[0, paths.converged, tendon])
     return forces
 
 
@@ -239,8 +239,8 @@ def _paths(chain: Chain, tensions: np.ndarray, gravity: np.ndarray) -> Equilibri
     return Equilibrium(*spread_rows(_follow_some, (tensions,), (chain, gravity), least))
 
 
-def _follow_some(given: tuple[Chain, np.ndarray], rows: tuple[np.ndarray]) -> tuple[np.ndarray, ...]:
-    (chain, gravity), (tensions,) = given, rows
+def _follow_some(fixed: tuple[Chain, np.ndarray], rows: tuple[np.ndarray]) -> tuple[np.ndarray, ...]:
+    (chain, gravity), (tensions,) = fixed, rows
     return tuple(vars(equilibrium_paths(chain, tensions, gravity)).values())
 
 
@@ -257,8 +257,8 @@ def thin(points: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray
     for _ in range(40):
         edge = np.sqrt(low * high)
         low, high = (edge, high) if len(_one_a_cell(points[shuffled], edge)) > count else (low, edge)
-    kept = shuffled[_one_a_cell(points[shuffled], low)]
-    return np.sort(kept[rng.permutation(len(kept))[:count]])
+    retained = shuffled[_one_a_cell(points[shuffled], low)]
+    return np.sort(retained[rng.permutation(len(retained))[:count]])
 
 
 def _one_a_cell(points: np.ndarray, edge: float) -> np.ndarray:

@@ -65,21 +65,21 @@ def sample_table(
     on_curves = [rows[thin(tips[rows], max(1, count // 50), rng)] for rows in planar.values() if len(rows)]
     general = np.flatnonzero(candidates.kind == "general")
     share = count - sum(len(rows) for rows in on_curves)
-    kept = np.sort(np.concatenate([general[thin(tips[general], share, rng)], *on_curves]))
-    density = Density(down, tips, tips[kept], candidates.failed, candidates.snapped)
-    return _table(chain, down, candidates, kept), density
+    retained = np.sort(np.concatenate([general[thin(tips[general], share, rng)], *on_curves]))
+    density = Density(down, tips, tips[retained], candidates.failed, candidates.snapped)
+    return _table(chain, down, candidates, retained), density
 
 
-def _table(chain: Chain, down: np.ndarray, candidates: Candidates, kept: np.ndarray) -> pd.DataFrame:
-    rest = candidates.equilibrium[kept]
+def _table(chain: Chain, down: np.ndarray, candidates: Candidates, retained: np.ndarray) -> pd.DataFrame:
+    rest = candidates.equilibrium[retained]
     slopes = sensitivity(chain, rest.qpos, rest.tensions, candidates.gravity)
-    columns = {"theta_g": np.full(len(kept), angle_of(down))}
-    columns |= {name: np.full(len(kept), part) for name, part in zip(DOWN, down, strict=True)}
+    columns = {"theta_g": np.full(len(retained), angle_of(down))}
+    columns |= {name: np.full(len(retained), part) for name, part in zip(DOWN, down, strict=True)}
     columns |= dict(zip(POSE, np.concatenate([rest.position, rest.quaternion], axis=1).T, strict=True))
     columns |= dict(zip(length_columns(chain.tendons), rest.lengths.T, strict=True))
     columns |= dict(zip(tension_columns(chain.tendons), rest.tensions.T, strict=True))
     columns |= dict(zip(command_columns(chain.tendons), rest.commands.T, strict=True))
-    columns |= {"residual": rest.residual, "iterations": rest.iterations, "set": candidates.kind[kept]}
+    columns |= {"residual": rest.residual, "iterations": rest.iterations, "set": candidates.kind[retained]}
     for t in range(chain.tendons):
         columns |= {f"d{axis}_df{t + 1}": slopes.tip_by_tension[:, k, t] for k, axis in enumerate(AXES)}
         columns |= {f"r{axis}_df{t + 1}": slopes.turn_by_tension[:, k, t] for k, axis in enumerate(AXES)}

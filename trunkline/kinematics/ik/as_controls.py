@@ -70,7 +70,7 @@ class Drawn:
 def draw_targets(
     model: mujoco.MjModel,
     chain: Chain,
-    known: np.ndarray,
+    sampled: np.ndarray,
     deepest: np.ndarray,
     count: int,
     rng: np.random.Generator,
@@ -80,30 +80,30 @@ def draw_targets(
     its limit.
 
     Args:
-        known: what samples tell of gravity; others are drawn between them, see `inputs.draw_gravity`. Shape (G, 0, 1
+        sampled: gravity inputs of the samples; others are drawn between them, see `inputs.draw_gravity`. Shape (G, 0, 1
             or 3).
         deepest: of each tendon, how far it is drawn in at most, m. Shape (K,).
         others_pay_out: whether motors that do not pull give way; else they stay where the straight arm has them, and
             pull against the others as the arm bends: shapes that the data set has none of.
     """
-    told, commands = draw_commands(chain, known, deepest, count, rng, others_pay_out)
-    rest = settle(model, commands[:, model.actuator_trnid[:, 0]], _gravity_told(told), PATIENCE)
+    gravity, commands = draw_commands(chain, sampled, deepest, count, rng, others_pay_out)
+    rest = settle(model, commands[:, model.actuator_trnid[:, 0]], _gravity_vectors(gravity), PATIENCE)
     tensions = rest.tensions[:, actuators(model)]
     near_limit = ~(tensions < NEAR_LIMIT * chain.max_tension).all(axis=1)
-    found = np.column_stack([told, rest.position, rest.quaternion])[rest.rested & ~near_limit]
-    return Drawn(found, int((rest.rested & near_limit).sum()), int((~rest.rested).sum()))
+    targets = np.column_stack([gravity, rest.position, rest.quaternion])[rest.rested & ~near_limit]
+    return Drawn(targets, int((rest.rested & near_limit).sum()), int((~rest.rested).sum()))
 
 
 def draw_commands(
-    chain: Chain, known: np.ndarray, deepest: np.ndarray, count: int, rng: np.random.Generator, others_pay_out: bool
+    chain: Chain, sampled: np.ndarray, deepest: np.ndarray, count: int, rng: np.random.Generator, others_pay_out: bool
 ) -> tuple[np.ndarray, np.ndarray]:
     """Gravities (count, 0, 1 or 3) and commands, m (count, K), as `draw_targets` has them; its words. Of an arm of
     several sections, as many of them as its motors reach."""
-    told = draw_gravity(known, count, rng)
+    gravity = draw_gravity(sampled, count, rng)
     if len(sections(chain)) > 1:
-        found, within = in_sections(chain, _gravity_told(told), count, deepest, rng)
+        result, within = in_sections(chain, _gravity_vectors(gravity), count, deepest, rng)
         idle = chain.straight_lengths + others_pay_out * chain.length
-        return told[within], np.where(found.tensions == 0, idle, found.commands)[within]
+        return gravity[within], np.where(result.tensions == 0, idle, result.commands)[within]
     first = rng.integers(chain.tendons, size=count)
     order = around_the_arm(chain)
     place = np.argsort(order)
@@ -113,12 +113,12 @@ def draw_commands(
     pulls[np.arange(count), second] = np.where(rng.random(count) < 0.5, rng.uniform(0, 1, count), 0.0)
     idle = pulls == 0
     commands = chain.straight_lengths - pulls * deepest + idle * others_pay_out * chain.length
-    return told, commands
+    return gravity, commands
 
 
-def _gravity_told(told: np.ndarray) -> np.ndarray:
-    """Gravity, m/s² (N, 3), from what is told of it, (N, 0, 1 or 3)."""
-    return gravity_of(np.pad(told, [(0, 0), (0, len(POSE))]))
+def _gravity_vectors(values: np.ndarray) -> np.ndarray:
+    """Gravity, m/s² (N, 3), from the inputs of the network for it, (N, 0, 1 or 3)."""
+    return gravity_of(np.pad(values, [(0, 0), (0, len(POSE))]))
 
 
 @dataclass
@@ -160,15 +160,16 @@ class Reached:
     def time_to_rest(self) -> dict:
         """Median and 95th percentile, s; what never rested counts as longer than all others."""
         seconds = np.where(np.isfinite(self.seconds), self.seconds, np.inf)
-        found = np.quantile(seconds, (0.5, 0.95), method="higher")  # between two infinities, nothing is interpolated
-        return {name: v if np.isfinite(v) else None for name, v in zip(("median", "p95"), found, strict=True)}
+        # between two infinities, nothing is interpolated
+        quantiles = np.quantile(seconds, (0.5, 0.95), method="higher")
+        return {name: v if np.isfinite(v) else None for name, v in zip(("median", "p95"), quantiles, strict=True)}
 
 
 def score(
     model: mujoco.MjModel,
     chain: Chain,
     ask: Ask,
-    known: np.ndarray,
+    sampled: np.ndarray,
     deepest: np.ndarray,
     settings: AsControls,
     rng: np.random.Generator,
@@ -181,14 +182,14 @@ def score(
 
     Args:
         ask: the network, targets to its answer.
-        known, deepest: as in `draw_targets`.
+        sampled, deepest: as in `draw_targets`.
         rig: the arm that the model is of.
 
     Returns:
         Metrics of the model, and of the rig beside the model's with friction on the same targets.
     """
-    drawn = draw_targets(model, chain, known, PULL_SHARE * deepest, settings.targets, rng)
-    taut = draw_targets(model, chain, known, TAUT_SHARE * deepest, settings.targets // 8, rng, others_pay_out=False)
+    drawn = draw_targets(model, chain, sampled, PULL_SHARE * deepest, settings.targets, rng)
+    taut = draw_targets(model, chain, sampled, TAUT_SHARE * deepest, settings.targets // 8, rng, others_pay_out=False)
     targets = drawn.targets
     timed = driven(model, ask, targets[: settings.timed], settings.seconds, friction=False, calm=True)
     if has_friction(model):
@@ -243,8 +244,8 @@ def driven(
     """
     answer = ask(targets)
     commands, gravity = answer["commands"][:, model.actuator_trnid[:, 0]], gravity_of(targets)
-    found = drive(model, commands, gravity, seconds, friction, calm=calm)
-    return replace(_reached(targets, answer, found.end), seconds=found.seconds_to_rest, rested=found.rested)
+    motion = drive(model, commands, gravity, seconds, friction, calm=calm)
+    return replace(_reached(targets, answer, motion.end), seconds=motion.seconds_to_rest, rested=motion.rested)
 
 
 def _reached(targets: np.ndarray, answer: dict[str, np.ndarray], tips: np.ndarray) -> Reached:

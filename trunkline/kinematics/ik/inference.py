@@ -6,7 +6,7 @@ import numpy as np
 import onnxruntime
 
 from trunkline.errors import InputError
-from trunkline.kinematics.ik.inputs import position_of, told_of_gravity
+from trunkline.kinematics.ik.inputs import gravity_columns, position_of
 
 UNIT = 1e-3  # by which the length of a quaternion or direction may differ from 1: that of one written with three digits
 
@@ -30,13 +30,13 @@ def ask(runtime: onnxruntime.InferenceSession, poses: np.ndarray) -> dict[str, n
         if key not in meaning:
             raise InputError(f"found no {key!r} in the file's metadata, expected a network of train_ik")
     names = [output.name for output in runtime.get_outputs()]
-    given = {taken.name: checked(poses, json.loads(meaning["inputs"]))}
-    answers = dict(zip(names, runtime.run(names, given), strict=True))
+    inputs = {taken.name: checked(poses, json.loads(meaning["inputs"]))}
+    answers = dict(zip(names, runtime.run(names, inputs), strict=True))
     for name, values in answers.items():
         bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
         if len(bad):
             raise InputError(f"pose {bad[0]}: found {name} {values[bad[0]]}, expected finite numbers")
-    missed = np.linalg.norm(answers["tip"] - position_of(given[taken.name]), axis=1)
+    missed = np.linalg.norm(answers["tip"] - position_of(inputs[taken.name]), axis=1)
     return answers | {"doubtful": missed > float(meaning["doubt_beyond_m"])}
 
 
@@ -54,7 +54,7 @@ def checked(poses: np.ndarray, inputs: list[str]) -> np.ndarray:
         raise InputError(f"pose {row}: {inputs[column]}: found {poses[row, column]:g}, expected a finite number")
     units = {"quaternion": poses[:, -4:]}
     if len(inputs) > 8:
-        units["direction of gravity"] = told_of_gravity(poses)
+        units["direction of gravity"] = gravity_columns(poses)
     for name, vectors in units.items():
         lengths = np.linalg.norm(vectors, axis=1)
         for row in np.flatnonzero(np.abs(lengths - 1) > UNIT):

@@ -26,14 +26,14 @@ def inputs_of(table: pd.DataFrame) -> list[str]:
 
 def gravity_of(targets: np.ndarray) -> np.ndarray:
     """Gravity in the base frame for targets (N, 7, 8 or 10), m/s². Shape (N, 3)."""
-    told = told_of_gravity(targets)
-    if told.shape[1] == 0:
-        return np.zeros((len(told), 3))
-    return gravity_in_base(told[:, 0]) if told.shape[1] == 1 else STANDARD_GRAVITY * told
+    values = gravity_columns(targets)
+    if values.shape[1] == 0:
+        return np.zeros((len(values), 3))
+    return gravity_in_base(values[:, 0]) if values.shape[1] == 1 else STANDARD_GRAVITY * values
 
 
-def told_of_gravity(targets: np.ndarray) -> np.ndarray:
-    """The columns of targets that tell of gravity. Shape (N, 0, 1 or 3)."""
+def gravity_columns(targets: np.ndarray) -> np.ndarray:
+    """The columns of targets for gravity. Shape (N, 0, 1 or 3)."""
     return targets[:, : -len(POSE)]
 
 
@@ -47,15 +47,15 @@ def quaternion_of(targets: np.ndarray) -> np.ndarray:
     return targets[:, -4:]
 
 
-def draw_gravity(known: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Gravities between those `known` (G, 0, 1 or 3), told as they are: angles, or azimuths too, at random.
+def draw_gravity(sampled: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
+    """Gravities between those `sampled` (G, 0, 1 or 3), in the same form: angles, or azimuths too, at random.
 
     Returns:
         Shape (count, 0, 1 or 3).
     """
-    if known.shape[1] == 0:
+    if sampled.shape[1] == 0:
         return np.zeros((count, 0))
-    if known.shape[1] == 1:
-        return rng.uniform(known.min(), known.max(), (count, 1))
-    largest = np.arccos(np.clip(-known[:, 2].max(), -1, 1))
+    if sampled.shape[1] == 1:
+        return rng.uniform(sampled.min(), sampled.max(), (count, 1))
+    largest = np.arccos(np.clip(-sampled[:, 2].max(), -1, 1))
     return downwards(rng.uniform(0, largest, count), rng.uniform(0, 2 * np.pi, count))

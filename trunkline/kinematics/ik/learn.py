@@ -19,10 +19,10 @@ from trunkline.kinematics.dataset.sampling import sections
 from trunkline.kinematics.dataset.table import command_by_tension, sample_table, tip_by_tension, turn_by_tension
 from trunkline.kinematics.ik.as_controls import DOUBT, AsControls, Rig, score
 from trunkline.kinematics.ik.inference import ask
-from trunkline.kinematics.ik.inputs import draw_gravity, inputs_of, position_of, told_of_gravity
+from trunkline.kinematics.ik.inputs import draw_gravity, gravity_columns, inputs_of, position_of
 from trunkline.kinematics.ik.network import OUTPUTS, InverseKinematics
 from trunkline.kinematics.ik.onnx import to_onnx
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.score import (
     TipErrors,
     beyond_range,
@@ -50,7 +50,7 @@ class Unseen:
 
 
 @dataclass
-class Polish:
+class AnswerRefinement:
     """Gauss-Newton from the network's answers: for how many held-out targets, and of how many steps at most."""
 
     targets: Annotated[int, Field(ge=1, le=1_000_000)]
@@ -68,7 +68,7 @@ class Learning(Training):
     lever: Annotated[float, Field(ge=0, le=1)]
     unseen: Unseen
     as_controls: AsControls
-    polish: Polish
+    polish: AnswerRefinement
     outside: Annotated[int, Field(ge=1, le=1_000_000)]
     rig: str | None
 
@@ -79,7 +79,7 @@ class Learned:
 
     held_out: the samples that no training saw. errors: of the exported network's commands, for them ("held out") and
     for targets under "unseen angles". as_lengths: of its lengths, for the latter, held by cables. as_controls: what
-    comes of its commands in MuJoCo, on_plant: on the arm itself. polished: of some held-out targets after Gauss-Newton
+    comes of its commands in MuJoCo, on_plant: on the arm itself. refined: of some held-out targets after Gauss-Newton
     steps.
     outside: how many targets far off there are, beyond_range: how far (m) any answer to them leaves the tendons' range.
     difference: between the network and what was exported, m, at most.
@@ -93,7 +93,7 @@ class Learned:
     as_lengths: TipErrors
     as_controls: dict
     on_plant: dict | None
-    polished: TipErrors
+    refined: TipErrors
     outside: int
     beyond_range: float
     difference: float
@@ -110,28 +110,28 @@ def learn(
     network, curve = fit(table, chain, learning)
     columns = inputs_of(table)
     held_out = table[table["split"] == "validate"]
-    known = known_gravities(table)
+    sampled = sampled_gravities(table)
     sent_before = table.loc[table["split"] == "train", command_columns(chain.tendons)].to_numpy()
     deepest = chain.straight_lengths - sent_before.min(axis=0)
-    unseen = unseen_targets(chain, known, learning.unseen, learning.seed, deepest)
+    between = unseen_targets(chain, sampled, learning.unseen, learning.seed, deepest)
     doubtful = doubt_beyond(network, held_out[columns].to_numpy(), chain.length)
     exported = to_onnx(network, [model.tendon(t).name for t in range(chain.tendons)], doubtful)
     runtime = onnxruntime.InferenceSession(exported.SerializeToString(), providers=["CPUExecutionProvider"])
-    errors, difference, found = {}, 0.0, {}
-    for name, targets in (("held out", held_out), ("unseen angles", unseen)):
+    errors, difference, answers = {}, 0.0, {}
+    for name, targets in (("held out", held_out), ("unseen angles", between)):
         inputs = targets[columns].to_numpy()
-        found = ask(runtime, inputs)
+        answers = ask(runtime, inputs)
         with torch.no_grad():
-            told = network(torch.tensor(inputs, dtype=torch.float32))._asdict()
-        difference = max(difference, *(largest_difference(found[key], told[key].numpy()) for key in OUTPUTS))
+            outputs = network(torch.tensor(inputs, dtype=torch.float32))._asdict()
+        difference = max(difference, *(largest_difference(answers[key], outputs[key].numpy()) for key in OUTPUTS))
         print(f"train_ik: forward kinematics of {len(inputs)} answers, {name}", flush=True)
-        errors[name] = tip_errors(chain, inputs, found["commands"].astype(float))
-    as_lengths = length_errors(chain, unseen[columns].to_numpy(), found["lengths"].astype(float))
-    polished = polished_errors(chain, held_out[columns], runtime, learning.polish, learning.seed)
+        errors[name] = tip_errors(chain, inputs, answers["commands"].astype(float))
+    as_lengths = length_errors(chain, between[columns].to_numpy(), answers["lengths"].astype(float))
+    refined = refined_errors(chain, held_out[columns], runtime, learning.polish, learning.seed)
     rng = np.random.default_rng(learning.seed)
-    far = ask(runtime, outside_targets(learning.outside, chain.length, rng, known.shape[1]))["commands"]
+    far = ask(runtime, outside_targets(learning.outside, chain.length, rng, sampled.shape[1]))["commands"]
     print("train_ik: sending commands to MuJoCo until the arm rests", flush=True)
-    sent, on_plant = score(model, chain, partial(ask, runtime), known, deepest, learning.as_controls, rng, rig)
+    sent, on_plant = score(model, chain, partial(ask, runtime), sampled, deepest, learning.as_controls, rng, rig)
     return Learned(
         network=network,
         exported=exported,
@@ -141,7 +141,7 @@ def learn(
         as_lengths=as_lengths,
         as_controls=sent,
         on_plant=on_plant,
-        polished=polished,
+        refined=refined,
         outside=len(far),
         beyond_range=beyond_range(far, sent_before),
         difference=difference,
@@ -185,37 +185,37 @@ def doubt_beyond(network: InverseKinematics, reachable: np.ndarray, length: floa
     return max(DOUBT * length, float(np.quantile(missed, 1 - FALSE_ALARMS)))
 
 
-def polished_errors(chain: Chain, held_out: pd.DataFrame, runtime, polishing: Polish, seed: int) -> TipErrors:
+def refined_errors(chain: Chain, held_out: pd.DataFrame, runtime, settings: AnswerRefinement, seed: int) -> TipErrors:
     """Errors of some held-out targets after Gauss-Newton steps from the network's answers."""
-    count = min(polishing.targets, len(held_out))
+    count = min(settings.targets, len(held_out))
     inputs = held_out.sample(count, random_state=seed).to_numpy()
-    print(f"train_ik: up to {polishing.steps} Gauss-Newton steps for {count} answers", flush=True)
+    print(f"train_ik: up to {settings.steps} Gauss-Newton steps for {count} answers", flush=True)
     answer = {name: values.astype(float) for name, values in ask(runtime, inputs).items()}
     commands = answer["commands"] if len(sections(chain)) > 1 else None
-    found = polish(chain, inputs, answer["lengths"], polishing.steps, commands=commands)
-    return TipErrors(found.position_error, found.orientation_error)
+    refined = refine(chain, inputs, answer["lengths"], settings.steps, commands=commands)
+    return TipErrors(refined.position_error, refined.orientation_error)
 
 
-def known_gravities(table: pd.DataFrame) -> np.ndarray:
-    """What the samples tell of gravity, each once. Shape (G, 0, 1 or 3)."""
+def sampled_gravities(table: pd.DataFrame) -> np.ndarray:
+    """The gravity inputs of the samples, each once. Shape (G, 0, 1 or 3)."""
     columns = inputs_of(table)
-    told = table.drop_duplicates(columns[:-7]) if columns[:-7] else table[:1]
-    return told_of_gravity(told[columns].to_numpy())
+    rows = table.drop_duplicates(columns[:-7]) if columns[:-7] else table[:1]
+    return gravity_columns(rows[columns].to_numpy())
 
 
 def unseen_targets(
-    chain: Chain, known: np.ndarray, unseen: Unseen, seed: int, deepest: np.ndarray | None = None
+    chain: Chain, sampled: np.ndarray, unseen: Unseen, seed: int, deepest: np.ndarray | None = None
 ) -> pd.DataFrame:
-    """Targets under gravities that the data set has none of, `known` (G, 0, 1 or 3): half way between its angles, or
-    at random. `deepest` as for `sample_table`."""
+    """Targets under gravities that the data set has none of, unlike `sampled` (G, 0, 1 or 3): half way between
+    its angles, or at random. `deepest` as for `sample_table`."""
     rng = np.random.default_rng(seed)
-    if known.shape[1] == 0:
+    if sampled.shape[1] == 0:
         between = np.zeros((1, 3))
-    elif known.shape[1] == 1:
-        angles = np.sort(known[:, 0])
+    elif sampled.shape[1] == 1:
+        angles = np.sort(sampled[:, 0])
         between = downwards((angles[1:] + angles[:-1]) / 2, np.zeros(len(angles) - 1))
     else:
-        between = draw_gravity(known, unseen.gravities, rng)
+        between = draw_gravity(sampled, unseen.gravities, rng)
     count = unseen.samples // max(1, len(between))
     tables = [
         sample_table(chain, down, count, unseen.directions, unseen.steps, rng, deepest)[0] for down in between

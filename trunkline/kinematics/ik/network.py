@@ -84,7 +84,7 @@ class InverseKinematics(nn.Module):
         buffers["most_stretch"] = torch.tensor((lengths - commands).max(axis=0))
         for name, values in buffers.items():
             self.register_buffer(name, values.to(torch.float32))
-        tendons, told = commands.shape[1], inputs.shape[1] - 7
+        tendons, columns = commands.shape[1], inputs.shape[1] - 7
         self.inputs = inputs.shape[1]
         self.layers = nn.Sequential(
             Linear(raw.shape[1], width), nn.ReLU(),
@@ -93,7 +93,7 @@ class InverseKinematics(nn.Module):
             Linear(width, 2 * tendons),
         )  # fmt: skip
         self.tip_layers = nn.Sequential(
-            Linear((2 if told == 1 else told) + tendons, width), nn.ReLU(),
+            Linear((2 if columns == 1 else columns) + tendons, width), nn.ReLU(),
             Linear(width, width), nn.ReLU(),
             Linear(width, width), nn.ReLU(),
             Linear(width, 3),
@@ -141,8 +141,8 @@ def features(inputs: torch.Tensor) -> torch.Tensor:
 def gravity_features(inputs: torch.Tensor) -> torch.Tensor:
     """sin θ_G, cos θ_G of inputs (B, 8), the direction of gravity of inputs (B, 10), nothing of inputs (B, 7). Shape
     (B, 2, 3 or 0)."""
-    told = inputs[:, :-7]
-    if told.shape[1] != 1:
-        return told
-    angle = told.to(torch.float64)  # a sine's last digit is each processor's own (MKL): here it is rounded away
-    return torch.cat([torch.sin(angle), torch.cos(angle)], dim=1).to(told.dtype)
+    gravity = inputs[:, :-7]
+    if gravity.shape[1] != 1:
+        return gravity
+    angle = gravity.to(torch.float64)  # a sine's last digit is each processor's own (MKL): here it is rounded away
+    return torch.cat([torch.sin(angle), torch.cos(angle)], dim=1).to(gravity.dtype)

@@ -50,13 +50,13 @@ def to_onnx(network: InverseKinematics, tendons: list[str], doubt_beyond: float)
         pulling = [node("Sin", [angle], "sin_theta_g"), node("Cos", [angle], "cos_theta_g")]
     elif inputs == DIRECTION:
         pulling = [gather([0, 1, 2], "gravity")]
-    seen = [*pulling, position, products]
+    features = [*pulling, position, products]
     if inputs == DIRECTION:
         pose, size = node("Concat", [position, products], "pose_features", axis=1), 3 + len(FIRST)
         columns = constant("mixed_columns", np.tile(np.arange(size), 3))
         tiled = node("Gather", [pose, columns], "mixed_pose", axis=1)
-        seen.append(node("Mul", [gather(np.repeat([0, 1, 2], size), "mixed_gravity"), tiled], "mixed"))
-    x = node("Concat", seen, "features", axis=1)
+        features.append(node("Mul", [gather(np.repeat([0, 1, 2], size), "mixed_gravity"), tiled], "mixed"))
+    x = node("Concat", features, "features", axis=1)
     x = node("Sub", [x, constant("mean", network.mean.numpy())], "centred")
     x = node("Mul", [x, constant("scale", network.scale.numpy())], "normalised")
 

@@ -29,7 +29,7 @@ NEGLIGIBLE = 1e-6  # m, pose error below which no further step is taken
 
 
 @dataclass
-class Polished:
+class RefinedLengths:
     """N answers.
 
     Attributes:
@@ -49,14 +49,14 @@ class Polished:
     converged: np.ndarray
 
 
-def polish(
+def refine(
     chain: Chain,
     targets: np.ndarray,
     lengths: np.ndarray,
     steps: int = 3,
     lever: float = 0.02,
     commands: np.ndarray | None = None,
-) -> Polished:
+) -> RefinedLengths:
     """Lengths that bring the tip nearer to its targets, never further from them.
 
     Args:
@@ -79,16 +79,16 @@ def polish(
         if not len(rows):
             break
         tensions, lengths_to_hold = _step(chain, best[rows], error[rows], gravity[rows], lever)
-        found = restart(chain, best.qpos[rows], tensions, lengths_to_hold, gravity[rows])
-        missing = _missing_pose(found, targets[rows], lever)
-        better = found.converged & (np.linalg.norm(missing, axis=1) < size[rows])
+        moved = restart(chain, best.qpos[rows], tensions, lengths_to_hold, gravity[rows])
+        missing = _missing_pose(moved, targets[rows], lever)
+        better = moved.converged & (np.linalg.norm(missing, axis=1) < size[rows])
         at = rows[better]
         for name, values in vars(best).items():
-            values[at] = vars(found)[name][better]
+            values[at] = vars(moved)[name][better]
         error[at], size[at] = missing[better], np.linalg.norm(missing[better], axis=1)
         taken[rows] += 1
         going[rows] = better & (size[rows] > NEGLIGIBLE)
-    return Polished(
+    return RefinedLengths(
         lengths=np.where(best.converged[:, None], best.lengths, lengths),
         commands=np.where(best.converged[:, None], best.commands, np.nan),
         position_error=np.where(best.converged, np.linalg.norm(error[:, :3], axis=1), np.inf),
@@ -98,19 +98,19 @@ def polish(
     )
 
 
-def _missing_pose(found: Equilibrium, targets: np.ndarray, lever: float) -> np.ndarray:
+def _missing_pose(rest: Equilibrium, targets: np.ndarray, lever: float) -> np.ndarray:
     """Position and turn from the tip to its target, m. Shape (N, 6)."""
-    quaternion = np.where(found.converged[:, None], found.quaternion, [1.0, 0, 0, 0])
+    quaternion = np.where(rest.converged[:, None], rest.quaternion, [1.0, 0, 0, 0])
     turn = (rotation_from_wxyz(quaternion_of(targets)) * rotation_from_wxyz(quaternion).inv()).as_rotvec()
-    return np.concatenate([position_of(targets) - found.position, lever * turn], axis=1)
+    return np.concatenate([position_of(targets) - rest.position, lever * turn], axis=1)
 
 
 def _tensions_of(section, tensions, pose, error, here: Equilibrium, chain) -> np.ndarray:
     """Best `tensions` of a `section` (S,) whose every pair is tried, those of the others as they are. Shape (N, S)."""
-    held = tensions.copy()
-    held[:, section] = 0.0
+    others = tensions.copy()
+    others[:, section] = 0.0
     best, least = np.zeros((len(error), len(section))), np.full(len(error), np.inf)
-    wanted = error + np.einsum("nkt,nt->nk", pose, here.tensions - held)  # pose missing if it did not pull
+    wanted = error + np.einsum("nkt,nt->nk", pose, here.tensions - others)  # pose missing if it did not pull
     for pair in combinations(range(len(section)), min(2, len(section))):
         taut, trial = section[list(pair)], np.zeros_like(best)
         trial[:, pair] = bounded_least_squares(pose[:, :, taut], wanted, chain.max_tension[taut])

@@ -15,7 +15,7 @@ def summary(learned: Learned, length: float) -> dict:
         "as_lengths": learned.as_lengths.metrics(length),
         "as_controls": learned.as_controls,
         **({"on_plant": learned.on_plant} if learned.on_plant else {}),
-        "polished": learned.polished.metrics(length),
+        "polished": learned.refined.metrics(length),
         "outside": {"targets": learned.outside, "beyond_range_m": learned.beyond_range},
         "onnx_max_abs_diff_m": learned.difference,
         "opset": OPSET,

@@ -59,40 +59,40 @@ def tip_errors(chain: Chain, inputs: np.ndarray, commands: np.ndarray) -> TipErr
 
 def length_errors(chain: Chain, inputs: np.ndarray, lengths: np.ndarray) -> TipErrors:
     """Errors of predicted path lengths (N, K), m, held by cables whatever it takes, for targets as in `tip_errors`."""
-    found = forward(chain, lengths, gravity_of(inputs))
-    beyond = found.converged & (found.tensions > (1 + FORCE_ROUNDING) * chain.max_tension).any(axis=1)
-    return replace(_errors(found, inputs), beyond_force=beyond)
+    rest = forward(chain, lengths, gravity_of(inputs))
+    beyond = rest.converged & (rest.tensions > (1 + FORCE_ROUNDING) * chain.max_tension).any(axis=1)
+    return replace(_errors(rest, inputs), beyond_force=beyond)
 
 
-def _errors(found: Equilibrium, inputs: np.ndarray) -> TipErrors:
-    position = np.linalg.norm(found.position - position_of(inputs), axis=1)
-    overlap = np.abs(np.einsum("ni,ni->n", found.quaternion, quaternion_of(inputs)))
+def _errors(rest: Equilibrium, inputs: np.ndarray) -> TipErrors:
+    position = np.linalg.norm(rest.position - position_of(inputs), axis=1)
+    overlap = np.abs(np.einsum("ni,ni->n", rest.quaternion, quaternion_of(inputs)))
     orientation = 2 * np.arccos(np.clip(overlap, 0, 1))
-    position[~found.converged], orientation[~found.converged] = np.nan, np.nan
+    position[~rest.converged], orientation[~rest.converged] = np.nan, np.nan
     return TipErrors(position, orientation)
 
 
-def outside_targets(count: int, length: float, rng: np.random.Generator, told: int) -> np.ndarray:
+def outside_targets(count: int, length: float, rng: np.random.Generator, columns: int) -> np.ndarray:
     """Poses that have nothing to do with the arm: any orientation, any gravity angle up to π, positions in a box
-    of four arm `length`s (m) around the base, gravity in `told` columns, 0, 1 or 3. Shape (count, told + 7)."""
+    of four arm `length`s (m) around the base, gravity in `columns` columns, 0, 1 or 3. Shape (count, columns + 7)."""
     angles = rng.uniform(0, np.pi, count)
     quaternions = rng.normal(size=(count, 4))
-    gravity = downwards(angles, rng.uniform(0, 2 * np.pi, count)) if told == 3 else angles[:, None]
+    gravity = downwards(angles, rng.uniform(0, 2 * np.pi, count)) if columns == 3 else angles[:, None]
     return np.column_stack([
-        gravity[:, :told],
+        gravity[:, :columns],
         rng.uniform(-2 * length, 2 * length, (count, 3)),
         quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True),
     ])
 
 
-def beyond_range(commands: np.ndarray, known: np.ndarray) -> float:
-    """How far any of `commands` (N, K) lies beyond the shortest and longest of `known` (M, K), m; zero if none does.
+def beyond_range(commands: np.ndarray, sampled: np.ndarray) -> float:
+    """How far any of `commands` (N, K) lies beyond the shortest and longest of `sampled` (M, K), m; zero if none does.
 
     Raises:
         InputError: an answer is not finite.
     """
     _check_finite(commands)
-    low, high = known.min(axis=0), known.max(axis=0)
+    low, high = sampled.min(axis=0), sampled.max(axis=0)
     return float(max(0.0, (low - commands).max(), (commands - high).max()))
 
 

@@ -41,7 +41,7 @@ class Training:
     seed: Seed
 
 
-class Samples(NamedTuple):
+class TrainingSamples(NamedTuple):
     """What training reads of N samples.
 
     x: normalised features (N, 13, 15 or 55). pulling: what `network.gravity_features` says (N, 0, 2 or 3).
@@ -58,17 +58,17 @@ class Samples(NamedTuple):
     spare: torch.Tensor
     loss: TipLoss
 
-    def at(self, rows: torch.Tensor | slice) -> "Samples":
+    def at(self, rows: torch.Tensor | slice) -> "TrainingSamples":
         """Of these samples alone."""
         return self._replace(**{name: part[rows] for name, part in self._asdict().items()})
 
 
 def samples(
     network: InverseKinematics, inputs: np.ndarray, commands: np.ndarray, lengths: np.ndarray, loss: TipLoss
-) -> Samples:
+) -> TrainingSamples:
     """Arguments as those of `train`."""
     pose, command = torch.tensor(inputs, dtype=torch.float32), torch.tensor(commands, dtype=torch.float32)
-    return Samples(
+    return TrainingSamples(
         x=network.normalise(pose),
         pulling=gravity_features(pose),
         tip=torch.tensor(position_of(inputs), dtype=torch.float32),
@@ -105,9 +105,9 @@ def train(
     torch.manual_seed(training.seed)
     network = InverseKinematics(training.width, inputs[is_train], commands[is_train], lengths[is_train])
     parameters: list[torch.Tensor] = list(network.parameters())
-    known = samples(network, inputs, commands, lengths, loss)
+    data = samples(network, inputs, commands, lengths, loss)
     rows = torch.tensor(np.flatnonzero(is_train))
-    others = known.at(torch.tensor(np.flatnonzero(~is_train)))
+    others = data.at(torch.tensor(np.flatnonzero(~is_train)))
     shuffle = torch.Generator().manual_seed(training.seed)
     batches = len(rows) // training.batch
     steps = max(1, training.epochs * batches)
@@ -115,7 +115,7 @@ def train(
     first, second = ([torch.zeros_like(parameter) for parameter in parameters] for _ in range(2))
     counts = [torch.zeros(()) for _ in parameters]
 
-    def slopes(part: Samples, spare: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
+    def slopes(part: TrainingSamples, spare: torch.Tensor) -> tuple[tuple[torch.Tensor, ...], torch.Tensor]:
         """Gradient of the batch's mean objective as far as these samples make it, and the sum of their tip errors."""
         commands, stretches = network.unclipped(part.x)
         delta = commands - part.command
@@ -126,19 +126,19 @@ def train(
         return torch.autograd.grad(objective, parameters), moved.detach()[:, :3].norm(dim=1).sum()
 
     @torch.no_grad()
-    def tip_error(part: Samples) -> torch.Tensor:
+    def tip_error(part: TrainingSamples) -> torch.Tensor:
         return part.loss(network.unclipped(part.x)[0] - part.command)[:, :3].norm(dim=1)
 
     done, size = 0, -(-training.batch // PARTS)
     with ThreadPoolExecutor(min(PARTS, thread_count()), initializer=torch.set_num_threads, initargs=(1,)) as pool:
         for epoch in range(1, training.epochs + 1):
             total = 0.0
-            order = known.at(rows[torch.randperm(len(rows), generator=shuffle)])  # in a row: batches are parts of it
-            spares = torch.rand(len(rows), known.spare.shape[1], generator=shuffle)
+            order = data.at(rows[torch.randperm(len(rows), generator=shuffle)])  # in a row: batches are parts of it
+            spares = torch.rand(len(rows), data.spare.shape[1], generator=shuffle)
             for batch in pieces(batches * training.batch, training.batch):
                 parts = [slice(batch.start + p.start, batch.start + p.stop) for p in pieces(training.batch, size)]
-                found = pool.map(slopes, [order.at(part) for part in parts], [spares[part] for part in parts])
-                (gradient, error), *rest = found
+                results = pool.map(slopes, [order.at(part) for part in parts], [spares[part] for part in parts])
+                (gradient, error), *rest = results
                 for more, further in rest:
                     for mine, other in zip(gradient, more, strict=True):
                         mine += other
@@ -153,8 +153,8 @@ def train(
                     f"train_ik.learning_rate: found {training.learning_rate}, by which the tip error is not finite in"
                     f" epoch {epoch}, expected a smaller one"
                 )
-            held = pool.map(tip_error, map(others.at, pieces(len(others.x), 4096)))
-            validate = torch.cat(list(held))
+            errors = pool.map(tip_error, map(others.at, pieces(len(others.x), 4096)))
+            validate = torch.cat(list(errors))
             report(epoch, total / batches, float(validate.mean()))
     return network.eval()
 

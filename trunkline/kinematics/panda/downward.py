@@ -46,14 +46,14 @@ def _sample(sequence: qmc.Sobol, count: int, tilt: float, mount_offset: float, a
         return poses[clearance(poses, mount_offset) > 0.0] if avoid_collisions else poses
 
     threads = thread_count()
-    found, total = [], 0
+    accepted, total = [], 0
     with ThreadPoolExecutor(threads) as pool:
         while total < count:
             for poses in pool.map(solve, [sequence.random(CHUNK) for _ in range(threads)]):
                 if total < count:  # whatever the number of threads, the same draws count
-                    found.append(poses)
+                    accepted.append(poses)
                     total += len(poses)
-    return np.concatenate(found)
+    return np.concatenate(accepted)
 
 
 def _solve(draws: np.ndarray, tilt: float) -> np.ndarray:

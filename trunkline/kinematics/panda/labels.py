@@ -75,9 +75,9 @@ def label(
     return reached
 
 
-def _reached(given: tuple[np.ndarray, dict], rows: tuple[np.ndarray]) -> tuple[np.ndarray]:
+def _reached(fixed: tuple[np.ndarray, dict], rows: tuple[np.ndarray]) -> tuple[np.ndarray]:
     """Whether the solver reaches some of the points (N, 3), those with the numbers (n,) in `rows`. Shape (n,)."""
-    (points, how), (numbers,) = given, rows
+    (points, how), (numbers,) = fixed, rows
     return (solve(points, only=numbers, **how).success[numbers],)
 
 

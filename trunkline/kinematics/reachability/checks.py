@@ -9,15 +9,15 @@ import numpy as np
 from pydantic import Field
 
 from trunkline.kinematics.panda.labels import Agreement, agreement, draw_points, label
-from trunkline.kinematics.reachability.hybrid_check import Poses, draw_inside_and_outside, find_poses, verified
+from trunkline.kinematics.reachability.hybrid_check import ReachingPoses, draw_inside_and_outside, find_poses, verified
 from trunkline.kinematics.reachability.maps import Map, Maps, angle_name
 from trunkline.kinematics.reachability.reach_signal import HeldOut, held_out, packed
 from trunkline.kinematics.reachability.soft import SoftSettings
-from trunkline.kinematics.reachability.surface_check import check_sheets
+from trunkline.kinematics.reachability.surface_check import check_surfaces
 from trunkline.kinematics.reachability.tilted import find_tilted
 from trunkline.kinematics.reachability.tips import ArmTips, Tips
 from trunkline.kinematics.sdf.grid import Lattice
-from trunkline.kinematics.sdf.mesh import Surface, contains, unsimplified
+from trunkline.kinematics.sdf.mesh import TriangleMesh, contains, unsimplified
 from trunkline.kinematics.sdf.mesh_distance import mesh_distance
 from trunkline.model.statics.chain import Chain
 
@@ -45,7 +45,7 @@ class Check:
     """How good the maps are.
 
     `rigid`: agreement of the rigid mesh (`claimed`, (N,)) with labels (`reachable`, (N,)) at `points`
-    (N, 3). `heldout`: the soft maps under gravities between theirs. `found`: by name of each hybrid map, the shares
+    (N, 3). `heldout`: the soft maps under gravities between theirs. `verified`: by name of each hybrid map, the shares
     of points inside it and a little outside it for which a pose of both arms was found and verified. `moved`: by name
     of each map (the soft ones together), how far simplification moved the surface at most, in voxels.
     """
@@ -55,7 +55,7 @@ class Check:
     claimed: np.ndarray
     reachable: np.ndarray
     heldout: list[HeldOut]
-    found: dict[str, tuple[float, float]]
+    verified: dict[str, tuple[float, float]]
     moved: dict[str, float]
 
 
@@ -86,20 +86,20 @@ def check_maps(
         avoid_collisions=maps.self_collision,
     )
     done("labels")
-    if maps.sheets:
+    if maps.surfaces:
         how = {"beyond": spot_check.outside, "count": 10 * spot_check.count, "seed": seed}
-        heldout = check_sheets(maps.sheets, tips_at.chain, soft, **how, done=done)
+        heldout = check_surfaces(maps.surfaces, tips_at.chain, soft, **how, done=done)
     else:
         heldout = check_soft(maps, tips_at, spot_check, seed, done)
-    found = check_hybrid(maps, tips_at.chain, tips_at, spot_check, seed)
+    verified_shares = check_hybrid(maps, tips_at.chain, tips_at, spot_check, seed)
     done("spot check")
-    moved = {name: moved_voxels(one.mesh, one.field, one.lattice) for name, one in maps.in_space().items()}
+    moved = {name: moved_voxels(hybrid.mesh, hybrid.field, hybrid.lattice) for name, hybrid in maps.in_space().items()}
     moved["soft"] = float(np.max([
         moved_voxels(mesh, maps.soft.at(angle), maps.soft.lattice)
         for mesh, angle in zip(maps.soft.meshes, maps.soft.mesh_angles, strict=True)
     ]))
     done("meshes")
-    return Check(agreement(claimed, reachable), points, claimed, reachable, heldout, found, moved)
+    return Check(agreement(claimed, reachable), points, claimed, reachable, heldout, verified_shares, moved)
 
 
 def check_soft(maps: Maps, tips_at: ArmTips, spot_check: SpotCheckSettings, seed: int, done) -> list[HeldOut]:
@@ -122,25 +122,25 @@ def check_hybrid(
     weight = tips_at.unseen is None
     how = {"seed": seed, "mount_offset": maps.mount_offset, "avoid_collisions": maps.self_collision}
 
-    def shares(one: Map, tips: Tips, find: Callable[[np.ndarray], Poses]) -> tuple[float, float]:
-        sets = draw_inside_and_outside(one.field, one.lattice, spot_check.outside, spot_check.count, seed)
+    def shares(space_map: Map, tips: Tips, find: Callable[[np.ndarray], ReachingPoses]) -> tuple[float, float]:
+        sets = draw_inside_and_outside(space_map.field, space_map.lattice, spot_check.outside, spot_check.count, seed)
         inside, outside = (
             float(verified(p, find(p), tips.lengths, chain, maps.mount_offset, weight).mean()) for p in sets
         )
         return inside, outside
 
     down, rigid = tips_at(0.0), maps.rigid
-    found = {"hybrid": shares(
+    verified_shares = {"hybrid": shares(
         maps.hybrid, down, lambda points: find_poses(points, down.positions, rigid.field, rigid.lattice, **how)
     )}  # fmt: skip
-    for one in maps.tilted:
-        tips = tips_at(one.tilt)
-        find = functools.partial(find_tilted, pairs=one.pairs, tips=tips.positions, **how)
-        found[angle_name(one.tilt, "hybrid")] = shares(one, tips, find)
-    return found
+    for tilted in maps.tilted:
+        tips = tips_at(tilted.tilt)
+        find = functools.partial(find_tilted, pairs=tilted.pairs, tips=tips.positions, **how)
+        verified_shares[angle_name(tilted.tilt, "hybrid")] = shares(tilted, tips, find)
+    return verified_shares
 
 
-def moved_voxels(mesh: Surface, field: np.ndarray, lattice: Lattice) -> float:
+def moved_voxels(mesh: TriangleMesh, field: np.ndarray, lattice: Lattice) -> float:
     """How far simplification moved the surface of `field` at most, in lattice steps."""
     whole = unsimplified(field, lattice)
     return mesh_distance((mesh.vertices, mesh.faces), whole, 0.5 * lattice.spacing) / lattice.spacing

@@ -25,14 +25,14 @@ CLOSE = 1e-3  # m, how near its point a tip must come out when a pose is verifie
 DEEP = -0.01  # m; a pair whose mount lies this deep needs no finer search
 
 
-class Poses(NamedTuple):
+class ReachingPoses(NamedTuple):
     """How each of N points is reached.
 
-    `found` (N,); `q` (N, 7) in rad; `tip` (N,), index of the soft sample; `yaw` (N,) of the soft arm's
-    base in rad. Rows that are not found hold nothing of use.
+    `reached` (N,); `q` (N, 7) in rad; `tip` (N,), index of the soft sample; `yaw` (N,) of the soft arm's
+    base in rad. Rows that are not reached hold nothing of use.
     """
 
-    found: np.ndarray
+    reached: np.ndarray
     q: np.ndarray
     tip: np.ndarray
     yaw: np.ndarray
@@ -47,7 +47,7 @@ def find_poses(
     seed: int,
     mount_offset: float,
     avoid_collisions: bool,
-) -> Poses:
+) -> ReachingPoses:
     """Rigid pose and soft sample for each of `points`.
 
     Args:
@@ -59,7 +59,7 @@ def find_poses(
         avoid_collisions: whether poses in which the Panda touches itself count.
     """
     few = np.random.default_rng(seed).permutation(len(tips))[:COARSE_TIPS]
-    poses = Poses(np.zeros(len(points), bool), np.zeros((len(points), 7)), np.zeros(len(points), int),
+    poses = ReachingPoses(np.zeros(len(points), bool), np.zeros((len(points), 7)), np.zeros(len(points), int),
                   np.zeros(len(points)))
     tip, yaw = np.zeros((len(points), TRIES), int), np.zeros((len(points), TRIES))
     for i, point in enumerate(points):
@@ -69,20 +69,25 @@ def find_poses(
             index, turn, depth = _deepest(point, tips, FINE_YAWS, rigid, lattice)
         tip[i], yaw[i] = index, turn
     for attempt in range(TRIES):
-        left = np.flatnonzero(~poses.found)
+        left = np.flatnonzero(~poses.reached)
         mounts, rotations = mount_for_tips(points[left], tips[tip[left, attempt]], yaw[left, attempt])
         near = ~beyond_links(mounts, mount_offset)
         left, mounts, rotations = left[near], mounts[near], rotations[near]
         result = solve(mounts, rotations, seed=seed + attempt, starts=STARTS, mount_offset=mount_offset,
                        avoid_collisions=avoid_collisions)
         at = left[result.success]
-        poses.found[at], poses.q[at] = True, result.q[result.success]
+        poses.reached[at], poses.q[at] = True, result.q[result.success]
         poses.tip[at], poses.yaw[at] = tip[at, attempt], yaw[at, attempt]
     return poses
 
 
 def verified(
-    points: np.ndarray, poses: Poses, lengths: np.ndarray, chain: Chain, mount_offset: float, weight: bool = True
+    points: np.ndarray,
+    poses: ReachingPoses,
+    lengths: np.ndarray,
+    chain: Chain,
+    mount_offset: float,
+    weight: bool = True,
 ) -> np.ndarray:
     """Whether joint angles and tendon lengths alone bring the tip to each of `points` (N, 3). Shape (N,).
 
@@ -93,7 +98,7 @@ def verified(
         lengths: of the soft samples, (M, K) in m. weight: whether the soft arm has any.
     """
     good = np.zeros(len(points), bool)
-    rows = np.flatnonzero(poses.found)
+    rows = np.flatnonzero(poses.reached)
     if not len(rows):
         return good
     mount, rotation = mount_pose(poses.q[rows], mount_offset)

@@ -9,13 +9,13 @@ from trunkline.kinematics.panda.downward import sample_downward
 from trunkline.kinematics.reachability.hybrid import minkowski_field, swept_cells
 from trunkline.kinematics.reachability.reach_signal import THRESHOLD, packed
 from trunkline.kinematics.reachability.rigid import profile, rigid_field
-from trunkline.kinematics.reachability.settings import HybridSettings, RigidSettings
+from trunkline.kinematics.reachability.settings import HybridMapSettings, RigidSettings
 from trunkline.kinematics.reachability.soft import SoftShape, soft_fields
 from trunkline.kinematics.reachability.tilted import Pairs, draw_pairs, tilted_field
 from trunkline.kinematics.reachability.tips import TipSource
-from trunkline.kinematics.reachability.workspace_surface import Sheets
+from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces
 from trunkline.kinematics.sdf.grid import Lattice
-from trunkline.kinematics.sdf.mesh import Surface, surface
+from trunkline.kinematics.sdf.mesh import TriangleMesh, surface
 
 
 @dataclass
@@ -24,7 +24,7 @@ class Map:
 
     field: np.ndarray
     lattice: Lattice
-    mesh: Surface
+    mesh: TriangleMesh
 
 
 @dataclass
@@ -48,7 +48,7 @@ class SoftMaps:
     lattice: Lattice
     shape: SoftShape
     mesh_angles: np.ndarray
-    meshes: list[Surface]
+    meshes: list[TriangleMesh]
 
     def at(self, angle: float) -> np.ndarray:
         """The field at the nearest of `angles`."""
@@ -57,7 +57,7 @@ class SoftMaps:
 
 @dataclass
 class Maps:
-    """Rigid and hybrid maps in the Panda's base frame, soft maps in the soft arm's, and how they were made; `sheets`
+    """Rigid and hybrid maps in the Panda's base frame, soft maps in the soft arm's, and how they were made; `surfaces`
     where gravity comes from any side: then the soft maps are there to be shown, at some tilts."""
 
     rigid: Map
@@ -66,29 +66,29 @@ class Maps:
     tilted: list[TiltedMap]
     mount_offset: float
     self_collision: bool
-    sheets: Sheets | None = None
+    surfaces: WorkspaceSurfaces | None = None
 
     def arrays(self) -> dict[str, np.ndarray]:
         """Grids by name (float16, m), each with `<name>_origin` and `<name>_spacing`; soft ones share theirs."""
         arrays = {}
-        for name, one in self.in_space().items():
-            arrays |= {name: one.field.astype(np.float16)} | _placement(name, one.lattice)
+        for name, space_map in self.in_space().items():
+            arrays |= {name: space_map.field.astype(np.float16)} | _placement(name, space_map.lattice)
         names = [angle_name(angle) for angle in self.soft.angles]
         arrays |= dict(zip(names, packed(self.soft.fields), strict=True))
         arrays |= {"soft_angles": self.soft.angles, "soft_threshold": np.asarray(THRESHOLD)}
         arrays |= {"soft_tolerance": np.asarray(self.soft.shape.tolerance)}
-        if self.sheets:
-            arrays |= self.sheets.arrays()
+        if self.surfaces:
+            arrays |= self.surfaces.arrays()
         return arrays | _placement("soft", self.soft.lattice)
 
-    def meshes(self) -> dict[str, Surface]:
+    def meshes(self) -> dict[str, TriangleMesh]:
         """Surfaces by name."""
         soft = {angle_name(a): m for a, m in zip(self.soft.mesh_angles, self.soft.meshes, strict=True)}
-        return {name: one.mesh for name, one in self.in_space().items()} | soft
+        return {name: space_map.mesh for name, space_map in self.in_space().items()} | soft
 
     def in_space(self) -> dict[str, Map]:
         """The maps in the Panda's base frame by name."""
-        tilted = {angle_name(one.tilt, "hybrid"): one for one in self.tilted}
+        tilted = {angle_name(tilted_map.tilt, "hybrid"): tilted_map for tilted_map in self.tilted}
         return {"rigid": self.rigid, "hybrid": self.hybrid} | tilted
 
 
@@ -103,7 +103,7 @@ def build_maps(
     sampled: np.ndarray,
     rigid: RigidSettings,
     shape: SoftShape,
-    hybrid: HybridSettings,
+    hybrid: HybridMapSettings,
     *,
     soft_voxel: float,
     step: float,
@@ -135,7 +135,7 @@ def build_maps(
 
 
 def build_tilted(
-    tips_at: TipSource, rigid: RigidSettings, hybrid: HybridSettings, tilt: float, most_triangles: int, seed: int
+    tips_at: TipSource, rigid: RigidSettings, hybrid: HybridMapSettings, tilt: float, most_triangles: int, seed: int
 ) -> TiltedMap:
     """The hybrid map with the end effector `tilt` rad off straight down."""
     pairs = draw_pairs(tips_at(tilt).positions, tilt, hybrid.tilted_poses, seed,

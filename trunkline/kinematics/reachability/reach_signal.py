@@ -68,8 +68,8 @@ def held_out(
         beyond: m, how far from every tip are the points that shall be out of reach.
         count: how many of them to draw. seed: of the draw.
     """
-    own = soft_field(tips, lattice, shape)
-    iou = overlap(blend(fields.astype(np.float32), angles, angle), own)
+    sampled = soft_field(tips, lattice, shape)
+    iou = overlap(blend(fields.astype(np.float32), angles, angle), sampled)
     outside = points_beyond(tips, beyond, count, np.random.default_rng(seed))
     reachable, called = (
         (reach_signal(fields, angles, lattice, points, angle) <= THRESHOLD).mean() for points in (tips, outside)

@@ -5,7 +5,7 @@ import pandas as pd
 
 from trunkline.kinematics.reachability.checks import Check
 from trunkline.kinematics.reachability.maps import Maps
-from trunkline.kinematics.sdf.mesh import Surface
+from trunkline.kinematics.sdf.mesh import TriangleMesh
 
 
 def heldout_table(check: Check) -> pd.DataFrame:
@@ -19,17 +19,17 @@ def heldout_table(check: Check) -> pd.DataFrame:
 def summary(maps: Maps, check: Check) -> dict:
     """The maps in a few numbers, for metrics.json; NaN, which Python's own `min` and `max` may pass over, stays."""
     soft = maps.soft.meshes
-    space = {name: mesh_summary(one.mesh, check.moved[name]) for name, one in maps.in_space().items()}
-    found = {
+    space = {name: mesh_summary(space_map.mesh, check.moved[name]) for name, space_map in maps.in_space().items()}
+    shares = {
         name: space[name] | {"found_inside": inside, "found_outside": outside}
-        for name, (inside, outside) in check.found.items()
+        for name, (inside, outside) in check.verified.items()
     }
-    return found | {
+    return shares | {
         "rigid": check.rigid._asdict() | space["rigid"],
         "soft": {
-            "heldout_iou_min": np.min([one.iou for one in check.heldout]),
-            "heldout_reachable_min": np.min([one.reachable for one in check.heldout]),
-            "heldout_beyond_max": np.max([one.beyond for one in check.heldout]),
+            "heldout_iou_min": np.min([space_map.iou for space_map in check.heldout]),
+            "heldout_reachable_min": np.min([space_map.reachable for space_map in check.heldout]),
+            "heldout_beyond_max": np.max([space_map.beyond for space_map in check.heldout]),
             "watertight": all(mesh.is_closed() for mesh in soft),
             "triangles": max(len(mesh.faces) for mesh in soft),
             "moved_voxels": check.moved["soft"],
@@ -37,5 +37,5 @@ def summary(maps: Maps, check: Check) -> dict:
     }
 
 
-def mesh_summary(mesh: Surface, moved: float) -> dict:
+def mesh_summary(mesh: TriangleMesh, moved: float) -> dict:
     return {"watertight": mesh.is_closed(), "triangles": len(mesh.faces), "moved_voxels": moved}

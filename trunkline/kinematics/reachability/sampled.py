@@ -26,8 +26,9 @@ def read_tips(path: Path, chain: Chain, soft: SoftSettings, seed: int) -> ArmTip
     lengths = length_columns(chain.tendons)
 
     def tips_of(rows: pd.DataFrame) -> Tips:
-        held = held_by(chain, rows[lengths].to_numpy(float), rows[tension_columns(chain.tendons)].to_numpy(float))
-        return Tips(rows[["x", "y", "z"]].to_numpy(float), held)
+        tensions = rows[tension_columns(chain.tendons)].to_numpy(float)
+        tendon_lengths = held_by(chain, rows[lengths].to_numpy(float), tensions)
+        return Tips(rows[["x", "y", "z"]].to_numpy(float), tendon_lengths)
 
     if weightless(table):
         trains = table["split"] == "train"
@@ -39,9 +40,9 @@ def read_tips(path: Path, chain: Chain, soft: SoftSettings, seed: int) -> ArmTip
         largest = float(table["theta_g"].max())
         angles = np.radians(soft.shown_deg)
         angles = angles[angles <= largest + 1e-6]
-        found = ArmTips(chain, angles, [], soft.directions, soft.steps, seed, largest)
-        found.samples = [found.fresh(angle) for angle in angles]
-        return found
+        source = ArmTips(chain, angles, [], soft.directions, soft.steps, seed, largest)
+        source.samples = [source.fresh(angle) for angle in angles]
+        return source
     if table["theta_g"].abs().min() > 1e-6:
         raise InputError(f"{path}: found no gravity angle of 0, expected one: the hybrid map hangs straight down")
     groups = [group for _, group in table.groupby(table["theta_g"].round(9))]

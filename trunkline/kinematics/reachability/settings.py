@@ -22,7 +22,7 @@ class RigidSettings:
 
 
 @dataclass(frozen=True)
-class HybridSettings:
+class HybridMapSettings:
     """See conf/reachability/config.yaml; voxel in m, smoothing in lattice steps."""
 
     voxel: Annotated[float, Field(ge=0.007, le=0.1)]

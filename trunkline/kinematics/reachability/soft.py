@@ -35,8 +35,8 @@ class SoftShape:
 
 
 @dataclass(frozen=True)
-class SheetSettings:
-    """See conf/reachability/config.yaml; of `sheets.Sheets`."""
+class SurfaceSettings:
+    """See conf/reachability/config.yaml; of `workspace_surface.WorkspaceSurfaces`."""
 
     directions: Annotated[int, Field(ge=8, le=10_000)]
     around: Annotated[int, Field(ge=8, le=1000)]
@@ -53,7 +53,7 @@ class SoftSettings(SoftShape):
     directions: Annotated[int, Field(ge=8, le=10000)]
     steps: Annotated[int, Field(ge=8, le=10000)]
     shown_deg: Annotated[list[Annotated[float, Field(ge=0, le=180)]], Field(min_length=2)]
-    sheets: SheetSettings
+    sheets: SurfaceSettings
 
     def __post_init__(self) -> None:
         if self.shown_deg[0] != 0 or any(after <= before for before, after in pairwise(self.shown_deg)):

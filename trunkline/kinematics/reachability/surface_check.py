@@ -1,23 +1,23 @@
-"""How good the sheets are: at directions of gravity that have none, against equilibria that are found there."""
+"""Check of the workspace surfaces, at directions of gravity without one, against equilibria there."""
 
 from collections.abc import Callable
 
 import numpy as np
 
 from trunkline.frames import STANDARD_GRAVITY, downwards
-from trunkline.kinematics.dataset.sampling import sample_at, sheet_at
+from trunkline.kinematics.dataset.sampling import sample_at, workspace_surface_at
 from trunkline.kinematics.reachability.reach_signal import THRESHOLD, HeldOut, points_beyond
 from trunkline.kinematics.reachability.soft import SoftSettings, soft_field, soft_lattice
 from trunkline.kinematics.reachability.tips import LOOK_EVERY
-from trunkline.kinematics.reachability.workspace_surface import Sheets, finer
+from trunkline.kinematics.reachability.workspace_surface import WorkspaceSurfaces, finer
 from trunkline.kinematics.sdf.grid import overlap
 from trunkline.model.statics.chain import Chain
 
-DENSER = 4  # times, of sheets whose sets are compared
+DENSER = 4  # times, of surfaces whose sets are compared
 
 
-def check_sheets(
-    sheets: Sheets,
+def check_surfaces(
+    surfaces: WorkspaceSurfaces,
     chain: Chain,
     soft: SoftSettings,
     *,
@@ -26,9 +26,9 @@ def check_sheets(
     seed: int,
     done: Callable[[str], None],
 ) -> list[HeldOut]:
-    """Sheets at `soft.sheets.heldout` directions of gravity, at random, that no sheet was made for.
+    """Surfaces at `soft.sheets.heldout` directions of gravity, at random, that no surface was made for.
 
-    Compared are the sets within reach, as `soft.soft_field` makes them of points: of the sheet in between, and of one
+    Compared are the sets within reach, as `soft.soft_field` makes them of points: of the surface in between, and of one
     that is found there. What the signal says is checked with tips that lie on no lattice.
 
     Args:
@@ -36,19 +36,20 @@ def check_sheets(
         count: how many of them, and of tips, to draw at each. seed: of the draws.
     """
     rng = np.random.default_rng(seed)
-    largest = np.arccos(np.clip(-sheets.downs[:, 2].max(), -1, 1))
+    largest = np.arccos(np.clip(-surfaces.downs[:, 2].max(), -1, 1))
     angles, azimuths = rng.uniform(0, largest, soft.sheets.heldout), rng.uniform(0, 2 * np.pi, soft.sheets.heldout)
-    around, along = sheets.points.shape[1:3]
+    around, along = surfaces.points.shape[1:3]
     results = []
     for angle, azimuth in zip(angles, azimuths, strict=True):
         down = downwards(angle, azimuth)
-        gravity, sheet = STANDARD_GRAVITY * down, sheets.at(down)
-        between, own = (finer(one, DENSER) for one in (sheet, sheet_at(chain, gravity, around, along)))
-        lattice = soft_lattice([between, own], soft, soft.voxel)
-        iou = overlap(*(soft_field(points, lattice, soft) for points in (between, own)))
+        gravity, surface = STANDARD_GRAVITY * down, surfaces.at(down)
+        solved = workspace_surface_at(chain, gravity, around, along)
+        between, sampled = (finer(each, DENSER) for each in (surface, solved))
+        lattice = soft_lattice([between, sampled], soft, soft.voxel)
+        iou = overlap(*(soft_field(points, lattice, soft) for points in (between, sampled)))
         tips = sample_at(chain, gravity, around, along, rng, LOOK_EVERY).equilibrium.position
-        asked = tips[rng.permutation(len(tips))[:count]], points_beyond(own, beyond, count, rng)
-        reachable, called = ((sheets.signal(sheet, points) <= THRESHOLD).mean() for points in asked)
+        targets = tips[rng.permutation(len(tips))[:count]], points_beyond(sampled, beyond, count, rng)
+        reachable, called = ((surfaces.signal(surface, points) <= THRESHOLD).mean() for points in targets)
         results.append(HeldOut(angle, iou, float(reachable), float(called), azimuth))
         done(f"held-out {np.degrees(angle):.0f}°, {np.degrees(azimuth):.0f}°")
     return results

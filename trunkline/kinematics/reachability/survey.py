@@ -10,15 +10,15 @@ from pydantic import Field
 from trunkline.kinematics.dataset.gravities import spread
 from trunkline.kinematics.reachability.checks import Check, LabelSettings, SpotCheckSettings, check_maps
 from trunkline.kinematics.reachability.maps import Maps, blend_angles, build_maps
-from trunkline.kinematics.reachability.settings import HybridSettings, RigidSettings
+from trunkline.kinematics.reachability.settings import HybridMapSettings, RigidSettings
 from trunkline.kinematics.reachability.soft import SoftSettings
 from trunkline.kinematics.reachability.tips import ArmTips
-from trunkline.kinematics.reachability.workspace_surface import build_sheets
+from trunkline.kinematics.reachability.workspace_surface import build_surfaces
 from trunkline.settings import Seed
 
 
 @dataclass
-class Survey:
+class SurveySettings:
     """See conf/reachability/config.yaml. seed: of poses, of the points that are checked and of the solver's starts."""
 
     most_triangles: Annotated[int, Field(ge=100, le=10_000_000)]
@@ -26,7 +26,7 @@ class Survey:
     rigid: RigidSettings
     labels: LabelSettings
     soft: SoftSettings
-    hybrid: HybridSettings
+    hybrid: HybridMapSettings
     spot_check: SpotCheckSettings
 
     def parts(self, tips_at: ArmTips) -> int:
@@ -43,7 +43,7 @@ class Survey:
         return self.soft.angle_step if tips_at.largest is None else np.pi
 
 
-def survey(tips_at: ArmTips, settings: Survey, done: Callable[[str], None]) -> tuple[Maps, Check]:
+def survey(tips_at: ArmTips, settings: SurveySettings, done: Callable[[str], None]) -> tuple[Maps, Check]:
     """Rigid, soft and hybrid maps, and their check. `done` hears of each part."""
     soft, seed = settings.soft, settings.seed
     maps = build_maps(
@@ -59,9 +59,9 @@ def survey(tips_at: ArmTips, settings: Survey, done: Callable[[str], None]) -> t
         done=done,
     )
     if tips_at.largest is not None:
-        sheets = soft.sheets
-        downs = spread(sheets.directions, tips_at.largest, crowd=True)
-        maps.sheets = build_sheets(
-            tips_at.chain, downs, sheets.around, sheets.along, soft.tolerance, lambda: done("sheet")
+        surfaces = soft.sheets
+        downs = spread(surfaces.directions, tips_at.largest, crowd=True)
+        maps.surfaces = build_surfaces(
+            tips_at.chain, downs, surfaces.around, surfaces.along, soft.tolerance, lambda: done("sheet")
         )
     return maps, check_maps(maps, tips_at, soft, settings.labels, settings.spot_check, seed=seed, done=done)

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from trunkline.kinematics.panda.downward import sample_tilted
 from trunkline.kinematics.panda.inverse import solve
 from trunkline.kinematics.panda.kinematics import Q_MAX, Q_MIN, mount_pose
-from trunkline.kinematics.reachability.hybrid_check import STARTS, TRIES, Poses
+from trunkline.kinematics.reachability.hybrid_check import STARTS, TRIES, ReachingPoses
 from trunkline.kinematics.reachability.rigid import azimuth_from_joint_1, outline, rigid_field
 from trunkline.kinematics.sdf.grid import Lattice
 
@@ -70,7 +70,7 @@ def tilted_field(pairs: Pairs, spacing: float, smoothing: float, smallest: int) 
 
 def find_tilted(
     points: np.ndarray, pairs: Pairs, tips: np.ndarray, *, seed: int, mount_offset: float, avoid_collisions: bool
-) -> Poses:
+) -> ReachingPoses:
     """Rigid pose and soft tip for each of `points` (N, 3), as `hybrid_check.find_poses`, near drawn `pairs`."""
     plane = np.column_stack([np.hypot(pairs.points[:, 0], pairs.points[:, 1]), pairs.points[:, 2]])
     # Millions of pairs and a few hundred targets: what counts is how fast the tree is built.
@@ -84,9 +84,9 @@ def find_tilted(
     outside = np.maximum(Q_MIN[0] - first, first - Q_MAX[0])
     order = np.argsort(np.maximum(outside, 0.0), axis=1, kind="stable")[:, :TRIES]
     count = len(points)
-    poses = Poses(np.zeros(count, bool), np.zeros((count, 7)), np.zeros(count, int), np.zeros(count))
+    poses = ReachingPoses(np.zeros(count, bool), np.zeros((count, 7)), np.zeros(count, int), np.zeros(count))
     for attempt in range(TRIES):
-        left = np.flatnonzero(~poses.found)
+        left = np.flatnonzero(~poses.reached)
         if not len(left):
             break
         chosen = order[left, attempt]
@@ -98,5 +98,5 @@ def find_tilted(
         result = solve(mount, base * np.array([1.0, -1.0, -1.0]), seed=seed + attempt, starts=STARTS,
                        mount_offset=mount_offset, avoid_collisions=avoid_collisions)
         at = left[result.success]
-        poses.found[at], poses.q[at], poses.tip[at] = True, result.q[result.success], pairs.tip[pair[result.success]]
+        poses.reached[at], poses.q[at], poses.tip[at] = True, result.q[result.success], pairs.tip[pair[result.success]]
     return poses

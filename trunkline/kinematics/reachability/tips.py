@@ -55,8 +55,8 @@ class ArmTips:
         """Equilibria under gravity at `angle` (rad), the mount tilting about base +y."""
         rng = np.random.default_rng([self.seed, round(1e6 * angle)])
         gravity = gravity_in_base(angle)
-        found = sample_at(self.chain, gravity, self.directions, self.steps, rng, LOOK_EVERY, self.deepest).equilibrium
-        return Tips(found.position, held_by(self.chain, found.lengths, found.tensions))
+        rest = sample_at(self.chain, gravity, self.directions, self.steps, rng, LOOK_EVERY, self.deepest).equilibrium
+        return Tips(rest.position, held_by(self.chain, rest.lengths, rest.tensions))
 
 
 def held_by(chain: Chain, lengths: np.ndarray, tensions: np.ndarray) -> np.ndarray:

@@ -64,8 +64,8 @@ def drop_specks(cells: np.ndarray, smallest: int) -> np.ndarray:
 def without_specks(field: np.ndarray, spacing: float, smallest: int) -> np.ndarray:
     """`field` (m) after `drop_specks` on its inside, as a distance field again."""
     cells = field < 0
-    kept = drop_specks(cells, smallest)
-    return redistance(np.where(kept == cells, field, np.where(kept, -0.5, 0.5) * spacing), spacing)
+    retained = drop_specks(cells, smallest)
+    return redistance(np.where(retained == cells, field, np.where(retained, -0.5, 0.5) * spacing), spacing)
 
 
 def distance_from_cells(cells: np.ndarray, spacing: float) -> np.ndarray:

@@ -21,7 +21,7 @@ AGGRESSIVENESS = range(3, 10)
 
 
 @dataclass
-class Surface:
+class TriangleMesh:
     """A closed triangle mesh: `vertices` (V, 3) in m, `faces` (F, 3), outward by the right-hand rule."""
 
     vertices: np.ndarray
@@ -37,7 +37,7 @@ class Surface:
         return bool(mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0)
 
 
-def surface(field: np.ndarray, lattice: Lattice, most_triangles: int, settings: str) -> Surface:
+def surface(field: np.ndarray, lattice: Lattice, most_triangles: int, settings: str) -> TriangleMesh:
     """Closed mesh of the zero level of `field` on a 3-D `lattice`, with at most `most_triangles`, as it is `written`.
 
     `settings` is the section of params.yaml in which the field's `voxel` is set, for errors.
@@ -63,18 +63,18 @@ def surface(field: np.ndarray, lattice: Lattice, most_triangles: int, settings: 
     return shape
 
 
-def _is_small(shape: Surface, most_triangles: int) -> bool:
+def _is_small(shape: TriangleMesh, most_triangles: int) -> bool:
     return len(shape.faces) <= most_triangles and shape.is_closed()
 
 
-def _simplified(vertices: np.ndarray, faces: np.ndarray, triangles: int, aggressiveness: int) -> Surface:
+def _simplified(vertices: np.ndarray, faces: np.ndarray, triangles: int, aggressiveness: int) -> TriangleMesh:
     """Edges collapsed until `triangles` are left, or `aggressiveness` allows no more."""
     return written(*fast_simplification.simplify(
         vertices.astype(np.float32), faces.astype(np.int32), target_count=triangles, agg=aggressiveness
     ))  # fmt: skip
 
 
-def written(vertices: np.ndarray, faces: np.ndarray) -> Surface:
+def written(vertices: np.ndarray, faces: np.ndarray) -> TriangleMesh:
     """The mesh that a reader of its file makes, who takes vertices of the same digits for one.
 
     `vertices` (V, 3) in m, `faces` (F, 3).
@@ -83,9 +83,9 @@ def written(vertices: np.ndarray, faces: np.ndarray) -> Surface:
     """
     rounded = np.round(vertices.astype(float), DIGITS)
     _, first, place = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
-    kept = np.sort(first)
-    corners = np.searchsorted(kept, first[place.ravel()])[faces]
-    return Surface(rounded[kept], corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)])
+    retained = np.sort(first)
+    corners = np.searchsorted(retained, first[place.ravel()])[faces]
+    return TriangleMesh(rounded[retained], corners[(corners != np.roll(corners, 1, axis=1)).all(axis=1)])
 
 
 def unsimplified(field: np.ndarray, lattice: Lattice) -> tuple[np.ndarray, np.ndarray]:
@@ -96,7 +96,7 @@ def unsimplified(field: np.ndarray, lattice: Lattice) -> tuple[np.ndarray, np.nd
     return vertices + (lattice.origin - lattice.spacing), faces
 
 
-def contains(shape: Surface, points: np.ndarray) -> np.ndarray:
+def contains(shape: TriangleMesh, points: np.ndarray) -> np.ndarray:
     """Whether each of `points` (N, 3), m, lies inside."""
     distance, _, _ = signed_distance_to_mesh(
         np.asarray(points, float), np.asarray(shape.vertices, float), np.asarray(shape.faces, np.int32)
@@ -104,7 +104,7 @@ def contains(shape: Surface, points: np.ndarray) -> np.ndarray:
     return distance < 0
 
 
-def write_obj(path: str | Path, shape: Surface, title: str) -> None:
+def write_obj(path: str | Path, shape: TriangleMesh, title: str) -> None:
     """Write a Wavefront OBJ in m, to a micrometre; `title` goes into its first line."""
     text = export_obj(shape.mesh, include_normals=False, include_color=False, header=f"{title}; m", digits=DIGITS)
     Path(path).write_text(text.rstrip() + "\n", encoding="ascii")

@@ -90,7 +90,7 @@ def _open(row: dict) -> str:
 
 def telling(name: str) -> list[str]:
     """The kinds of experiment that tell a parameter."""
-    return [kind for kind, experiment in EXPERIMENTS.items() if parameter_named(name).told_by(experiment)]
+    return [kind for kind, experiment in EXPERIMENTS.items() if parameter_named(name).identifiable_from(experiment)]
 
 
 def strong_pairs(table: dict) -> list[str]:

@@ -8,7 +8,7 @@ from matplotlib.ticker import MaxNLocator
 
 from trunkline.kinematics.reachability.checks import Check
 from trunkline.kinematics.reachability.maps import Maps
-from trunkline.kinematics.sdf.mesh import Surface
+from trunkline.kinematics.sdf.mesh import TriangleMesh
 from trunkline.report.figures.panda import POSE, panda_line
 from trunkline.report.figures.space import add_line, add_surface, frame, space
 from trunkline.report.figures.style import (
@@ -69,7 +69,7 @@ def maps_figure(maps: Maps, tips: list[np.ndarray]) -> Figure:
     d = space(figure, 224, "(d) Both: soft tip, soft arm hanging from the Panda")
     add_surface(d, maps.hybrid.mesh, HYBRID, 0.22)
     soft = maps.soft.meshes[nearest[0]]
-    add_surface(d, Surface(soft.vertices + mount, soft.faces), SOFT, 0.5)
+    add_surface(d, TriangleMesh(soft.vertices + mount, soft.faces), SOFT, 0.5)
     add_line(d, arm, MEASURED, 4)
     frame(d, [maps.hybrid.mesh.vertices])
     return figure
@@ -131,7 +131,7 @@ def slices_figure(maps: Maps, tips: list[np.ndarray], check: Check) -> Figure:
     arm = panda_line(maps.mount_offset, maps.self_collision)
     hybrid.plot(arm[:, 0], arm[:, 2], color=MEASURED, linewidth=3, label="Panda")
     hybrid.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2, fontsize=8)
-    inside = 100 * check.found["hybrid"][0]
+    inside = 100 * check.verified["hybrid"][0]
     hybrid.set(title=f"Hybrid: poses found for {inside:.1f} % inside", xlabel="x (m)", ylabel="z (m)")
     rigid.set_xlim(-WIDEST_SHOWN, WIDEST_SHOWN)
     for axes in (rigid, soft, hybrid):

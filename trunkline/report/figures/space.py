@@ -7,7 +7,7 @@ from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d import Axes3D
 from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-from trunkline.kinematics.sdf.mesh import Surface
+from trunkline.kinematics.sdf.mesh import TriangleMesh
 from trunkline.report.figures.style import BACKGROUND
 
 LIGHT = np.array([0.35, -0.75, 0.55])  # towards the light
@@ -27,7 +27,7 @@ def space(figure: Figure, position: int, title: str) -> Axes3D:
     return axes
 
 
-def add_surface(axes: Axes3D, shape: Surface, color: str, alpha: float) -> None:
+def add_surface(axes: Axes3D, shape: TriangleMesh, color: str, alpha: float) -> None:
     """`shape` in `color`, lighter where it faces the light."""
     triangles = shape.vertices[shape.faces]
     normals = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])

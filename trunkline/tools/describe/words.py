@@ -144,7 +144,8 @@ def doubt_lines(model: mujoco.MjModel, session: Session | None) -> list[str]:
     lines += _unknown(model, session)
     kinds, weightless = {trial.experiment for trial in session.trials}, session.frame.gravity == "none"
     names = [name for name, parameter in PARAMETERS.items() if parameter.belongs_to(model)]
-    unidentifiable = [name for name in names if not any(PARAMETERS[name].told_by(EXPERIMENTS[kind]) for kind in kinds)]
+    experiments = [EXPERIMENTS[kind] for kind in kinds]
+    unidentifiable = [name for name in names if not any(map(PARAMETERS[name].identifiable_from, experiments))]
     if unidentifiable:
         lines.append(f"no trial of the session ({', '.join(sorted(kinds))}) tells {', '.join(unidentifiable)}")
     if weightless and model.nu and all(EXPERIMENTS[kind].static for kind in kinds):

@@ -72,7 +72,7 @@ class Scorer:
     def score(self, trial: Trial) -> Score:
         """Raises InputError where the trial is not of this arm, or the model does not survive it."""
         kind = EXPERIMENTS[trial.experiment]
-        determined = [i for i, name in enumerate(self.parameters) if PARAMETERS[name].told_by(kind)]
+        determined = [i for i, name in enumerate(self.parameters) if PARAMETERS[name].identifiable_from(kind)]
         experiment = prepare(trial, self.model, self.frames, self.command_delay)
         slope, curvature = np.zeros(len(self.parameters)), np.zeros((len(self.parameters),) * 2)
         if determined:

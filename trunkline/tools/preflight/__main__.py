@@ -11,7 +11,12 @@ from pathlib import Path
 
 from trunkline.errors import in_one_line
 from trunkline.identification.fit.setup import check_parameters
-from trunkline.identification.parameters.per_session import make_room, names_apart, other_sessions, untold_apart
+from trunkline.identification.parameters.per_session import (
+    make_room,
+    other_sessions,
+    per_session_names,
+    unidentifiable_per_session,
+)
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.stages import STAGES
 from trunkline.identification.uncertainty.identifiability import (
@@ -59,10 +64,10 @@ def main(arguments: list[str] | None = None) -> int:
     ups = other_ups(takes)
     for stage, config in configs.items():
         check_parameters(stage, config, model)
-        names = names_apart(list(config.parameters), config.per_session, other_sessions(trials))
+        names = per_session_names(list(config.parameters), config.per_session, other_sessions(trials))
         make_room(spec, names)
         model = spec.compile()
-        lacking = unidentifiable(config, trials) or untold_apart(names, trials, config.experiments)
+        lacking = unidentifiable(config, trials) or unidentifiable_per_session(names, trials, config.experiments)
         chosen = [t for t in trials if t.experiment in config.experiments and t.split == IDENTIFY]
         print(f"{stage}, from {len(chosen)} trials:", flush=True)
         for line in lacking:

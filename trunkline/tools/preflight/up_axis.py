@@ -5,8 +5,8 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from trunkline.identification.evaluation.baselines import straight
 from trunkline.identification.evaluation.evaluation import Prediction, replay
-from trunkline.identification.evaluation.null_model import straight
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.recordings.cleaning.gravity_direction import AXES
 from trunkline.recordings.signals.base_frame import average_base, gravity_from_up

@@ -61,7 +61,7 @@ class Shown:
     def view(self) -> View:
         self.now += 1 / RATE
         left, right = self.hands
-        buttons = {f"right {name}" for name in right.held} | {f"left {name}" for name in left.held}
+        buttons = {f"right {name}" for name in right.pressed} | {f"left {name}" for name in left.pressed}
         pressed, self.before = buttons - self.before, buttons
         if self.mode == "aim" and "right trigger" in pressed:
             self._to("ready")

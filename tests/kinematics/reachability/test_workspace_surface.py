@@ -8,14 +8,19 @@ from tests.support.bent_chain import hardening_stump
 from trunkline.errors import InputError
 from trunkline.frames import STANDARD_GRAVITY, downwards
 from trunkline.kinematics.dataset.gravities import spread
-from trunkline.kinematics.dataset.sampling import sheet_at
+from trunkline.kinematics.dataset.sampling import workspace_surface_at
 from trunkline.kinematics.dataset.table import sample_table
 from trunkline.kinematics.reachability import surface_check
 from trunkline.kinematics.reachability.sampled import read_tips
-from trunkline.kinematics.reachability.soft import SheetSettings, SoftSettings
+from trunkline.kinematics.reachability.soft import SoftSettings, SurfaceSettings
 from trunkline.kinematics.reachability.triangles import nearest_on_triangles
 from trunkline.kinematics.reachability.weights import spline_matrix, spline_weights
-from trunkline.kinematics.reachability.workspace_surface import Sheets, build_sheets, finer, sheet_triangles
+from trunkline.kinematics.reachability.workspace_surface import (
+    WorkspaceSurfaces,
+    build_surfaces,
+    finer,
+    surface_triangles,
+)
 from trunkline.model.statics.chain import read_chain
 
 LARGEST = np.radians(100)
@@ -29,7 +34,7 @@ SOFT = SoftSettings(
     directions=60,
     steps=16,
     shown_deg=[0.0, 60.0],
-    sheets=SheetSettings(50, 24, 12, 2),
+    sheets=SurfaceSettings(50, 24, 12, 2),
 )
 
 
@@ -40,7 +45,7 @@ def chain():
 
 @pytest.fixture(scope="module")
 def sheets(chain):
-    return build_sheets(chain, spread(50, LARGEST, crowd=True), 24, 12, 0.02, lambda: None)
+    return build_surfaces(chain, spread(50, LARGEST, crowd=True), 24, 12, 0.02, lambda: None)
 
 
 def test_weights_give_the_nodes_back_and_every_linear_function():
@@ -60,8 +65,8 @@ def test_a_smooth_function_is_interpolated_ever_better():
         nodes = spread(count, LARGEST, crowd=True)
         matrix = spline_matrix(nodes)
         at = downwards(np.linspace(0.1, 1.7, 20), np.linspace(0, 6, 20))
-        found = [spline_weights(matrix, nodes, down) @ np.sin(2 * nodes[:, 0] + nodes[:, 2]) for down in at]
-        errors.append(np.abs(found - np.sin(2 * at[:, 0] + at[:, 2])).max())
+        values = [spline_weights(matrix, nodes, down) @ np.sin(2 * nodes[:, 0] + nodes[:, 2]) for down in at]
+        errors.append(np.abs(values - np.sin(2 * at[:, 0] + at[:, 2])).max())
     assert errors[1] < 0.2 * errors[0]
     assert errors[1] < 0.01
 
@@ -81,13 +86,13 @@ def test_the_nearest_point_of_triangles_is_as_near_as_any_of_many():
 def test_the_nearest_point_before_a_face_an_edge_and_a_corner():
     corner = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], float)
     for point, expected in (([0.2, 0.3, 0.5], [0.2, 0.3, 0]), ([1, 1, 0.5], [0.5, 0.5, 0]), ([-1, -2, 3], [0, 0, 0])):
-        found, distance = nearest_on_triangles(np.array([point], float), corner[None])
-        np.testing.assert_allclose(found[0], expected, atol=1e-12)
+        nearest, distance = nearest_on_triangles(np.array([point], float), corner[None])
+        np.testing.assert_allclose(nearest[0], expected, atol=1e-12)
         assert distance[0] == pytest.approx(np.linalg.norm(np.subtract(point, expected)))
 
 
 def test_triangles_cover_the_lattice_and_close_around_the_arm():
-    triangles = sheet_triangles(5, 4)
+    triangles = surface_triangles(5, 4)
     assert len(triangles) == 2 * 5 * 3
     assert len(np.unique(triangles, axis=0)) == len(triangles)
     edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1)
@@ -99,10 +104,10 @@ def test_triangles_cover_the_lattice_and_close_around_the_arm():
 def test_a_sheet_between_the_directions_kept_is_where_the_arm_comes_to(chain, sheets):
     for angle, azimuth in ((0.4, 2.2), (1.0, 5.0), (1.6, 0.7)):
         down = downwards(angle, azimuth)
-        own, blended = sheet_at(chain, STANDARD_GRAVITY * down, 24, 12), sheets.at(down)
-        assert np.linalg.norm(blended - own, axis=2).max() < 0.005 * chain.length
+        solved, blended = workspace_surface_at(chain, STANDARD_GRAVITY * down, 24, 12), sheets.at(down)
+        assert np.linalg.norm(blended - solved, axis=2).max() < 0.005 * chain.length
         other = sheets.at(downwards(angle, azimuth + np.pi))
-        assert np.linalg.norm(other - own, axis=2).max() > 0.02 * chain.length
+        assert np.linalg.norm(other - solved, axis=2).max() > 0.02 * chain.length
 
 
 def test_the_signal_is_the_distance_from_the_surface_less_the_tolerance(sheets):
@@ -126,12 +131,12 @@ def test_finer_points_lie_on_the_cells(sheets):
 
 def test_the_check_finds_good_sheets_good_and_bad_ones_bad(chain, sheets):
     how = {"beyond": 0.03, "count": 200, "seed": 0, "done": lambda _: None}
-    for found in surface_check.check_sheets(sheets, chain, SOFT, **how):
-        assert found.iou > 0.95
-        assert found.reachable > 0.99
-        assert found.beyond < 0.01
-    shifted = Sheets(sheets.downs, sheets.points + np.float16(0.03), sheets.tolerance)
-    assert all(found.iou < 0.8 for found in surface_check.check_sheets(shifted, chain, SOFT, **how))
+    for check in surface_check.check_surfaces(sheets, chain, SOFT, **how):
+        assert check.iou > 0.95
+        assert check.reachable > 0.99
+        assert check.beyond < 0.01
+    shifted = WorkspaceSurfaces(sheets.downs, sheets.points + np.float16(0.03), sheets.tolerance)
+    assert all(check.iou < 0.8 for check in surface_check.check_surfaces(shifted, chain, SOFT, **how))
 
 
 def test_a_surface_that_is_torn_is_refused_by_its_gravity(chain, monkeypatch):
@@ -140,13 +145,13 @@ def test_a_surface_that_is_torn_is_refused_by_its_gravity(chain, monkeypatch):
     along = sampling._along
 
     def torn(*args):
-        found = along(*args)
-        found.snapped[5] = True
-        return found
+        result = along(*args)
+        result.snapped[5] = True
+        return result
 
     monkeypatch.setattr(sampling, "_along", torn)
     with pytest.raises(InputError, match=r"gravity \[.*\]: found 1 of 32 tips by no steady way, expected a surface"):
-        sheet_at(chain, np.array([0.0, 0.0, -9.8]), 8, 4)
+        workspace_surface_at(chain, np.array([0.0, 0.0, -9.8]), 8, 4)
 
 
 @pytest.mark.parametrize("azimuth", [0.0, 1.0])

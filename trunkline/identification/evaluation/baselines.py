@@ -1,7 +1,7 @@
-"""What a model's errors stand beside: predictions that know nothing of forces, and the floor that noise leaves.
+"""What a model's errors are compared with: baselines without forces, and the floor that noise leaves.
 
-A model whose errors are not far below those of the null models has learnt nothing; one whose errors are near the noise
-floor has nothing left to learn from these trials.
+A model whose errors are not far below those of the baselines has learnt nothing; one whose errors are near the noise
+floor has nothing left to learn from these trials. In metrics.json the baselines are the null models.
 """
 
 from dataclasses import replace
@@ -28,7 +28,7 @@ def references(
     ended: list[Experiment] | None = None,
     floor_poses: int = FLOOR_POSES,
 ) -> dict[str, Prediction]:
-    """The null models and the noise floor, by their names in metrics.json.
+    """The baselines and the noise floor, by their names in metrics.json.
 
     Args:
         trials, experiments: the same ones, in the same order.
@@ -36,13 +36,13 @@ def references(
         ended: from whose ends the mean shape at rest is; None for `experiments` themselves.
         floor_poses: of each trial, at most, in which the noise floor is taken.
     """
-    found = {
+    baselines = {
         "null": Prediction(hanging_still(experiments, like, ended or experiments), experiments),
         "null_straight": Prediction(straight(experiments, like), experiments),
-        "null_held": held(trials, experiments, model, like),
+        "null_held": start_pose(trials, experiments, model, like),
         "noise_floor": noise_floor(trials, experiments, model, like, floor_poses),
     }
-    return {name: prediction for name, prediction in found.items() if prediction.experiments}
+    return {name: prediction for name, prediction in baselines.items() if prediction.experiments}
 
 
 def hanging_still(experiments: list[Experiment], like: Replay, ended: list[Experiment]) -> Replay:
@@ -55,10 +55,10 @@ def hanging_still(experiments: list[Experiment], like: Replay, ended: list[Exper
     Args:
         like: a model's replay of the same experiments, for the arm's length and tip.
     """
-    seen = [e for e in ended if e.split == IDENTIFY] or ended
+    fitted = [e for e in ended if e.split == IDENTIFY] or ended
     positions = []
     for experiment in experiments:
-        same = [e for e in seen if e.kind == experiment.kind] or seen
+        same = [e for e in fitted if e.kind == experiment.kind] or fitted
         same = [e for e in same if e.session == experiment.session] or same
         shape = np.nanmean([_last_shape(e) for e in same], axis=0)
         positions.append(np.broadcast_to(shape, experiment.positions.shape))
@@ -70,7 +70,7 @@ def straight(experiments: list[Experiment], like: Replay) -> Replay:
     return replace(like, positions=[np.broadcast_to(like.straight, e.positions.shape) for e in experiments])
 
 
-def held(trials: list[Trial], experiments: list[Experiment], model: mujoco.MjModel, like: Replay) -> Prediction:
+def start_pose(trials: list[Trial], experiments: list[Experiment], model: mujoco.MjModel, like: Replay) -> Prediction:
     """Every trial as the pose in which its simulation starts: the last frame before the comparison, held.
 
     Trials at rest are left out: their start is fitted to the very frame that is compared.
@@ -98,8 +98,8 @@ def noise_floor(
 def _floor(trial: Trial, experiment: Experiment, model: mujoco.MjModel, count: int) -> tuple[Experiment, np.ndarray]:
     model = model_in(trial.session, model)
     first = 0 if is_static(trial.experiment) else start_frames(trial)[0] + 1
-    seen = np.flatnonzero(experiment.measured.any(axis=1))
-    frames = seen[np.linspace(0, len(seen) - 1, min(count, len(seen))).round().astype(int)]
+    measured = np.flatnonzero(experiment.measured.any(axis=1))
+    frames = measured[np.linspace(0, len(measured) - 1, min(count, len(measured))).round().astype(int)]
     poses = [fit_pose(model, trial.segments, *measured_pose(trial, first + frame)).qpos for frame in frames]
     parts = {name: getattr(experiment, name)[frames] for name in ("controls", "positions", "measured")}
     shapes = np.array([segment_positions(model, trial.segments, qpos) for qpos in poses])

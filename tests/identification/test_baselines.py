@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.support.matched_plant import release, segments_of, small_model, tilt
+from trunkline.identification.evaluation.baselines import hanging_still, references
 from trunkline.identification.evaluation.error_tables import segment_table, trial_table
 from trunkline.identification.evaluation.evaluation import Prediction, replay
-from trunkline.identification.evaluation.null_model import hanging_still, references
 from trunkline.identification.simulate.experiment import prepare
 
 
@@ -31,26 +31,26 @@ def beside(model, trials):
 
 def test_each_null_model_is_what_its_name_says(model):
     trials = trials_of(model)
-    experiments, replayed, found = beside(model, trials)
-    assert set(found) == {"null", "null_straight", "null_held", "noise_floor"}
-    straight = found["null_straight"].replay.positions[0]
+    experiments, replayed, baselines = beside(model, trials)
+    assert set(baselines) == {"null", "null_straight", "null_held", "noise_floor"}
+    straight = baselines["null_straight"].replay.positions[0]
     np.testing.assert_allclose(straight[..., :2], 0, atol=1e-12)  # along -z
     assert np.all(np.diff(straight[0, :, 2]) < 0)
-    held = found["null_held"]
-    for e, positions in zip(held.experiments, held.replay.positions, strict=True):
+    start = baselines["null_held"]
+    for e, positions in zip(start.experiments, start.replay.positions, strict=True):
         trial = next(t for t in trials if t.name == e.name)
         np.testing.assert_allclose(positions, np.broadcast_to(trial.positions[0], positions.shape), atol=2e-4)
-    rest = found["null"].replay.positions[2]
+    rest = baselines["null"].replay.positions[2]
     np.testing.assert_allclose(rest[0], np.mean([e.positions[-1] for e in experiments[2:4]], axis=0))
     moving = experiments[0]
-    errors = Prediction(held.replay, held.experiments).scores()["identify"]
+    errors = Prediction(start.replay, start.experiments).scores()["identify"]
     away = np.linalg.norm(moving.positions - trials[0].positions[0], axis=-1)
     assert errors["e_tip_mm"] == pytest.approx(1e3 * away[:, replayed.tip].mean(), abs=0.2)
 
 
 def test_a_held_start_says_nothing_of_trials_at_rest(model):
-    _, _, found = beside(model, trials_of(model))
-    assert {e.kind for e in found["null_held"].experiments} == {"release"}
+    _, _, baselines = beside(model, trials_of(model))
+    assert {e.kind for e in baselines["null_held"].experiments} == {"release"}
     _, _, still = beside(model, trials_of(model)[2:])
     assert "null_held" not in still
 
@@ -65,9 +65,9 @@ def test_a_session_without_trials_to_identify_from_rests_in_its_own_mean_shape(m
 def test_the_floor_rises_with_noise_and_has_no_velocity(model):
     floors = []
     for noise in (0.0, 1e-3):
-        _, _, found = beside(model, trials_of(model, noise))
-        floors.append(found["noise_floor"].scores()["validate"])
-        assert all(len(p) <= 12 for p in found["noise_floor"].replay.positions)
+        _, _, baselines = beside(model, trials_of(model, noise))
+        floors.append(baselines["noise_floor"].scores()["validate"])
+        assert all(len(p) <= 12 for p in baselines["noise_floor"].replay.positions)
     assert floors[0]["e_position_mm"] < 0.1
     assert 3 * floors[0]["e_position_mm"] < floors[1]["e_position_mm"] < 2.0
     assert "e_velocity_mm_s" not in floors[1]
@@ -80,9 +80,9 @@ def test_tables_say_which_trial_is_bad_and_where_along_the_arm(model):
     shift[:, -1, 0] = 0.02  # the tip of one trial, 20 mm aside
     trials[1] = replace(trials[1], positions=trials[1].positions + shift)
     experiments = [prepare(trial, model, 30) for trial in trials]
-    seen = experiments[1].measured.copy()
-    seen[:, 1] = False
-    experiments[1].measured = seen
+    measured = experiments[1].measured.copy()
+    measured[:, 1] = False
+    experiments[1].measured = measured
     replayed = replay(model, [prepare(trial, model, 30) for trial in trials_of(model)], segments_of(model))
     table = trial_table({"model": Prediction(replayed, experiments)}).set_index("trial")
     assert table.e_tip_mm.idxmax() == trials[1].name

@@ -17,7 +17,7 @@ from rehearsal.experiments.handle import handle
 from rehearsal.experiments.reach import reach
 from rehearsal.experiments.result import Result
 from rehearsal.operator.scripts import Ending
-from tests.rehearsal.seen import FORCE, TIP, UNITS, frame
+from tests.rehearsal.frames import FORCE, TIP, UNITS, frame
 from tests.rehearsal.test_held import SCENE, handed, run
 
 THING = np.array([0.5, 0.1, 0.2])
@@ -28,28 +28,28 @@ def staged(judge, **more) -> Staged:
     return Staged("touch", 3, None, iter(()), judge, "a thing", **more)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("ending", "cause", "success", "told"), [
+@pytest.mark.parametrize(("ending", "cause", "success", "stated"), [
     (Ending(True), "", True, ""),
     (Ending(True), "aim: beside it", False, "aim: beside it"),
     (Ending(False), "stopped: fault", False, "stopped: fault"),
     (None, "", False, "stopped: the run did not end"),
     ("done", "", False, "stopped: the run did not end"),
 ])  # fmt: skip
-def test_a_run_succeeds_where_its_script_ended_and_its_judge_names_no_cause(ending, cause, success, told):
-    result = staged(lambda *given: cause).judged(ending, [], [], 4.5)
-    assert (result.success, result.cause) == (success, told)
+def test_a_run_succeeds_where_its_script_ended_and_its_judge_names_no_cause(ending, cause, success, stated):
+    result = staged(lambda *arguments: cause).judged(ending, [], [], 4.5)
+    assert (result.success, result.cause) == (success, stated)
     assert (result.experiment, result.seed, result.seconds, result.object) == ("touch", 3, 4.5, "a thing")
 
 
 @pytest.mark.parametrize("ended", [True, False])
 def test_who_looks_on_does_so_after_the_judge_and_only_where_a_script_ended(monkeypatch, ended):
-    ending, seen = Ending(True) if ended else None, []
+    ending, calls = Ending(True) if ended else None, []
     monkeypatch.setattr(benches, "rehearse", lambda session, script: (ending, ["frame"], ["view"]))
-    one = staged(lambda result, *given: seen.append("judge") or "", watch=lambda *given: seen.append(given))
-    one.session = SimpleNamespace(now=7.0)  # type: ignore[assignment]
-    result, frames = perform(one)
+    stage_run = staged(lambda result, *args: calls.append("judge") or "", watch=lambda *args: calls.append(args))
+    stage_run.session = SimpleNamespace(now=7.0)  # type: ignore[assignment]
+    result, frames = perform(stage_run)
     assert frames == ["frame"]
-    assert seen == (["judge", (result, ending, ["frame"])] if ended else [])
+    assert calls == (["judge", (result, ending, ["frame"])] if ended else [])
 
 
 class Nothing:
@@ -58,19 +58,19 @@ class Nothing:
     left = right = None
 
     def __getattr__(self, name):
-        return lambda *given: iter(())
+        return lambda *args: iter(())
 
 
 def bench(session=None) -> SimpleNamespace:
     return SimpleNamespace(
-        place=lambda rng: THING, operator=lambda rng: Nothing(), session=lambda *given: session, settings=FREE,
+        place=lambda rng: THING, operator=lambda rng: Nothing(), session=lambda *args: session, settings=FREE,
         arm=SimpleNamespace(chain=SimpleNamespace(units=UNITS)), foresight="foresight",
         config=SimpleNamespace(core=SimpleNamespace(follow_delay=0.4)),
     )  # fmt: skip
 
 
-def judged(one: Staged, ending: Ending, frames: list, views: list | None = None) -> Result:
-    return one.judged(ending, frames, views or [], 1.0)
+def judged(stage_run: Staged, ending: Ending, frames: list, views: list | None = None) -> Result:
+    return stage_run.judged(ending, frames, views or [], 1.0)
 
 
 @pytest.mark.parametrize(("unit", "success"), [
@@ -95,31 +95,31 @@ def test_an_aim_beside_the_object_is_one_beyond_its_radius(aimed, kind):
 )
 def test_what_was_stated_of_a_reach_is_told_where_it_was_done(monkeypatch, done, foreseen, radius):
     stated = SimpleNamespace(radii=np.array([0.004]), tips=np.zeros((1, 3)))
-    told = SimpleNamespace(preview=SimpleNamespace(stated=stated)) if foreseen else None
+    preview = SimpleNamespace(preview=SimpleNamespace(stated=stated)) if foreseen else None
     monkeypatch.setattr(reaches, "tips_after", lambda session, frames: {"after_2s": np.array([0.0, 0.003, 0.0])})
-    result, one = Result("reach", 0, True), reach(bench(SimpleNamespace(foresee=lambda: told)), 0)  # type: ignore[arg-type]
-    one.watch(result, Ending(done), [])  # type: ignore[misc]
+    result, stage_run = Result("reach", 0, True), reach(bench(SimpleNamespace(foresee=lambda: preview)), 0)  # type: ignore[arg-type]
+    stage_run.watch(result, Ending(done), [])  # type: ignore[misc]
     np.testing.assert_equal((result.radius_mm, result.after_2s_mm), (radius, radius - 1))
 
 
 def test_a_reach_has_the_foresight_of_its_bench_and_following_has_none():
-    given = []
+    sessions = []
     stage = bench()
-    stage.session = lambda *all: given.append(all)
+    stage.session = lambda *all: sessions.append(all)
     reach(stage, 0), follow(stage, 0)  # type: ignore[arg-type]
-    assert [len(all) for all in given] == [5, 4]
-    assert given[0][4] == "foresight"
+    assert [len(all) for all in sessions] == [5, 4]
+    assert sessions[0][4] == "foresight"
 
 
 @pytest.mark.parametrize(("seconds", "success"), [(FREE.interruption, True), (FREE.interruption + 0.25, False)])
 def test_following_may_be_interrupted_for_as_long_as_the_settings_say(seconds, success):
     session = SimpleNamespace(refusals=[(t, "collision: arm") for t in np.arange(2.0, 2.0 + seconds + 0.01, 0.25)])
-    path, one = on_path(bench(session), 0)  # type: ignore[arg-type]
+    path, stage_run = on_path(bench(session), 0)  # type: ignore[arg-type]
     path.begin(1.0)
     views = [SimpleNamespace(now=now, tip=np.zeros(3), intent=SimpleNamespace(notice="", follow=None))
              for now in np.arange(0.0, 30.0, 0.25)]  # fmt: skip
     frames = [frame(now, "follow", tip=path(now - 0.4)) for now in np.arange(1.0, 17.0, 0.25)]
-    result = judged(one, Ending(True), frames, views)
+    result = judged(stage_run, Ending(True), frames, views)
     assert result.success is success
     assert result.tip_mm < 1e-6, "by the delay of the settings"
 
@@ -130,9 +130,9 @@ def stood(monkeypatch):
     session = SimpleNamespace(foreseen=None, robot=SimpleNamespace(scene=SCENE))
     offered = SimpleNamespace(name="standing basket", thing=SimpleNamespace(position=[0.5, 0.0, 0.2]))
     for module in (grasps, handles):
-        monkeypatch.setattr(module, "offered", lambda *given: offered)
-        monkeypatch.setattr(module, "session_of", lambda *given: session)
-        monkeypatch.setattr(module, "beside", lambda *given: np.zeros(3))
+        monkeypatch.setattr(module, "offered", lambda *args: offered)
+        monkeypatch.setattr(module, "session_of", lambda *args: session)
+        monkeypatch.setattr(module, "beside", lambda *args: np.zeros(3))
 
 
 @pytest.mark.parametrize(("frames", "success", "agreed"), [(run(), True, 1.0), (run(lifted=0.0), False, 0.0)])

@@ -10,7 +10,7 @@ from trunkline.kinematics.dataset.columns import length_columns
 from trunkline.kinematics.dataset.sampling import pull_directions
 from trunkline.kinematics.dataset.table import sample_table
 from trunkline.kinematics.ik.inputs import TILT
-from trunkline.kinematics.ik.refine import polish
+from trunkline.kinematics.ik.refine import refine
 from trunkline.kinematics.ik.score import beyond_range, largest_difference, outside_targets
 from trunkline.model.statics.equilibria import equilibrium, forward
 from trunkline.model.statics.restart import restart
@@ -26,7 +26,7 @@ def samples(chain):
 def test_three_steps_undo_an_error_of_millimetres(chain, samples):
     targets, lengths = samples[TILT].to_numpy(), samples[length_columns(3)].to_numpy()
     wrong = lengths + np.random.default_rng(1).uniform(-2e-3, 2e-3, lengths.shape)
-    before, after = (polish(chain, targets, wrong, steps) for steps in (0, 3))
+    before, after = (refine(chain, targets, wrong, steps) for steps in (0, 3))
     assert before.position_error.max() > 0.005 * chain.length
     assert after.converged.all()
     assert np.quantile(after.position_error, 0.95) < 1e-4 * chain.length
@@ -36,17 +36,17 @@ def test_three_steps_undo_an_error_of_millimetres(chain, samples):
 
 def test_polished_lengths_lead_to_the_error_stated(chain, samples):
     targets = samples[TILT].to_numpy()[:20] + [0, 0.002, 0, 0.004, 0, 0, 0, 0]  # a little off the surface of tips
-    found = polish(chain, targets, samples[length_columns(3)].to_numpy()[:20])
-    tip = forward(chain, found.lengths, gravity_in_base(targets[:, 0]))
-    np.testing.assert_allclose(np.linalg.norm(tip.position - targets[:, 1:4], axis=1), found.position_error, atol=1e-7)
+    answer = refine(chain, targets, samples[length_columns(3)].to_numpy()[:20])
+    tip = forward(chain, answer.lengths, gravity_in_base(targets[:, 0]))
+    np.testing.assert_allclose(np.linalg.norm(tip.position - targets[:, 1:4], axis=1), answer.position_error, atol=1e-7)
     assert (tip.tensions.min(axis=1) < 1e-3).all()
     assert (tip.tensions <= chain.max_tension + 1e-3).all()
 
 
 def test_exact_lengths_need_no_step(chain, samples):
-    found = polish(chain, samples[TILT].to_numpy(), samples[length_columns(3)].to_numpy())
-    assert (found.steps == 0).all()
-    assert found.position_error.max() < 1e-6
+    answer = refine(chain, samples[TILT].to_numpy(), samples[length_columns(3)].to_numpy())
+    assert (answer.steps == 0).all()
+    assert answer.position_error.max() < 1e-6
 
 
 def test_restart_finds_the_equilibrium_that_the_loads_lead_to(chain):
@@ -55,28 +55,28 @@ def test_restart_finds_the_equilibrium_that_the_loads_lead_to(chain):
     gravity = gravity_in_base(rng.uniform(0, 2, 20))
     there = equilibrium(chain, tensions, gravity)
     guess = there.qpos + rng.uniform(-0.05, 0.05, there.qpos.shape)
-    found = restart(chain, guess, np.zeros_like(tensions), there.lengths, gravity)
-    assert found.converged.all()
-    np.testing.assert_allclose(found.position, there.position, atol=1e-7)
-    np.testing.assert_allclose(found.tensions, tensions, atol=1e-4)
+    rest = restart(chain, guess, np.zeros_like(tensions), there.lengths, gravity)
+    assert rest.converged.all()
+    np.testing.assert_allclose(rest.position, there.position, atol=1e-7)
+    np.testing.assert_allclose(rest.tensions, tensions, atol=1e-4)
 
 
 def test_far_targets_are_far_and_what_is_beyond_the_range_is_seen():
-    targets = outside_targets(2000, 0.5, np.random.default_rng(0), told=1)
+    targets = outside_targets(2000, 0.5, np.random.default_rng(0), columns=1)
     assert (np.linalg.norm(targets[:, 1:4], axis=1) > 0.5).mean() > 0.9
     np.testing.assert_allclose(np.linalg.norm(targets[:, 4:], axis=1), 1)
-    known = np.array([[0.3, 0.4], [0.5, 0.6]])
-    assert beyond_range(np.array([[0.3, 0.6]]), known) == 0
-    assert beyond_range(np.array([[0.31, 0.62], [0.29, 0.5]]), known) == pytest.approx(0.02)
+    sampled = np.array([[0.3, 0.4], [0.5, 0.6]])
+    assert beyond_range(np.array([[0.3, 0.6]]), sampled) == 0
+    assert beyond_range(np.array([[0.31, 0.62], [0.29, 0.5]]), sampled) == pytest.approx(0.02)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_an_answer_that_is_not_finite_is_an_error_of_one_line(value):
-    known = np.array([[0.3, 0.4], [0.5, 0.6]])
+    sampled = np.array([[0.3, 0.4], [0.5, 0.6]])
     broken = np.array([[0.3, 0.6], [0.4, value], [0.4, 0.5]])
     with pytest.raises(InputError, match="found 1 of 3 answers of the network that are not finite"):
-        beyond_range(broken, known)
-    for one, other in ((broken, known[[0, 0, 1]]), (known[[0, 0, 1]], broken), (broken, broken)):
+        beyond_range(broken, sampled)
+    for first, second in ((broken, sampled[[0, 0, 1]]), (sampled[[0, 0, 1]], broken), (broken, broken)):
         with pytest.raises(InputError, match="found 1 of 3 answers"):
-            largest_difference(one, other)
-    assert largest_difference(known, known + [[0, 0], [0, -2e-3]]) == pytest.approx(2e-3)
+            largest_difference(first, second)
+    assert largest_difference(sampled, sampled + [[0, 0], [0, -2e-3]]) == pytest.approx(2e-3)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from rehearsal.experiments.bench import Seen
+from rehearsal.experiments.bench import SessionFrame
 
 UNITS, TIP = 6, 4  # of an arm; number from 0 of the first that counts as its tip
 FORCE = (0.0, 0.0, 0.01)  # N
@@ -19,7 +19,7 @@ def frame(
     place: tuple = (0.0, 0.0, 0.0),
     units: np.ndarray | None = None,
     **truth,
-) -> Seen:
+) -> SessionFrame:
     """thing, world: forces on units, by number, N. lies: forces on the object, of each surface. place: the object's, m.
     units: centres (U, 3), m. truth: what else is so."""
     touched, struck = np.zeros((UNITS, 3)), np.zeros((UNITS, 2, 3))
@@ -30,4 +30,4 @@ def frame(
     so = {"hanging": False, "speed": np.zeros(3), "tip": np.zeros(3), **truth}
     so |= {"arm_thing": touched, "arm_world": struck, "thing_world": np.array(lies or [(0.0, 0.0, 0.0)] * 2)}
     centres = np.zeros((UNITS, 3)) if units is None else units
-    return Seen(now, mode, SimpleNamespace(**so), np.array(place), np.zeros(7), np.zeros(3), centres)  # type: ignore[arg-type]
+    return SessionFrame(now, mode, SimpleNamespace(**so), np.array(place), np.zeros(7), np.zeros(3), centres)  # type: ignore[arg-type]

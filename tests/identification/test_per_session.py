@@ -13,7 +13,7 @@ from tests.support.matched_plant import begin_project, tilt
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError
 from trunkline.identification.parameters.parameters import PARAMETERS, candidate_fields, set_fields
-from trunkline.identification.parameters.per_session import make_room, model_in, names_apart
+from trunkline.identification.parameters.per_session import make_room, model_in, per_session_names
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.recordings.trials.trial import write_trials
 
@@ -39,7 +39,7 @@ def session_of(truth: mujoco.MjModel, session: str, seed: int) -> list:
 
 
 @pytest.fixture(scope="module")
-def found(tmp_path_factory):
+def identified(tmp_path_factory):
     """By what was identified: metrics, the table of parameters, and the model. And the true stiffness."""
     results = {}
     with pytest.MonkeyPatch.context() as patch:
@@ -76,27 +76,27 @@ def half_width(case) -> float:
     return (high - low) / 2
 
 
-def test_each_session_gets_its_own_mount_and_both_one_stiffness(found):
-    _, table, model = found["together"]
-    assert table["parameters"]["stiffness"]["value"] == pytest.approx(found["truth"], rel=0.01)
+def test_each_session_gets_its_own_mount_and_both_one_stiffness(identified):
+    _, table, model = identified["together"]
+    assert table["parameters"]["stiffness"]["value"] == pytest.approx(identified["truth"], rel=0.01)
     for i, name in enumerate(NAMES):
         assert table["parameters"][name]["value"] == pytest.approx(MOUNTS["monday"][i], abs=0.002)
         assert table["per_session"][f"{name}@friday"]["value"] == pytest.approx(MOUNTS["friday"][i], abs=0.002)
     assert set(table["correlation"]) == {"stiffness", *NAMES}  # what others read knows one session
 
 
-def test_held_out_errors_together_are_those_of_each_alone_and_far_below_those_as_one(found):
-    alone = np.mean([held_out(found[session]) for session in MOUNTS])
-    assert held_out(found["together"]) < 1.2 * alone
-    assert held_out(found["as one"]) > 5 * held_out(found["together"])
+def test_held_out_errors_together_are_those_of_each_alone_and_far_below_those_as_one(identified):
+    alone = np.mean([held_out(identified[session]) for session in MOUNTS])
+    assert held_out(identified["together"]) < 1.2 * alone
+    assert held_out(identified["as one"]) > 5 * held_out(identified["together"])
 
 
-def test_two_sessions_tell_stiffness_better_than_one(found):
-    assert half_width(found["together"]) < 0.9 * min(half_width(found[session]) for session in MOUNTS)
+def test_two_sessions_tell_stiffness_better_than_one(identified):
+    assert half_width(identified["together"]) < 0.9 * min(half_width(identified[session]) for session in MOUNTS)
 
 
-def test_the_written_model_holds_both_mounts(found):
-    model = found["together"][2]
+def test_the_written_model_holds_both_mounts(identified):
+    model = identified["together"][2]
     assert model_in("monday", model) is model
     for session, mount in MOUNTS.items():
         turned = model_in(session, model).body("base").quat
@@ -105,7 +105,7 @@ def test_the_written_model_holds_both_mounts(found):
 
 def test_what_a_session_has_for_itself_may_be_its_shape_at_rest():
     spec = small_spec(6)
-    names = names_apart(["stiffness", "rest_bend_x", "mount_tilt_x"], ["rest_bend_x"], ["friday"])
+    names = per_session_names(["stiffness", "rest_bend_x", "mount_tilt_x"], ["rest_bend_x"], ["friday"])
     make_room(spec, names)
     model = spec.compile()
     values = {"rest_bend_x": np.array([0.01]), "rest_bend_x@friday": np.array([0.03])}
@@ -116,20 +116,20 @@ def test_what_a_session_has_for_itself_may_be_its_shape_at_rest():
     assert read(model_in("monday", model)) == pytest.approx(0.01)
 
 
-def test_a_single_session_leaves_no_trace_of_several(found):
-    _, table, model = found["monday"]
+def test_a_single_session_leaves_no_trace_of_several(identified):
+    _, table, model = identified["monday"]
     assert "per_session" not in table
     assert not any("@" in model.numeric(i).name for i in range(model.nnumeric))
 
 
-@pytest.mark.parametrize("untold", ["monday", "friday"])
-def test_a_session_that_does_not_tell_its_mount_is_refused(tmp_path, monkeypatch, untold):
+@pytest.mark.parametrize("unidentifiable", ["monday", "friday"])
+def test_a_session_that_does_not_tell_its_mount_is_refused(tmp_path, monkeypatch, unidentifiable):
     monkeypatch.chdir(tmp_path)
     model = begin_project(tmp_path, 6)
     days = [*session_of(model, "monday", 0), *session_of(model, "friday", 9)]
-    kept = [trial for trial in days if trial.session != untold or trial.split == "validate"]
-    write_trials(tmp_path / "data/processed/filter", kept)
+    retained = [trial for trial in days if trial.session != unidentifiable or trial.split == "validate"]
+    write_trials(tmp_path / "data/processed/filter", retained)
     ranges = {"stiffness": (0.1, 10.0), "mount_tilt_x": (-0.1, 0.1)}
-    said = f"mount_tilt_x: found no static_tilt of the session {untold} with split identify"
-    with pytest.raises(InputError, match=said):
+    pattern = f"mount_tilt_x: found no static_tilt of the session {unidentifiable} with split identify"
+    with pytest.raises(InputError, match=pattern):
         run("identify_stiffness", settings(["static_tilt"], ["static_tilt"], ranges), CAD_MODEL)
