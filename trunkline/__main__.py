@@ -52,11 +52,11 @@ def overview() -> str:
 
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
-    told = sys.argv[1:] if arguments is None else arguments
-    if not told or told[0] in HELP:
+    words = sys.argv[1:] if arguments is None else arguments
+    if not words or words[0] in HELP:
         print(overview())
-        return 0 if told else 2
-    name, *rest = told
+        return 0 if words else 2
+    name, *rest = words
     if name == "--version":
         print(f"{COMMAND} {__version__}")
         return 0
@@ -70,8 +70,8 @@ def main(arguments: list[str] | None = None) -> int:
         if (error.name or "").partition(".")[0] == "trunkline":
             raise
         extras = ",".join(filter(None, ("pipeline", verb.extra)))
-        found = f"found no module {error.name!r}, expected what `pip install 'trunkline[{extras}]'` brings"
-        raise InputError(f"{COMMAND} {name}: {found}") from error
+        problem = f"found no module {error.name!r}, expected what `pip install 'trunkline[{extras}]'` brings"
+        raise InputError(f"{COMMAND} {name}: {problem}") from error
     set_called(name)
     return module.main(rest)
 

@@ -7,8 +7,8 @@ COMMAND = "trunkline"
 
 def called(module: str) -> str:
     """`trunkline VERB` where the command `trunkline` called, as `sys.argv[0]` says; else `python -m module`."""
-    told = sys.argv[0] if sys.argv else ""
-    return told if told.startswith(f"{COMMAND} ") else f"python -m {module}"
+    program = sys.argv[0] if sys.argv else ""
+    return program if program.startswith(f"{COMMAND} ") else f"python -m {module}"
 
 
 def set_called(verb: str) -> None:

@@ -125,7 +125,7 @@ def test_scaling_keeps_the_arm_s_proportions():
     np.testing.assert_allclose(model.dof_damping[arm] / start.dof_damping[arm], 0.02 / start.dof_damping[0])
     for one in all_elements(start, BRANCH):  # branches are as stiff beside their springs as before, and as slow
         np.testing.assert_allclose(model.tendon_stiffness[one.tendon] / start.tendon_stiffness[one.tendon], stiffer)
-        np.testing.assert_allclose(model.dof_damping[one.own] / start.dof_damping[one.own], stiffer)
+        np.testing.assert_allclose(model.dof_damping[one.branch] / start.dof_damping[one.branch], stiffer)
 
 
 @pytest.mark.parametrize(("place", "error"), [(0.0, 3 / 2 / 20 + 1 / 2 / 20**2), (0.5, -1 / 4 / 20**2)])

@@ -235,6 +235,6 @@ def test_what_joints_remember_begins_as_the_hand_left_it():
     moving = InMotion(model, {0: experiment}, False, np.zeros(0, int), 1.0)
     batch = moving._batch({"jnt_stiffness": model.jnt_stiffness[None]}, [0])
     branch, slider = elements(model, BRANCH), elements(model, SLIDER)
-    np.testing.assert_allclose(batch.bind("qpos")[0, branch.own], start)
+    np.testing.assert_allclose(batch.bind("qpos")[0, branch.branch], start)
     places = model.tendon_plasticadr[slider.tendon]
     np.testing.assert_allclose(batch.bind("plastic")[0, places], np.tile([0.08, 0.0], 8), atol=1e-12)

@@ -37,12 +37,12 @@ def likeness(code_of: str) -> Likeness:
     return Likeness(parts | {"loops for": _loops()}, code_of)
 
 
-def unlike(found: Likeness | BaseException, expected: Likeness) -> str:
+def unlike(actual: Likeness | BaseException, expected: Likeness) -> str:
     """The first thing in which another process differs from this one, found and expected; empty if in none."""
-    if not isinstance(found, Likeness):
-        return f"found no {OURS} like this one ({type(found).__name__}: {found}), expected the same code"
+    if not isinstance(actual, Likeness):
+        return f"found no {OURS} like this one ({type(actual).__name__}: {actual}), expected the same code"
     for name, value in expected.parts.items():
-        if (other := found.parts.get(name, "none")) != value:
+        if (other := actual.parts.get(name, "none")) != value:
             return f"found {name} {other}, expected {value} as here"
     return ""
 

@@ -22,8 +22,8 @@ def main() -> int:
             "trunkline.compute.worker: found no library distributed, expected trunkline[cluster]"
         ) from None
     hold_arithmetic()  # before the processes begin, as NumPy reads it when it is imported
-    own = [] if "--nworkers" in sys.argv else ["--nworkers", str(thread_count())]
-    command = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", *own, *sys.argv[1:]]
+    processes = [] if "--nworkers" in sys.argv else ["--nworkers", str(thread_count())]
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", "--nthreads", "1", *processes, *sys.argv[1:]]
     os.environ["TRUNKLINE_THREADS"] = "1"
     os.execv(sys.executable, command)
 

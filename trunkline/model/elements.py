@@ -30,24 +30,25 @@ WINDING, PRELOAD, SECTIONS = "winding", "preload", "sections"
 class Elements:
     """Those of one kind and number in a model, one for each of n hinges of the arm.
 
-    tendon, hinge: numbers of their tendons and of the arm's hinges. own: of a branch's own hinges. Shape (n,).
+    tendon, hinge: numbers of their tendons and of the hinges of the arm. branch: hinges of Maxwell elements, empty
+    for other kinds. Shape (n,).
     """
 
     tendon: np.ndarray
     hinge: np.ndarray
-    own: np.ndarray
+    branch: np.ndarray
 
 
 # by model: those that were looked for; names are fixed once a model is compiled, and looking through them takes long
-_KNOWN: WeakKeyDictionary[mujoco.MjModel, dict[tuple[str, int], Elements]] = WeakKeyDictionary()
+_CACHE: WeakKeyDictionary[mujoco.MjModel, dict[tuple[str, int], Elements]] = WeakKeyDictionary()
 
 
 def elements(model: mujoco.MjModel, kind: str, number: int = 1) -> Elements:
     """The model's elements `kind`, BRANCH, SLIDER or DIAGONAL, of this number; none where it was built without."""
-    known = _KNOWN.setdefault(model, {})
-    if (kind, number) not in known:
-        known[kind, number] = _named(model, kind, number)
-    return known[kind, number]
+    cached = _CACHE.setdefault(model, {})
+    if (kind, number) not in cached:
+        cached[kind, number] = _named(model, kind, number)
+    return cached[kind, number]
 
 
 def _named(model: mujoco.MjModel, kind: str, number: int) -> Elements:
@@ -55,25 +56,25 @@ def _named(model: mujoco.MjModel, kind: str, number: int) -> Elements:
     names = {tendon: model.tendon(tendon).name.removesuffix(TIE) for tendon in range(model.ntendon)}
     names = {tendon: name for tendon, name in names.items() if name.endswith(ending)}
     hinges = [model.joint(name.removesuffix(ending)).id for name in names.values()]
-    own = [model.joint(name).id for name in names.values()] if kind == BRANCH else []
-    return Elements(*(np.array(found, dtype=int) for found in (list(names), hinges, own)))
+    own_hinges = [model.joint(name).id for name in names.values()] if kind == BRANCH else []
+    return Elements(*(np.array(numbers, dtype=int) for numbers in (list(names), hinges, own_hinges)))
 
 
 def all_elements(model: mujoco.MjModel, kind: str) -> list[Elements]:
     """Those of every number that the model has, in order."""
-    found = []
-    while len((one := elements(model, kind, len(found) + 1)).tendon):
-        found.append(one)
-    return found
+    result = []
+    while len((group := elements(model, kind, len(result) + 1)).tendon):
+        result.append(group)
+    return result
 
 
 def diagonal_lengths(model: mujoco.MjModel, angles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Numbers of the tendons that are diagonals of round joints (D,), and how long they are, rad, at joint angles
     (..., nq): the sum of the joint's two, and their difference. Shape (..., D)."""
     tendons, lengths = [np.zeros(0, dtype=int)], [np.zeros((*angles.shape[:-1], 0))]
-    for one, sign in zip(all_elements(model, DIAGONAL), (1, -1), strict=False):
-        tendons.append(one.tendon)
-        lengths.append(angles[..., one.hinge] + sign * angles[..., one.hinge + 1])
+    for diagonals, sign in zip(all_elements(model, DIAGONAL), (1, -1), strict=False):
+        tendons.append(diagonals.tendon)
+        lengths.append(angles[..., diagonals.hinge] + sign * angles[..., diagonals.hinge + 1])
     return np.concatenate(tendons), np.concatenate(lengths, axis=-1)
 
 
@@ -83,13 +84,13 @@ def give_way(model: mujoco.MjModel, qpos: np.ndarray) -> None:
     Args:
         qpos: angles of all hinges, rad; those of the arm are read, those of branches written. Shape (..., nq).
     """
-    for one in all_elements(model, BRANCH):
-        qpos[..., one.own] = qpos[..., one.hinge]
+    for branches in all_elements(model, BRANCH):
+        qpos[..., branches.branch] = qpos[..., branches.hinge]
 
 
 def arm_hinges(model: mujoco.MjModel) -> int:
     """How many hinges are the arm's; they come first, branches after them."""
-    return model.njnt - sum(len(branch.own) for branch in all_elements(model, BRANCH))
+    return model.njnt - sum(len(group.branch) for group in all_elements(model, BRANCH))
 
 
 def segment_sites(model: mujoco.MjModel, segments: tuple[str, ...]) -> np.ndarray:

@@ -236,7 +236,7 @@ def branches_of(model: mujoco.MjModel) -> list[Branch]:
     return [
         Branch(joint=model.joint(hinge).name, branch=model.joint(own).name, tie=model.tendon(tendon).name)
         for one in all_elements(model, BRANCH)
-        for hinge, own, tendon in zip(one.hinge, one.own, one.tendon, strict=True)
+        for hinge, own, tendon in zip(one.hinge, one.branch, one.tendon, strict=True)
     ]
 
 

@@ -122,7 +122,7 @@ def _scale_stiffness(fields: Fields, factors: np.ndarray, model: mujoco.MjModel)
         fields["tendon_stiffnesspoly"][:, one.tendon] *= factors[:, one.hinge, None]
     for one in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
         fields["tendon_stiffness"][:, one.tendon] *= factors[:, one.hinge]
-        fields["dof_damping"][:, one.own] *= factors[:, one.hinge[: len(one.own)]]
+        fields["dof_damping"][:, one.branch] *= factors[:, one.hinge[: len(one.branch)]]
 
 
 def _scale_damping(fields: Fields, factors: np.ndarray, model: mujoco.MjModel) -> None:
@@ -277,10 +277,10 @@ def _share(kind: str, number: int) -> Parameter:
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         one = elements(model, kind, number)
-        times = fields["dof_damping"][:, one.own] / fields["tendon_stiffness"][:, one.tendon[: len(one.own)]]
+        times = fields["dof_damping"][:, one.branch] / fields["tendon_stiffness"][:, one.tendon[: len(one.branch)]]
         stiffness = values[:, None] * fields["jnt_stiffness"][:, one.hinge]
         fields["tendon_stiffness"][:, one.tendon] = stiffness
-        fields["dof_damping"][:, one.own] = times * stiffness[:, : len(one.own)]
+        fields["dof_damping"][:, one.branch] = times * stiffness[:, : len(one.branch)]
 
     fields = ("tendon_stiffness", "dof_damping", "jnt_stiffness")
     return Parameter("", fields, read, write, part=f"{kind} {number}", told_by=_moving)
@@ -289,11 +289,13 @@ def _share(kind: str, number: int) -> Parameter:
 def _relaxation_time(number: int) -> Parameter:
     def read(model: mujoco.MjModel) -> float:
         one = elements(model, BRANCH, number)
-        return float(model.dof_damping[one.own[0]] / model.tendon_stiffness[one.tendon[0]]) if len(one.own) else 0.0
+        if not len(one.branch):
+            return 0.0
+        return float(model.dof_damping[one.branch[0]] / model.tendon_stiffness[one.tendon[0]])
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
         one = elements(model, BRANCH, number)
-        fields["dof_damping"][:, one.own] = values[:, None] * fields["tendon_stiffness"][:, one.tendon]
+        fields["dof_damping"][:, one.branch] = values[:, None] * fields["tendon_stiffness"][:, one.tendon]
 
     fields = ("dof_damping", "tendon_stiffness")
     return Parameter("s", fields, read, write, part=f"{BRANCH} {number}", told_by=_moving)

@@ -51,8 +51,8 @@ def add_holes(spec: mujoco.MjSpec, holes: Holes) -> None:
     for cable in cables:
         arms = _moment_arms(straight, data, straight.tendon(cable.name).id)
         if len(arms) < units:
-            found = f"found holes in which cables rub, and {cable.name!r}, which ends at unit {len(arms)} of {units}"
-            raise InputError(f"build_mjcf.holes: {found}, expected cables to the last unit, or `smooth`")
+            problem = f"found holes in which cables rub, and {cable.name!r}, which ends at unit {len(arms)} of {units}"
+            raise InputError(f"build_mjcf.holes: {problem}, expected cables to the last unit, or `smooth`")
         edges = stretch_edges(len(arms), holes.stretches)
         for number, (begin, end) in enumerate(pairwise(edges), start=1):
             rubbing = spec.add_tendon(

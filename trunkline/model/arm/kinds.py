@@ -28,12 +28,12 @@ class Kind(Protocol):
 
 
 def _kinds() -> dict[str, type[Kind]]:
-    found = {}
+    kinds = {}
     for module in pkgutil.iter_modules([str(Path(__file__).parent)], f"{PACKAGE}."):
         for value in list(vars(import_module(module.name)).values()):
             if is_dataclass(value) and value.__module__ == module.name and "kind" in value.__annotations__:
-                found |= dict.fromkeys(get_args(value.__annotations__["kind"]), value)
-    return found
+                kinds |= dict.fromkeys(get_args(value.__annotations__["kind"]), value)
+    return kinds
 
 
 ARMS = _kinds()

@@ -28,8 +28,8 @@ class Section:
 
     def __post_init__(self):
         if (self.bending_stiffness is None) == (self.joint_stiffness is None):
-            found = "neither" if self.joint_stiffness is None else "both"
-            raise ValueError(f"found {found}, expected either bending_stiffness (EI) or joint_stiffness (K)")
+            which = "neither" if self.joint_stiffness is None else "both"
+            raise ValueError(f"found {which}, expected either bending_stiffness (EI) or joint_stiffness (K)")
 
     @property
     def stiffness(self) -> float:

@@ -28,8 +28,8 @@ class Uniform(Chain):
     def __post_init__(self):
         super().__post_init__()
         if (self.bending_stiffness is None) == (self.joint_stiffness is None):
-            found = "neither" if self.joint_stiffness is None else "both"
-            raise ValueError(f"found {found}, expected either bending_stiffness (EI) or joint_stiffness (K)")
+            which = "neither" if self.joint_stiffness is None else "both"
+            raise ValueError(f"found {which}, expected either bending_stiffness (EI) or joint_stiffness (K)")
         if len(self.unit_masses) not in (1, self.units):
             raise ValueError(f"unit_masses: found {len(self.unit_masses)}, expected one for all units, or "
                              f"one for each of the {self.units}")

@@ -78,12 +78,12 @@ def rubbing(batch: Batch, longest: float | None = None) -> Rubbing | None:
 
 def _hinges(model: mujoco.MjModel) -> np.ndarray:
     """Addresses of the two angles of each unit along each cable. Shape (K, n, 2)."""
-    found = []
+    addresses = []
     for cable in cables(model):
         path = slice(model.tendon_adr[cable], model.tendon_adr[cable] + model.tendon_num[cable])
         units = model.body_weldid[model.site_bodyid[model.wrap_objid[path]]][1:]
-        found.append(model.jnt_qposadr[model.body_jntadr[units][:, None] + np.arange(2)])
-    return np.array(found)
+        addresses.append(model.jnt_qposadr[model.body_jntadr[units][:, None] + np.arange(2)])
+    return np.array(addresses)
 
 
 def _arms(model: mujoco.MjModel, tendons: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,10 +93,10 @@ def _arms(model: mujoco.MjModel, tendons: np.ndarray) -> tuple[np.ndarray, np.nd
         tendons: by which cables rub. Shape (K, P).
     """
     entries, slopes = [], []
-    for cable, own in zip(cables(model), tendons, strict=True):
+    for cable, stretches in zip(cables(model), tendons, strict=True):
         row = model.ten_J_rowadr[cable] + np.arange(model.ten_J_rownnz[cable])
         place = dict(zip(model.ten_J_colind[row].tolist(), row.tolist(), strict=True))
-        for tendon in own:
+        for tendon in stretches:
             entries.append(model.tendon_adr[tendon] + np.arange(model.tendon_num[tendon]))
             slopes.append([place[dof] for dof in model.jnt_dofadr[model.wrap_objid[entries[-1]]].tolist()])
     return np.concatenate(entries), np.concatenate(slopes)

@@ -103,8 +103,8 @@ def relax(batch: Batch, model: mujoco.MjModel) -> float:
     # a step never throws the arm past where its motors pull; their own damping ends where a tendon is slack
     pull = batch.expand("actuator_gainprm")[:, :, 0]
     batch.expand("tendon_damping")[:, model.actuator_trnid[:, 0]] = timestep * pull
-    for one in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
-        batch.expand("tendon_stiffness")[:, one.tendon] = 0
+    for group in (*all_elements(model, BRANCH), *all_elements(model, SLIDER)):
+        batch.expand("tendon_stiffness")[:, group.tendon] = 0
     return timestep
 
 

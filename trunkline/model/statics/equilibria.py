@@ -137,12 +137,12 @@ def follow(
         raise ValueError(f"found {tendons} tendons, expected {chain.tendons}")
     if torques is None:
         torques = np.zeros((paths, chain.units, 2))
-    found, gravities = room(chain, paths * steps), plain(gravity, (paths, 3))
+    rows, gravities = room(chain, paths * steps), plain(gravity, (paths, 3))
     over_rows(
         solve_paths, paths, chain, plain(tensions), plain(lengths), gravities, plain(slope), plain(ceiling, (tendons,)),
-        plain(torques), loose_chords(chain, gravities), cables, found,
+        plain(torques), loose_chords(chain, gravities), cables, rows,
     )  # fmt: skip
-    return equilibria(chain, found)
+    return equilibria(chain, rows)
 
 
 def loose_chords(chain: Chain, gravities: np.ndarray) -> np.ndarray:
@@ -183,12 +183,12 @@ def room(chain: Chain, count: int) -> Found:
     )
 
 
-def equilibria(chain: Chain, found: Found) -> Equilibrium:
+def equilibria(chain: Chain, rows: Found) -> Equilibrium:
     """What the kernels found, with the pose of the tip in place of the last unit's."""
-    rotation = Rotation.from_matrix(found.rotation, assume_valid=True)
-    values = found._asdict() | {
-        "position": found.position + found.rotation @ chain.tip,
-        "commands": found.lengths - found.tensions / chain.gain,
+    rotation = Rotation.from_matrix(rows.rotation, assume_valid=True)
+    values = rows._asdict() | {
+        "position": rows.position + rows.rotation @ chain.tip,
+        "commands": rows.lengths - rows.tensions / chain.gain,
     }
     del values["rotation"]
     return Equilibrium(quaternion=wxyz_from_rotation(rotation * rotation_from_wxyz(chain.tip_quaternion)), **values)

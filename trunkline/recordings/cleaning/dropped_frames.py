@@ -34,7 +34,7 @@ def find_lost(time: np.ndarray, positions: np.ndarray, noise: float) -> list[Los
     step = np.median(steps) if len(steps) else 0.0
     even = np.abs(steps - step) < EVEN * step
     window = np.arange(1 - SIDE, SIDE + 1)
-    found = []
+    gaps = []
     fits = [_misfit(np.where(window > 0, window + lost, window)) for lost in range(MOST + 1)]
     shift = np.zeros(len(time), dtype=int)  # frames put in before each frame
     for after in range(SIDE - 1, len(time) - SIDE):
@@ -52,9 +52,9 @@ def find_lost(time: np.ndarray, positions: np.ndarray, noise: float) -> list[Los
         best = int(np.argmin(misfits))
         together = bodies[best, jumped] < bodies[0, jumped] / 2
         if 0 < best < MOST and together.all() and misfits[0] > GAIN * misfits[best]:
-            found.append(Lost(after, best))
+            gaps.append(Lost(after, best))
             shift[after + 1 :] += best
-    return found
+    return gaps
 
 
 def unbroken(time: np.ndarray, positions: np.ndarray) -> slice:

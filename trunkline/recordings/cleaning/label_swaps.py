@@ -38,10 +38,10 @@ def usual_distances(logs: list[np.ndarray]) -> np.ndarray:
     together = np.concatenate(samples)
     distances = np.full(together.shape[1:], np.nan)
     for first, second in zip(*np.triu_indices(len(distances), 1), strict=True):
-        seen = together[:, first, second]
-        seen = seen[np.isfinite(seen)]
-        if len(seen):
-            distances[first, second] = distances[second, first] = np.median(seen)
+        apart = together[:, first, second]
+        apart = apart[np.isfinite(apart)]
+        if len(apart):
+            distances[first, second] = distances[second, first] = np.median(apart)
     return distances
 
 
@@ -100,16 +100,16 @@ def _exchanged(distances: np.ndarray, usual: np.ndarray, bodies: tuple[int, ...]
     others = [b for b in others if np.isfinite(usual[list(bodies), b]).all()][:REFERENCES]
     if len(others) < 2:
         return np.zeros(len(distances), bool)
-    kept, exchanged, contrast, terms, both = (np.zeros(len(distances)) for _ in range(5))
+    as_labelled, exchanged, contrast, terms, both = (np.zeros(len(distances)) for _ in range(5))
     for label, pose in zip(bodies, (*bodies[1:], bodies[0]), strict=True):
-        own, other = usual[label, others], usual[pose, others]
-        found = distances[:, label, others]
-        seen = np.isfinite(found)
-        kept += np.sum(np.where(seen, abs(found - own), 0), axis=1)
-        exchanged += np.sum(np.where(seen, abs(found - other), 0), axis=1)
-        contrast += np.sum(np.where(seen, abs(own - other), 0), axis=1)
-        terms += seen.sum(axis=1)
-        both += seen.any(axis=1)
-    told = ((terms >= 3) | ((terms == 2) & (both == 1))) & (contrast > LEAST_CONTRAST * terms)
-    flagged = told & (kept > 0.5 * contrast) & (exchanged < CLEAR * kept)
+        usual_own, usual_other = usual[label, others], usual[pose, others]
+        measured = distances[:, label, others]
+        visible = np.isfinite(measured)
+        as_labelled += np.sum(np.where(visible, abs(measured - usual_own), 0), axis=1)
+        exchanged += np.sum(np.where(visible, abs(measured - usual_other), 0), axis=1)
+        contrast += np.sum(np.where(visible, abs(usual_own - usual_other), 0), axis=1)
+        terms += visible.sum(axis=1)
+        both += visible.any(axis=1)
+    enough = ((terms >= 3) | ((terms == 2) & (both == 1))) & (contrast > LEAST_CONTRAST * terms)
+    flagged = enough & (as_labelled > 0.5 * contrast) & (exchanged < CLEAR * as_labelled)
     return flagged & ((both == len(bodies)) | lasting(flagged, LONE))

@@ -27,29 +27,29 @@ def take_in(folder: Path, session: Session, limits: Limits) -> Iterator[tuple[Tr
     logs: dict[str, Source | InputError] = {}
     read: list[tuple[Source, Stretch] | InputError] = []
     findings = [Findings(warnings=list(session.shared.get(trial.name, []))) for trial in session.trials]
-    for trial, found in zip(session.trials, findings, strict=True):
+    for trial, record in zip(session.trials, findings, strict=True):
         try:
             if trial.file not in logs:
                 logs[trial.file] = _opened(folder / trial.file, session)
             source = logs[trial.file]
             if isinstance(source, InputError):
                 raise source
-            found.where = f"{source.log.path}: trial {trial.name}"
-            found.log = source.log
-            found.repairs += [f"log: {damage}" for damage in source.log.damage]
-            read.append((source, read_stretch(source, trial, session, limits, found)))
+            record.where = f"{source.log.path}: trial {trial.name}"
+            record.log = source.log
+            record.repairs += [f"log: {damage}" for damage in source.log.damage]
+            read.append((source, read_stretch(source, trial, session, limits, record)))
         except InputError as error:
             read.append(error)
     usable = [(trial, *some) for trial, some in zip(session.trials, read, strict=True) if isinstance(some, tuple)]
     reference = reference_of(session, usable)
-    for trial, some, found in zip(session.trials, read, findings, strict=True):
+    for trial, some, record in zip(session.trials, read, findings, strict=True):
         if isinstance(some, InputError):
-            yield trial, some, found
+            yield trial, some, record
             continue
         try:
-            yield trial, _take(*some, trial, session, reference, limits, found), found
+            yield trial, _take(*some, trial, session, reference, limits, record), record
         except InputError as error:
-            yield trial, error, found
+            yield trial, error, record
 
 
 def _opened(path: Path, session: Session) -> Source | InputError:

@@ -91,7 +91,7 @@ def check_motors(
     if any(within) and not lost:
         return
     recorder = by_recorder(source, session)
-    found = [
+    streams_found = [
         f"no {role} topic"
         if stream is None
         else f"{len(stream.stamps)} messages on {stream.topic}{'' if some else _distance(stream, recorder, stretch)}"
@@ -100,7 +100,7 @@ def check_motors(
     both = "and" if any(within) else "or"
     expected = f"expected commands {both} tendon positions within {limits.clock_offset:g} s of the poses"
     topics = f" among: {', '.join(source.joint_topics) or 'none'} ({kind})" if not any(streams) else ""
-    raise InputError(f"{where}: found {' and '.join(found)}{topics}, {expected}")
+    raise InputError(f"{where}: found {' and '.join(streams_found)}{topics}, {expected}")
 
 
 def by_recorder(source: Source, session: Session) -> bool:

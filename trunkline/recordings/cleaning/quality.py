@@ -36,8 +36,8 @@ def judge(take: Take, findings: Findings) -> Quality:
     """Measure the quality of a take."""
     steps = np.diff(take.time)
     interval = float(np.median(steps))
-    seen = np.isfinite(take.positions[..., 0])
-    gaps = [np.diff(take.time[good]) for good in seen.T]
+    visible = np.isfinite(take.positions[..., 0])
+    gaps = [np.diff(take.time[good]) for good in visible.T]
     shape = (len(take.time), len(take.segments), -1)
     position_noise = noise_level(take.positions.reshape(len(take.time), -1)).reshape(shape[1:])
     angle_noise = None
@@ -50,18 +50,18 @@ def judge(take: Take, findings: Findings) -> Quality:
         findings,
         interval,
         int(np.sum(np.round(steps / interval) - 1)),
-        seen.mean(axis=0),
+        visible.mean(axis=0),
         np.concatenate([gap[gap > 1.5 * interval] for gap in gaps]),
         np.sqrt(np.mean(position_noise**2, axis=1)),
         angle_noise,
     )
 
 
-def by_sentence(qualities: list[Quality], said: Callable[[Findings], list[str]]) -> list[str]:
+def by_sentence(qualities: list[Quality], sentences_of: Callable[[Findings], list[str]]) -> list[str]:
     """What is said of takes, each sentence once, with the trials of which it is said."""
     names: dict[str, list[str]] = {}
     for quality in qualities:
-        for sentence in said(quality.findings):
+        for sentence in sentences_of(quality.findings):
             names.setdefault(sentence, []).append(quality.take.name)
     every = len(qualities)
     who = ["all trials" if len(trials) == every > 1 else ", ".join(trials) for trials in names.values()]
@@ -100,8 +100,8 @@ def remarks(qualities: list[Quality]) -> list[str]:
     """What whoever runs a stage should know at once, a line each."""
     logs = _logs(qualities)
     bare = [log.path.name for log in logs if log.unchecked]
-    told = f"{len(bare)} of {len(logs)} logs have messages without checksums, such as {bare[0]}" if bare else ""
-    return [f"{told}: bits that flipped there go unseen (quality.json: logs)"] if bare else []
+    unchecked = f"{len(bare)} of {len(logs)} logs have messages without checksums, such as {bare[0]}" if bare else ""
+    return [f"{unchecked}: bits that flipped there go unseen (quality.json: logs)"] if bare else []
 
 
 def summary(qualities: list[Quality], gathered: Gathered) -> dict:

@@ -100,11 +100,11 @@ def with_lost_time(time: np.ndarray, positions: np.ndarray, motors: bool, findin
         return time
     count, at = sum(place.frames for place in lost), ", ".join(f"{time[place.after]:.2f}" for place in lost)
     frames = "frame" if count == 1 else "frames"
-    told = f"{count} {frames} lost at {at} s, though the stamps go on evenly: all bodies jump ahead on their ways"
+    sentence = f"{count} {frames} lost at {at} s, though the stamps go on evenly: all bodies jump ahead on their ways"
     if motors:
-        findings.warnings.append(f"{told}; left so, as the motors have a clock of their own")
+        findings.warnings.append(f"{sentence}; left so, as the motors have a clock of their own")
         return time
-    findings.repairs.append(f"{told}; their time put back")
+    findings.repairs.append(f"{sentence}; their time put back")
     return put_back(time, lost)
 
 

@@ -53,29 +53,29 @@ def gather(
             raise error
         gathered.refused[name] = str(error)
 
-    for trial, take, found in taken:
+    for trial, take, record in taken:
         if isinstance(take, InputError):
             refuse(trial.name, take)
         else:
             gathered.takes.append(take)
-            gathered.findings.append(found)
+            gathered.findings.append(record)
     base = None if isinstance(session.base, FixedBase) else session.base
     session_faults = check_plausible(gathered.takes, gathered.findings, base, plausible) if gathered.takes else []
     if plausible.otherwise == "refuse":
-        for take, found in zip(gathered.takes, gathered.findings, strict=True):
-            if found.faults:
-                refuse(take.name, InputError(f"{found.where}: {'; '.join(found.faults)}"))
+        for take, record in zip(gathered.takes, gathered.findings, strict=True):
+            if record.faults:
+                refuse(take.name, InputError(f"{record.where}: {'; '.join(record.faults)}"))
         if session_faults:
             raise InputError(f"{where}: {'; '.join(session_faults)}")
-        used = [not found.faults for found in gathered.findings]
+        used = [not record.faults for record in gathered.findings]
         gathered.takes = [take for take, use in zip(gathered.takes, used, strict=True) if use]
-        gathered.findings = [found for found, use in zip(gathered.findings, used, strict=True) if use]
+        gathered.findings = [record for record, use in zip(gathered.findings, used, strict=True) if use]
     if not gathered.takes:
         first = next(iter(gathered.refused.values()))
         raise InputError(f"{where}: all {len(gathered.refused)} trials refused, the first: {first}")
     missing = _missing(gathered.takes)
-    for found in gathered.findings:
-        found.warnings += found.faults + session_faults + missing
+    for record in gathered.findings:
+        record.warnings += record.faults + session_faults + missing
     settle_vertical(gathered.takes, gathered.findings, session)
     gathered.clock = align_clocks(gathered.takes, gathered.findings, plausible.clock)
     return gathered
@@ -85,10 +85,11 @@ def together(sessions: list[Gathered]) -> Gathered:
     """Of several sessions of one arm all takes, each with its own offset by now; the clock is the one told least."""
     if len(sessions) == 1:
         return sessions[0]
-    takes = [take for one in sessions for take in one.takes]
-    findings = [found for one in sessions for found in one.findings]
-    refused = {name: why for one in sessions for name, why in one.refused.items()}
-    return Gathered(takes, findings, refused, max((one.clock for one in sessions), key=lambda c: c.uncertainty or 0.0))
+    takes = [take for session in sessions for take in session.takes]
+    findings = [record for session in sessions for record in session.findings]
+    refused = {name: why for session in sessions for name, why in session.refused.items()}
+    clock = max((session.clock for session in sessions), key=lambda clock: clock.uncertainty or 0.0)
+    return Gathered(takes, findings, refused, clock)
 
 
 def require_enough(gathered: Gathered, planned: list[TrialEntry]) -> None:
@@ -104,14 +105,14 @@ def _missing(takes: list[Take]) -> list[str]:
     """Splits and experiments that the session lacks, and experiments that one of its splits lacks, a sentence each."""
     splits, kinds = ({getattr(take, key) for take in takes} for key in ("split", "experiment"))
     done = {(take.experiment, take.split) for take in takes}
-    said = [f"splits: no trial of the split {split}: {WITHOUT[split]}" for split in SPLITS if split not in splits]
+    sentences = [f"splits: no trial of the split {split}: {WITHOUT[split]}" for split in SPLITS if split not in splits]
     lacking = [name for name, kind in EXPERIMENTS.items() if name not in kinds and not kind.stepwise]
     if lacking and not any(map(is_stepwise, kinds)):  # an arm that rests throughout needs no other
-        told = "data/raw/README.md tells which settings do without"
+        remedy = "data/raw/README.md tells which settings do without"
         if len(lacking) == 1 and (way_out := EXPERIMENTS[lacking[0]].without):  # two that are missing need another
-            told = f"in params.yaml {way_out}: data/raw/README.md"
-        said.append(f"experiments: no {', '.join(lacking)} in the session: {told}")
-    return said + [
+            remedy = f"in params.yaml {way_out}: data/raw/README.md"
+        sentences.append(f"experiments: no {', '.join(lacking)} in the session: {remedy}")
+    return sentences + [
         f"splits: no {experiment} of the split {split}, which the session has"
         for experiment in EXPERIMENTS
         for split in SPLITS

@@ -16,11 +16,11 @@ def frozen(positions: np.ndarray) -> np.ndarray:
     """
     repeats = np.zeros(positions.shape[:2], bool)
     for body in range(positions.shape[1]):
-        seen = np.flatnonzero(np.isfinite(positions[:, body, 0]))
-        same = np.diff(positions[seen, body], axis=0) == 0
+        visible = np.flatnonzero(np.isfinite(positions[:, body, 0]))
+        same = np.diff(positions[visible, body], axis=0) == 0
         whole = same.all(axis=1)
         long = lasting(whole, SHORTEST - 1)
         rest = same[~long]
-        if 0 < long.sum() < len(seen) / 2 and rest.any(axis=1).mean() <= ROUNDED:
-            repeats[seen[1:][long], body] = True
+        if 0 < long.sum() < len(visible) / 2 and rest.any(axis=1).mean() <= ROUNDED:
+            repeats[visible[1:][long], body] = True
     return repeats

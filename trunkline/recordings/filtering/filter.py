@@ -62,10 +62,10 @@ def filter_take(take: Take, settings: Filter) -> tuple[Trial, Effect]:
         samples = positions[:, index]
         if quaternions is not None:
             samples = np.hstack([samples, quaternions[:, index]])
-        found = _segment(take.time, samples, grid, settings, f"trial {take.name}: {name!r}")
-        columns[:, index], measured[:, index] = found.columns, found.measured
-        filled, dropped = filled + found.filled, dropped + found.dropped
-        removed.append(found.removed)
+        filtered = _segment(take.time, samples, grid, settings, f"trial {take.name}: {name!r}")
+        columns[:, index], measured[:, index] = filtered.columns, filtered.measured
+        filled, dropped = filled + filtered.filled, dropped + filtered.dropped
+        removed.append(filtered.removed)
     noise = np.sqrt(np.mean(removed, axis=0))
     if width == 7:
         columns[..., 3:] /= np.linalg.norm(columns[..., 3:], axis=-1, keepdims=True)
@@ -125,10 +125,10 @@ def start_of(trial: Trial, kind: Kind, settings: Filter) -> dict:
         return {}
     smooth = partial(low_pass, rate=1 / (trial.time[1] - trial.time[0]), cutoff=settings.cutoff, order=settings.order)
     begun = kind.start(trial, smooth)
-    found = {"start": begun.time, "start_sigma": begun.sigma, "in_motion": begun.in_motion, "swaying": begun.swaying}
+    fields = {"start": begun.time, "start_sigma": begun.sigma, "in_motion": begun.in_motion, "swaying": begun.swaying}
     if kind.free is not None and settings.release == "free":
-        found |= {"start": kind.free(trial, begun.time), "in_motion": True, "swaying": False}
-    return found
+        fields |= {"start": kind.free(trial, begun.time), "in_motion": True, "swaying": False}
+    return fields
 
 
 def _settled(

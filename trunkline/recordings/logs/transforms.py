@@ -37,8 +37,8 @@ def in_one_frame(
     if target is None:
         return moving, [root for root, _ in Counter(path[-1] for path in paths.values()).most_common()]
     if target not in above.values():
-        found = ", ".join(sorted(set(above.values())))
-        raise ValueError(f"found poses in the frames {found}, expected {target!r}, as in session.yaml: frame.name")
+        frames = ", ".join(sorted(set(above.values())))
+        raise ValueError(f"found poses in the frames {frames}, expected {target!r}, as in session.yaml: frame.name")
     moving = moving.take(np.isin(moving.names, [name for name, path in paths.items() if target in path[1:]]))
     time = np.concatenate([np.full(len(static.names), ALWAYS), moving.clock])
     names = np.concatenate([static.names, moving.names])
@@ -48,10 +48,10 @@ def in_one_frame(
     for name in np.unique(moving.names).tolist():
         rows = np.flatnonzero(moving.names == name)
         for parent in paths[name][1 : paths[name].index(target)]:
-            known = np.flatnonzero(names == parent)
-            known = known[np.argsort(time[known], kind="stable")]
-            latest = np.searchsorted(time[known], moving.clock[rows], side="right") - 1
-            outer = known[np.maximum(latest, 0)]
+            transforms = np.flatnonzero(names == parent)
+            transforms = transforms[np.argsort(time[transforms], kind="stable")]
+            latest = np.searchsorted(time[transforms], moving.clock[rows], side="right") - 1
+            outer = transforms[np.maximum(latest, 0)]
             there = np.where(latest[:, None] < 0, np.nan, turns[outer])
             positions[rows], quaternions[rows] = _product(places[outer], there, positions[rows], quaternions[rows])
     return moving._replace(positions=positions, quaternions=quaternions), [target]

@@ -59,8 +59,8 @@ def propose(surveys: list[Survey], up: tuple[int, int, int] | None = None) -> st
         later = [other for _, other, _ in trials[index + 1 :]]
         earlier = [other for _, other, _ in trials[:index]]
         split = VALIDATE if experiment in earlier and experiment not in later else IDENTIFY
-        told = "" if level is None else f", level: {level:g}"
-        lines.append(f"  - {{file: {_quoted(path.name)}, experiment: {experiment}{told}, split: {split}}}")
+        level_text = "" if level is None else f", level: {level:g}"
+        lines.append(f"  - {{file: {_quoted(path.name)}, experiment: {experiment}{level_text}, split: {split}}}")
     return "\n".join(lines) + "\n"
 
 
@@ -111,10 +111,10 @@ def _experiment(
         experiment = names[word[1]]
     else:
         rests = pull <= MIN_TRAVEL and travel < RESTING
-        asked = survey.commands or survey.tendon_positions  # encoders may start anywhere
-        held = asked is not None and np.nan_to_num(asked.positions).max(initial=0.0) > MIN_TRAVEL
-        seen = (pull > MIN_TRAVEL or (rests and held), rests)
-        experiment = next(name for name, kind in EXPERIMENTS.items() if (kind.needs_motors, kind.static) == seen)
+        motors = survey.commands or survey.tendon_positions  # encoders may start anywhere
+        pulled = motors is not None and np.nan_to_num(motors.positions).max(initial=0.0) > MIN_TRAVEL
+        signs = (pull > MIN_TRAVEL or (rests and pulled), rests)
+        experiment = next(name for name, kind in EXPERIMENTS.items() if (kind.needs_motors, kind.static) == signs)
     level = EXPERIMENTS[experiment].level
     if level is PULL:
         return experiment, round(1e3 * pull)

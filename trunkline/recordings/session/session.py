@@ -36,14 +36,14 @@ def _folder_name(name: str) -> str:
 SessionName = Annotated[str, AfterValidator(_folder_name)]
 
 
-def _no_list(found):
-    if isinstance(found, list):
-        names = ", ".join(map(str, found))
+def _no_list(value):
+    if isinstance(value, list):
+        names = ", ".join(map(str, value))
         raise ValueError(
             f"found a list, expected one folder: move these sessions into one, such as data/raw/arm_7, and write "
             f"session: arm_7, only: [{names}]"
         )
-    return found
+    return value
 
 
 def _each_once(names: list[str]) -> list[str]:
