@@ -19,7 +19,7 @@ from trunkline.ar.teleop.shaping import Kind, shaped, shaper_of
 from trunkline.ar.teleop.trajectory import Limits, point_to_point
 from trunkline.ar.teleop.vibration import Swings, slowest, swings
 from trunkline.frames import gravity_in_base
-from trunkline.model.elements import BACKLASH, RATE_LIMIT, give_way, numeric
+from trunkline.model.elements import BACKLASH, RATE_LIMIT, numeric, unload_branches
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.model.simulation.rest import base_frame, settle
 from trunkline.pipeline.inputs import read_model
@@ -133,7 +133,7 @@ def at_rest(model: mujoco.MjModel, count: int, held: np.ndarray, gravity: np.nda
     if numeric(model, RATE_LIMIT) or numeric(model, BACKLASH):
         raise ValueError("found winches with a rate limit or backlash, expected none: this study does not wind them")
     rest = settle(model, held[None], gravity[None]).qpos
-    give_way(model, rest)
+    unload_branches(model, rest)
     batch = batch_of(model, count)
     batch.expand("opt.gravity")[:] = base_frame(model)[1] @ gravity
     hold(batch, model, np.tile(held, (count, 1)))

@@ -40,7 +40,7 @@ from trunkline.identification.fit.setup import set_up
 from trunkline.identification.simulate.experiment import Experiment, prepare
 from trunkline.identification.simulate.loss import loss_of
 from trunkline.identification.uncertainty.trial_diagnostics import suspicions
-from trunkline.model.elements import give_way
+from trunkline.model.elements import unload_branches
 from trunkline.pipeline.config import load_config
 from trunkline.pipeline.identify import TRIALS as FILTERED
 from trunkline.pipeline.identify import read_reported
@@ -105,7 +105,7 @@ def swung(trial: Trial, rng: np.random.Generator) -> Trial:
         if frame <= released:
             since = rate * (time - trial.time[released]) + phase
             data.qpos[:arm], data.qvel[:arm] = start.start + along / rate * np.sin(since), along * np.cos(since)
-            give_way(model, data.qpos)
+            unload_branches(model, data.qpos)
             data.ctrl[:] = start.controls[0]
             data.act[:] = start.controls[0][: model.na]
         else:

@@ -25,7 +25,7 @@ from trunkline.errors import InputError, in_one_line
 from trunkline.identification.fit.linearisation import DIFFERENCE, RUBBING_DIFFERENCE
 from trunkline.identification.parameters.parameters import PARAMETERS, Fields, candidate_fields, set_fields
 from trunkline.identification.simulate.experiment import SLACK
-from trunkline.model.elements import arm_hinges, give_way
+from trunkline.model.elements import arm_hinges, unload_branches
 from trunkline.model.simulation.motion import batch_of, hold
 from trunkline.pipeline.config import load_config
 from upkeep.results import recorded
@@ -92,7 +92,7 @@ def let_go(model: mujoco.MjModel) -> tuple[mujoco.MjData, np.ndarray]:
     controls = np.tile(model.tendon_length0[model.actuator_trnid[:, 0]] + SLACK, (_steps(model), 1))
     start = _held(model, controls[0])
     start.qpos[: arm_hinges(model)] = np.tile([0.5 * BEND, BEND], arm_hinges(model) // 2)
-    give_way(model, start.qpos)
+    unload_branches(model, start.qpos)
     return start, controls
 
 

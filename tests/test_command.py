@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from trunkline.__main__ import VERBS, Verb, main
-from trunkline.program import called
+from trunkline.program import program_name
 
 ROOT = Path(__file__).parents[1]
 HEAVY = ("numpy", "mujoco", "torch", "pandas", "dvc", "rich")
@@ -53,7 +53,7 @@ def test_a_verb_s_own_help_names_it_as_it_was_called(name, capsys):
 
 
 def test_called_as_a_module_a_verb_s_help_names_the_module():
-    assert called("trunkline.tools.preflight") == "python -m trunkline.tools.preflight"
+    assert program_name("trunkline.tools.preflight") == "python -m trunkline.tools.preflight"
 
 
 @pytest.mark.parametrize(("typed", "meant"), [("chek", "check"), ("sugest", "suggest"), ("randomize", "randomise")])

@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import NamedTuple
 
 from trunkline.errors import InputError, in_one_line, nearest
-from trunkline.program import COMMAND, set_called
+from trunkline.program import COMMAND, set_program_name
 from trunkline.version import __version__
 
 
@@ -72,7 +72,7 @@ def main(arguments: list[str] | None = None) -> int:
         extras = ",".join(filter(None, ("pipeline", verb.extra)))
         problem = f"found no module {error.name!r}, expected what `pip install 'trunkline[{extras}]'` brings"
         raise InputError(f"{COMMAND} {name}: {problem}") from error
-    set_called(name)
+    set_program_name(name)
     return module.main(rest)
 
 

@@ -11,7 +11,7 @@ from stages import build_mjcf
 from trunkline.frames import gravity_in_base
 from trunkline.identification.simulate.experiment import SLACK, Experiment
 from trunkline.identification.simulate.pose_fit import PoseFit
-from trunkline.model.arm.cad import Chain
+from trunkline.model.arm.cad import ChainArm
 from trunkline.model.elements import arm_hinges, cables
 from trunkline.model.statics.supported import unit_bodies
 from trunkline.pipeline.config import load_config
@@ -54,7 +54,7 @@ def _evaluation_time(case: Case, count: int, trials: int, repeats: int) -> Spent
 def _case_of_units(case: Case, units: int) -> Case:
     first = case.experiments[0]
     config = load_config(build_mjcf.Config, "build_mjcf")
-    assert isinstance(config.arm, Chain)
+    assert isinstance(config.arm, ChainArm)
     model = build_mjcf.cad_arm(replace(config, arm=replace(config.arm, units=units))).spec.compile()
     experiment, segments = bent_release(model, first.frames, first.frame_step)
     return replace(case, model=model, experiments=[experiment], fit=replace(case.fit, segments=segments))

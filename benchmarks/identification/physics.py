@@ -15,14 +15,14 @@ from benchmarks.identification.timing import alternate
 from stages.build_mjcf import Config, cad_arm
 from trunkline.identification.simulate.experiment import Experiment
 from trunkline.identification.simulate.population import Population
-from trunkline.model.arm.guide_holes import Holes
-from trunkline.model.arm.joints import Branch, Joints, Slider
+from trunkline.model.arm.guide_holes import GuideHoles
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
 from trunkline.pipeline.config import load_config
 
 CANDIDATES = 4
-BRANCHES = [Branch(0.3, 0.5), Branch(0.2, 2.0)]
-SLIDERS = [Slider(0.2, 0.02), Slider(0.1, 0.05), Slider(0.1, 0.1)]
-HOLES = Holes(0.2, 8)
+BRANCHES = [MaxwellElement(0.3, 0.5), MaxwellElement(0.2, 2.0)]
+SLIDERS = [JenkinsElement(0.2, 0.02), JenkinsElement(0.1, 0.05), JenkinsElement(0.1, 0.1)]
+HOLES = GuideHoles(0.2, 8)
 DEAD_TIME, RATE_LIMIT, BACKLASH = 0.02, 0.25, 3e-4  # s, m/s, m
 
 
@@ -31,7 +31,7 @@ class Terms:
     """What a row's model has beside springs, dampers and motors with a lag; s, m/s and m."""
 
     joints: Joints = field(default_factory=Joints)
-    holes: Holes = field(default_factory=Holes)
+    holes: GuideHoles = field(default_factory=GuideHoles)
     dead_time: float = 0.0
     rate_limit: float = 0.0
     backlash: float = 0.0

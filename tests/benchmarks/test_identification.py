@@ -29,7 +29,7 @@ from trunkline.identification.parameters.parameters import candidate_fields, set
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.population import Population
-from trunkline.model.elements import BRANCH, SLIDER, all_elements, capstan_friction, holes, numeric
+from trunkline.model.elements import BRANCH, SLIDER, all_elements, capstan_friction, hole_tendons, numeric
 
 TRUTH = np.log([0.09, 0.5])
 SIZE = Size(budget=0.5, seeds=2, repeats=1, units=(3, 5))
@@ -113,7 +113,7 @@ def test_the_row_of_all_terms_has_all_of_them():
     model = model_with(OF_CABLES["all, those of joints too"])
     assert (len(all_elements(model, BRANCH)), len(all_elements(model, SLIDER))) == (2, 3)
     assert capstan_friction(model) == HOLES.friction
-    assert holes(model).shape == (3, HOLES.stretches)
+    assert hole_tendons(model).shape == (3, HOLES.stretches)
     assert (model.actuator_delay == DEAD_TIME).all()
     assert (numeric(model, "rate_limit"), numeric(model, "backlash")) == (RATE_LIMIT, BACKLASH)
     plain = model_with(OF_CABLES[NONE])

@@ -22,7 +22,7 @@ from tests.support.small_arm import small_spec
 from trunkline.compute import cluster as workers
 from trunkline.compute import scheduler
 from trunkline.compute.cluster import VARIABLE
-from trunkline.compute.environment import likeness_for
+from trunkline.compute.environment import fingerprint_for
 from trunkline.compute.scheduler import arriving, pieces, spread
 from trunkline.errors import InputError
 from trunkline.identification.fit.problem import Bounds, Problem
@@ -34,7 +34,7 @@ from trunkline.kinematics.dataset import sampling
 from trunkline.kinematics.dataset.deviation import mujoco_deviation
 from trunkline.kinematics.dataset.table import sample_table
 from trunkline.kinematics.panda import labels
-from trunkline.model.arm.guide_holes import Holes, add_holes
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.statics.chain import read_chain
 from trunkline.pipeline.identify import CAD_MODEL, run
 from trunkline.pipeline.stage import output_folder
@@ -70,7 +70,7 @@ def rubbing_model():
     """Cables rub, winches wind at a limited rate and with backlash: all that goes on between two steps."""
     spec = small_spec(4, rate_limit=0.3, backlash=1e-3)
     spec.option.timestep = FRAME / 8
-    add_holes(spec, Holes(0.1, 2))
+    add_holes(spec, GuideHoles(0.1, 2))
     return spec.compile()
 
 
@@ -233,9 +233,9 @@ def _mistaken(_, piece):
 @pytest.mark.parametrize("joined_late", [False, True])
 def test_a_worker_with_another_library_is_refused_in_one_line(spreading, monkeypatch, joined_late):
     spreading()
-    real = likeness_for(_mistaken)
+    real = fingerprint_for(_mistaken)
     wanted = replace(real, parts=real.parts | {"mujoco": "9.9.9"})
-    monkeypatch.setattr(workers, "likeness_for", lambda _: wanted)
+    monkeypatch.setattr(workers, "fingerprint_for", lambda _: wanted)
     own = scheduler._cluster()
     monkeypatch.setattr(own, "_alike", set())
     if joined_late:

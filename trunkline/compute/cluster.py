@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from trunkline.compute.environment import Likeness, likeness, likeness_for, unlike
+from trunkline.compute.environment import Fingerprint, difference_from, fingerprint, fingerprint_for
 from trunkline.errors import InputError
 
 VARIABLE = "TRUNKLINE_SCHEDULER"
@@ -69,7 +69,7 @@ class Cluster:
 
     def arriving(self, work: Callable, parts: list, shared: Any) -> Iterator[tuple[int, Any]]:
         """As `trunkline.compute.scheduler.arriving`."""
-        expected, futures = likeness_for(work), []
+        expected, futures = fingerprint_for(work), []
         with self._failing():
             try:
                 self._check(expected)
@@ -132,14 +132,14 @@ class Cluster:
             self._shared[id(shared)] = shared, self._client.submit(_itself, packed, pure=False)
         return self._shared[id(shared)][1]
 
-    def _check(self, expected: Likeness) -> None:
+    def _check(self, expected: Fingerprint) -> None:
         """Refuse workers that are not as this process, before they have any work; those that come later refuse it."""
         there = self._client.scheduler_info(n_workers=-1)["workers"]
         new = [address for address in there if (address, expected.code_of) not in self._alike]
-        answers = self._client.run(likeness, expected.code_of, workers=new, on_error="return") if new else {}
+        answers = self._client.run(fingerprint, expected.code_of, workers=new, on_error="return") if new else {}
         for address, answer in answers.items():
-            if difference := unlike(answer, expected):
-                raise InputError(f"{VARIABLE}: worker {address}: {difference}")
+            if mismatch := difference_from(answer, expected):
+                raise InputError(f"{VARIABLE}: worker {address}: {mismatch}")
             self._alike.add((address, expected.code_of))
 
 
@@ -163,16 +163,16 @@ def _itself(packed: _SharedValue) -> _SharedValue:
     return packed
 
 
-def _do(work: Callable, expected: Likeness, packed: _SharedValue, part: bytes) -> bytes:
+def _do(work: Callable, expected: Fingerprint, packed: _SharedValue, part: bytes) -> bytes:
     """What a worker, which has to be as `expected`, does with a piece.
 
     Part and result are packed here: Dask would look for tasks of its own in the one, and may hand over arrays that
     cannot be written to.
     """
-    if difference := unlike(likeness(expected.code_of), expected):
+    if mismatch := difference_from(fingerprint(expected.code_of), expected):
         import distributed
 
-        raise InputError(f"{VARIABLE}: worker {distributed.get_worker().address}: {difference}")
+        raise InputError(f"{VARIABLE}: worker {distributed.get_worker().address}: {mismatch}")
     from threadpoolctl import threadpool_limits
 
     os.environ.setdefault("TRUNKLINE_THREADS", "1")  # workers are as many as the machine has cores

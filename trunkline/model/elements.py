@@ -78,7 +78,7 @@ def diagonal_lengths(model: mujoco.MjModel, angles: np.ndarray) -> tuple[np.ndar
     return np.concatenate(tendons), np.concatenate(lengths, axis=-1)
 
 
-def give_way(model: mujoco.MjModel, qpos: np.ndarray) -> None:
+def unload_branches(model: mujoco.MjModel, qpos: np.ndarray) -> None:
     """Put the joints' branches where they bear nothing, in place: those of an arm that was long in the pose `qpos`.
 
     Args:
@@ -108,7 +108,7 @@ def hole_name(cable: str, number: int) -> str:
     return f"{cable}_{HOLE}_{number}"
 
 
-def holes(model: mujoco.MjModel) -> np.ndarray:
+def hole_tendons(model: mujoco.MjModel) -> np.ndarray:
     """Numbers of the tendons by which each cable rubs, P for each. Shape (K, P), P = 0 where nothing rubs."""
     tendons = [t for t in range(model.ntendon) if is_hole(model.tendon(t).name)]
     return np.array(tendons, dtype=int).reshape(len(cables(model)), -1) if tendons else np.zeros((0, 0), dtype=int)
@@ -173,13 +173,13 @@ def switch_off(model: mujoco.MjModel, *names: str) -> None:
             model.numeric_data[place] = 0
 
 
-def let_slide(model: mujoco.MjModel) -> None:
+def switch_off_capstan_friction(model: mujoco.MjModel) -> None:
     """Take the friction of cables on their holes from a model, in place."""
     switch_off(model, CAPSTAN_FRICTION)
 
 
-def let_hang(model: mujoco.MjModel) -> None:
+def switch_off_cables(model: mujoco.MjModel) -> None:
     """Take all cables from a model in place, for where they are slack and so move nothing: each is cut down to a
     point, as its path takes much of a step."""
-    let_slide(model)
+    switch_off_capstan_friction(model)
     model.tendon_num[cables(model)] = 1

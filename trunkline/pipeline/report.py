@@ -12,7 +12,7 @@ from pathlib import Path
 
 from trunkline.errors import in_one_line
 from trunkline.pipeline.checkout import require_checkout
-from trunkline.program import called
+from trunkline.program import program_name
 
 PAGE = Path("artifacts/report/certificate.html")
 
@@ -20,7 +20,7 @@ PAGE = Path("artifacts/report/certificate.html")
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.pipeline.report"), description=__doc__,
+        prog=program_name("trunkline.pipeline.report"), description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="say what changed since they ran, and run none")

@@ -21,8 +21,8 @@ from trunkline.identification.parameters.parameters import PARAMETERS, candidate
 from trunkline.identification.simulate.experiment import prepare
 from trunkline.identification.simulate.loss import LossWeights
 from trunkline.identification.simulate.population import Population
-from trunkline.model.arm.joints import Branch, Joints, Slider
-from trunkline.model.elements import arm_hinges, cables, give_way, let_hang
+from trunkline.model.arm.joints import JenkinsElement, Joints, MaxwellElement
+from trunkline.model.elements import arm_hinges, cables, switch_off_cables, unload_branches
 from trunkline.model.simulation import motion
 from trunkline.model.simulation.motion import batch_of, hold, move
 from trunkline.pipeline.identify import CAD_MODEL, run
@@ -70,7 +70,7 @@ def varied(batch: Batch, model: mujoco.MjModel, kind: str) -> np.ndarray:
     else:
         angles, hinges = batch.bind("qpos"), arm_hinges(model)
         angles[:, :hinges] = np.tile([0.02, 0.04], hinges // 2)
-        give_way(model, angles)
+        unload_branches(model, angles)
     hold(batch, model, controls[:, 0])
     return controls
 
@@ -122,7 +122,7 @@ def test_a_dead_time_that_takes_samples_as_they_are_is_refused(warp):
 
 def test_cables_cut_down_to_a_point_are_refused(warp):
     model = small_model()
-    let_hang(model)
+    switch_off_cables(model)
     with pytest.raises(InputError, match="found a cable cut down to a point"):
         batch_of(model, 2, rough=True)
 
@@ -148,7 +148,7 @@ def late():
 
 
 def with_elements():
-    return small_model(joints=Joints([Branch(0.3, 0.5)], [Slider(0.2, 0.02)], True))
+    return small_model(joints=Joints([MaxwellElement(0.3, 0.5)], [JenkinsElement(0.2, 0.02)], True))
 
 
 @pytest.mark.parametrize("model_of", [small_model, with_elements, late])
@@ -200,7 +200,7 @@ def test_one_that_diverges_is_warned_of_and_stays(library, field, value):
 
 def test_friction_that_some_simulations_have_alone_acts(library):
     """What Warp asks of a model once, whether anything is not 0, is asked of all simulations."""
-    model = small_model(joints=Joints([Branch(0.3, 0.5)]))
+    model = small_model(joints=Joints([MaxwellElement(0.3, 0.5)]))
     found = []
     for batch in (batch_of(model, 2), batch_of(model, 2, rough=True)):
         controls = varied(batch, model, "release")

@@ -7,7 +7,7 @@ import pytest
 from tests.support.bent_chain import hardening_stump, stump, stump_spec
 from trunkline.frames import gravity_in_base
 from trunkline.kinematics.dataset.sampling import pull_directions
-from trunkline.model.arm.guide_holes import Holes, add_holes
+from trunkline.model.arm.guide_holes import GuideHoles, add_holes
 from trunkline.model.elements import SLIP
 from trunkline.model.simulation.drive import drive
 from trunkline.model.statics.capstan import eliminate, solve_eliminated
@@ -180,7 +180,7 @@ def test_slow_motors_in_mujoco_come_to_rest_there():
     spec = stump_spec()
     for cable in spec.tendons:
         cable.frictionloss = 0.0
-    add_holes(spec, Holes(FRICTION, 7))
+    add_holes(spec, GuideHoles(FRICTION, 7))
     model = spec.compile()
     model.dof_frictionloss[:] = 0
     chain = read_chain(model)
@@ -223,7 +223,7 @@ def test_friction_builds_up_within_the_slip_length(chain, slip):
 
 def test_a_model_says_its_slip_length_and_one_that_does_not_has_the_usual():
     spec, without = stump_spec(), stump_spec()
-    add_holes(spec, Holes(FRICTION, 7, slip=7e-4))
+    add_holes(spec, GuideHoles(FRICTION, 7, slip=7e-4))
     assert read_chain(spec.compile()).slip == 7e-4
     again = mujoco.MjSpec.from_string(spec.to_xml())
     assert read_chain(again.compile()).slip == 7e-4

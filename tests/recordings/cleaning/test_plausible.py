@@ -21,14 +21,14 @@ from tests.support.sessions import (
     static_truth,
 )
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Findings, Limits
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.cleaning.sanity_checks import Plausible, check_plausible
-from trunkline.recordings.cleaning.session_checks import gather
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.cleaning.sanity_checks import SanityLimits, check_sanity
+from trunkline.recordings.cleaning.session_checks import check_session
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-PLAUSIBLE = Plausible(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+PLAUSIBLE = SanityLimits(still=0.02, distance=0.1, pull=3.0, clock=0.1, otherwise="refuse")
 NO_TEST = "splits: no trial of the split test: no error is of trials that nothing was decided on"
 
 
@@ -58,15 +58,16 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def sound(folder):
-    """What `take_in` gives of a sound session; by trial."""
-    return {trial.name: (trial, take, found) for trial, take, found in take_in(folder, read_session(folder), LIMITS)}
+    """What `load_raw_trials` gives of a sound session; by trial."""
+    loaded = load_raw_trials(folder, read_session(folder), LIMITS)
+    return {trial.name: (trial, raw, findings) for trial, raw, findings in loaded}
 
 
 def judged(sound, base="base", **changed):
     """(what is said of each trial, of the session) after `changed` takes, by trial."""
     takes = [changed.get(name, take) for name, (_, take, _) in sound.items()]
     findings = [Findings() for _ in takes]
-    session = check_plausible(takes, findings, base, PLAUSIBLE)
+    session = check_sanity(takes, findings, base, PLAUSIBLE)
     return {take.name: found.faults for take, found in zip(takes, findings, strict=True) if found.faults}, session
 
 
@@ -86,7 +87,7 @@ def moved(take, body, offset):
 
 def test_a_sound_session_has_no_fault_and_no_warning(folder, sound):
     assert judged(sound) == ({}, [])
-    gathered = gather(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
+    gathered = check_session(sound.values(), read_session(folder), PLAUSIBLE, "stop", "sound")
     assert [found.repairs + found.warnings for found in gathered.findings] == [[NO_TEST]] * len(sound)
 
 
@@ -99,7 +100,7 @@ def test_real_recordings_have_no_fault(tmp_path):
     head = ["frame: {up: [0, 1, 0]}", "base: {position: [0.1015, 0.0, 0.105]}", "trials:"]
     (tmp_path / "session.yaml").write_text("\n".join(head + lines) + "\n")
     session = read_session(tmp_path)
-    gathered = gather(take_in(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
+    gathered = check_session(load_raw_trials(tmp_path, session, LIMITS), session, PLAUSIBLE, "stop", "real")
     assert len(gathered.takes) == 13
     for found in gathered.findings:
         no_validate, no_test, no_others = found.warnings
@@ -338,7 +339,7 @@ def test_static_pulls_have_no_say_in_the_clocks(tmp_path):
     truth.commands = held * np.clip(np.arange(len(held)) / 40, 0, 1)[:, None]
     truth.tendon_positions = truth.tendon_positions * np.clip(np.arange(len(truth.time)) / 200, 0, 1)[:, None]
     record(tmp_path, [truth], instruments())
-    ((_, _, found),) = take_in(tmp_path, read_session(tmp_path), LIMITS)
+    ((_, _, found),) = load_raw_trials(tmp_path, read_session(tmp_path), LIMITS)
     assert found.by_motion is None
 
 
@@ -362,7 +363,7 @@ def test_what_is_not_plausible_is_refused_left_out_or_said(folder, sound):
     def gathered(otherwise, refused_trials):
         taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
         taken["release_a"] = trial, moved(take, 2, 0.5), replace(found, warnings=[], faults=[])
-        return gather(taken.values(), session, replace(PLAUSIBLE, otherwise=otherwise), refused_trials, "here")
+        return check_session(taken.values(), session, replace(PLAUSIBLE, otherwise=otherwise), refused_trials, "here")
 
     with pytest.raises(InputError, match=r"release_a\.mcap: trial release_a: 'unit_06' is "):
         gathered("refuse", "stop")
@@ -379,7 +380,7 @@ def test_a_level_that_the_base_contradicts_is_said(folder, sound):
     trial, take, _ = sound["tilt_60"]
     taken = {name: (t, some, replace(f, warnings=[], faults=[])) for name, (t, some, f) in sound.items()}
     taken["tilt_60"] = trial, replace(take, level=10.0), taken["tilt_60"][2]
-    gathered = gather(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
+    gathered = check_session(taken.values(), read_session(folder), PLAUSIBLE, "stop", "here")
     said = {take.name: found.warnings for take, found in zip(gathered.takes, gathered.findings, strict=True)}
     assert said["tilt_60"][1].startswith("level: found 10, but the base is tilted by 60°")
     assert all(said[name] == [NO_TEST] for name in said if name != "tilt_60")
@@ -388,7 +389,7 @@ def test_a_level_that_the_base_contradicts_is_said(folder, sound):
 def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
     kept = [trial for name, trial in sound.items() if name != "curl_60"]
     taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in kept]
-    gathered = gather(taken, read_session(folder), PLAUSIBLE, "stop", "here")
+    gathered = check_session(taken, read_session(folder), PLAUSIBLE, "stop", "here")
     said = [NO_TEST, "splits: no curl of the split validate, which the session has"]
     assert all(found.warnings == said for found in gathered.findings)
 
@@ -421,13 +422,13 @@ def test_an_experiment_that_a_split_lacks_is_said(folder, sound):
 )
 def test_a_split_or_an_experiment_that_the_session_lacks_is_said(folder, sound, kept, said):
     taken = [(t, some, replace(f, warnings=[], faults=[])) for t, some, f in sound.values() if kept(some)]
-    for found in gather(taken, read_session(folder), PLAUSIBLE, "stop", "here").findings:
+    for found in check_session(taken, read_session(folder), PLAUSIBLE, "stop", "here").findings:
         assert [one for one in found.warnings if one.startswith(("splits:", "experiments:"))] == said
 
 
 def test_usual_distances_of_other_splits_are_said(tmp_path):
     record(tmp_path, [release_truth("validate"), static_truth(0.0, "validate")], instruments())
-    for _, _, found in take_in(tmp_path, read_session(tmp_path), LIMITS):
+    for _, _, found in load_raw_trials(tmp_path, read_session(tmp_path), LIMITS):
         assert "no trial of the split identify can be read: the unit and the usual" in found.warnings[0]
 
 
@@ -437,7 +438,7 @@ def test_a_body_nowhere_is_not_taken_for_seen(tmp_path, value):
     m.positions[:, 3] = value
     write_log(tmp_path / f"{m.name}.mcap", m)
     write_session(tmp_path, [m], instruments())
-    ((_, error, found),) = take_in(tmp_path, read_session(tmp_path), LIMITS)
+    ((_, error, found),) = load_raw_trials(tmp_path, read_session(tmp_path), LIMITS)
     assert isinstance(error, InputError)
     assert "trial release_a: 'unit_06' is seen in 0.0 %" in str(error)
     assert any("(unit_06)" in said for said in found.repairs)

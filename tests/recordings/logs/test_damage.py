@@ -12,14 +12,14 @@ from stages import ingest
 from tests.support.sessions import SEGMENTS, all_truths, curl_truth, instruments, record, release_truth, static_truth
 from tests.support.workbench import ROOT
 from trunkline.pipeline.stage import run_stage
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.clock_offset import settle_vertical
-from trunkline.recordings.cleaning.label_swaps import find_swaps, usual_distances
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.cleaning.stale_poses import frozen
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.clock_offset import set_gravity_direction
+from trunkline.recordings.cleaning.label_swaps import find_label_swaps, usual_distances
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.cleaning.stale_poses import stale_samples
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 CLEAN = instruments(occlusions_per_s=0.3, outliers=0)
 
 
@@ -40,8 +40,8 @@ def session(folder, change=None, truths=None, settings=CLEAN):
 
 def taken(folder):
     found = read_session(folder)
-    _, takes, findings = zip(*take_in(folder, found, LIMITS), strict=True)
-    settle_vertical(takes, findings, found)
+    _, takes, findings = zip(*load_raw_trials(folder, found, LIMITS), strict=True)
+    set_gravity_direction(takes, findings, found)
     return takes, findings
 
 
@@ -66,10 +66,10 @@ def test_of_three_discs_one_may_be_lost_as_another_takes_its_place():
     wrong = seen.copy()
     wrong[50:56, 3], wrong[50:56, 1] = seen[50:56, 1], np.nan
     wrong[90, 3], wrong[90, 1] = seen[90, 1], np.nan  # for a frame alone, it may be an outlier
-    (found,) = find_swaps(wrong, usual, marked_base=False)
+    (found,) = find_label_swaps(wrong, usual, marked_base=False)
     assert (found.bodies, np.flatnonzero(found.frames).tolist()) == ((1, 3), list(range(50, 56)))
     seen[60:70, 1] = np.nan
-    assert find_swaps(seen, usual, marked_base=False) == []
+    assert find_label_swaps(seen, usual, marked_base=False) == []
 
 
 @pytest.mark.parametrize("frames", [slice(60, 110), slice(60, 61), slice(200, None), slice(0, 250)])
@@ -113,8 +113,8 @@ def test_rounds_of_four_are_told_too(bodies):
     usual, positions = usual_distances([right]), right.copy()
     wrong = np.isin(np.arange(300), [50, 51, 120])
     positions[np.ix_(wrong, bodies)] = right[np.ix_(wrong, [*bodies[1:], bodies[0]])]
-    assert find_swaps(right, usual) == []
-    for swap in find_swaps(positions, usual):
+    assert find_label_swaps(right, usual) == []
+    for swap in find_label_swaps(positions, usual):
         positions[np.ix_(swap.frames, [*swap.bodies[1:], swap.bodies[0]])] = positions[np.ix_(swap.frames, swap.bodies)]
     np.testing.assert_array_equal(positions, right)
 
@@ -125,7 +125,7 @@ def test_memory_for_finding_swaps_hardly_grows_with_the_rounds_that_are_tried():
     positions = np.linspace([0, 0, 0], [0, 0, -0.5], bodies) + np.random.default_rng(0).normal(0, 3e-4, (frames, 1, 3))
     usual = usual_distances([positions])
     tracemalloc.start()
-    find_swaps(positions, usual)
+    find_label_swaps(positions, usual)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 2 * 8 * frames * bodies**2
@@ -136,7 +136,7 @@ def test_nothing_is_swapped_where_nothing_was(tmp_path, truth):
     for seed in range(3):
         settings = instruments(occlusions_per_s=2.0, outliers=0.01)
         m = measure(truth, settings, np.random.default_rng(seed))
-        assert find_swaps(m.positions, usual_distances([m.positions])) == []
+        assert find_label_swaps(m.positions, usual_distances([m.positions])) == []
 
 
 def test_repeated_poses_are_dropped_as_frozen(tmp_path):
@@ -163,9 +163,9 @@ def test_rounded_and_constant_positions_are_not_frozen():
     rng = np.random.default_rng(0)
     noise = rng.normal(scale=3e-4, size=(600, 2, 3))
     rounded = np.round(noise, 3)
-    assert not frozen(rounded).any(), "noise of 0.3 mm rounded to 1 mm repeats itself"
-    assert not frozen(np.zeros((600, 2, 3))).any()
-    assert not frozen(noise).any()
+    assert not stale_samples(rounded).any(), "noise of 0.3 mm rounded to 1 mm repeats itself"
+    assert not stale_samples(np.zeros((600, 2, 3))).any()
+    assert not stale_samples(noise).any()
 
 
 @pytest.mark.parametrize(("factor", "declared", "taken_as"), [(1000.0, "m", "mm"), (1.0, "mm", "m")])

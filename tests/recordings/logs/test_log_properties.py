@@ -16,13 +16,13 @@ from mcap.writer import CompressionType, Writer
 
 from tests.support.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.logs.log import read_log
 from trunkline.recordings.logs.records import MAGIC
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
 POSES, PULLS = {"/rigid_bodies"}, {"/tendon_commands", "/tendon_states"}
 ENOUGH = 1e9  # ns of poses and pulls, with which no trial is refused
 FOOTER = b"\x02" + (20).to_bytes(8, "little") + bytes(20) + MAGIC
@@ -53,7 +53,7 @@ def log(request, folder):
                 channels[channel.topic] = writer.register_channel(channel.topic, "cdr", known)
             writer.add_message(channels[channel.topic], message.log_time, message.data, message.publish_time)
         writer.finish()
-    data, ((_, take, findings),) = path.read_bytes(), take_in(folder, read_session(folder), LIMITS)
+    data, ((_, take, findings),) = path.read_bytes(), load_raw_trials(folder, read_session(folder), LIMITS)
     assert findings.repairs == []
     whole = messages(path)
     yield data, whole, take
@@ -167,7 +167,7 @@ def test_a_trial_is_refused_or_holds_measured_poses_only(folder, log, data):
     broken = damage(whole, data.draw)
     (folder / "curl_40.mcap").write_bytes(broken)
     kept = trusted(before(broken, whole) if damage in (truncate, flip) else broken)
-    ((_, found, findings),) = take_in(folder, read_session(folder), LIMITS)
+    ((_, found, findings),) = load_raw_trials(folder, read_session(folder), LIMITS)
     poses, pulls = ([t for name, t, _ in set(kept) if name in names] for names in (POSES, PULLS))
     if isinstance(found, InputError):
         assert "curl_40.mcap" in str(found)

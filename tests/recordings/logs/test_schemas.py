@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 
 from tests.support.sessions import curl_truth, instruments, record
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.logs.definitions import HEADER, MARKERS, RIGID_BODIES, SEPARATOR
 from trunkline.recordings.session.session import Session, read_session
 from trunkline.recordings.session.source import open_log
@@ -357,16 +357,16 @@ def rewrite_motors(source, target):
 
 def test_float_arrays_count_by_log_time(tmp_path):
     record(tmp_path, [curl_truth()], instruments())
-    limits = Limits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
-    ((_, stamped, _),) = take_in(tmp_path, read_session(tmp_path), limits)
+    limits = TrialLimits(duration=0.5, coverage=0.3, disorder=0.1, clock_offset=1.0)
+    ((_, stamped, _),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
     log = tmp_path / "curl_40.mcap"
     original = log.rename(tmp_path / "original.log")
     rewrite_motors(original, log)
-    ((_, refused, _),) = take_in(tmp_path, read_session(tmp_path), limits)
+    ((_, refused, _),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
     assert "/tendon_commands: found 3 numbers without names, expected `tendons`" in str(refused)
     with open(tmp_path / "session.yaml", "a") as file:
         file.write("tendons: [tendon_1, tendon_2, tendon_3]\n")
-    ((_, take, found),) = take_in(tmp_path, read_session(tmp_path), limits)
+    ((_, take, found),) = load_raw_trials(tmp_path, read_session(tmp_path), limits)
     assert take.tendons == stamped.tendons
     # the recorder dates all messages by one clock, so that of the offset of 137 ms only the delivery's jitter is left
     pulls = np.interp(take.command_time, stamped.command_time - 0.137, stamped.commands[:, 0])

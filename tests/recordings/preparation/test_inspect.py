@@ -10,12 +10,12 @@ import pytest
 from tests.recordings.logs.test_schemas import CASES, write_foxglove, write_ros
 from tests.support.sessions import SEGMENTS, all_truths, instruments, motion_truth, pull_truth, record
 from tests.support.workbench import ROOT
-from trunkline.recordings.cleaning.checks import Limits
-from trunkline.recordings.cleaning.loading import take_in
+from trunkline.recordings.cleaning.checks import TrialLimits
+from trunkline.recordings.cleaning.loading import load_raw_trials
 from trunkline.recordings.preparation.inspect import main
 from trunkline.recordings.session.session import read_session
 
-LIMITS = Limits(duration=0.2, coverage=0.3, disorder=0.1, clock_offset=1.0)
+LIMITS = TrialLimits(duration=0.2, coverage=0.3, disorder=0.1, clock_offset=1.0)
 
 
 def inspect(capsys, *paths) -> tuple[str, str]:
@@ -39,7 +39,7 @@ def test_a_lab_session_is_described_and_its_proposal_is_the_session(tmp_path, ca
     assert (session.base, session.clock, session.topics) == (right.base, right.clock, right.topics)
     found = {trial.file: (trial.experiment, trial.level) for trial in session.trials}
     assert found == {trial.file: (trial.experiment, trial.level) for trial in right.trials}
-    assert all(not isinstance(take, Exception) for _, take, _ in take_in(tmp_path, session, LIMITS))
+    assert all(not isinstance(take, Exception) for _, take, _ in load_raw_trials(tmp_path, session, LIMITS))
 
 
 def test_it_says_what_it_cannot_know(tmp_path, capsys):
@@ -81,7 +81,7 @@ def test_every_schema_gets_a_proposal_that_is_read(tmp_path, capsys, encoding, k
     if kind == "markers":
         assert session.base == "base"
     else:
-        ((_, take, _),) = take_in(tmp_path, session, LIMITS)
+        ((_, take, _),) = load_raw_trials(tmp_path, session, LIMITS)
         assert len(take.segments) == 2, take
         assert np.isfinite(take.positions).any()
 

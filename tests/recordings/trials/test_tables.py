@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from trunkline.errors import InputError
-from trunkline.recordings.trials.raw_trial import Take, read_takes, write_takes
+from trunkline.recordings.trials.raw_trial import RawTrial, read_takes, write_takes
 from trunkline.recordings.trials.splits import SPLITS
 from trunkline.recordings.trials.trial import Trial, read_trials, write_trials
 
@@ -34,7 +34,7 @@ def trial(name, frames, segments, tendons, oriented):
 
 
 def take(name, frames, segments, tendons, commands, oriented):
-    return Take(
+    return RawTrial(
         name=name,
         experiment="release",
         split="validate",

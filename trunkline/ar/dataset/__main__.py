@@ -14,7 +14,7 @@ from trunkline.ar.dataset.episodes import Episode, episodes
 from trunkline.ar.dataset.recording import read_recording
 from trunkline.errors import InputError, in_one_line
 from trunkline.pipeline.stage import output_folder
-from trunkline.program import called
+from trunkline.program import program_name
 
 ROBOT = "panda_with_soft_arm"
 
@@ -22,7 +22,7 @@ ROBOT = "panda_with_soft_arm"
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.ar.dataset"), description=__doc__,
+        prog=program_name("trunkline.ar.dataset"), description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )  # fmt: skip
     parser.add_argument("logs", type=Path, nargs="+", metavar="LOG")

@@ -19,7 +19,7 @@ from trunkline.ar.session.auth import is_local, names_of
 from trunkline.ar.session.certificate import fingerprint, make_certificate, tls_context
 from trunkline.ar.session.hardware import MOTORS, ROBOTS
 from trunkline.errors import InputError, in_one_line
-from trunkline.program import called
+from trunkline.program import program_name
 
 PORT = 8443  # kept: anchors of a headset belong to scheme, host and port
 ANY = ("0.0.0.0", "::", "")
@@ -31,7 +31,7 @@ def parsed(arguments: list[str]) -> argparse.Namespace:
         InputError: an address that others reach, without TLS.
     """
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.ar.session"), description=(__doc__ or "").partition("\n")[0]
+        prog=program_name("trunkline.ar.session"), description=(__doc__ or "").partition("\n")[0]
     )
     parser.add_argument("package", type=Path, metavar="PACKAGE", help="folder or .tgz that package_unity writes")
     parser.add_argument("--host", default="127.0.0.1", help="an address of this machine")

@@ -28,12 +28,12 @@ from trunkline.model.elements import (
     cables,
     diagonal_lengths,
     elements,
-    holes,
+    hole_tendons,
     numbers_place,
     numeric,
     numeric_place,
 )
-from trunkline.recordings.trials.experiments import Kind
+from trunkline.recordings.trials.experiments import ExperimentKind
 
 SHORTEST = 1e-6  # m; a unit whose ends are nearer to each other has no line along which its hinges may move
 Fields = dict[str, np.ndarray]  # name of an MjModel field → its values per candidate, (candidates, ...)
@@ -62,7 +62,7 @@ class Parameter:
     write: Callable[[Fields, np.ndarray, mujoco.MjModel], None]
     signed: bool = False
     part: str = ""
-    told_by: Callable[[Kind], bool] = lambda kind: True
+    told_by: Callable[[ExperimentKind], bool] = lambda kind: True
     scale: float = 1.0
 
     def belongs_to(self, model: mujoco.MjModel) -> bool:
@@ -70,7 +70,7 @@ class Parameter:
         if self.part == "dead time":
             return bool(model.nhistory)
         if self.part == "holes":
-            return holes(model).size > 0
+            return hole_tendons(model).size > 0
         if self.part in (RATE_LIMIT, BACKLASH, WINDING):
             return numeric_place(model, self.part) is not None
         kind, _, number = self.part.partition(" ")
@@ -91,20 +91,20 @@ class Parameter:
         return np.asarray(coordinate, dtype=float) * self.scale if self.signed else np.exp(coordinate)
 
 
-def _moving(kind: Kind) -> bool:
+def _moving(kind: ExperimentKind) -> bool:
     """At rest friction, dampers, branches and sliders are off."""
     return not kind.static
 
 
-def _pulled(kind: Kind) -> bool:
+def _pulled(kind: ExperimentKind) -> bool:
     return kind.needs_motors
 
 
-def _pulled_and_moving(kind: Kind) -> bool:
+def _pulled_and_moving(kind: ExperimentKind) -> bool:
     return kind.needs_motors and not kind.static
 
 
-def _start_known(kind: Kind) -> bool:
+def _start_known(kind: ExperimentKind) -> bool:
     """The bent pose from which a release starts is fitted beforehand, with the hinges where they were then."""
     return kind.static or kind.needs_motors
 
@@ -336,7 +336,9 @@ def _rest_bend(axis: int, power: int) -> Parameter:
     return Parameter("rad", ("qpos_spring",), read, write, signed=True)
 
 
-def _number(name: str, unit: str, part: str, told_by: Callable[[Kind], bool] = _pulled_and_moving) -> Parameter:
+def _number(
+    name: str, unit: str, part: str, told_by: Callable[[ExperimentKind], bool] = _pulled_and_moving
+) -> Parameter:
     """One that is no field of MuJoCo's but a number of that name, which the stepper reads."""
 
     def write(fields: Fields, values: np.ndarray, model: mujoco.MjModel) -> None:
@@ -346,7 +348,7 @@ def _number(name: str, unit: str, part: str, told_by: Callable[[Kind], bool] = _
     return Parameter(unit, ("numeric_data",), read, write, part=part, told_by=told_by)
 
 
-def _winds(kind: Kind) -> bool:
+def _winds(kind: ExperimentKind) -> bool:
     """Backlash shows where tendons go to and fro."""
     return kind.needs_motors and (not kind.static or kind.stepwise)
 

@@ -26,7 +26,7 @@ Share = Annotated[float, Field(gt=0, le=10)]
 
 
 @dataclass
-class Branch:
+class MaxwellElement:
     """share: stiffness k over that of the joint's spring. time: τ, s, in which the branch gives way."""
 
     share: Share
@@ -34,7 +34,7 @@ class Branch:
 
 
 @dataclass
-class Slider:
+class JenkinsElement:
     """share: stiffness k over that of the joint's spring. yield_bend: rad, beyond which it slips."""
 
     share: Share
@@ -48,8 +48,8 @@ class Joints:
     round: whether it hardens by its whole bend, in place of each of its two hinges by its own.
     """
 
-    branches: Annotated[list[Branch], Field(max_length=3)] = field(default_factory=list)
-    sliders: Annotated[list[Slider], Field(max_length=5)] = field(default_factory=list)
+    branches: Annotated[list[MaxwellElement], Field(max_length=3)] = field(default_factory=list)
+    sliders: Annotated[list[JenkinsElement], Field(max_length=5)] = field(default_factory=list)
     round: bool = False
 
 

@@ -6,13 +6,13 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field
 
-from trunkline.model.arm.cad import Chain
+from trunkline.model.arm.cad import ChainArm
 from trunkline.model.arm.geometry import ChainGeometry
 from trunkline.model.arm.material import UnitProperties, joint_damping
 
 
 @dataclass
-class Uniform(Chain):
+class Uniform(ChainArm):
     """width: m. unit_masses: kg, one for all units or one each. joint_range_deg: how far a joint bends.
 
     Either bending_stiffness, EI in N m², or joint_stiffness, K of every joint in N m/rad.

@@ -8,7 +8,7 @@ from mujoco.batch import Batch
 
 from trunkline.compute.scheduler import rough_by_warp
 from trunkline.compute.threads import thread_count
-from trunkline.model.simulation.capstan import rubbing
+from trunkline.model.simulation.capstan import capstan_friction_of
 
 CHUNK = 128  # steps a call: few calls, and records of some MB
 LEAST_BY_WARP = 1000  # simulations, about, below which a GPU has too little to do at once
@@ -82,7 +82,7 @@ def move(
     Returns:
         A record for each name. Shape (n, T / every, ...).
     """
-    rub = rubbing(batch, longest)
+    rub = capstan_friction_of(batch, longest)
     simulations = np.arange(batch.nsim) if ids is None else ids
     length = rub.steps if rub else max(CHUNK // every, 1) * every
     if rub:

@@ -14,7 +14,7 @@ SLACK = 1e3  # m, a length that no arm's tendon has: it does not pull
 MIN_SHARE = 1 / 4096  # smallest step of the continuation, as a share of the load
 
 
-class Found(NamedTuple):
+class EquilibriumRows(NamedTuple):
     """What the kernels write, a row an equilibrium: as in `equilibria.Equilibrium`, but for the tip the frame of the
     last unit, its rotation (B, 3, 3) and its joint's position (B, 3) in the base frame, m."""
 

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
 from trunkline.model.statics.chain import Chain
-from trunkline.model.statics.continuation import Found, solve_paths
+from trunkline.model.statics.continuation import EquilibriumRows, solve_paths
 from trunkline.model.statics.kernel import over_rows
 from trunkline.model.statics.placement import place_chords
 
@@ -168,9 +168,9 @@ def plain(values: np.ndarray | float, shape: tuple | None = None) -> np.ndarray:
     return np.array(values if shape is None else np.broadcast_to(values, shape), float, order="C")
 
 
-def room(chain: Chain, count: int) -> Found:
+def room(chain: Chain, count: int) -> EquilibriumRows:
     """Room for `count` equilibria, for a kernel to fill."""
-    return Found(
+    return EquilibriumRows(
         qpos=np.zeros((count, 2 * chain.units)),
         rotation=np.zeros((count, 3, 3)),
         position=np.zeros((count, 3)),
@@ -183,7 +183,7 @@ def room(chain: Chain, count: int) -> Found:
     )
 
 
-def equilibria(chain: Chain, rows: Found) -> Equilibrium:
+def equilibria(chain: Chain, rows: EquilibriumRows) -> Equilibrium:
     """What the kernels found, with the pose of the tip in place of the last unit's."""
     rotation = Rotation.from_matrix(rows.rotation, assume_valid=True)
     values = rows._asdict() | {

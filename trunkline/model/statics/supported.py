@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.model.elements import BRANCH, DIAGONAL, SLIDER, all_elements, cables, holes
+from trunkline.model.elements import BRANCH, DIAGONAL, SLIDER, all_elements, cables, hole_tendons
 
 _POSITION_DYNAMICS = (
     mujoco.mjtDyn.mjDYN_NONE,
@@ -99,7 +99,7 @@ def _geom_name(model: mujoco.MjModel, geom: int) -> str:
 
 def _require_site_tendons(model: mujoco.MjModel) -> None:
     parts = [group.tendon for kind in (BRANCH, SLIDER, DIAGONAL) for group in all_elements(model, kind)]
-    parts.append(holes(model).ravel())
+    parts.append(hole_tendons(model).ravel())
     for tendon in np.setdiff1d(np.arange(model.ntendon), np.concatenate(parts)):
         name = model.tendon(tendon).name
         path = slice(model.tendon_adr[tendon], model.tendon_adr[tendon] + model.tendon_num[tendon])

@@ -16,7 +16,7 @@ Item = TypeVar("Item")
 
 
 @dataclass
-class Limits:
+class TrialLimits:
     """What a trial must have. duration: s. coverage: share of frames in which a body is seen.
 
     disorder: s by which a stamp may be behind one before it and still be sorted in.

@@ -6,11 +6,11 @@ from typing import Literal
 import numpy as np
 
 from trunkline.recordings.cleaning.checks import Findings, deciding
-from trunkline.recordings.cleaning.gravity_direction import check_levels, check_vertical
+from trunkline.recordings.cleaning.gravity_direction import check_gravity_direction, check_levels
 from trunkline.recordings.session.session import FixedBase, Session
 from trunkline.recordings.signals.clock import agree
 from trunkline.recordings.trials.experiments import EXPERIMENTS
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 AHEAD = 0.03  # s, by which a fit of its motion may put an arm ahead of its tendons
 LEAST = 1e-3  # s, by which clocks of trials may differ at least before it is said
@@ -31,7 +31,7 @@ class MotorClock:
     lag: float | None = None
 
 
-def align_clocks(takes: list[Take], findings: list[Findings], longest_lag: float) -> MotorClock:
+def align_clocks(takes: list[RawTrial], findings: list[Findings], longest_lag: float) -> MotorClock:
     """Give every take the offset of its motors' clock.
 
     By log times it is each trial's own. The arm's motion, in whose offset its lag is, checks them: no arm is ahead of
@@ -56,7 +56,7 @@ def align_clocks(takes: list[Take], findings: list[Findings], longest_lag: float
 
 
 def _agreed(
-    takes: list[Take],
+    takes: list[RawTrial],
     findings: list[Findings],
     logged: dict[str, float],
     moved: dict[str, float],
@@ -101,10 +101,10 @@ def _trial_offset(clock: MotorClock, logged: float, lag: float | None, longest_l
     return logged
 
 
-def settle_vertical(takes: list[Take], findings: list[Findings], session: Session) -> None:
+def set_gravity_direction(takes: list[RawTrial], findings: list[Findings], session: Session) -> None:
     """Set the gravity direction that the session's tilts prove in every take; or warn of what looks wrong."""
     measured_base = not isinstance(session.base, FixedBase)
-    up, remark, fallback = check_vertical(takes, measured_base)
+    up, remark, fallback = check_gravity_direction(takes, measured_base)
     for take, record in zip(takes, findings, strict=True):
         if up is not None:
             take.up = up

@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 
 from trunkline.errors import InputError
-from trunkline.recordings.cleaning.checks import Findings, Limits
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.signals.steps import find_step, relative, size_at
 
@@ -15,7 +15,7 @@ DRIFT = 0.01  # by which stamps and log times may differ in rate
 CERTAIN = 10.0  # times the jitter that such a drift has to bring in all
 
 
-def check_clocks(poses: PoseStream, clock: str, limits: Limits, where: str, findings: Findings) -> None:
+def check_clocks(poses: PoseStream, clock: str, limits: TrialLimits, where: str, findings: Findings) -> None:
     """Refuse a log whose time would be bent, by a step of a clock that `clock` uses; warn of a step of another.
 
     Raises:

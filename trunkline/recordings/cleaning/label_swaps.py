@@ -21,7 +21,7 @@ SAMPLE = 200  # frames of a log that tell the usual distances
 
 
 @dataclass
-class Swap:
+class LabelSwap:
     """bodies: by index, each label on the next one's pose, the last on the first's. frames: (T,) in which they are."""
 
     bodies: tuple[int, ...]
@@ -45,7 +45,7 @@ def usual_distances(logs: list[np.ndarray]) -> np.ndarray:
     return distances
 
 
-def find_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = True) -> list[Swap]:
+def find_label_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = True) -> list[LabelSwap]:
     """Labels that changed places, up to `LONGEST` at a time, among the bodies of (T, B, 3) m, the base first.
 
     Args:
@@ -64,7 +64,7 @@ def find_swaps(positions: np.ndarray, usual: np.ndarray, marked_base: bool = Tru
         left = _misfit(distances[flagged], usual, bodies)
         better = left < least[flagged]
         least[flagged[better]], best[flagged[better]] = left[better], place
-    return [Swap(bodies, best == place) for place, bodies in enumerate(candidates) if (best == place).any()]
+    return [LabelSwap(bodies, best == place) for place, bodies in enumerate(candidates) if (best == place).any()]
 
 
 def _candidates(usual: np.ndarray, marked_base: bool) -> list[tuple[int, ...]]:

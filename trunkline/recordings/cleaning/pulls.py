@@ -5,7 +5,7 @@ import numpy as np
 from trunkline.recordings.signals.clock import MIN_TRAVEL
 from trunkline.recordings.signals.smoothing import noise_level
 from trunkline.recordings.trials.experiments import EXPERIMENTS, PULL
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 FOLLOWS, FAILS = 0.9, 0.5  # correlations of a measured tendon with its command's, and with another's
 FITS = 1.25  # factor within which a pull is as its level says, whatever is let out meanwhile
@@ -15,7 +15,7 @@ NOISIER = 5.0  # times the measurements' noise, that no command has
 HELD = MIN_TRAVEL  # m, to either side, by which a tendon that is held may be wound
 
 
-def encoder_zeros(takes: list[Take], idle: float) -> dict[str, float]:
+def encoder_zeros(takes: list[RawTrial], idle: float) -> dict[str, float]:
     """What each tendon's measured position reads where its command is 0, m, by the takes that pull.
 
     None of a tendon of which most of them are off by more than `idle`: its encoder starts anywhere in each trial.
@@ -30,7 +30,7 @@ def encoder_zeros(takes: list[Take], idle: float) -> dict[str, float]:
     return {name: zero for name, zero in middle.items() if np.median(np.abs(np.array(readings[name]) - zero)) <= idle}
 
 
-def check_pulls(take: Take, length: float, idle: float, factor: float, zeros: dict[str, float]) -> list[str]:
+def check_pulls(take: RawTrial, length: float, idle: float, factor: float, zeros: dict[str, float]) -> list[str]:
     """What cannot be true of a take's tendons, a sentence each.
 
     Args:
@@ -59,7 +59,7 @@ def check_pulls(take: Take, length: float, idle: float, factor: float, zeros: di
     return []
 
 
-def _pulled(take: Take, static: bool, idle: float, zeros: dict[str, float]) -> list[str]:
+def _pulled(take: RawTrial, static: bool, idle: float, zeros: dict[str, float]) -> list[str]:
     """In an experiment without motors, commands do not move while the arm does, and most of the time no tendon is drawn
     in. A loose one may well move by itself, and may be let out by any length.
 
@@ -89,7 +89,7 @@ def _pulled(take: Take, static: bool, idle: float, zeros: dict[str, float]) -> l
     return []
 
 
-def _fixed_commands(take: Take) -> list[str]:
+def _fixed_commands(take: RawTrial) -> list[str]:
     """In an experiment at rest, most of the time every command is about where it is in the middle: windows may touch
     the way to the next pull, the more so as the motors' clock is not set yet."""
     inside = (take.command_time >= 0) & (take.command_time <= take.time[-1])
@@ -126,7 +126,7 @@ def _against_level(key: str, wound: np.ndarray, level: float, factor: float) -> 
     return [f"{problem}, {expected}{hint}"]
 
 
-def _against_commands(take: Take, factor: float) -> list[str]:
+def _against_commands(take: RawTrial, factor: float) -> list[str]:
     """Each tendon's measured position follows its own command, forwards, by about as much, and not ahead of it."""
     measured, commanded = take.tendon_positions, _commanded(take)
     faults = []
@@ -148,7 +148,7 @@ def _against_commands(take: Take, factor: float) -> list[str]:
     return faults or _exchanged(take, commanded)
 
 
-def _exchanged(take: Take, commanded: np.ndarray) -> list[str]:
+def _exchanged(take: RawTrial, commanded: np.ndarray) -> list[str]:
     """Measurements lag behind commands and have noise; where it is the other way about, topics are exchanged."""
     most = int(np.argmax(np.ptp(commanded, axis=0)))
     if np.ptp(commanded[:, most]) < MIN_TRAVEL or len(take.tendon_time) < 10:
@@ -169,7 +169,7 @@ def _exchanged(take: Take, commanded: np.ndarray) -> list[str]:
     return [f"topics: {problem}: are `commands` and `tendon_positions` exchanged in session.yaml?"]
 
 
-def _commanded(take: Take) -> np.ndarray:
+def _commanded(take: RawTrial) -> np.ndarray:
     """Commands at the times of the measured positions, m. Shape (Tm, K)."""
     return np.stack([np.interp(take.tendon_time, take.command_time, command) for command in take.commands.T], axis=1)
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.clock_offset import MotorClock
-from trunkline.recordings.cleaning.session_checks import Gathered
+from trunkline.recordings.cleaning.session_checks import CheckedSession
 from trunkline.recordings.logs.log import Log
 from trunkline.recordings.signals.smoothing import noise_level
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 
 @dataclass
@@ -22,7 +22,7 @@ class Quality:
     position_noise: (S,) m, angle_noise: (S,) rad or None: per axis, standard deviation.
     """
 
-    take: Take
+    take: RawTrial
     findings: Findings
     interval: float
     dropped: int
@@ -32,7 +32,7 @@ class Quality:
     angle_noise: np.ndarray | None
 
 
-def judge(take: Take, findings: Findings) -> Quality:
+def judge(take: RawTrial, findings: Findings) -> Quality:
     """Measure the quality of a take."""
     steps = np.diff(take.time)
     interval = float(np.median(steps))
@@ -68,7 +68,7 @@ def by_sentence(qualities: list[Quality], sentences_of: Callable[[Findings], lis
     return [f"{trials}: {sentence}" for trials, sentence in zip(who, names, strict=True)]
 
 
-def report(qualities: list[Quality], gathered: Gathered) -> dict:
+def report(qualities: list[Quality], gathered: CheckedSession) -> dict:
     """The quality report, per trial and for the session; None where there is nothing to measure."""
     several = len({log.path.parent for log in _logs(qualities)}) > 1
     return {
@@ -104,7 +104,7 @@ def remarks(qualities: list[Quality]) -> list[str]:
     return [f"{unchecked}: bits that flipped there go unseen (quality.json: logs)"] if bare else []
 
 
-def summary(qualities: list[Quality], gathered: Gathered) -> dict:
+def summary(qualities: list[Quality], gathered: CheckedSession) -> dict:
     """The session in a few numbers, for metrics.json. repairs: their number by split, and in all."""
     angles = [quality.angle_noise for quality in qualities if quality.angle_noise is not None]
     gaps, clock = np.concatenate([quality.gaps for quality in qualities]), gathered.clock

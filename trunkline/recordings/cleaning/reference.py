@@ -8,7 +8,7 @@ from trunkline.recordings.cleaning.checks import deciding
 from trunkline.recordings.cleaning.label_swaps import usual_distances
 from trunkline.recordings.cleaning.trial_window import Stretch
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
-from trunkline.recordings.session.source import Source
+from trunkline.recordings.session.source import LogSource
 from trunkline.recordings.signals.units import extent, likely_unit
 
 FARTHEST = 1e6  # m or mm; no camera sees farther, and squares of what is farther overflow at last
@@ -39,7 +39,7 @@ class Reference:
         return list(self.segments) if self.base is None else [self.base, *self.segments]
 
 
-def reference_of(session: Session, trials: list[tuple[TrialEntry, Source, Stretch]]) -> Reference:
+def reference_of(session: Session, trials: list[tuple[TrialEntry, LogSource, Stretch]]) -> Reference:
     """Compare the logs of a session: the trials of the split `identify`, or all where none of those can be read."""
     base = None if isinstance(session.base, FixedBase) else session.base
     segments, sources = session.segments, [source for _, source, _ in trials]

@@ -7,32 +7,32 @@ import numpy as np
 
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.label_swaps import usual_distances
-from trunkline.recordings.cleaning.session_checks import Gathered
+from trunkline.recordings.cleaning.session_checks import CheckedSession
 from trunkline.recordings.session.session import Session, read_session
 from trunkline.recordings.session.shared_recordings import file_digest
 
 
-def gather_each(
-    folders: dict[str, Path], take: Callable[[Path, Session], Gathered], distance: float
-) -> dict[str, Gathered]:
+def check_each_session(
+    folders: dict[str, Path], take: Callable[[Path, Session], CheckedSession], distance: float
+) -> dict[str, CheckedSession]:
     """What `take` gathers of each of the sessions in `folders`, by name; of several, refused unless of one arm, and
     under names that no other has.
 
     Args:
-        distance: as `require_one_arm` has it.
+        distance: as `require_same_arm` has it.
     """
     sessions = {name: read_session(folder) for name, folder in folders.items()}
     if len(sessions) > 1:
-        require_own_logs(folders, sessions)
+        require_distinct_logs(folders, sessions)
     sessions_read = {name: take(folders[name], session) for name, session in sessions.items()}
     if len(sessions_read) > 1:
-        require_one_arm(sessions_read, distance)
+        require_same_arm(sessions_read, distance)
         for name, gathered in sessions_read.items():
             name_apart(gathered, name)
     return sessions_read
 
 
-def name_apart(gathered: Gathered, session: str) -> None:
+def name_apart(gathered: CheckedSession, session: str) -> None:
     """Say of all takes, and of refused trials, to which session they belong: `session/name`, as no session has a / in
     its name."""
     for take in gathered.takes:
@@ -40,7 +40,7 @@ def name_apart(gathered: Gathered, session: str) -> None:
     gathered.refused = {f"{session}/{name}": why for name, why in gathered.refused.items()}
 
 
-def require_one_arm(sessions: dict[str, Gathered], distance: float) -> None:
+def require_same_arm(sessions: dict[str, CheckedSession], distance: float) -> None:
     """Refuse sessions that cannot be of one arm: other segments, other tendons, or other distances along it.
 
     Args:
@@ -65,7 +65,7 @@ def require_one_arm(sessions: dict[str, Gathered], distance: float) -> None:
             raise InputError(f"{problem}, expected about {before}, as one arm is identified from both")
 
 
-def require_own_logs(folders: dict[str, Path], sessions: dict[str, Session]) -> None:
+def require_distinct_logs(folders: dict[str, Path], sessions: dict[str, Session]) -> None:
     """Refuse a log that two sessions hold: it would count twice, and may be fitted here and scored there."""
     first_use: dict[str, tuple[str, str]] = {}
     for name, session in sessions.items():
@@ -76,7 +76,7 @@ def require_own_logs(folders: dict[str, Path], sessions: dict[str, Session]) -> 
                 raise InputError(f"{problem}, expected no log in two sessions")
 
 
-def _along(gathered: Gathered) -> np.ndarray:
+def _along(gathered: CheckedSession) -> np.ndarray:
     """Usual distances of each segment from the body before it, the base before the first, m. Shape (S,)."""
     usual = usual_distances([np.insert(take.positions, 0, take.base_positions, axis=1) for take in gathered.takes])
     return np.diagonal(usual, 1)

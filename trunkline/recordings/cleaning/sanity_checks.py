@@ -18,7 +18,7 @@ from trunkline.recordings.cleaning.label_swaps import usual_distances
 from trunkline.recordings.cleaning.pulls import check_pulls, encoder_zeros
 from trunkline.recordings.signals.smoothing import fill_gaps
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 
 NEAREST = 4  # other bodies by whose distances a body's place is told
 BLOCK = 12  # frames whose median is a sample of motion: few outliers are left, and a third of the noise
@@ -28,7 +28,7 @@ LONGER = 0.01  # share of the arm's length by which the way along the named orde
 
 
 @dataclass
-class Plausible:
+class SanityLimits:
     """What a trial must be like. Shares are of the arm's length.
 
     still: by how much an arm at rest may move, as a share; an arm in motion moves by more.
@@ -45,7 +45,9 @@ class Plausible:
     otherwise: Literal["refuse", "warn"]
 
 
-def check_plausible(takes: list[Take], findings: list[Findings], base: str | None, settings: Plausible) -> list[str]:
+def check_sanity(
+    takes: list[RawTrial], findings: list[Findings], base: str | None, settings: SanityLimits
+) -> list[str]:
     """Add to each take's findings what cannot be true of it; returned: what cannot be true of the session.
 
     What is usual is what the takes of the split `identify` say, or all where there are none of it.
@@ -65,12 +67,12 @@ def check_plausible(takes: list[Take], findings: list[Findings], base: str | Non
     return faults if base is None else faults + _base_at_rest(chosen, base)
 
 
-def _bodies(take: Take) -> np.ndarray:
+def _bodies(take: RawTrial) -> np.ndarray:
     """The base and the segments, (T, 1 + S, 3) m."""
     return np.insert(take.positions, 0, take.base_positions, axis=1)
 
 
-def _misplaced(take: Take, usual: np.ndarray, names: tuple[str, ...], least: float) -> list[str]:
+def _misplaced(take: RawTrial, usual: np.ndarray, names: tuple[str, ...], least: float) -> list[str]:
     """Bodies that are not where the session's other trials have them, by the distances from their neighbours."""
     distances = usual_distances([_bodies(take)])
     ratio = float(np.nanmedian((distances / usual)[~np.eye(len(usual), dtype=bool)]))
@@ -94,7 +96,7 @@ def _misplaced(take: Take, usual: np.ndarray, names: tuple[str, ...], least: flo
     return faults
 
 
-def _motion(take: Take, length: float, still: float) -> list[str]:
+def _motion(take: RawTrial, length: float, still: float) -> list[str]:
     """Whether an experiment at rest rests, and another moves."""
     if is_stepwise(take.experiment):
         return []
@@ -142,7 +144,7 @@ def _way(usual: np.ndarray, order: list[int]) -> float:
     return float(sum(usual[a, b] for a, b in pairwise(order)))
 
 
-def _loose(takes: list[Take], usual: np.ndarray, settings: Plausible, length: float) -> list[str]:
+def _loose(takes: list[RawTrial], usual: np.ndarray, settings: SanityLimits, length: float) -> list[str]:
     """Segments that are not fixed to the arm: in most trials in which it moves they keep no distance from any other
     segment, or rest while one nearer to the base moves."""
     least, still, count = settings.distance * length, settings.still * length, len(takes[0].segments)
@@ -168,7 +170,7 @@ def _loose(takes: list[Take], usual: np.ndarray, settings: Plausible, length: fl
     return faults
 
 
-def _base_at_rest(takes: list[Take], base: str) -> list[str]:
+def _base_at_rest(takes: list[RawTrial], base: str) -> list[str]:
     """A base that moves or turns while a segment rests."""
     motion = []
     for take in takes:

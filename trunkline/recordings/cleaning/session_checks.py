@@ -6,11 +6,11 @@ from typing import Literal
 
 from trunkline.errors import InputError
 from trunkline.recordings.cleaning.checks import Findings
-from trunkline.recordings.cleaning.clock_offset import MotorClock, align_clocks, settle_vertical
-from trunkline.recordings.cleaning.sanity_checks import Plausible, check_plausible
+from trunkline.recordings.cleaning.clock_offset import MotorClock, align_clocks, set_gravity_direction
+from trunkline.recordings.cleaning.sanity_checks import SanityLimits, check_sanity
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
 from trunkline.recordings.trials.experiments import EXPERIMENTS, is_stepwise
-from trunkline.recordings.trials.raw_trial import Take
+from trunkline.recordings.trials.raw_trial import RawTrial
 from trunkline.recordings.trials.splits import IDENTIFY, SPLITS, TEST, VALIDATE
 
 Refusal = Literal["stop", "leave_out"]
@@ -23,30 +23,30 @@ WITHOUT = {
 
 
 @dataclass
-class Gathered:
+class CheckedSession:
     """takes, findings: of the trials that are used. refused: why a trial is not, by its name. clock: of the motors."""
 
-    takes: list[Take] = field(default_factory=list)
+    takes: list[RawTrial] = field(default_factory=list)
     findings: list[Findings] = field(default_factory=list)
     refused: dict[str, str] = field(default_factory=dict)
     clock: MotorClock = field(default_factory=MotorClock)
 
 
-def gather(
-    taken: Iterable[tuple[TrialEntry, Take | InputError, Findings]],
+def check_session(
+    taken: Iterable[tuple[TrialEntry, RawTrial | InputError, Findings]],
     session: Session,
-    plausible: Plausible,
+    plausible: SanityLimits,
     refused_trials: Refusal,
     where: str,
-) -> Gathered:
-    """Compare a session's takes, as `take_in` gives them, and settle what they have in common.
+) -> CheckedSession:
+    """Compare a session's raw trials, as `load_raw_trials` gives them, and settle what they have in common.
 
     Args: where: the session's folder, for messages.
 
     Raises:
         InputError: a trial is refused and none may be left out, none is left, or the whole session cannot be true.
     """
-    gathered = Gathered()
+    gathered = CheckedSession()
 
     def refuse(name: str, error: InputError) -> None:
         if refused_trials == "stop":
@@ -60,7 +60,7 @@ def gather(
             gathered.takes.append(take)
             gathered.findings.append(record)
     base = None if isinstance(session.base, FixedBase) else session.base
-    session_faults = check_plausible(gathered.takes, gathered.findings, base, plausible) if gathered.takes else []
+    session_faults = check_sanity(gathered.takes, gathered.findings, base, plausible) if gathered.takes else []
     if plausible.otherwise == "refuse":
         for take, record in zip(gathered.takes, gathered.findings, strict=True):
             if record.faults:
@@ -76,12 +76,12 @@ def gather(
     missing = _missing(gathered.takes)
     for record in gathered.findings:
         record.warnings += record.faults + session_faults + missing
-    settle_vertical(gathered.takes, gathered.findings, session)
+    set_gravity_direction(gathered.takes, gathered.findings, session)
     gathered.clock = align_clocks(gathered.takes, gathered.findings, plausible.clock)
     return gathered
 
 
-def together(sessions: list[Gathered]) -> Gathered:
+def together(sessions: list[CheckedSession]) -> CheckedSession:
     """Of several sessions of one arm all takes, each with its own offset by now; the clock is the one told least."""
     if len(sessions) == 1:
         return sessions[0]
@@ -89,10 +89,10 @@ def together(sessions: list[Gathered]) -> Gathered:
     findings = [record for session in sessions for record in session.findings]
     refused = {name: why for session in sessions for name, why in session.refused.items()}
     clock = max((session.clock for session in sessions), key=lambda clock: clock.uncertainty or 0.0)
-    return Gathered(takes, findings, refused, clock)
+    return CheckedSession(takes, findings, refused, clock)
 
 
-def require_enough(gathered: Gathered, planned: list[TrialEntry]) -> None:
+def require_enough(gathered: CheckedSession, planned: list[TrialEntry]) -> None:
     """Refuse what is left of a session that had trials of an experiment in a split, all of which were refused."""
     left = {(take.experiment, take.split) for take in gathered.takes}
     for trial in planned:
@@ -101,7 +101,7 @@ def require_enough(gathered: Gathered, planned: list[TrialEntry]) -> None:
             raise InputError(f"{gathered.refused[trial.name]}; {expected}")
 
 
-def _missing(takes: list[Take]) -> list[str]:
+def _missing(takes: list[RawTrial]) -> list[str]:
     """Splits and experiments that the session lacks, and experiments that one of its splits lacks, a sentence each."""
     splits, kinds = ({getattr(take, key) for take in takes} for key in ("split", "experiment"))
     done = {(take.experiment, take.split) for take in takes}

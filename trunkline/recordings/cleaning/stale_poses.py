@@ -8,7 +8,7 @@ SHORTEST = 5  # frames that agree to the last bit; noise does not, and a rounded
 ROUNDED = 0.05  # share of other steps in which an axis does not change, above which the log is rounded
 
 
-def frozen(positions: np.ndarray) -> np.ndarray:
+def stale_samples(positions: np.ndarray) -> np.ndarray:
     """Which samples of (T, B, 3) only repeat the one before: (T, B). NaN where unseen.
 
     The first of a stretch is a measurement and is not marked. A body that hardly ever changes is a noise-free one,

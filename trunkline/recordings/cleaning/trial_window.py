@@ -7,11 +7,11 @@ from scipy.spatial.transform import Rotation
 
 from trunkline.errors import InputError
 from trunkline.frames import wxyz_from_rotation
-from trunkline.recordings.cleaning.checks import Findings, Limits, in_order
+from trunkline.recordings.cleaning.checks import Findings, TrialLimits, in_order
 from trunkline.recordings.cleaning.clocks import check_clocks
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.session.session import FixedBase, Session, TrialEntry
-from trunkline.recordings.session.source import Source
+from trunkline.recordings.session.source import LogSource
 from trunkline.recordings.signals.clock import FrameFit, fit_frames
 
 
@@ -36,7 +36,7 @@ class Stretch:
 
 
 def read_stretch(
-    source: Source, trial: TrialEntry, session: Session, limits: Limits, findings: Findings
+    source: LogSource, trial: TrialEntry, session: Session, limits: TrialLimits, findings: Findings
 ) -> Stretch:
     """Date a log's frames by the clock that the session names, and cut out the trial.
 
@@ -66,7 +66,7 @@ def read_stretch(
     return Stretch(rows, time, epoch, int(poses.log_times[rows[0]]))
 
 
-def columns_of(source: Source, names: list[str], where: str) -> list[int]:
+def columns_of(source: LogSource, names: list[str], where: str) -> list[int]:
     """Where each of `names` is among the bodies of the log. Raises InputError where one is not."""
     poses = source.poses
     for name in names:

@@ -9,8 +9,8 @@ import numpy as np
 from trunkline.recordings.logs.cdr import short_name
 from trunkline.recordings.logs.encodings import decode
 from trunkline.recordings.logs.log import Topic
-from trunkline.recordings.logs.messages import POSES, READING, Poses
-from trunkline.recordings.logs.samples import Samples, union
+from trunkline.recordings.logs.messages import POSES, READING, DecodedPoses
+from trunkline.recordings.logs.samples import PoseSamples, union
 from trunkline.recordings.logs.transforms import in_one_frame
 
 
@@ -104,7 +104,7 @@ def _repeated(names: list[str] | np.ndarray | None) -> str | None:
     return None
 
 
-def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, Poses]]:
+def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, DecodedPoses]]:
     reader = POSES[short_name(topic.schema)]
     for rows, message in decode(topic):
         try:
@@ -116,7 +116,7 @@ def _read_poses(topic: Topic) -> Iterator[tuple[np.ndarray, Poses]]:
         yield rows, poses._replace(names=named)
 
 
-def _batches(rows: np.ndarray, poses: Poses, topic: Topic, declared: Sequence[str] | None) -> Iterator[Batch]:
+def _batches(rows: np.ndarray, poses: DecodedPoses, topic: Topic, declared: Sequence[str] | None) -> Iterator[Batch]:
     """What a reader returned as batches, one a set of names; none if they do not fit."""
     count, size = rows.size, poses.positions.shape[-2]
     time = topic.log_times[rows] if poses.time is None else poses.time
@@ -167,7 +167,7 @@ def _by_message(topic: Topic, batches: list[Batch]) -> PoseStream:
     )
 
 
-def _gather(samples: Samples) -> PoseStream:
+def _gather(samples: PoseSamples) -> PoseStream:
     """Frames from bodies that have times of their own, in the order in which their first sample was logged, so that a
     clock that runs back shows."""
     names, body = samples.bodies()
@@ -189,15 +189,15 @@ def _gather(samples: Samples) -> PoseStream:
     )
 
 
-def _samples(read: list[tuple[Topic, list[Batch]]]) -> Samples:
+def _samples(read: list[tuple[Topic, list[Batch]]]) -> PoseSamples:
     """What batches hold, body by body."""
-    parts = [Samples.none()]
+    parts = [PoseSamples.none()]
     for topic, batches in read:
         for batch in batches:
             shape = (len(batch.rows), len(batch.names))
             time = batch.time if batch.time.ndim == 2 else batch.time[:, None]
             turned = np.full((*shape, 4), np.nan) if batch.orientations is None else batch.orientations
-            parts.append(Samples(
+            parts.append(PoseSamples(
                 np.broadcast_to(time, shape).ravel(),
                 np.repeat(topic.log_times[batch.rows], shape[1]),
                 np.tile(np.array(batch.names, dtype=str), shape[0]),
@@ -205,5 +205,5 @@ def _samples(read: list[tuple[Topic, list[Batch]]]) -> Samples:
                 batch.positions.reshape(-1, 3),
                 turned.reshape(-1, 4),
             ))  # fmt: skip
-    samples = Samples(*(np.concatenate(values) for values in zip(*parts, strict=True)))
+    samples = PoseSamples(*(np.concatenate(values) for values in zip(*parts, strict=True)))
     return samples.take(np.argsort(samples.logged, kind="stable"))

@@ -5,15 +5,15 @@ from collections import Counter
 import numpy as np
 
 from trunkline.frames import rotation_from_wxyz, wxyz_from_rotation
-from trunkline.recordings.logs.samples import Samples
+from trunkline.recordings.logs.samples import PoseSamples
 
 NORM_TOLERANCE = 0.01  # of a quaternion's length; float32 rounding is far below, anything above is no rotation
 ALWAYS = np.iinfo(np.int64).min  # ns, since when a static transform holds
 
 
 def in_one_frame(
-    moving: Samples, static: Samples, parents: list[str], wanted: str | None
-) -> tuple[Samples, list[str]]:
+    moving: PoseSamples, static: PoseSamples, parents: list[str], wanted: str | None
+) -> tuple[PoseSamples, list[str]]:
     """The poses of `moving` in one frame, and its name.
 
     A parent is where its latest transform at or before the child's time puts it. A pose is NaN where there was none
@@ -62,7 +62,7 @@ def is_rotation(quaternions: np.ndarray) -> np.ndarray:
     return np.abs(np.linalg.norm(quaternions, axis=-1) - 1) < NORM_TOLERANCE
 
 
-def _tree(*transforms: Samples) -> dict[str, str]:
+def _tree(*transforms: PoseSamples) -> dict[str, str]:
     """Frame to its parent."""
     above: dict[str, str] = {}
     for samples in transforms:

@@ -14,7 +14,7 @@ import numpy as np
 from mcap_ros2.writer import Writer
 
 from trunkline.errors import in_one_line
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.logs.definitions import MARKERS, RIGID_BODIES
 from trunkline.recordings.logs.pose_stream import PoseStream
 from trunkline.recordings.preparation.export import read_export
@@ -55,7 +55,7 @@ def _body(poses: PoseStream, frame: int, body: int) -> dict:
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.recordings.preparation.motive"),
+        prog=program_name("trunkline.recordings.preparation.motive"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -5,7 +5,7 @@ import re
 import numpy as np
 
 from trunkline.recordings.logs.pose_stream import PoseStream
-from trunkline.recordings.preparation.survey import Survey
+from trunkline.recordings.preparation.survey import LogSurvey
 from trunkline.recordings.signals.clock import MIN_TRAVEL
 from trunkline.recordings.signals.units import likely_unit
 from trunkline.recordings.trials.experiments import EXPERIMENTS, PULL, TILT
@@ -16,7 +16,7 @@ GUESSED = "  # up as if the arm hangs: no log tells it of a mount that is turned
 RESTING = 5e-3  # m; a trial whose every body stays within this, but for its worst hundredth, is at rest
 
 
-def propose(surveys: list[Survey], up: tuple[int, int, int] | None = None) -> str:
+def propose(surveys: list[LogSurvey], up: tuple[int, int, int] | None = None) -> str:
     """The text of a session.yaml for logs of one folder; empty where none of them holds poses.
 
     up: the axis against gravity, where the logs' maker says it.
@@ -87,7 +87,7 @@ def _clock(streams: list[PoseStream]) -> str:
     return "frame" if numbered else "stamp"
 
 
-def _topics(survey: Survey) -> list[str]:
+def _topics(survey: LogSurvey) -> list[str]:
     by_body = {body: topic.name for body, topic in survey.pose_topics.items() if body is not None}
     if by_body:
         poses = "{" + ", ".join(f"{_quoted(body)}: {name}" for body, name in by_body.items()) + "}"
@@ -98,7 +98,7 @@ def _topics(survey: Survey) -> list[str]:
 
 
 def _experiment(
-    survey: Survey, poses: PoseStream, base: str | None, up: np.ndarray, scale: float
+    survey: LogSurvey, poses: PoseStream, base: str | None, up: np.ndarray, scale: float
 ) -> tuple[str, float | None]:
     """(experiment, level) by the file's name, or else by what moves."""
     names = {word: name for name, kind in EXPERIMENTS.items() for word in kind.words}

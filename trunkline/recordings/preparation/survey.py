@@ -20,7 +20,7 @@ GAP = 1.5  # median intervals between frames that make a gap
 
 
 @dataclass
-class Survey:
+class LogSurvey:
     """A log and what could be read in it. notes: why something could not. pose_topics: as in `source`."""
 
     log: Log
@@ -33,13 +33,13 @@ class Survey:
     tendon_positions: JointStream | None = None
 
 
-def survey(path: Path) -> Survey:
+def survey(path: Path) -> LogSurvey:
     """Look through a log.
 
     Raises:
         InputError: it cannot be read at all.
     """
-    result = Survey(read_log(path, POSES.keys() | JOINTS.keys()))
+    result = LogSurvey(read_log(path, POSES.keys() | JOINTS.keys()))
     arms = _of_the_arm(result.log)
     try:
         result.pose_topics = pose_topics(arms, None)
@@ -66,7 +66,7 @@ def _of_the_arm(log: Log) -> Log:
     return replace(log, topics={name: topic for name, topic in log.topics.items() if not OTHERS.match(name)})
 
 
-def describe(result: Survey) -> list[str]:
+def describe(result: LogSurvey) -> list[str]:
     """Lines for people to read."""
     log = result.log
     lines = [f"{log.path}"] + [f"  damaged: {damage}" for damage in log.damage]

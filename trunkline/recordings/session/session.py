@@ -112,7 +112,7 @@ class Topics(Entry):
 UNITS = {"m": 1.0, "mm": 1e-3, "rad": 1.0, "deg": np.pi / 180}
 
 
-class Motor(Entry):
+class MotorEntry(Entry):
     """What a motor's name in the log stands for, where that is not the pull of one tendon in metres.
 
     unit: of its numbers. spool_radius: m, of the drum of one that turns. tendons: name in the model to how far the
@@ -191,7 +191,7 @@ class Session(Entry):
     base: str | FixedBase
     segments: dict[str, str] | None = Field(default=None, min_length=1)
     tendons: dict[str, str] | None = Field(default=None, min_length=1)
-    motors: dict[str, Motor] | None = Field(default=None, min_length=1)
+    motors: dict[str, MotorEntry] | None = Field(default=None, min_length=1)
     topics: Topics = Topics()
     bodies: list[str] | None = Field(default=None, min_length=1)
     clock: Literal["stamp", "log", "frame"] = "stamp"

@@ -20,7 +20,7 @@ COMMAND_WORDS, POSITION_WORDS = ("command", "cmd", "target"), ("state", "positio
 
 
 @dataclass
-class Source:
+class LogSource:
     """One log, decoded. log: without its messages, which are decoded. pose_topic: for people to read.
 
     joint_topics: all whose schema is in `JOINTS`.
@@ -34,7 +34,7 @@ class Source:
     joint_topics: tuple[str, ...]
 
 
-def open_log(path: Path, session: Session) -> Source:
+def open_log(path: Path, session: Session) -> LogSource:
     """Read and decode a log.
 
     Raises:
@@ -68,7 +68,7 @@ def open_log(path: Path, session: Session) -> Source:
     tendon_positions = _joints(log, session.topics.tendon_positions, "tendon position", POSITION_WORDS, session)
     joint_topics = tuple(name for name, t in log.topics.items() if short_name(t.schema) in JOINTS)
     log.topics = {}  # decoded: the raw messages can go
-    return Source(log, name, poses, commands, tendon_positions, joint_topics)
+    return LogSource(log, name, poses, commands, tendon_positions, joint_topics)
 
 
 def _joints(log: Log, wanted: str | None, role: str, words: tuple[str, ...], session: Session) -> JointStream | None:

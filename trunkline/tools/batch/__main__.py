@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 from trunkline.errors import InputError, in_one_line
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.tools.batch.listing import Listing, read_listing
 from trunkline.tools.batch.results import Results, drift, read_results
 from trunkline.tools.batch.running import prepare, run
@@ -21,7 +21,9 @@ from trunkline.tools.batch.words import error_table, long_table, parameter_table
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.batch"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=program_name("trunkline.tools.batch"),
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("list", type=Path, metavar="LIST.yaml", help="the arms: docs/fleet.md")
     parser.add_argument("--out", type=Path, metavar="FOLDER", default=Path("build/fleet"), help="default: build/fleet")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from trunkline.errors import in_one_line
 from trunkline.model.statics.chain import read_chain
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.session.session import read_session
 from trunkline.report.figures.arm import arm_figure
 from trunkline.report.figures.style import save_figure
@@ -23,7 +23,7 @@ DRAWINGS = Path("artifacts/describe")  # below the current folder; Git ignores p
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.describe"),
+        prog=program_name("trunkline.tools.describe"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -21,7 +21,7 @@ from trunkline.identification.parameters.per_session import make_room, names_apa
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import load_folder, own_or_project, settings_of
 from trunkline.pipeline.inputs import read_spec
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.trials.experiments import EXPERIMENTS
 from trunkline.recordings.trials.splits import IDENTIFY
 from trunkline.recordings.trials.trial import Trial
@@ -50,7 +50,9 @@ Stages = list[StageInformation]
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.design"), description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog=program_name("trunkline.tools.design"),
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("session", type=Path, metavar="SESSION",
                         help="folder of logs and session.yaml, or of filtered trials")  # fmt: skip

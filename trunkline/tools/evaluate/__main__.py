@@ -18,7 +18,7 @@ from trunkline.identification.evaluation.error_tables import segment_table, tria
 from trunkline.identification.results.scoring import evaluate
 from trunkline.identification.simulate.checks import check_trials
 from trunkline.pipeline.stage import output_folder, write_json
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.trials.trial import sessions_of
 from trunkline.tools.evaluate.model import read_arm, written_beside
 from trunkline.tools.evaluate.report import change_lines, kind_lines, read_reference, trial_lines
@@ -28,7 +28,7 @@ from trunkline.tools.evaluate.session import trials_of
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.evaluate"),
+        prog=program_name("trunkline.tools.evaluate"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

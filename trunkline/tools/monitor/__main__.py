@@ -14,7 +14,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from trunkline.errors import in_one_line
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.tools.monitor.monitor import LEARN, Watch
 
 UNCHANGED, CHANGED, UNUSABLE = 0, 1, 2
@@ -23,7 +23,7 @@ ENDED = 10  # so that it is told from what `in_one_line` returns after a mistake
 
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.monitor"),
+        prog=program_name("trunkline.tools.monitor"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -11,9 +11,9 @@ from omegaconf import OmegaConf
 
 from trunkline.errors import InputError
 from trunkline.pipeline.config import settings_of
-from trunkline.recordings.cleaning.loading import take_in
-from trunkline.recordings.cleaning.session_checks import gather
-from trunkline.recordings.filtering.filter import filter_take
+from trunkline.recordings.cleaning.loading import load_raw_trials
+from trunkline.recordings.cleaning.session_checks import check_session
+from trunkline.recordings.filtering.filter import filter_raw_trial
 from trunkline.recordings.session.session import Session, read_session
 from trunkline.recordings.trials.trial import Trial
 from trunkline.settings import read_yaml
@@ -38,15 +38,15 @@ def take(session: Path, files: set[str], root: Path) -> Intake:
     """
     with _so_far(session, files) as (folder, read):
         ingest, settings = settings_of("ingest", root), settings_of("filter", root)
-        taken = list(take_in(folder, read, ingest.limits))
+        taken = list(load_raw_trials(folder, read, ingest.limits))
         found = Intake(refused={trial.name: str(one) for trial, one, _ in taken if isinstance(one, InputError)})
         if len(found.refused) < len(taken):
-            gathered = gather(taken, read, ingest.plausible, "leave_out", f"{session}")
+            gathered = check_session(taken, read, ingest.plausible, "leave_out", f"{session}")
             found.refused |= gathered.refused
             for one, findings in zip(gathered.takes, gathered.findings, strict=True):
                 one.repairs = len(findings.repairs)
                 try:
-                    found.trials[one.name] = filter_take(one, settings)[0]
+                    found.trials[one.name] = filter_raw_trial(one, settings)[0]
                 except InputError as error:
                     found.refused[one.name] = str(error)
         found.refused = {name: said.replace(f"{folder}", f"{session}") for name, said in found.refused.items()}

@@ -16,7 +16,7 @@ from trunkline.identification.simulate.checks import check_trials
 from trunkline.identification.uncertainty.identifiability import described_lines, to_identify_from, told_by, untold
 from trunkline.model.arm.kinds import described_arm
 from trunkline.pipeline.config import own_or_project, settings_of
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.recordings.trials.inventory import missing_lines, recorded_of_each
 from trunkline.recordings.trials.splits import DECIDING, IDENTIFY
 from trunkline.settings import read_yaml
@@ -29,7 +29,7 @@ STAGES = ("identify_stiffness", "identify_damping", "identify_control")
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.preflight"),
+        prog=program_name("trunkline.tools.preflight"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -20,7 +20,7 @@ import numpy as np
 
 from trunkline.errors import InputError, in_one_line
 from trunkline.identification.parameters.parameters import PARAMETERS
-from trunkline.program import called
+from trunkline.program import program_name
 from trunkline.report.certificate.identified import identified
 from trunkline.tools.evaluate.model import STAGES, read_arm
 from trunkline.tools.randomize.fields import changed_fields, drawn_fields, of_model
@@ -31,7 +31,7 @@ from trunkline.tools.randomize.randomisation import Randomisation, of_arm, of_po
 @in_one_line
 def main(arguments: list[str] | None = None) -> int:
     parser = argparse.ArgumentParser(
-        prog=called("trunkline.tools.randomize"),
+        prog=program_name("trunkline.tools.randomize"),
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
