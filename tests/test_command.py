@@ -39,8 +39,8 @@ def test_help_imports_nothing_heavy():
     code = (
         f"from trunkline.__main__ import main; main(['-h']); import sys; print(sorted(set({HEAVY}) & set(sys.modules)))"
     )
-    said = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    assert said.splitlines()[-1] == "[]"
+    output = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert output.splitlines()[-1] == "[]"
 
 
 @pytest.mark.parametrize("name", VERBS)

@@ -97,9 +97,9 @@ def test_what_the_settings_name_is_added_and_its_motors_stay_its_own(project):
     names = "build_mjcf: {arm: four_links, joints: viscoelastic, holes: rubbing, solver: {timestep: 0.002}}"
     Path("params.yaml").write_text(names)
     added = cad_arm(project(TEXT)).spec.compile()
-    one = elements(added, BRANCH, 1)
-    assert (len(one.branch), len(elements(drawn, BRANCH, 1).own)) == (8, 0)
-    np.testing.assert_allclose(added.dof_armature[one.branch], 1e-5)
+    group = elements(added, BRANCH, 1)
+    assert (len(group.branch), len(elements(drawn, BRANCH, 1).own)) == (8, 0)
+    np.testing.assert_allclose(added.dof_armature[group.branch], 1e-5)
     assert (hole_tendons(added).size, hole_tendons(drawn).size) == (12, 0)
     for name in ("actuator_gainprm", "actuator_dynprm", "actuator_delay"):
         np.testing.assert_array_equal(getattr(added, name), getattr(drawn, name))

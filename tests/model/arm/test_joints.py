@@ -29,20 +29,20 @@ def one_joint(joints: Joints, inertia: float = 1e6, damping: float = 0.0) -> muj
 
 def torques(model: mujoco.MjModel, angles: np.ndarray) -> np.ndarray:
     """Passive torque on the arm's hinge, N m, while it is led through `angles` (T,), rad, one a step. Shape (T,)."""
-    data, found = mujoco.MjData(model), []
+    data, result = mujoco.MjData(model), []
     for angle in angles:
         data.qpos[0], data.qvel[0] = angle, 0
         mujoco.mj_forward(model, data)
-        found.append(data.qfrc_passive[0])
+        result.append(data.qfrc_passive[0])
         mujoco.mj_step(model, data)
-    return np.array(found)
+    return np.array(result)
 
 
 def test_a_held_joint_relaxes_as_a_standard_linear_solid():
     time, bend = np.arange(2000) * 1e-3, 0.2
-    found = -torques(one_joint(Joints([MaxwellElement(SHARE, TIME)])), np.full(len(time), bend))
+    result = -torques(one_joint(Joints([MaxwellElement(SHARE, TIME)])), np.full(len(time), bend))
     expected = STIFFNESS * bend * (1 + SHARE * np.exp(-time / TIME))
-    assert np.abs(found / expected - 1).max() < 1e-3
+    assert np.abs(result / expected - 1).max() < 1e-3
 
 
 def test_a_loaded_joint_creeps_as_a_standard_linear_solid():
@@ -52,22 +52,22 @@ def test_a_loaded_joint_creeps_as_a_standard_linear_solid():
     inertia, damping, step, torque = 1e-6, 1e-3, 2e-4, 0.1
     model = one_joint(Joints([MaxwellElement(SHARE, TIME)]), inertia, damping)
     model.opt.timestep = step
-    data, found = mujoco.MjData(model), []
+    data, bends = mujoco.MjData(model), []
     data.qfrc_applied[0] = torque
     for _ in range(round(2 / step)):
         mujoco.mj_step(model, data)
-        found.append(data.qpos[0])
-    time = step * np.arange(1, len(found) + 1)
+        bends.append(data.qpos[0])
+    time = step * np.arange(1, len(bends) + 1)
     expected = torque / STIFFNESS * (1 - SHARE / (1 + SHARE) * np.exp(-time / TIME / (1 + SHARE)))
     settled = time >= 10 * 2 * inertia / damping
-    assert np.abs(np.array(found) / expected - 1)[settled].max() < 1e-3
+    assert np.abs(np.array(bends) / expected - 1)[settled].max() < 1e-3
 
 
 def test_two_branches_relax_as_the_sum_of_their_terms():
     time, bend = np.arange(2000) * 1e-3, 0.2
-    found = -torques(one_joint(Joints([MaxwellElement(0.3, 0.1), MaxwellElement(0.2, 1.0)])), np.full(len(time), bend))
+    result = -torques(one_joint(Joints([MaxwellElement(0.3, 0.1), MaxwellElement(0.2, 1.0)])), np.full(len(time), bend))
     expected = STIFFNESS * bend * (1 + 0.3 * np.exp(-time / 0.1) + 0.2 * np.exp(-time / 1.0))
-    assert np.abs(found / expected - 1).max() < 1e-3
+    assert np.abs(result / expected - 1).max() < 1e-3
 
 
 def test_a_slider_turns_round_and_encloses_an_area_as_an_elastic_plastic_spring():
@@ -116,10 +116,10 @@ def test_elements_stand_after_the_arms_own(pair):
     assert arm_hinges(full) == arm_hinges(plain) == plain.njnt
     assert cables(full) == cables(plain) == list(range(plain.ntendon))
     for kind, count in ((BRANCH, 2), (SLIDER, 1)):
-        found = all_elements(full, kind)
-        assert len(found) == count
-        for one in found:
-            np.testing.assert_array_equal(one.hinge, np.arange(plain.njnt))
+        groups = all_elements(full, kind)
+        assert len(groups) == count
+        for group in groups:
+            np.testing.assert_array_equal(group.hinge, np.arange(plain.njnt))
 
 
 def test_branches_that_have_given_way_bear_nothing():
@@ -143,8 +143,8 @@ def test_elements_change_nothing_at_rest(pair):
     rests = [settle(model, commands, np.array([3.0, 0.0, -9.0])) for model in pair]
     assert all(rest.rested.all() for rest in rests)
     np.testing.assert_allclose(rests[1].position, rests[0].position, atol=1e-8)
-    for one, other in zip(read_chain(plain), read_chain(full), strict=True):
-        np.testing.assert_array_equal(one, other)
+    for expected, actual in zip(read_chain(plain), read_chain(full), strict=True):
+        np.testing.assert_array_equal(expected, actual)
 
 
 def test_the_model_survives_its_file(pair):

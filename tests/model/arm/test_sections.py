@@ -84,8 +84,8 @@ def test_a_marker_may_stick_out_and_sit_aside(model):
 
 
 def test_an_arm_may_bring_guesses_of_its_own_motors(tmp_path):
-    own = Actuation(friction=0.0, kp=500.0, max_force=9.0, time_constant=0.02)
-    built = arm(actuation=own).build(ACTUATION, SOLVER, tmp_path).spec.compile()
+    actuation = Actuation(friction=0.0, kp=500.0, max_force=9.0, time_constant=0.02)
+    built = arm(actuation=actuation).build(ACTUATION, SOLVER, tmp_path).spec.compile()
     assert built.actuator_gainprm[0, 0] == 500.0
 
 

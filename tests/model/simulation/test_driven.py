@@ -30,8 +30,8 @@ def test_the_time_to_rest_is_from_when_on_a_tip_stays_near_its_end(away, rested,
     """Beside another drive, which rests at once."""
     tips = np.zeros((2, len(away), 3))
     tips[0, :, 1] = away
-    found = Driven(tips, np.array([rested, True]), calmed).seconds_to_rest
-    np.testing.assert_equal(found, [seconds, 0.0])
+    result = Driven(tips, np.array([rested, True]), calmed).seconds_to_rest
+    np.testing.assert_equal(result, [seconds, 0.0])
 
 
 def plain():

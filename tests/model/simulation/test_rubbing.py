@@ -39,17 +39,17 @@ def shares(speed: float, stretches: int) -> np.ndarray:
     controls = np.tile(model.tendon_length0[cables(model)] + 0.3, (1, STEPS, 1))
     controls[:, :, 0] = 0.0
     hold(batch, model, controls[:, 0])
-    pulled, held = batch.bind("qfrc_actuator")[0], batch.bind("qfrc_constraint")[0]
+    pulled, friction = batch.bind("qfrc_actuator")[0], batch.bind("qfrc_constraint")[0]
     move(batch, controls, ())
-    return 1 + held[about_y] / pulled[about_y]
+    return 1 + friction[about_y] / pulled[about_y]
 
 
 @pytest.mark.parametrize("speed", [0.5, -0.5])
 def test_tension_falls_as_the_capstan_equation_says(speed):
-    found = shares(speed, 8)
+    result = shares(speed, 8)
     bend = BEND + speed * 0.001 * (STEPS - 1)
     turned = bend * (np.arange(UNITS) + 0.5)  # at the holes up to the chord across each unit's joint
-    np.testing.assert_allclose(found, np.exp(-np.sign(speed) * FRICTION * turned), rtol=0.03)
+    np.testing.assert_allclose(result, np.exp(-np.sign(speed) * FRICTION * turned), rtol=0.03)
 
 
 def test_friction_taken_together_bends_as_much():
@@ -100,8 +100,8 @@ def test_rest_is_the_middle_of_what_friction_holds():
     np.testing.assert_allclose(rests[1].position, rests[0].position, atol=1e-8)
     chain = read_chain(rubbing)
     assert chain.capstan == FRICTION
-    for one, other in zip(read_chain(plain), chain._replace(capstan=0.0), strict=True):
-        np.testing.assert_array_equal(one, other)
+    for expected, actual in zip(read_chain(plain), chain._replace(capstan=0.0), strict=True):
+        np.testing.assert_array_equal(expected, actual)
     middle = rests[0].position[0]
     rubbing.dof_damping *= 20  # led so slowly, it does not swing
     way_in = np.tile(commands, (200, 1)) + np.linspace(0.05, 0, 200)[:, None] * [1, 0, 0]

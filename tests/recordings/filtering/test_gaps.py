@@ -66,10 +66,10 @@ def test_what_is_measured_does_not_depend_on_what_fills_a_gap(missed):
     inside = slice(100, 100 + missed)
     jerked.positions[inside, 1, 1] += 0.1 * np.hanning(missed)
     full, _ = filter_raw_trial(jerked, SETTINGS)
-    seen, _ = filter_raw_trial(missing(calm, 100, missed), SETTINGS)
-    off = np.abs(seen.positions - full.positions).max(axis=2)
-    assert off[~seen.measured].max() > 50e-3
-    assert off[seen.measured].max() < 0.5e-3
+    filtered, _ = filter_raw_trial(missing(calm, 100, missed), SETTINGS)
+    off = np.abs(filtered.positions - full.positions).max(axis=2)
+    assert off[~filtered.measured].max() > 50e-3
+    assert off[filtered.measured].max() < 0.5e-3
 
 
 @pytest.mark.parametrize(("begin", "hidden"), [(0, range(20 + MARGIN)), (340, range(340 - MARGIN, FRAMES))])
@@ -99,13 +99,13 @@ def test_a_sample_counts_only_with_its_orientation():
     assert np.flatnonzero(~trial.measured[:, 1]).tolist() == list(range(100 - MARGIN, 140 + MARGIN))
 
 
-@pytest.mark.parametrize(("seen", "enough"), [(8, True), (7, False)])
-def test_fewer_samples_than_the_low_pass_needs_are_refused(seen, enough):
-    source = missing(take(), seen, FRAMES)
+@pytest.mark.parametrize(("samples", "enough"), [(8, True), (7, False)])
+def test_fewer_samples_than_the_low_pass_needs_are_refused(samples, enough):
+    source = missing(take(), samples, FRAMES)
     if enough:
-        assert filter_raw_trial(source, SETTINGS)[0].measured[:, 1].sum() == seen - MARGIN
+        assert filter_raw_trial(source, SETTINGS)[0].measured[:, 1].sum() == samples - MARGIN
         return
-    with pytest.raises(InputError, match=f"'unit_2': found {seen} good samples, expected more"):
+    with pytest.raises(InputError, match=f"'unit_2': found {samples} good samples, expected more"):
         filter_raw_trial(source, SETTINGS)
 
 
@@ -148,12 +148,12 @@ def test_the_mean_shape_by_hand():
     quaternions[1, 0] = [0, 1, 0, 0]
     quaternions[2, 0] = [0, 0, 0, 1]
     measured = np.array([[True, False], [True, False], [False, False], [False, False]])
-    found = average_static(static(positions, measured, quaternions))
-    assert found.positions[0, 0].tolist() == [1.5, 0, 0]
-    np.testing.assert_allclose(found.quaternions[0, 0], [half, half, 0, 0])
-    assert found.measured.tolist() == [[True, False]]
-    assert (found.commands.item(), found.tendon_positions.item()) == (1.5, 3.0)
-    assert found.time.tolist() == [0.0]
+    result = average_static(static(positions, measured, quaternions))
+    assert result.positions[0, 0].tolist() == [1.5, 0, 0]
+    np.testing.assert_allclose(result.quaternions[0, 0], [half, half, 0, 0])
+    assert result.measured.tolist() == [[True, False]]
+    assert (result.commands.item(), result.tendon_positions.item()) == (1.5, 3.0)
+    assert result.time.tolist() == [0.0]
 
 
 @pytest.mark.parametrize("oriented", [False, True])
@@ -195,11 +195,11 @@ def test_only_a_release_that_is_to_be_free_begins_in_motion(kind, release, free)
     aside = np.clip(1.2 - TIME, 0, 0.2) / 0.2  # let go at 1 s
     source.positions[..., 0] = 0.1 * aside[:, None] * [0.5, 1.0]
     trial, _ = filter_raw_trial(source, SETTINGS)
-    found = start_of(trial, EXPERIMENTS[kind], replace(SETTINGS, release=release))
-    assert found["in_motion"] is free
+    result = start_of(trial, EXPERIMENTS[kind], replace(SETTINGS, release=release))
+    assert result["in_motion"] is free
     if free:
-        assert not found["swaying"]
-        assert found["start"] == pytest.approx(1.0, abs=0.1)
+        assert not result["swaying"]
+        assert result["start"] == pytest.approx(1.0, abs=0.1)
 
 
 def test_gravity_is_against_up_in_the_frame_of_the_base():

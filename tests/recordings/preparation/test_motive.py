@@ -77,10 +77,10 @@ def test_decimal_commas_between_semicolons(tmp_path, measured):
     path = write(tmp_path / "release_1.csv", measured)
     text = path.read_text(encoding="utf-8-sig")
     (tmp_path / "german.csv").write_text(text.replace(",", ";").replace(".", ","), encoding="utf-8-sig")
-    expected, found = read_export(path), read_export(tmp_path / "german.csv")
-    assert found.names == expected.names
-    np.testing.assert_array_equal(found.positions, expected.positions)
-    np.testing.assert_array_equal(found.stamps, expected.stamps)
+    expected, result = read_export(path), read_export(tmp_path / "german.csv")
+    assert result.names == expected.names
+    np.testing.assert_array_equal(result.positions, expected.positions)
+    np.testing.assert_array_equal(result.stamps, expected.stamps)
 
 
 def test_markers_alone_become_positions_alone(tmp_path, measured):

@@ -70,14 +70,14 @@ def take(name, frames, segments, tendons, commands, oriented):
 )
 def test_round_trip(tmp_path, rows, write, read):
     write(tmp_path, rows)
-    found = read(tmp_path, SPLITS)
-    assert len(found) == len(rows)
-    for one, other in zip(rows, found, strict=True):
-        for key, value in vars(one).items():
+    result = read(tmp_path, SPLITS)
+    assert len(result) == len(rows)
+    for row, copy in zip(rows, result, strict=True):
+        for key, value in vars(row).items():
             if isinstance(value, np.ndarray):
-                np.testing.assert_array_equal(getattr(other, key), value, err_msg=key)
+                np.testing.assert_array_equal(getattr(copy, key), value, err_msg=key)
             else:
-                assert getattr(other, key) == value, key
+                assert getattr(copy, key) == value, key
 
 
 @pytest.mark.parametrize(("read", "stage"), [(read_takes, "ingest"), (read_trials, "filter")])
