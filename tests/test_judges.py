@@ -101,7 +101,7 @@ JUDGES = {  # by function, the test that has its table, and its file below tests
         "test_sheets_are_checked_with_tips_and_points_beyond",
     ),
     "trunkline.model.statics.newton:find_equilibrium": (
-        "model/statics/test_converged.py",
+        "model/statics/test_newton.py",
         "test_balance_alone_is_no_rest",
     ),
 }

@@ -98,7 +98,7 @@ def test_what_the_settings_name_is_added_and_its_motors_stay_its_own(project):
     Path("params.yaml").write_text(names)
     added = cad_arm(project(TEXT)).spec.compile()
     group = elements(added, BRANCH, 1)
-    assert (len(group.branch), len(elements(drawn, BRANCH, 1).own)) == (8, 0)
+    assert (len(group.branch), len(elements(drawn, BRANCH, 1).branch)) == (8, 0)
     np.testing.assert_allclose(added.dof_armature[group.branch], 1e-5)
     assert (hole_tendons(added).size, hole_tendons(drawn).size) == (12, 0)
     for name in ("actuator_gainprm", "actuator_dynprm", "actuator_delay"):

@@ -10,8 +10,8 @@ import pytest
 from mujoco.batch import Batch
 
 from tests.identification.test_stage import settings, truth_of
+from tests.model.simulation.test_capstan import rubbing_arm
 from tests.model.simulation.test_motion import delayed
-from tests.model.simulation.test_rubbing import rubbing_arm
 from tests.support.matched_plant import begin_project, curl, release, segments_of, small_model
 from tests.support.small_arm import small_spec
 from trunkline.errors import InputError

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.recordings.cleaning.test_intake import edit_session, one_trial, taken
+from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
 from tests.support.sessions import curl_truth
 from trunkline.errors import InputError
 

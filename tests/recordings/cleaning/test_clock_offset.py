@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.recordings.cleaning.test_intake import edit_session, one_trial, taken
+from tests.recordings.cleaning.test_loading import edit_session, one_trial, taken
 from tests.support.sessions import bent_truth, curl_truth, pull_truth, static_truth
 from trunkline.recordings.cleaning.checks import Findings
 from trunkline.recordings.cleaning.clock_offset import align_clocks
